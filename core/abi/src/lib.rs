@@ -1,0 +1,1 @@
+//! C tables that cross a library boundary.

@@ -1,0 +1,1 @@
+//! Strokes, plates and journal in SQLite.

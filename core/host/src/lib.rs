@@ -1,0 +1,1 @@
+//! Measures plates on a press: loads plugins, runs strokes, command line.

@@ -1,0 +1,2 @@
+//! Program `platen`.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Plant and plate TOML to checked types, every fault at once with file, line and column.

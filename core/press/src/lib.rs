@@ -1,0 +1,1 @@
+//! Register map, Modbus link and handshake with the press.

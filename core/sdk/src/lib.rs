@@ -1,0 +1,1 @@
+//! For plugin authors: Scanner, Flattening, Comparison, options, export!.

@@ -1,0 +1,19 @@
+//! From the lattice to the plate: the geometry of platen, as pure functions of their arguments.
+//!
+//! The modules follow the data: `extract` finds the plate's scanned face among the samples of a scan,
+//! `outline` its boundary loop, four corners and four edge curves, `mesh` the mid-surface mesh, a flattening
+//! (a plugin, seen here only as the trait `Flatten`) gives every vertex its place on the original rectangle,
+//! `surface` fits S(u, v), `evaluate` reads lines, markers and grids off it.
+//!
+//! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
+
+mod outline;
+mod patch;
+mod plate;
+
+pub use outline::{Corner, EdgeCurve, Outline};
+pub use patch::{Patch, Sample};
+pub use plate::{PlateSpec, RegionOfInterest};
+
+/// A point or vector in space, metres, scanner frame unless said.
+pub type Vec3 = nalgebra::Vector3<f64>;

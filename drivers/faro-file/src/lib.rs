@@ -1,0 +1,1 @@
+//! Scanner driver for FARO scan files: E57, PTX, XYZ, XYB.

@@ -1,0 +1,1 @@
+//! Scanner driver for the simulated cell.

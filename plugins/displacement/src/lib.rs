@@ -1,0 +1,1 @@
+//! Comparison: displacement between strokes.

@@ -1,0 +1,1 @@
+//! Flattening by harmonic map.

@@ -1,0 +1,1 @@
+//! Comparison: template gap against the target.

@@ -1,0 +1,1 @@
+//! Program platen-sim: simulated press, scanner or both on one plate.

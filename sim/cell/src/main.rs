@@ -1,0 +1,2 @@
+//! Program `platen-sim`.
+fn main() {}

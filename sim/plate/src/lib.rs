@@ -1,0 +1,1 @@
+//! Closed-form bent plates with thickness and exact material map.

@@ -1,0 +1,1 @@
+//! A Modbus server that behaves like a plate press.

@@ -1,0 +1,1 @@
+//! Ray-casting terrestrial laser scanner with a scene round the plate.
