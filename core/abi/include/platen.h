@@ -1,0 +1,256 @@
+/* platen.h - what crosses the boundary between platen and a plugin library, major version 1.
+ *
+ * A plugin is a shared library that exports one constant, `const platen_entry platen_entry_1`.
+ * Structs begin with struct_size and grow only at their end: a reader uses what both sides have.
+ *
+ *   [inst]  calls of one instance: serialised, always the same thread
+ *   [any]   any thread, may run at the same time as an [inst] call
+ *
+ * Rules: no exception leaves a call (C++: catch (...) in each); inputs are not written; memory of frames comes from
+ * buffer_alloc and is emitted or freed before run returns; run returns by the deadline or soon after cancel; cancel
+ * returns at once; success means complete data. Metres, radians, UTF-8 with NUL. Little endian.
+ */
+#ifndef PLATEN_H
+#define PLATEN_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PLATEN_ABI_MINOR 0
+
+typedef int32_t platen_status; /* < 0 failed, <= PLATEN_E_VENDOR the plugin's own */
+enum {
+  PLATEN_OK = 0,
+  PLATEN_E_CANCELLED = -1,
+  PLATEN_E_TIMEOUT = -2,
+  PLATEN_E_CONFIG = -3,
+  PLATEN_E_UNSUPPORTED = -4,
+  PLATEN_E_NOT_FOUND = -5,
+  PLATEN_E_DISCONNECTED = -6,
+  PLATEN_E_BUSY = -7,
+  PLATEN_E_DENIED = -8,
+  PLATEN_E_IO = -9,
+  PLATEN_E_NO_DATA = -10,
+  PLATEN_E_BAD_DATA = -11,
+  PLATEN_E_MEMORY = -12,
+  PLATEN_E_STATE = -13,
+  PLATEN_E_INTERNAL = -14,
+  PLATEN_E_VENDOR = -10000
+};
+
+enum { PLATEN_ERROR_RETRYABLE = 1, PLATEN_ERROR_DEVICE_LOST = 2, PLATEN_ERROR_RECREATE = 4 };
+
+/* Memory of the caller; the callee fills it when it fails. */
+typedef struct platen_error {
+  uint32_t struct_size, flags;
+  int32_t vendor_code;
+  uint32_t reserved;
+  char message[512]; /* what happened, one sentence */
+  char hint[256];    /* what to do, one sentence */
+} platen_error;
+
+/* One piece of work; borrowed for the call. Times of the host's monotonic clock (now_mono_ns) unless named utc. */
+typedef struct platen_job {
+  uint32_t struct_size, reserved;
+  uint64_t job_id, stroke_no;
+  int64_t trigger_mono_ns, trigger_utc_ns, deadline_mono_ns;
+} platen_job;
+
+typedef struct platen_buffer {
+  void *data;
+  uint64_t bytes, token;
+} platen_buffer;
+
+typedef struct platen_attr {
+  const char *key, *value;
+} platen_attr;
+
+enum { PLATEN_FRAME_INCOMPLETE = 1, PLATEN_FRAME_SIMULATED = 2, PLATEN_FRAME_LAST = 4 };
+
+typedef struct platen_frame {
+  uint32_t struct_size, flags;
+  const char *format, *frame_id; /* "platen.column/1", "scanner" */
+  int64_t mono_ns;
+  uint64_t count;
+  platen_buffer buffer; /* emit() takes it */
+  const platen_attr *attrs;
+  uint32_t n_attrs, reserved;
+} platen_frame;
+
+enum {
+  PLATEN_TYPE_BOOL = 1,       /* i */
+  PLATEN_TYPE_INT = 2,        /* i */
+  PLATEN_TYPE_FLOAT = 3,      /* f, in the declared unit */
+  PLATEN_TYPE_STRING = 4,     /* s */
+  PLATEN_TYPE_CHOICE = 5,     /* s */
+  PLATEN_TYPE_PATH = 6,       /* s, absolute */
+  PLATEN_TYPE_DURATION = 7,   /* f, seconds */
+  PLATEN_TYPE_FLOAT_LIST = 8  /* list, n */
+};
+enum {
+  PLATEN_OPTION_REQUIRED = 1,
+  PLATEN_OPTION_SECRET = 2,
+  PLATEN_OPTION_ADVANCED = 4,
+  PLATEN_OPTION_DEPRECATED = 8,
+  PLATEN_OPTION_HAS_MIN = 16,
+  PLATEN_OPTION_HAS_MAX = 32
+};
+
+/* Declaration of one option; static data. struct_size is the stride of the array. */
+typedef struct platen_option {
+  uint32_t struct_size;
+  int32_t type;
+  uint32_t flags, reserved;
+  const char *name, *unit, *doc, *default_text; /* default as TOML text, or NULL */
+  double min, max;
+  const char *const *choices; /* NULL at the end */
+} platen_option;
+
+/* One option's value: checked, defaulted, in the declared unit. */
+typedef struct platen_value {
+  const char *name;
+  int32_t type, from_default;
+  int64_t i;
+  double f;
+  const char *s;
+  const double *list;
+  uint64_t n;
+} platen_value;
+
+enum { PLATEN_DESC_HARDWARE = 1 };
+
+/* Static data, no I/O to produce. */
+typedef struct platen_desc {
+  uint32_t struct_size, flags;
+  const char *id, *kind, *name, *vendor, *version, *doc, *url, *license; /* kind: scanner, flattening, comparison */
+  const char *const *inputs, *const *outputs;                            /* formats, NULL at the end; or NULL */
+  const platen_option *options;
+  uint32_t n_options, reserved;
+} platen_desc;
+
+/* Log levels: 1 error, 2 warn, 3 info, 4 debug, 5 trace. job_id 0: no job. */
+typedef struct platen_host platen_host;
+struct platen_host { /* all [any]; valid until deinit returns */
+  uint32_t struct_size, abi_minor;
+  void *ctx;
+  const char *name, *version;
+  int (*log_enabled)(const platen_host *, int32_t level);
+  void (*log)(const platen_host *, uint64_t job_id, int32_t level, const char *message);
+  void (*progress)(const platen_host *, uint64_t job_id, double fraction, const char *phase);
+  int (*cancelled)(const platen_host *, uint64_t job_id);
+  platen_status (*buffer_alloc)(const platen_host *, uint64_t job_id, uint64_t bytes, uint32_t align, platen_buffer *);
+  void (*buffer_free)(const platen_host *, platen_buffer *);
+  platen_status (*emit)(const platen_host *, uint64_t job_id, const platen_frame *);
+  const void *(*get_extension)(const platen_host *, const char *id);
+  int64_t (*now_mono_ns)(const platen_host *);
+};
+
+typedef struct platen_instance platen_instance;
+struct platen_instance {
+  uint32_t struct_size, reserved;
+  void *data;
+  const platen_desc *desc;
+  platen_status (*open)(platen_instance *, platen_error *);                   /* [inst] connects, may block */
+  platen_status (*arm)(platen_instance *, const platen_job *, platen_error *); /* [inst] or NULL */
+  platen_status (*run)(platen_instance *, const platen_job *, const platen_frame *in, uint32_t n_in,
+                       platen_error *);                  /* [inst] one job, emits its results */
+  void (*cancel)(platen_instance *, uint64_t job_id);    /* [any] wakes run, returns at once */
+  void (*close)(platen_instance *);                      /* [inst] joins own threads */
+  void (*destroy)(platen_instance *);                    /* [inst] no host call after it */
+  const void *(*get_extension)(platen_instance *, const char *id); /* [any] */
+};
+
+typedef struct platen_entry {
+  uint32_t struct_size, abi_minor;
+  platen_status (*init)(const platen_host *, const char *library_dir, platen_error *); /* once, before create */
+  void (*deinit)(void);
+  uint32_t (*count)(void);
+  const platen_desc *(*desc)(uint32_t index); /* constant, also before init; NULL when there is none */
+  platen_status (*create)(const platen_host *, const char *id, const platen_value *values, uint32_t n,
+                          platen_instance **, platen_error *); /* touches no hardware */
+} platen_entry;
+
+/* ---- Payloads: a header at the start of the buffer, then arrays aligned to 8 bytes, pointed to by offset. ---- */
+
+typedef struct platen_span {
+  uint64_t offset, count; /* bytes from the start of the buffer; scalar elements. 0, 0: absent */
+} platen_span;
+
+#define PLATEN_FORMAT_SCAN "platen.scan/1"         /* driver -> host, first */
+#define PLATEN_FORMAT_COLUMN "platen.column/1"     /* driver -> host */
+#define PLATEN_FORMAT_SCAN_END "platen.scan-end/1" /* driver -> host, last */
+#define PLATEN_FORMAT_WINDOW "platen.window/1"     /* host -> driver, optional */
+#define PLATEN_FORMAT_MESH "platen.mesh/1"         /* host -> flattening */
+#define PLATEN_FORMAT_CHART "platen.chart/1"       /* flattening -> host */
+#define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison; attribute role: now, before, baseline */
+#define PLATEN_FORMAT_TASK "platen.task/1"         /* host -> comparison, JSON */
+#define PLATEN_FORMAT_FINDINGS "platen.findings/1" /* comparison -> host, JSON */
+#define PLATEN_FORMAT_GRID "platen.grid/1"         /* comparison -> host */
+
+/* Rows run down from the top, columns by increasing azimuth, counter-clockwise seen from above; z is up. */
+typedef struct platen_scan {
+  uint32_t struct_size, flags; /* 1: simulated */
+  uint32_t n_rows, n_columns;
+  double azimuth_start, azimuth_step, elevation_start, elevation_step; /* steps positive */
+  uint32_t seam_column;                                                /* first of the back face, UINT32_MAX: one face */
+  uint16_t intensity_min, intensity_max;
+  double acquired_unix_s;        /* 0: unknown */
+  platen_span instrument, notes; /* UTF-8; notes one sentence a line */
+} platen_scan;
+
+typedef struct platen_column {
+  uint32_t struct_size, index, face, first_row; /* face 0 front, 1 back */
+  platen_span range_m;                          /* f32 */
+  platen_span azimuth, elevation;               /* f64 */
+  platen_span intensity;                        /* u16 */
+  platen_span state;                            /* u8: 0 valid, 1 direction only, 2 no return */
+} platen_column;
+
+typedef struct platen_scan_end {
+  uint32_t struct_size, columns;
+  uint64_t points;
+  uint32_t warm_up_columns, outcome; /* 0 complete, 1 aborted, 2 failed */
+} platen_scan_end;
+
+typedef struct platen_window {
+  uint32_t struct_size, reserved;
+  double azimuth_start, azimuth_width, elevation_min, elevation_max;
+} platen_window;
+
+typedef struct platen_mesh {
+  uint32_t struct_size, reserved;
+  double width, height, thickness;
+  uint32_t corners[4]; /* places in the boundary loop of (0,0), (W,0), (W,H), (0,H) */
+  double corner_sigma[8], edge_sigma[4];
+  platen_span vertices;  /* f64, 3 each, mid-surface */
+  platen_span triangles; /* u32, 3 each, counter-clockwise seen from the scanner */
+  platen_span boundary;  /* u32, loop counter-clockwise from corner (0,0) */
+  platen_span arc;       /* f64, arc length of each boundary vertex from its edge's first corner */
+} platen_mesh;
+
+typedef struct platen_chart {
+  uint32_t struct_size, reserved;
+  platen_span uv, strain, sigma; /* f64: 2, 3, 2 each; strain and sigma may be absent */
+} platen_chart;
+
+typedef struct platen_grid {
+  uint32_t struct_size, reserved, n_u, n_v, components, reserved_2;
+  platen_span name, unit; /* UTF-8 */
+  platen_span values;     /* f64, v outer, u inner, components innermost */
+  platen_span state;      /* u8 a node: 0 no data, 1 data, 2 data and unchanged */
+} platen_grid;
+
+/* Extension of a scanner instance. */
+#define PLATEN_EXT_ESTIMATE "platen.ext.estimate/1"
+typedef struct platen_estimate {
+  uint32_t struct_size, reserved;
+  double (*scan_seconds)(platen_instance *, const platen_window *); /* [inst] negative: unknown */
+} platen_estimate;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

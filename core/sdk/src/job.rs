@@ -1,0 +1,148 @@
+//! The work at hand: deadline, cancelling, progress, memory.
+
+use std::ffi::{CStr, CString};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use platen_abi as abi;
+
+use crate::{Error, ErrorKind, Result};
+
+/// What wakes a blocking call of the plugin when its job is cancelled.
+pub(crate) type Waker = Mutex<Option<Box<dyn Fn() + Send>>>;
+
+/// One piece of work. Borrowed for the call.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    pub(crate) raw: &'a abi::Job,
+    pub(crate) host: &'a abi::Host,
+    pub(crate) waker: &'a Waker,
+}
+
+impl std::fmt::Debug for Job<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Job").field("id", &self.raw.job_id).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Job<'a> {
+    /// Unique in the host's life.
+    pub fn id(&self) -> u64 {
+        self.raw.job_id
+    }
+
+    /// Stroke that this work belongs to, 0 when none.
+    pub fn stroke(&self) -> u64 {
+        self.raw.stroke_no
+    }
+
+    /// Err when the job was cancelled or its deadline is past. Ask often: at least every 50 ms of work.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Cancelled`].
+    pub fn check(&self) -> Result<()> {
+        // SAFETY: the host's table lives until `deinit`.
+        if unsafe { (self.host.cancelled)(self.host, self.raw.job_id) } == 0 {
+            Ok(())
+        } else {
+            Err(Error::new(ErrorKind::Cancelled, "the job was cancelled or its deadline passed"))
+        }
+    }
+
+    /// Time left until the deadline, zero when it is past.
+    pub fn remaining(&self) -> Duration {
+        // SAFETY: as above.
+        let now = unsafe { (self.host.now_mono_ns)(self.host) };
+        Duration::from_nanos(self.raw.deadline_mono_ns.saturating_sub(now).max(0).unsigned_abs())
+    }
+
+    /// Says how far the work is, 0 to 1, and in which phase.
+    pub fn progress(&self, fraction: f64, phase: &str) {
+        let phase = CString::new(phase.replace('\0', " ")).unwrap_or_default();
+        // SAFETY: the string lives for the call.
+        unsafe { (self.host.progress)(self.host, self.raw.job_id, fraction, phase.as_ptr()) };
+    }
+
+    /// `wake` is called from another thread when the job is cancelled, until the guard is dropped: close a socket
+    /// with it, so that a blocking read returns. It must return at once.
+    #[must_use]
+    pub fn on_cancel(&self, wake: impl Fn() + Send + 'static) -> CancelGuard<'a> {
+        *self.waker.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(wake));
+        CancelGuard { waker: self.waker }
+    }
+
+    /// A buffer of the host, zeroed.
+    pub(crate) fn buffer(&self, bytes: usize) -> Result<OwnedBuffer<'a>> {
+        let mut raw = abi::Buffer { data: std::ptr::null_mut(), bytes: 0, token: 0 };
+        // SAFETY: `raw` lives for the call.
+        let status =
+            unsafe { (self.host.buffer_alloc)(self.host, self.raw.job_id, bytes as u64, 8, &raw mut raw) };
+        if status != abi::status::OK || raw.data.is_null() || raw.bytes < bytes as u64 {
+            return Err(Error::new(ErrorKind::Memory, format!("the host has no buffer of {bytes} bytes")));
+        }
+        Ok(OwnedBuffer { raw, bytes, host: self.host })
+    }
+
+    /// Hands a buffer to the host.
+    pub(crate) fn emit(&self, format: &CStr, count: u64, flags: u32, buffer: OwnedBuffer<'_>) -> Result<()> {
+        let frame = abi::Frame {
+            struct_size: size_of::<abi::Frame>() as u32,
+            flags,
+            format: format.as_ptr(),
+            frame_id: c"scanner".as_ptr(),
+            mono_ns: 0,
+            count,
+            buffer: buffer.raw,
+            attrs: std::ptr::null(),
+            n_attrs: 0,
+            reserved: 0,
+        };
+        std::mem::forget(buffer);
+        // SAFETY: the frame lives for the call; the buffer is the host's from here on.
+        match unsafe { (self.host.emit)(self.host, self.raw.job_id, &raw const frame) } {
+            abi::status::OK => Ok(()),
+            abi::status::CANCELLED => Err(Error::new(ErrorKind::Cancelled, "the job was cancelled")),
+            status => {
+                Err(Error::new(ErrorKind::BadData, format!("the host refused a frame (status {status})")))
+            }
+        }
+    }
+}
+
+/// Takes the waker away again when the blocking call is over.
+pub struct CancelGuard<'a> {
+    waker: &'a Waker,
+}
+
+impl std::fmt::Debug for CancelGuard<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("CancelGuard")
+    }
+}
+
+impl Drop for CancelGuard<'_> {
+    fn drop(&mut self) {
+        *self.waker.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+}
+
+/// A buffer of the host that goes back when it is not emitted.
+pub(crate) struct OwnedBuffer<'a> {
+    raw: abi::Buffer,
+    bytes: usize,
+    host: &'a abi::Host,
+}
+
+impl OwnedBuffer<'_> {
+    pub(crate) fn bytes(&mut self) -> &mut [u8] {
+        // SAFETY: the host gave at least `bytes` zeroed bytes, which are ours until emitted or freed.
+        unsafe { std::slice::from_raw_parts_mut(self.raw.data.cast(), self.bytes) }
+    }
+}
+
+impl Drop for OwnedBuffer<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the buffer is ours and was not emitted.
+        unsafe { (self.host.buffer_free)(self.host, &raw mut self.raw) };
+    }
+}

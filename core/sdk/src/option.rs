@@ -1,0 +1,230 @@
+//! Options: declared once, from which come validation, `describe`, schema and the values.
+
+use std::ffi::{CStr, c_char};
+use std::path::PathBuf;
+
+use platen_abi::{OptionDecl, Value, option_flag, option_type};
+
+/// A struct declared with [`options!`](crate::options).
+pub trait Options: Sized {
+    /// The table that the host reads.
+    const TABLE: &'static [OptionDecl];
+    /// Takes the values that the host checked.
+    ///
+    /// # Errors
+    /// When one is missing, which is the host's fault.
+    fn from_values(values: &Values<'_>) -> crate::Result<Self>;
+}
+
+/// No options.
+impl Options for () {
+    const TABLE: &'static [OptionDecl] = &[];
+    fn from_values(_: &Values<'_>) -> crate::Result<Self> {
+        Ok(())
+    }
+}
+
+/// Values as they came from the host.
+#[derive(Debug, Clone, Copy)]
+pub struct Values<'a>(pub(crate) &'a [Value]);
+
+impl<'a> Values<'a> {
+    fn find(&self, name: &CStr) -> Option<Received<'a>> {
+        // SAFETY: the host's strings are NUL-terminated and live for the call.
+        let value = self.0.iter().find(|v| unsafe { CStr::from_ptr(v.name) } == name)?;
+        Some(Received { value })
+    }
+
+    /// The value of one option.
+    ///
+    /// # Errors
+    /// When it is missing or of another type.
+    #[doc(hidden)]
+    pub fn get<T: OptionType>(&self, name: &CStr) -> crate::Result<T> {
+        T::receive(self.find(name)).ok_or_else(|| {
+            let name = name.to_string_lossy();
+            crate::Error::new(
+                crate::ErrorKind::Internal,
+                format!("the host gave no sound value for option {name}"),
+            )
+        })
+    }
+}
+
+/// One value behind the boundary.
+#[derive(Debug, Clone, Copy)]
+pub struct Received<'a> {
+    value: &'a Value,
+}
+
+impl Received<'_> {
+    fn text(&self) -> Option<String> {
+        if self.value.s.is_null() {
+            return None;
+        }
+        // SAFETY: not null, NUL-terminated and alive for the call.
+        Some(unsafe { CStr::from_ptr(self.value.s) }.to_string_lossy().into_owned())
+    }
+}
+
+/// Types that a field of an options struct can have.
+pub trait OptionType: Sized {
+    /// Code of the type on the boundary.
+    const TYPE: i32;
+    /// False for `Option<T>`.
+    const REQUIRED: bool = true;
+    /// Takes the value; `None` when it is missing or of another type.
+    #[doc(hidden)]
+    fn receive(received: Option<Received<'_>>) -> Option<Self>;
+}
+
+macro_rules! option_type {
+    ($($ty:ty = $code:ident, |$r:ident| $take:expr;)*) => { $(
+        impl OptionType for $ty {
+            const TYPE: i32 = option_type::$code;
+            fn receive(received: Option<Received<'_>>) -> Option<Self> {
+                let $r = received?;
+                $take
+            }
+        }
+    )* };
+}
+
+option_type! {
+    bool = BOOL, |r| Some(r.value.i != 0);
+    i64 = INT, |r| Some(r.value.i);
+    f64 = FLOAT, |r| Some(r.value.f);
+    String = STRING, |r| r.text();
+    PathBuf = PATH, |r| r.text().map(PathBuf::from);
+    std::time::Duration = DURATION, |r| std::time::Duration::try_from_secs_f64(r.value.f).ok();
+    Vec<f64> = FLOAT_LIST, |r| {
+        if r.value.n == 0 {
+            return Some(Vec::new());
+        }
+        if r.value.list.is_null() {
+            return None;
+        }
+        // SAFETY: the host's list has n numbers and lives for the call.
+        Some(unsafe { std::slice::from_raw_parts(r.value.list, usize::try_from(r.value.n).ok()?) }.to_vec())
+    };
+}
+
+impl<T: OptionType> OptionType for Option<T> {
+    const TYPE: i32 = T::TYPE;
+    const REQUIRED: bool = false;
+    fn receive(received: Option<Received<'_>>) -> Option<Self> {
+        match received {
+            None => Some(None),
+            some => T::receive(some).map(Some),
+        }
+    }
+}
+
+/// What [`options!`](crate::options) collects of one field.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub struct Declared {
+    pub name: &'static str,
+    pub doc: &'static str,
+    pub default_text: Option<&'static str>,
+    pub unit: Option<&'static str>,
+    pub min: Option<f64>,
+    pub max: Option<f64>,
+    pub choices: Option<&'static [*const c_char]>,
+}
+
+const fn pointer(text: Option<&'static str>) -> *const c_char {
+    match text {
+        Some(text) => text.as_ptr().cast(),
+        None => std::ptr::null(),
+    }
+}
+
+/// Row of the table. The texts end in NUL, as the macro makes them.
+#[doc(hidden)]
+pub const fn declare<T: OptionType>(declared: Declared) -> OptionDecl {
+    let mut flags = 0;
+    if T::REQUIRED && declared.default_text.is_none() {
+        flags |= option_flag::REQUIRED;
+    }
+    let min = match declared.min {
+        Some(min) => {
+            flags |= option_flag::HAS_MIN;
+            min
+        }
+        None => 0.0,
+    };
+    let max = match declared.max {
+        Some(max) => {
+            flags |= option_flag::HAS_MAX;
+            max
+        }
+        None => 0.0,
+    };
+    let (kind, choices) = match declared.choices {
+        Some(choices) => (option_type::CHOICE, choices.as_ptr()),
+        None => (T::TYPE, std::ptr::null()),
+    };
+    OptionDecl {
+        struct_size: size_of::<OptionDecl>() as u32,
+        kind,
+        flags,
+        reserved: 0,
+        name: pointer(Some(declared.name)),
+        unit: pointer(declared.unit),
+        doc: pointer(Some(declared.doc)),
+        default_text: pointer(declared.default_text),
+        min,
+        max,
+        choices,
+    }
+}
+
+/// Declares a struct of options; see the crate's example.
+///
+/// Each field is `/// doc`, `name: Type`, optionally `= default`, `, unit "m"`, `, min 0.0`, `, max 1.0`,
+/// `, choices ["a", "b"]`, in this order, and a semicolon.
+#[macro_export]
+macro_rules! options {
+    ($(#[$meta:meta])* $vis:vis struct $name:ident { $(
+        $(#[doc = $doc:literal])* $field:ident : $ty:ty
+        $(= $default:literal)? $(, unit $unit:literal)? $(, min $min:literal)? $(, max $max:literal)?
+        $(, choices [$($choice:literal),+ $(,)?])? ;
+    )* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone)]
+        $vis struct $name { $( $(#[doc = $doc])* pub $field: $ty, )* }
+
+        impl $crate::Options for $name {
+            const TABLE: &'static [$crate::abi::OptionDecl] = &[ $(
+                $crate::shim::declare::<$ty>($crate::shim::Declared {
+                    name: concat!(stringify!($field), "\0"),
+                    doc: concat!($($doc, "\n",)* "\0"),
+                    default_text: $crate::options!(@text $($default)?),
+                    unit: $crate::options!(@plain $($unit)?),
+                    min: $crate::options!(@number $($min)?),
+                    max: $crate::options!(@number $($max)?),
+                    choices: $crate::options!(@choices $($($choice),+)?),
+                })
+            ),* ];
+            fn from_values(values: &$crate::Values<'_>) -> $crate::Result<Self> {
+                Ok(Self { $( $field: values.get(
+                    const { match ::std::ffi::CStr::from_bytes_with_nul(concat!(stringify!($field), "\0").as_bytes()) {
+                        Ok(name) => name,
+                        Err(_) => c"",
+                    } }
+                )?, )* })
+            }
+        }
+    };
+    (@text) => { None };
+    (@text $default:literal) => { Some(concat!(stringify!($default), "\0")) };
+    (@plain) => { None };
+    (@plain $text:literal) => { Some(concat!($text, "\0")) };
+    (@number) => { None };
+    (@number $number:literal) => { Some($number as f64) };
+    (@choices) => { None };
+    (@choices $($choice:literal),+) => {
+        Some(&[$(concat!($choice, "\0").as_ptr().cast(),)+ ::std::ptr::null()])
+    };
+}

@@ -1,0 +1,445 @@
+//! The C functions behind [`export!`](crate::export): each catches panics and turns errors into the caller's struct.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::{CStr, c_char, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
+
+use platen_abi as abi;
+
+pub use crate::option::{Declared, declare};
+use crate::{Error, ErrorKind, Info, Job, Options, Result, Scanner, Values, job, logging};
+
+/// One frame that the host handed in.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    pub(crate) format: &'a CStr,
+    #[cfg_attr(
+        not(feature = "comparison"),
+        expect(dead_code, reason = "only comparisons get frames with roles")
+    )]
+    pub(crate) role: Option<&'a CStr>,
+    pub(crate) bytes: &'a [u8],
+}
+
+/// The three kinds behind one set of C functions.
+pub trait Plugin: Send + Sized + 'static {
+    const DESC: abi::Desc;
+    fn create(values: &Values<'_>) -> Result<Self>;
+    fn open(&mut self) -> Result<()> {
+        Ok(())
+    }
+    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
+        job.check()
+    }
+    fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()>;
+    fn estimate_s(&mut self, window: Option<&platen_scan::Window>) -> Option<f64> {
+        let _ = window;
+        None
+    }
+    fn close(&mut self) {}
+}
+
+/// Descriptor of a plugin of this kind.
+pub const fn describe<O: Options>(
+    kind: &'static CStr,
+    info: Info,
+    inputs: &'static [*const c_char],
+    outputs: &'static [*const c_char],
+) -> abi::Desc {
+    abi::Desc {
+        struct_size: size_of::<abi::Desc>() as u32,
+        flags: info.flags,
+        id: info.id.as_ptr(),
+        kind: kind.as_ptr(),
+        name: info.name.as_ptr(),
+        vendor: info.vendor.as_ptr(),
+        version: info.version.as_ptr(),
+        doc: info.doc.as_ptr(),
+        url: std::ptr::null(),
+        license: info.license.as_ptr(),
+        inputs: inputs.as_ptr(),
+        outputs: outputs.as_ptr(),
+        options: O::TABLE.as_ptr(),
+        n_options: O::TABLE.len() as u32,
+        reserved: 0,
+    }
+}
+
+/// A scanner as a plugin.
+#[derive(Debug)]
+pub struct ScannerPlugin<S>(S);
+
+impl<S: Scanner> Plugin for ScannerPlugin<S> {
+    const DESC: abi::Desc = describe::<S::Options>(
+        c"scanner",
+        S::INFO,
+        &[c"platen.window/1".as_ptr(), std::ptr::null()],
+        &[
+            c"platen.scan/1".as_ptr(),
+            c"platen.column/1".as_ptr(),
+            c"platen.scan-end/1".as_ptr(),
+            std::ptr::null(),
+        ],
+    );
+    fn create(values: &Values<'_>) -> Result<Self> {
+        S::new(S::Options::from_values(values)?).map(Self)
+    }
+    fn open(&mut self) -> Result<()> {
+        self.0.open()
+    }
+    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
+        self.0.arm(job)
+    }
+    fn estimate_s(&mut self, window: Option<&platen_scan::Window>) -> Option<f64> {
+        self.0.estimate_s(window)
+    }
+    fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()> {
+        let window = inputs
+            .iter()
+            .find(|input| input.format == <abi::payload::Window as abi::payload::Header>::FORMAT)
+            .map(|input| abi::payload::read::<abi::payload::Window>(input.bytes).map(|w| from_window(&w)))
+            .transpose()
+            .map_err(|e| malformed(&e))?;
+        let mut sink = crate::ScanSink { job: *job, window, n_rows: None, simulated: false, ended: false };
+        self.0.capture(job, &mut sink)?;
+        if sink.ended {
+            Ok(())
+        } else {
+            Err(Error::new(ErrorKind::Internal, "the driver returned without ending the scan"))
+        }
+    }
+    fn close(&mut self) {
+        self.0.close();
+    }
+}
+
+fn from_window(window: &abi::payload::Window) -> platen_scan::Window {
+    platen_scan::Window {
+        azimuth_start: window.azimuth_start,
+        azimuth_width: window.azimuth_width,
+        elevation_min: window.elevation_min,
+        elevation_max: window.elevation_max,
+    }
+}
+
+pub(crate) fn malformed(error: &abi::payload::Malformed) -> Error {
+    Error::new(ErrorKind::BadData, format!("the host sent a malformed frame: {error}"))
+}
+
+/// Behind one `platen_instance`. `raw` comes first: a pointer to it is a pointer to the whole.
+#[repr(C)]
+struct State<P> {
+    raw: abi::Instance,
+    estimate: abi::Estimate,
+    host: &'static abi::Host,
+    waker: job::Waker,
+    plugin: P,
+}
+
+thread_local! {
+    static LAST_PANIC: RefCell<Option<String>> = const { RefCell::new(None) };
+}
+
+/// Runs `work`, catching panics, and tells the caller what went wrong.
+///
+/// # Safety
+/// `out` is null or a caller's `platen_error` with its `struct_size` set.
+unsafe fn guard(out: *mut abi::Error, work: impl FnOnce() -> Result<()>) -> abi::Status {
+    let error = match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(())) => return abi::status::OK,
+        Ok(Err(error)) => error,
+        Err(payload) => {
+            let text = LAST_PANIC.take().unwrap_or_else(|| panic_text(payload.as_ref()));
+            let mut error = Error::new(ErrorKind::Internal, format!("the plugin panicked: {text}"))
+                .hint("this is a fault of the plugin: report it with the scan and the plant file");
+            error.flags |= abi::error_flag::RECREATE;
+            error
+        }
+    };
+    // SAFETY: as the caller promises; a shorter struct of an older host is left alone.
+    if let Some(out) = unsafe { out.as_mut() }
+        && out.struct_size as usize >= size_of::<abi::Error>()
+    {
+        out.flags = error.flags;
+        copy_text(&mut out.message, &error.message);
+        copy_text(&mut out.hint, &error.hint);
+    }
+    error.kind as abi::Status
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> String {
+    payload
+        .downcast_ref::<&str>()
+        .map(|s| (*s).to_owned())
+        .or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "without a message".to_owned())
+}
+
+/// Copies as much of `text` as fits, whole characters only, NUL at the end.
+fn copy_text(out: &mut [c_char], text: &str) {
+    let mut end = text.len().min(out.len() - 1);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    for (place, byte) in out.iter_mut().zip(text.as_bytes()[..end].iter().filter(|b| **b != 0).chain([&0])) {
+        *place = *byte as c_char;
+    }
+}
+
+/// The exported table of a library with one plugin.
+pub const fn entry<P: Plugin>() -> abi::Entry {
+    abi::Entry {
+        struct_size: size_of::<abi::Entry>() as u32,
+        abi_minor: abi::ABI_MINOR,
+        init,
+        deinit,
+        count,
+        desc: desc::<P>,
+        create: create::<P>,
+    }
+}
+
+unsafe extern "C" fn init(
+    host: *const abi::Host,
+    _dir: *const c_char,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: the host's table is valid until `deinit`; `error` is the caller's.
+    unsafe {
+        guard(error, || {
+            let host = checked_host(host)?;
+            logging::install(host);
+            std::panic::set_hook(Box::new(|info| LAST_PANIC.set(Some(info.to_string().replace('\n', ": ")))));
+            Ok(())
+        })
+    }
+}
+
+/// # Safety
+/// `host` is null or a table that lives until `deinit`.
+unsafe fn checked_host(host: *const abi::Host) -> Result<&'static abi::Host> {
+    // SAFETY: as the caller promises.
+    let host = unsafe { host.as_ref() }.ok_or_else(|| Error::new(ErrorKind::State, "no host table"))?;
+    let needed = size_of::<abi::Host>();
+    if (host.struct_size as usize) < needed {
+        return Err(Error::new(
+            ErrorKind::Unsupported,
+            format!("the host's table has {} bytes, this plugin needs {needed}", host.struct_size),
+        )
+        .hint("use a plugin built for this version of platen"));
+    }
+    Ok(host)
+}
+
+unsafe extern "C" fn deinit() {}
+
+unsafe extern "C" fn count() -> u32 {
+    1
+}
+
+unsafe extern "C" fn desc<P: Plugin>(index: u32) -> *const abi::Desc {
+    if index == 0 { const { &P::DESC } } else { std::ptr::null() }
+}
+
+unsafe extern "C" fn create<P: Plugin>(
+    host: *const abi::Host,
+    id: *const c_char,
+    values: *const abi::Value,
+    n: u32,
+    out: *mut *mut abi::Instance,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: the arguments are the host's, valid for the call, as the header demands.
+    unsafe {
+        guard(error, || {
+            let host = checked_host(host)?;
+            if id.is_null() || CStr::from_ptr(id) != CStr::from_ptr(P::DESC.id) {
+                return Err(Error::new(ErrorKind::NotFound, "this library has no plugin of that name"));
+            }
+            let values = if n == 0 { &[] } else { std::slice::from_raw_parts(values, n as usize) };
+            let state = Box::new(State {
+                raw: abi::Instance {
+                    struct_size: size_of::<abi::Instance>() as u32,
+                    reserved: 0,
+                    data: std::ptr::null_mut(),
+                    desc: const { &P::DESC },
+                    open: open::<P>,
+                    arm: Some(arm::<P>),
+                    run: run::<P>,
+                    cancel: cancel::<P>,
+                    close: close::<P>,
+                    destroy: destroy::<P>,
+                    get_extension: get_extension::<P>,
+                },
+                estimate: abi::Estimate {
+                    struct_size: size_of::<abi::Estimate>() as u32,
+                    reserved: 0,
+                    scan_seconds: scan_seconds::<P>,
+                },
+                host,
+                waker: Mutex::new(None),
+                plugin: P::create(&Values(values))?,
+            });
+            *out = Box::into_raw(state).cast();
+            Ok(())
+        })
+    }
+}
+
+/// The parts of an instance that an `[inst]` call uses.
+///
+/// # Safety
+/// `instance` came from [`create`] and no other `[inst]` call is running.
+unsafe fn parts<'a, P>(instance: *mut abi::Instance) -> (&'a mut P, &'static abi::Host, &'a job::Waker) {
+    let state = instance.cast::<State<P>>();
+    // SAFETY: distinct fields; `cancel` touches only `waker`, which is shared.
+    unsafe { (&mut (*state).plugin, (*state).host, &(*state).waker) }
+}
+
+unsafe extern "C" fn open<P: Plugin>(instance: *mut abi::Instance, error: *mut abi::Error) -> abi::Status {
+    // SAFETY: `[inst]` call on an instance of ours.
+    unsafe { guard(error, || parts::<P>(instance).0.open()) }
+}
+
+unsafe extern "C" fn arm<P: Plugin>(
+    instance: *mut abi::Instance,
+    job: *const abi::Job,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: `[inst]` call on an instance of ours; the job is borrowed for the call.
+    unsafe {
+        guard(error, || {
+            let (plugin, host, waker) = parts::<P>(instance);
+            let raw = &*job;
+            logging::in_job(raw.job_id, || plugin.arm(&Job { raw, host, waker }))
+        })
+    }
+}
+
+unsafe extern "C" fn run<P: Plugin>(
+    instance: *mut abi::Instance,
+    job: *const abi::Job,
+    frames: *const abi::Frame,
+    n_frames: u32,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: `[inst]` call on an instance of ours; job and frames are borrowed for the call.
+    unsafe {
+        guard(error, || {
+            let (plugin, host, waker) = parts::<P>(instance);
+            let raw = &*job;
+            let frames =
+                if n_frames == 0 { &[] } else { std::slice::from_raw_parts(frames, n_frames as usize) };
+            let inputs: Vec<Input<'_>> = frames.iter().map(|frame| input(frame)).collect();
+            logging::in_job(raw.job_id, || plugin.run(&Job { raw, host, waker }, &inputs))
+        })
+    }
+}
+
+/// # Safety
+/// The frame and what it points to live as long as the borrow.
+unsafe fn input(frame: &abi::Frame) -> Input<'_> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let attrs = if frame.n_attrs == 0 {
+            &[]
+        } else {
+            std::slice::from_raw_parts(frame.attrs, frame.n_attrs as usize)
+        };
+        let role = attrs.iter().find(|a| CStr::from_ptr(a.key) == c"role").map(|a| CStr::from_ptr(a.value));
+        let bytes = if frame.buffer.bytes == 0 {
+            &[]
+        } else {
+            std::slice::from_raw_parts(frame.buffer.data.cast::<u8>(), frame.buffer.bytes as usize)
+        };
+        Input { format: CStr::from_ptr(frame.format), role, bytes }
+    }
+}
+
+unsafe extern "C" fn cancel<P: Plugin>(instance: *mut abi::Instance, _job_id: u64) {
+    // SAFETY: `[any]` call; only the shared waker is touched.
+    let waker = unsafe { &(*instance.cast::<State<P>>()).waker };
+    let woken = catch_unwind(AssertUnwindSafe(|| {
+        if let Some(wake) = waker.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+            wake();
+        }
+    }));
+    if woken.is_err() {
+        tracing::error!("the plugin panicked while being cancelled");
+    }
+}
+
+unsafe extern "C" fn close<P: Plugin>(instance: *mut abi::Instance) {
+    // SAFETY: `[inst]` call on an instance of ours.
+    let _ = unsafe {
+        guard(std::ptr::null_mut(), || {
+            parts::<P>(instance).0.close();
+            Ok(())
+        })
+    };
+}
+
+unsafe extern "C" fn destroy<P: Plugin>(instance: *mut abi::Instance) {
+    // SAFETY: the last `[inst]` call; the box came from `create`.
+    let _ = unsafe {
+        guard(std::ptr::null_mut(), || {
+            drop(Box::from_raw(instance.cast::<State<P>>()));
+            Ok(())
+        })
+    };
+}
+
+unsafe extern "C" fn get_extension<P: Plugin>(
+    instance: *mut abi::Instance,
+    id: *const c_char,
+) -> *const c_void {
+    // SAFETY: `[any]` call; the estimate table never changes, the id is NUL-terminated.
+    unsafe {
+        if !id.is_null() && CStr::from_ptr(id) == abi::EXT_ESTIMATE {
+            (&raw const (*instance.cast::<State<P>>()).estimate).cast()
+        } else {
+            std::ptr::null()
+        }
+    }
+}
+
+unsafe extern "C" fn scan_seconds<P: Plugin>(
+    instance: *mut abi::Instance,
+    window: *const abi::payload::Window,
+) -> f64 {
+    let mut seconds = -1.0;
+    // SAFETY: `[inst]` call on an instance of ours; the window is null or borrowed for the call.
+    let _ = unsafe {
+        guard(std::ptr::null_mut(), || {
+            let window = window.as_ref().map(from_window);
+            seconds = parts::<P>(instance).0.estimate_s(window.as_ref()).unwrap_or(-1.0);
+            Ok(())
+        })
+    };
+    seconds
+}
+
+/// Exports a plugin: `export!(scanner Type);`, `export!(flattening Type);` or `export!(comparison Type);`.
+#[macro_export]
+macro_rules! export {
+    (scanner $plugin:ty) => {
+        $crate::export!(@entry $crate::shim::ScannerPlugin<$plugin>);
+    };
+    (flattening $plugin:ty) => {
+        $crate::export!(@entry $crate::shim::FlatteningPlugin<$plugin>);
+    };
+    (comparison $plugin:ty) => {
+        $crate::export!(@entry $crate::shim::ComparisonPlugin<$plugin>);
+    };
+    (@entry $shim:ty) => {
+        #[cfg(panic = "abort")]
+        compile_error!("a plugin must be built with panic = \"unwind\": its panics become errors");
+
+        /// The library's table.
+        #[allow(non_upper_case_globals, unsafe_code, reason = "the name is the boundary's")]
+        #[unsafe(no_mangle)]
+        pub static platen_entry_1: $crate::abi::Entry = $crate::shim::entry::<$shim>();
+    };
+}
