@@ -7,10 +7,14 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+pub mod flatten;
+pub mod mesh;
 mod outline;
 mod patch;
 mod plate;
 
+pub use flatten::{Chart, Flatten, FlattenError};
+pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, Outline};
 pub use patch::{Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};

@@ -1,0 +1,259 @@
+//! A triangulated disk with four corners: the type that every flattening may rely on.
+
+use std::collections::BTreeMap;
+use std::ops::Deref;
+
+use crate::Vec3;
+
+/// What a [`DiskMesh`] is made of: plain data, unchecked.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DiskParts {
+    /// Points of the mid-surface, metres, scanner frame.
+    pub vertices: Vec<Vec3>,
+    /// Vertex indices, counter-clockwise seen from the scanner.
+    pub triangles: Vec<[u32; 3]>,
+    /// The boundary loop: vertex indices from corner (0,0), counter-clockwise seen from the scanner.
+    pub boundary: Vec<u32>,
+    /// Positions of the corners (0,0), (W,0), (W,H), (0,H) in `boundary`; the first is 0.
+    pub corners: [u32; 4],
+    /// Per corner: standard deviation along the edge that leaves it and along the one that arrives, metres.
+    pub corner_sigma: [[f64; 2]; 4],
+    /// Per edge: standard deviation across the edge, in the surface, metres.
+    pub edge_sigma: [f64; 4],
+    /// Per boundary vertex: arc length from the first corner of its edge, metres; 0 in the corners.
+    pub arc: Vec<f64>,
+    /// Arc length of the edges v = 0, u = W, v = H, u = 0, metres.
+    pub edge_length: [f64; 4],
+    /// Extent of the original rectangle along u, metres.
+    pub width: f64,
+    /// Extent of the original rectangle along v, metres.
+    pub height: f64,
+    /// Thickness of the plate, metres.
+    pub thickness: f64,
+}
+
+/// A mesh that is one disk: connected, manifold, evenly oriented, with a single simple boundary loop.
+///
+/// Read-only access to the [`DiskParts`] it was made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiskMesh(DiskParts);
+
+/// Why a set of parts is no disk. Each is a fault of the program that made the parts.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// A length, index or number is outside what the type allows.
+    #[error("mesh: {what}; the program that made this mesh is at fault, report it")]
+    Malformed {
+        /// The first fault found.
+        what: String,
+    },
+    /// The triangles do not form a disk.
+    #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
+    NotADisk {
+        /// The first fault found.
+        what: String,
+    },
+}
+
+impl DiskMesh {
+    /// Checks the parts.
+    ///
+    /// # Errors
+    /// [`MeshError::Malformed`] for indices, lengths or numbers out of range, [`MeshError::NotADisk`] for wrong topology.
+    pub fn new(parts: DiskParts) -> Result<Self, MeshError> {
+        check_numbers(&parts)?;
+        check_loop(&parts)?;
+        check_topology(&parts.triangles, &parts.boundary, parts.vertices.len())?;
+        Ok(Self(parts))
+    }
+
+    /// The parts, to be changed and checked again.
+    #[must_use]
+    pub fn into_parts(self) -> DiskParts {
+        self.0
+    }
+
+    /// Positions in `boundary` of edge `k`'s vertices from corner k to corner k + 1, both included.
+    ///
+    /// The last edge ends in position 0, given as `boundary.len()`: take it modulo the length.
+    #[must_use]
+    pub fn edge(&self, k: usize) -> std::ops::RangeInclusive<usize> {
+        let end = if k == 3 { self.boundary.len() } else { self.corners[k + 1] as usize };
+        self.corners[k] as usize..=end
+    }
+}
+
+impl Deref for DiskMesh {
+    type Target = DiskParts;
+
+    fn deref(&self) -> &DiskParts {
+        &self.0
+    }
+}
+
+fn malformed(what: impl Into<String>) -> MeshError {
+    MeshError::Malformed { what: what.into() }
+}
+
+fn not_a_disk(what: impl Into<String>) -> MeshError {
+    MeshError::NotADisk { what: what.into() }
+}
+
+fn check_numbers(parts: &DiskParts) -> Result<(), MeshError> {
+    if let Some(i) = parts.vertices.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(malformed(format!("vertex {i} is not finite")));
+    }
+    for (name, value) in [("width", parts.width), ("height", parts.height), ("thickness", parts.thickness)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(malformed(format!("{name} is {value}, needs to be positive")));
+        }
+    }
+    let sigmas = parts.corner_sigma.iter().flatten().chain(&parts.edge_sigma);
+    if let Some(sigma) = sigmas.into_iter().find(|s| !(s.is_finite() && **s >= 0.0)) {
+        return Err(malformed(format!("standard deviation {sigma}, needs to be finite and not negative")));
+    }
+    Ok(())
+}
+
+fn check_loop(parts: &DiskParts) -> Result<(), MeshError> {
+    let n = parts.boundary.len();
+    if parts.arc.len() != n {
+        return Err(malformed(format!("{} arc lengths for {n} boundary vertices", parts.arc.len())));
+    }
+    let c = parts.corners.map(|c| c as usize);
+    if c[0] != 0 || c[1] <= c[0] || c[2] <= c[1] || c[3] <= c[2] || c[3] >= n {
+        return Err(malformed(format!("corners {c:?} in a loop of {n}: need 0 first, then growing")));
+    }
+    let mut seen = vec![false; parts.vertices.len()];
+    for &v in &parts.boundary {
+        match seen.get_mut(v as usize) {
+            None => return Err(malformed(format!("boundary vertex {v} of {}", seen.len()))),
+            Some(true) => return Err(not_a_disk(format!("the boundary passes vertex {v} twice"))),
+            Some(slot) => *slot = true,
+        }
+    }
+    for k in 0..4 {
+        let arc = &parts.arc[c[k]..if k == 3 { n } else { c[k + 1] }];
+        let grows = arc.windows(2).all(|w| w[1] > w[0]) && parts.edge_length[k] > arc[arc.len() - 1];
+        if arc[0] != 0.0 || !grows || !parts.edge_length[k].is_finite() {
+            return Err(malformed(format!(
+                "arc length of edge {k} does not grow from 0 to the edge's length"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// One disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
+/// together through edges, and V - E + F = 1. Together these exclude pinched vertices and handles.
+fn check_topology(triangles: &[[u32; 3]], boundary: &[u32], n_vertices: usize) -> Result<(), MeshError> {
+    let mut left_of = BTreeMap::new();
+    let mut used = vec![false; n_vertices];
+    for (t, tri) in triangles.iter().enumerate() {
+        for i in 0..3 {
+            let (a, b) = (tri[i], tri[(i + 1) % 3]);
+            *used.get_mut(a as usize).ok_or_else(|| malformed(format!("triangle {t} names vertex {a}")))? =
+                true;
+            if a == b || left_of.insert((a, b), t).is_some() {
+                return Err(not_a_disk(format!("edge {a}-{b} is used twice in one direction")));
+            }
+        }
+    }
+    if let Some(v) = used.iter().position(|u| !u) {
+        return Err(not_a_disk(format!("vertex {v} belongs to no triangle")));
+    }
+    let open = left_of.keys().filter(|(a, b)| !left_of.contains_key(&(*b, *a))).count();
+    let matched = (0..boundary.len())
+        .filter(|&i| {
+            let (a, b) = (boundary[i], boundary[(i + 1) % boundary.len()]);
+            left_of.contains_key(&(a, b)) && !left_of.contains_key(&(b, a))
+        })
+        .count();
+    if open != boundary.len() || matched != open {
+        return Err(not_a_disk(format!(
+            "{open} open edges, {matched} of them on the loop of {}",
+            boundary.len()
+        )));
+    }
+    let n_edges = (left_of.len() + open) / 2;
+    if n_vertices + triangles.len() != n_edges + 1 || reached(triangles, &left_of) != triangles.len() {
+        return Err(not_a_disk(format!("{n_vertices} vertices, {n_edges} edges, {} faces", triangles.len())));
+    }
+    Ok(())
+}
+
+/// Number of triangles that hang together with the first one through edges.
+fn reached(triangles: &[[u32; 3]], left_of: &BTreeMap<(u32, u32), usize>) -> usize {
+    let mut seen = vec![false; triangles.len()];
+    let mut stack: Vec<usize> = (0..triangles.len().min(1)).collect();
+    let mut count = 0;
+    while let Some(t) = stack.pop() {
+        if std::mem::replace(&mut seen[t], true) {
+            continue;
+        }
+        count += 1;
+        let tri = triangles[t];
+        stack.extend((0..3).filter_map(|i| left_of.get(&(tri[(i + 1) % 3], tri[i])).copied()));
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit square of four triangles around its centre.
+    fn square() -> DiskParts {
+        DiskParts {
+            vertices: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]]
+                .map(|[x, y]| Vec3::new(x, y, 0.0))
+                .to_vec(),
+            triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+            boundary: vec![0, 1, 2, 3],
+            corners: [0, 1, 2, 3],
+            arc: vec![0.0; 4],
+            edge_length: [1.0; 4],
+            width: 1.0,
+            height: 1.0,
+            thickness: 0.04,
+            ..DiskParts::default()
+        }
+    }
+
+    fn refused(change: impl FnOnce(&mut DiskParts)) -> String {
+        let mut parts = square();
+        change(&mut parts);
+        DiskMesh::new(parts).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn a_square_is_a_disk_with_four_edges() {
+        let mesh = DiskMesh::new(square()).expect("a disk");
+        let edges: Vec<_> = (0..4).map(|k| mesh.edge(k).collect::<Vec<_>>()).collect();
+        assert_eq!(edges, [[0, 1], [1, 2], [2, 3], [3, 4]]);
+    }
+
+    #[test]
+    fn wrong_topology_is_refused() {
+        assert!(refused(|p| p.triangles.truncate(3)).contains("open edges"));
+        assert!(refused(|p| p.triangles[0] = [1, 0, 4]).contains("used twice"));
+        assert!(refused(|p| p.vertices.push(Vec3::zeros())).contains("vertex 5 belongs to no triangle"));
+        assert!(refused(|p| p.boundary = vec![0, 3, 2, 1]).contains("open edges"));
+        assert!(refused(|p| p.boundary = vec![0, 1, 2, 1]).contains("passes vertex 1 twice"));
+        let shell = |p: &mut DiskParts| {
+            p.vertices.extend([Vec3::x(), Vec3::y(), Vec3::z(), Vec3::zeros()]);
+            p.triangles.extend([[5, 6, 7], [5, 8, 6], [6, 8, 7], [7, 8, 5]]);
+        };
+        assert!(refused(shell).contains("9 vertices"));
+    }
+
+    #[test]
+    fn wrong_numbers_are_refused() {
+        assert!(refused(|p| p.vertices[3].y = f64::NAN).contains("vertex 3 is not finite"));
+        assert!(refused(|p| p.corners = [0, 2, 1, 3]).contains("corners"));
+        assert!(refused(|p| p.triangles[2][0] = 77).contains("names vertex 77"));
+        assert!(refused(|p| p.edge_length[1] = 0.0).contains("edge 1"));
+        assert!(refused(|p| p.thickness = 0.0).contains("thickness"));
+        assert!(refused(|p| p.edge_sigma[0] = -1.0).contains("standard deviation"));
+    }
+}
