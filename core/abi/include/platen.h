@@ -224,7 +224,7 @@ typedef struct platen_mesh {
   uint32_t struct_size, reserved;
   double width, height, thickness;
   uint32_t corners[4]; /* places in the boundary loop of (0,0), (W,0), (W,H), (0,H) */
-  double corner_sigma[8], edge_sigma[4];
+  double corner_sigma[8], edge_sigma[4], edge_length[4];
   platen_span vertices;  /* f64, 3 each, mid-surface */
   platen_span triangles; /* u32, 3 each, counter-clockwise seen from the scanner */
   platen_span boundary;  /* u32, loop counter-clockwise from corner (0,0) */
@@ -233,7 +233,7 @@ typedef struct platen_mesh {
 
 typedef struct platen_chart {
   uint32_t struct_size, reserved;
-  platen_span uv, strain, sigma; /* f64: 2, 3, 2 each; strain and sigma may be absent */
+  platen_span uv, strain, sigma; /* f64: 2, 3 (e_uu, e_vv, e_uv), 2 each; strain and sigma may be absent */
 } platen_chart;
 
 typedef struct platen_grid {

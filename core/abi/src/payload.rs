@@ -161,6 +161,8 @@ header! {
         corner_sigma: [f64; 8],
         /// Standard deviation across each edge.
         edge_sigma: [f64; 4],
+        /// Arc length of the edges v = 0, u = W, v = H, u = 0.
+        edge_length: [f64; 4],
         /// f64, 3 a vertex.
         vertices: Span,
         /// u32, 3 a triangle, counter-clockwise seen from the scanner.
@@ -179,7 +181,7 @@ header! {
         reserved: u32,
         /// f64, 2 a vertex.
         uv: Span,
-        /// f64, 3 a vertex: larger and smaller principal membrane strain, direction of the larger from u towards v. May be absent.
+        /// f64, 3 a vertex: membrane strain e_uu, e_vv, e_uv (tensor component), positive when stretched. May be absent.
         strain: Span,
         /// f64, 2 a vertex: standard deviation of u and v. May be absent.
         sigma: Span,

@@ -58,7 +58,12 @@ mod scanner;
 pub mod shim;
 mod sink;
 
+#[cfg(feature = "flattening")]
+mod flattening;
+
 pub use error::{Error, ErrorKind, Result};
+#[cfg(feature = "flattening")]
+pub use flattening::Flattening;
 pub use info::Info;
 pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};

@@ -443,3 +443,6 @@ macro_rules! export {
         pub static platen_entry_1: $crate::abi::Entry = $crate::shim::entry::<$shim>();
     };
 }
+
+#[cfg(feature = "flattening")]
+pub use crate::flattening::FlatteningPlugin;
