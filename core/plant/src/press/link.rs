@@ -1,0 +1,166 @@
+//! How the press is reached, and how patient the host is with it.
+
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The way to the press and its time limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Link {
+    /// What the words travel over.
+    pub transport: Transport,
+    /// Modbus unit id; gateways need the real one.
+    pub unit: u8,
+    /// Longest wait for a connection.
+    pub connect_timeout: Duration,
+    /// Longest wait for an answer.
+    pub response_timeout: Duration,
+    /// Wait after connecting, for controllers that are not ready at once.
+    pub pause_after_connect: Duration,
+    /// Wait between two requests.
+    pub pause_between_requests: Duration,
+    /// Time from one poll to the next.
+    pub poll: Duration,
+    /// Shortest wait before a new attempt to connect.
+    pub backoff_min: Duration,
+    /// Longest wait before a new attempt to connect.
+    pub backoff_max: Duration,
+}
+
+/// What the words travel over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Transport {
+    /// Modbus TCP.
+    Tcp(Socket),
+    /// Modbus RTU on a serial port.
+    Rtu(Serial, Quiet),
+    /// Modbus RTU frames through a serial-to-Ethernet gateway.
+    RtuOverTcp(Socket, Quiet),
+}
+
+/// A TCP address: the press's when the host is the client, the one to listen on when it is the server.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Socket {
+    /// Name or address.
+    pub host: String,
+    /// Port.
+    pub port: u16,
+    /// Server role only: who may connect; empty admits loopback only.
+    pub peers: Vec<IpAddr>,
+}
+
+/// A serial port.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Serial {
+    /// Device file; a name in `/dev/serial/by-id` survives replugging.
+    pub device: PathBuf,
+    /// Bits per second.
+    pub baud: u32,
+    /// Parity bit.
+    pub parity: Parity,
+    /// Stop bits, 1 or 2.
+    pub stop_bits: u8,
+    /// The adapter hears what it sends: strip it.
+    pub echo: bool,
+}
+
+/// Parity bit of a serial line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Parity {
+    /// Even, the Modbus default.
+    #[default]
+    Even,
+    /// Odd.
+    Odd,
+    /// None.
+    None,
+}
+
+/// How long a serial line must be silent after a fault before the next request.
+///
+/// RTU frames have no transaction number: an answer that comes late is taken for the next one, without any error.
+/// Longer than the longest answer time of the press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quiet(pub Duration);
+
+impl Link {
+    /// Modbus TCP to `host:port` with default time limits.
+    pub fn tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
+        let socket = Socket { host: host.into(), port, peers: Vec::new() };
+        Self::with_defaults(
+            Transport::Tcp(socket),
+            unit,
+            Duration::from_millis(300),
+            Duration::from_millis(20),
+        )
+    }
+
+    /// Modbus RTU on a serial port; the response time follows from the line's speed.
+    pub fn rtu(serial: Serial, unit: u8) -> Self {
+        let response = serial.response_timeout();
+        let quiet = Quiet(response.mul_f64(1.5));
+        Self::with_defaults(Transport::Rtu(serial, quiet), unit, response, Duration::from_millis(100))
+    }
+
+    /// Modbus RTU frames over TCP to a gateway.
+    pub fn rtu_over_tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
+        let socket = Socket { host: host.into(), port, peers: Vec::new() };
+        let transport = Transport::RtuOverTcp(socket, Quiet(Duration::from_millis(750)));
+        Self::with_defaults(transport, unit, Duration::from_millis(500), Duration::from_millis(100))
+    }
+
+    fn with_defaults(transport: Transport, unit: u8, response_timeout: Duration, poll: Duration) -> Self {
+        Self {
+            transport,
+            unit,
+            connect_timeout: Duration::from_secs(1),
+            response_timeout,
+            pause_after_connect: Duration::ZERO,
+            pause_between_requests: Duration::ZERO,
+            poll,
+            backoff_min: Duration::from_millis(100),
+            backoff_max: Duration::from_secs(1),
+        }
+    }
+
+    /// Whether requests and answers share a slow line: then each poll reads as little as it can.
+    pub fn is_serial(&self) -> bool {
+        !matches!(self.transport, Transport::Tcp(_))
+    }
+
+    /// The silence that must follow a fault; `None` where transaction numbers make it needless.
+    pub fn quiet(&self) -> Option<Duration> {
+        match &self.transport {
+            Transport::Tcp(_) => None,
+            Transport::Rtu(_, Quiet(quiet)) | Transport::RtuOverTcp(_, Quiet(quiet)) => Some(*quiet),
+        }
+    }
+}
+
+impl Serial {
+    /// A port with the Modbus defaults: even parity, one stop bit.
+    pub fn new(device: impl Into<PathBuf>, baud: u32) -> Self {
+        Self { device: device.into(), baud, parity: Parity::Even, stop_bits: 1, echo: false }
+    }
+
+    /// Line time of `bytes` characters of 11 bits.
+    pub fn line_time(&self, bytes: u32) -> Duration {
+        Duration::from_secs_f64(f64::from(bytes) * 11.0 / f64::from(self.baud.max(1)))
+    }
+
+    /// Three times the line time of the longest exchange (60 registers written, 139 bytes) and 60 ms for the press
+    /// to think and the adapter to buffer.
+    pub fn response_timeout(&self) -> Duration {
+        self.line_time(139) * 3 + Duration::from_millis(60)
+    }
+}
+
+impl std::fmt::Display for Transport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Tcp(socket) => write!(f, "{}:{}", socket.host, socket.port),
+            Self::Rtu(serial, _) => write!(f, "{} at {} baud", serial.device.display(), serial.baud),
+            Self::RtuOverTcp(socket, _) => write!(f, "{}:{} (RTU)", socket.host, socket.port),
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! A register map: two blocks of registers and what stands in them.
+
+use std::collections::BTreeMap;
+
+use super::{Field, Input, Output};
+
+/// The Modbus kinds of register that a block can be read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Table {
+    /// Holding registers: read by function 3, written by function 16.
+    #[default]
+    Holding,
+    /// Input registers: read by function 4, never written.
+    Input,
+}
+
+impl Table {
+    /// The name in the plant file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Holding => "holding",
+            Self::Input => "input",
+        }
+    }
+}
+
+/// Consecutive registers that travel in one transaction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Block {
+    /// Kind of the registers.
+    pub table: Table,
+    /// Address of the first, zero-based, as on the wire.
+    pub start: u16,
+    /// How many.
+    pub count: u16,
+}
+
+impl Block {
+    /// Addresses of the block; `u32` because the end may lie behind the last address.
+    pub fn addresses(&self) -> std::ops::Range<u32> {
+        u32::from(self.start)..u32::from(self.start) + u32::from(self.count)
+    }
+}
+
+/// How addresses are counted in the plant file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum AddressBase {
+    /// As on the wire, from 0.
+    #[default]
+    Zero,
+    /// As in many manuals, from 1.
+    One,
+    /// Modicon notation with five digits: 40001 is the first holding register, 30001 the first input register.
+    FiveDigits,
+    /// Modicon notation with six digits: 400001 and 300001.
+    SixDigits,
+}
+
+impl AddressBase {
+    /// The number that the plant file has for the first register of `table`.
+    pub fn first(self, table: Table) -> u32 {
+        match (self, table) {
+            (Self::Zero, _) => 0,
+            (Self::One, _) => 1,
+            (Self::FiveDigits, Table::Holding) => 40_001,
+            (Self::FiveDigits, Table::Input) => 30_001,
+            (Self::SixDigits, Table::Holding) => 400_001,
+            (Self::SixDigits, Table::Input) => 300_001,
+        }
+    }
+}
+
+/// How much of a handshake the press can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Profile {
+    /// Stroke numbers, sessions and both heartbeats: the built-in map of version 1.
+    #[default]
+    Pph1,
+    /// One command word (1 go) and one status word (2 running, 4 done, 8 error); no stroke numbers.
+    Word,
+    /// Bits for trigger, busy, valid and acknowledge; no stroke numbers.
+    Bits,
+}
+
+impl Profile {
+    /// The name in the plant file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pph1 => "pph-1",
+            Self::Word => "word",
+            Self::Bits => "bits",
+        }
+    }
+}
+
+/// The stroke counter of the press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counter {
+    /// Largest number; the next one is `first`.
+    pub wrap: u16,
+    /// The number after `wrap`: 1 where 0 means "no stroke", else 0.
+    pub first: u16,
+}
+
+impl Counter {
+    /// How many strokes lie between two numbers, `to` included: 1 for neighbours, 0 for the same.
+    pub fn distance(&self, from: u16, to: u16) -> u32 {
+        let period = u32::from(self.wrap) - u32::from(self.first) + 1;
+        (u32::from(to) + period - u32::from(from) % period) % period
+    }
+}
+
+impl Default for Counter {
+    fn default() -> Self {
+        Self { wrap: u16::MAX, first: 1 }
+    }
+}
+
+/// What stands where in the registers of a press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegisterMap {
+    /// How much of a handshake the press can do.
+    pub profile: Profile,
+    /// How addresses are counted where people read them.
+    pub address_base: AddressBase,
+    /// Registers that the host reads.
+    pub read: Block,
+    /// Registers that the host writes.
+    pub write: Block,
+    /// What the press tells the host; a field that is not here does not exist on this press.
+    pub inputs: BTreeMap<Input, Field>,
+    /// What the host tells the press.
+    pub outputs: BTreeMap<Output, Field>,
+    /// The stroke counter of the press.
+    pub counter: Counter,
+}
+
+impl RegisterMap {
+    /// The field of an input, if this press has it.
+    pub fn input(&self, input: Input) -> Option<&Field> {
+        self.inputs.get(&input)
+    }
+
+    /// The field of an output, if this press has it.
+    pub fn output(&self, output: Output) -> Option<&Field> {
+        self.outputs.get(&output)
+    }
+
+    /// Whether strokes have numbers of the press's own. Without them a stroke is a rising trigger, the host
+    /// counts, and a missed stroke cannot be noticed.
+    pub fn counts_strokes(&self) -> bool {
+        self.inputs.contains_key(&Input::StrokeId)
+    }
+
+    /// Registers from the start of the read block that hold what every poll needs: the whole handshake but the
+    /// press's data. On a serial line only these are read until something happens.
+    pub fn fast_count(&self) -> u16 {
+        const FAST: [Input; 14] = [
+            Input::MapVersion,
+            Input::Heartbeat,
+            Input::Enable,
+            Input::Trigger,
+            Input::Ack,
+            Input::Abort,
+            Input::ErrorReset,
+            Input::ClearToScan,
+            Input::PartEnd,
+            Input::Rescan,
+            Input::Baseline,
+            Input::StrokeId,
+            Input::SessionId,
+            Input::PressId,
+        ];
+        let end = |input: &Input| {
+            let field = self.inputs.get(input)?;
+            Some(field.place.offset()? + field.registers())
+        };
+        FAST.iter().filter_map(end).max().unwrap_or(self.read.count).min(self.read.count)
+    }
+}

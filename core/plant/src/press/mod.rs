@@ -1,0 +1,185 @@
+//! `[press]` of the plant file: how the press is reached, what stands in its registers, what the host may do there.
+
+mod allow;
+mod field;
+mod link;
+mod map;
+mod names;
+mod pph1;
+
+pub use allow::{Refused, WriteAllow};
+pub use field::{Dimension, Field, Kind, Place, Unit, WordOrder};
+pub use link::{Link, Parity, Quiet, Serial, Socket, Transport};
+pub use map::{AddressBase, Block, Counter, Profile, RegisterMap, Table};
+pub use names::{Input, Measure, Output};
+pub use pph1::{INVALID_I16, INVALID_U16, MAP_VERSION, STATIONS};
+
+use std::time::Duration;
+
+/// Everything the plant file says about one press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    /// Name for people.
+    pub name: String,
+    /// Plant number; compared with the press's own where its map has one, against the wrong controller.
+    pub press_id: u16,
+    /// Who asks and who answers on Modbus.
+    pub role: Role,
+    /// How much the host does.
+    pub mode: Mode,
+    /// The way to the press.
+    pub link: Link,
+    /// The only registers that may ever be written.
+    pub write: WriteAllow,
+    /// What stands where.
+    pub map: RegisterMap,
+    /// Time limits of the handshake.
+    pub timeouts: Timeouts,
+    /// What to do when things go wrong.
+    pub policy: Policy,
+}
+
+impl Press {
+    /// A press with the built-in map, measured, with every default.
+    pub fn pph1(name: impl Into<String>, press_id: u16, link: Link) -> Self {
+        let map = RegisterMap::pph1();
+        Self {
+            name: name.into(),
+            press_id,
+            role: Role::Client,
+            mode: Mode::Measure,
+            link,
+            write: WriteAllow::block(&map.write),
+            map,
+            timeouts: Timeouts::default(),
+            policy: Policy::default(),
+        }
+    }
+}
+
+/// Who asks and who answers on Modbus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Role {
+    /// The host asks, the press answers.
+    #[default]
+    Client,
+    /// The press asks, the host answers: for controllers that have client blocks only.
+    Server,
+}
+
+/// How much the host does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mode {
+    /// The press is left alone.
+    Off,
+    /// Reads and decodes; never writes, never scans.
+    Listen,
+    /// Scans and judges; what it would write is only logged.
+    DryRun,
+    /// The whole handshake with results marked as simulated.
+    Simulate,
+    /// Everything.
+    #[default]
+    Measure,
+}
+
+impl Mode {
+    /// All of them with their names in the plant file.
+    pub const ALL: [(&'static str, Self); 5] = [
+        ("off", Self::Off),
+        ("listen", Self::Listen),
+        ("dry-run", Self::DryRun),
+        ("simulate", Self::Simulate),
+        ("measure", Self::Measure),
+    ];
+
+    /// Whether registers may be written at all.
+    pub fn writes(self) -> bool {
+        matches!(self, Self::Simulate | Self::Measure)
+    }
+}
+
+/// Time limits of the handshake.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timeouts {
+    /// Longest scan; `None`: the driver's own estimate times 1.5.
+    pub scan: Option<Duration>,
+    /// Longest evaluation.
+    pub evaluate: Duration,
+    /// Longest wait for the press's acknowledge.
+    pub ack: Duration,
+    /// Longest wait for the press to drop its acknowledge.
+    pub clear: Duration,
+    /// Time between two heartbeats of the host.
+    pub heartbeat: Duration,
+    /// The press is dead when its heartbeat stands still this long.
+    pub heartbeat_in: Duration,
+}
+
+impl Default for Timeouts {
+    fn default() -> Self {
+        Self {
+            scan: None,
+            evaluate: Duration::from_secs(10),
+            ack: Duration::from_secs(5),
+            clear: Duration::from_secs(2),
+            heartbeat: Duration::from_millis(500),
+            heartbeat_in: Duration::from_secs(2),
+        }
+    }
+}
+
+/// What to do when things go wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Policy {
+    /// A stroke came while another was being measured, or the stroke number jumped.
+    pub on_missed_stroke: OnMissed,
+    /// The host was restarted in the middle of a scan.
+    pub on_interrupted: OnInterrupted,
+    /// Results cannot be recorded.
+    pub on_storage_full: OnStorageFull,
+    /// The press does not acknowledge a result.
+    pub no_ack: NoAck,
+}
+
+/// What a missed stroke does beside being counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OnMissed {
+    /// A warning.
+    #[default]
+    Warn,
+    /// An error until error_reset; measuring goes on.
+    Error,
+    /// An error, and no stroke is accepted until error_reset.
+    Block,
+}
+
+/// What becomes of a stroke whose scan a restart interrupted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OnInterrupted {
+    /// Reported as not measured.
+    #[default]
+    Report,
+    /// Scanned again as a new attempt if the press still waits.
+    Rescan,
+}
+
+/// What happens while results cannot be recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OnStorageFull {
+    /// Results still go to the press, marked as not recorded.
+    #[default]
+    Degrade,
+    /// No stroke is accepted.
+    Stop,
+}
+
+/// What happens to a result that the press does not acknowledge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NoAck {
+    /// It stays until the next stroke, which acknowledges it.
+    #[default]
+    NextStroke,
+    /// No stroke is accepted until it is acknowledged.
+    Hold,
+}

@@ -1,0 +1,142 @@
+//! What the host must remember across a power cut, and the trait of whoever remembers it.
+//!
+//! Each promise to the press is journalled before it is made: no stroke is echoed as accepted before
+//! [`Record::Accepted`] is on the disk, no result is published before [`Record::Finished`] is.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Publication, StrokeData, StrokeKey};
+
+/// A step of a stroke that must survive a power cut.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Record {
+    /// The stroke is going to be echoed as accepted, then scanned.
+    Accepted {
+        /// Its identity.
+        key: StrokeKey,
+        /// Key of its record.
+        run_id: u32,
+        /// What the press said about it.
+        data: Box<StrokeData>,
+    },
+    /// The scan is taken.
+    Scanned {
+        /// The stroke.
+        key: StrokeKey,
+    },
+    /// The result is going to be published.
+    Finished(Box<Publication>),
+    /// The press has the result, or never will.
+    Acked {
+        /// The stroke.
+        key: StrokeKey,
+        /// How it ended.
+        how: Acked,
+    },
+}
+
+impl Record {
+    /// The stroke it belongs to.
+    pub fn key(&self) -> StrokeKey {
+        match self {
+            Self::Accepted { key, .. } | Self::Scanned { key } | Self::Acked { key, .. } => *key,
+            Self::Finished(publication) => publication.key,
+        }
+    }
+
+    /// The step it records.
+    pub fn stage(&self) -> Stage {
+        match self {
+            Self::Accepted { .. } => Stage::Accepted,
+            Self::Scanned { .. } => Stage::Scanned,
+            Self::Finished(_) => Stage::Finished,
+            Self::Acked { .. } => Stage::Acked,
+        }
+    }
+}
+
+/// How far a stroke has come, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Stage {
+    /// Accepted, not scanned.
+    Accepted,
+    /// Scanned, not judged.
+    Scanned,
+    /// Judged, the press may not have it.
+    Finished,
+    /// Done with.
+    Acked,
+}
+
+/// How the press took a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Acked {
+    /// It raised its acknowledge.
+    Explicit,
+    /// It went on to the next stroke while the result stood in the registers.
+    NextStroke,
+    /// It went on, or restarted, before the result was in the registers: the record alone has it.
+    Never,
+}
+
+/// The last stroke in the journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its identity.
+    pub key: StrokeKey,
+    /// Key of its record.
+    pub run_id: u32,
+    /// What the press said about it.
+    pub data: StrokeData,
+    /// How far it came.
+    pub stage: Stage,
+    /// Its result; `Some` from [`Stage::Finished`] on.
+    pub publication: Option<Publication>,
+}
+
+/// What the journal knows when the host starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recalled {
+    /// Random number of this installation, drawn once, never 0: tells a second host on the same press.
+    pub owner: u16,
+    /// `seq` of the last publication, 0 before the first.
+    pub result_seq: u16,
+    /// Run id of the last stroke, 0 before the first.
+    pub run_id: u32,
+    /// The last stroke accepted.
+    pub last: Option<Entry>,
+    /// Highest attempt per stroke number in the session of [`last`](Self::last): the strokes not to scan again.
+    pub attempts: BTreeMap<u16, u16>,
+}
+
+impl Recalled {
+    /// The journal of a new installation.
+    pub fn empty(owner: u16) -> Self {
+        Self { owner, result_seq: 0, run_id: 0, last: None, attempts: BTreeMap::new() }
+    }
+}
+
+/// Remembers strokes of one press. Opened by one process at a time: a second host must fail to open it.
+///
+/// Called on a thread that may block.
+pub trait Journal: Send + 'static {
+    /// Why something could not be remembered.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// What was remembered last.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    fn recall(&mut self) -> Result<Recalled, Self::Error>;
+
+    /// Remembers one step; returns when it would survive a power cut.
+    ///
+    /// Recording the same step of the same stroke again is no error and changes nothing.
+    ///
+    /// # Errors
+    /// When it cannot be written. Later steps of the same stroke may still come.
+    fn record(&mut self, record: &Record) -> Result<(), Self::Error>;
+}
