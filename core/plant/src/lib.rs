@@ -1,3 +1,29 @@
 //! Plant and plate TOML to checked types, every fault at once with file, line and column.
+//!
+//! [`Document`] parses a file and keeps every key and value with its place; [`Table`] and [`Field`] read it, key by key,
+//! and collect the faults; [`check_options`] does the same for the options of a plugin, from the plugin's own
+//! declarations. What leaves this crate is checked and in metres, radians and seconds.
+//!
+//! It reads files and nothing else: no socket, no clock, no plugin.
 
+mod document;
+mod error;
+mod fault;
+mod field;
+mod nearest;
+mod node;
+mod option;
 pub mod press;
+mod source;
+mod syntax;
+mod table;
+mod unit;
+
+pub use document::{Document, Reported};
+pub use error::Error;
+pub use fault::{Fault, Faults};
+pub use field::{Field, Located};
+pub use option::{OptionDecl, OptionType, RawOptions, Value, check_options, deprecated_options};
+pub use source::Place;
+pub use table::Table;
+pub use unit::Unit;

@@ -1,0 +1,149 @@
+//! A TOML file that is being read, and the faults found so far.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::sync::Arc;
+
+use toml::de::DeTable;
+
+use crate::node::{Entry, Node};
+use crate::source::{Place, Source};
+use crate::syntax::Syntax;
+use crate::{Error, Fault, Faults, Table};
+
+/// Proof that a fault has been recorded: only [`Document`] makes it, so a reader that returns it cannot refuse a file
+/// without a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reported(());
+
+/// A TOML file that is being read: [`Document::root`] gives the cursor, [`Document::finish`] the result or all faults.
+///
+/// Faults are collected, never returned one by one: a reader goes on after a fault, and takes its values out with `?`
+/// only when everything has been read.
+///
+/// ```
+/// use platen_plant::{Document, Faults, Reported, Table};
+///
+/// struct Oven { name: String, heat_kw: f64 }
+///
+/// fn oven(mut table: Table<'_>) -> Result<Oven, Reported> {
+///     let name = table.string("name").required();
+///     let heat_kw = table.number("heat_kw").in_range(1.0..=500.0).or(90.0);
+///     table.finish();
+///     Ok(Oven { name: name?, heat_kw: heat_kw? })
+/// }
+///
+/// let document = Document::parse("oven.toml", "name = 7\nheat_kw = 900\ncolor = 'red'\n");
+/// let oven = oven(document.root());
+/// let faults = document.finish(oven).err().unwrap();
+/// assert_eq!(
+///     faults.to_string(),
+///     "oven.toml:1:8: name: found 7, expected a text\n\
+///      oven.toml:2:11: heat_kw: found 900, allowed 1 to 500\n\
+///      oven.toml:3:1: color: unknown key; allowed here: name, heat_kw"
+/// );
+/// ```
+#[derive(Debug)]
+pub struct Document {
+    source: Arc<Source>,
+    path: String,
+    root: Node,
+    syntax: Syntax,
+    faults: RefCell<Vec<Fault>>,
+}
+
+impl Document {
+    /// Parses `text`; syntax faults are kept until [`Document::finish`], and the rest of the file is read as well.
+    pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
+        let source = Source { file: file.into(), text: text.into() };
+        let (table, errors) = DeTable::parse_recoverable(&source.text);
+        let mut root = Node::from_table(&table);
+        let syntax = Syntax::sort_out(&source, &root, &errors);
+        root.break_values(&syntax.broken);
+        let faults = RefCell::new(syntax.faults.clone());
+        Self { source: Arc::new(source), path: String::new(), root, syntax, faults }
+    }
+
+    /// Reads and parses a file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] when the file cannot be opened, [`Error::Faulty`] with the place when it is not UTF-8.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let file = path.display().to_string();
+        let bytes =
+            std::fs::read(path).map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self::parse(file, text)),
+            Err(error) => {
+                let valid = error.utf8_error().valid_up_to();
+                let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
+                let document = Self::parse(file, text);
+                document.faults.borrow_mut().clear();
+                let place = Place { key: String::new(), offset: valid };
+                let message = "this byte is not UTF-8; save the file as UTF-8".to_owned();
+                let fault = document.source.fault(&place, message);
+                Err(Error::Faulty(Faults::one(fault)))
+            }
+        }
+    }
+
+    /// A part of a file that was read before, to be read on its own.
+    pub(crate) fn part(source: Arc<Source>, path: String, root: Node) -> Self {
+        Self { source, path, root, syntax: Syntax::default(), faults: RefCell::default() }
+    }
+
+    /// The cursor over the whole file.
+    pub fn root(&self) -> Table<'_> {
+        Table::new(self, Place { key: self.path.clone(), offset: self.root.span.start }, self.entries())
+    }
+
+    /// Records a fault at `place`.
+    pub fn fault(&self, place: &Place, message: impl Into<String>) -> Reported {
+        if !self.syntax.covers(place.offset) {
+            self.faults.borrow_mut().push(self.source.fault(place, message.into()));
+        }
+        Reported(())
+    }
+
+    /// Records that a key is missing, unless broken syntax may have swallowed it.
+    pub(crate) fn missing(&self, place: &Place) -> Reported {
+        if self.syntax.broken.is_empty() {
+            return self.fault(place, "missing");
+        }
+        Reported(())
+    }
+
+    /// The proof for a value that a syntax fault has broken.
+    pub(crate) fn broken(&self) -> Reported {
+        Reported(())
+    }
+
+    /// `file:line:column` of a place, to name it in a message about another one.
+    pub fn locate(&self, place: &Place) -> String {
+        let (line, column) = self.source.line_column(place.offset);
+        format!("{}:{line}:{column}", self.source.file)
+    }
+
+    /// `result` when nothing at all was wrong, else every fault.
+    ///
+    /// # Errors
+    /// All faults of the file in the order of their places.
+    pub fn finish<T>(self, result: Result<T, Reported>) -> Result<T, Faults> {
+        match (Faults::new(self.faults.into_inner()), result) {
+            (None, Ok(value)) => Ok(value),
+            (Some(faults), _) => Err(faults),
+            (None, Err(Reported(()))) => {
+                let place = Place { key: self.path, offset: 0 };
+                Err(Faults::one(self.source.fault(&place, "cannot be read".to_owned())))
+            }
+        }
+    }
+
+    pub(crate) fn source(&self) -> &Arc<Source> {
+        &self.source
+    }
+
+    fn entries(&self) -> &[Entry] {
+        self.root.as_table().unwrap_or_default()
+    }
+}

@@ -1,0 +1,352 @@
+//! Options of a plugin: declared by the plugin, given in the plant file, checked here.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::document::{Document, Reported};
+use crate::field::Field;
+use crate::nearest;
+use crate::node::{Entry, Kind, Node};
+use crate::source::{Place, Source};
+use crate::table::{Table, number};
+use crate::unit::Unit;
+use crate::{Fault, Faults};
+
+/// Type of an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OptionType {
+    /// true or false.
+    Bool,
+    /// A whole number, with or without a unit.
+    Int,
+    /// A number, with or without a unit.
+    Float,
+    /// A text.
+    String,
+    /// One of [`OptionDecl::choices`].
+    Choice,
+    /// A file or folder; a relative one starts at the folder of the plant file.
+    Path,
+    /// A time, in seconds unless [`OptionDecl::unit`] says another unit of time.
+    Duration,
+    /// A list of numbers.
+    Floats,
+}
+
+/// What a plugin says of one of its options.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OptionDecl {
+    /// The key: `[a-z][a-z0-9_]*`.
+    pub name: String,
+    /// Its type.
+    pub kind: OptionType,
+    /// Symbol of the unit of a bare number, as [`Unit::find`] knows it; none for numbers that measure nothing.
+    pub unit: Option<String>,
+    /// Smallest number allowed, of each element of a list, in the declared unit.
+    pub min: Option<f64>,
+    /// Largest number allowed.
+    pub max: Option<f64>,
+    /// The words of a choice.
+    pub choices: Vec<String>,
+    /// The value where the plant file gives none, as TOML text.
+    pub default: Option<String>,
+    /// Whether the plant file must give it.
+    pub required: bool,
+    /// One sentence on what it does.
+    pub doc: String,
+    /// Whether its value is kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
+    pub secret: bool,
+    /// Whether most users never need it.
+    pub advanced: bool,
+    /// What to use in its place, for an option that will go.
+    pub deprecated: Option<String>,
+}
+
+/// A checked value. Numbers are in the declared unit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// Of a [`OptionType::Bool`].
+    Bool(bool),
+    /// Of a [`OptionType::Int`].
+    Int(i64),
+    /// Of a [`OptionType::Float`] or [`OptionType::Duration`].
+    Float(f64),
+    /// Of a [`OptionType::String`] or [`OptionType::Choice`].
+    String(String),
+    /// Of a [`OptionType::Path`].
+    Path(PathBuf),
+    /// Of a [`OptionType::Floats`].
+    Floats(Vec<f64>),
+}
+
+/// The options of one plugin as they stand in the plant file, unchecked, with their places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawOptions {
+    source: Arc<Source>,
+    place: Place,
+    entries: Vec<Entry>,
+}
+
+impl RawOptions {
+    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Vec<Entry>) -> Self {
+        Self { source, place, entries }
+    }
+
+    /// No options at all, for a plugin that no plant file names; `owner` stands for the file in messages.
+    pub fn none(owner: &str) -> Self {
+        let source = Source { file: owner.to_owned(), text: String::new() };
+        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Vec::new())
+    }
+
+    fn document(&self) -> Document {
+        let span = self.place.offset..self.place.offset;
+        let root = Node { span, kind: Kind::Table(self.entries.clone()) };
+        Document::part(self.source.clone(), self.place.key.clone(), root)
+    }
+
+    fn folder(&self) -> &Path {
+        Path::new(&self.source.file).parent().unwrap_or(Path::new(""))
+    }
+}
+
+/// Checks the options given for `plugin` against its declarations.
+///
+/// Returns one value per option that is given or has a default, in the order of the declarations.
+///
+/// # Errors
+/// Every fault: unknown names with the nearest, wrong types, units and ranges, missing required options; also a default
+/// that its own declaration refuses, under the plugin's name in place of a file.
+pub fn check_options(
+    plugin: &str,
+    raw: &RawOptions,
+    declared: &[OptionDecl],
+) -> Result<Vec<(String, Value)>, Faults> {
+    let document = raw.document();
+    let mut table = document.root();
+    let mut faults = Vec::new();
+    let mut values = Vec::new();
+    for option in declared {
+        match option.read(&mut table, raw.folder()).optional() {
+            Ok(Some(value)) => values.push((option.name.clone(), value)),
+            Ok(None) => match option.default_value(plugin) {
+                Ok(default) => values.extend(default.map(|value| (option.name.clone(), value))),
+                Err(bad) => faults.extend(bad),
+            },
+            Err(Reported { .. }) => {}
+        }
+        if option.required && !table.has(&option.name) {
+            document.fault(
+                &Place { key: format!("{}.{}", raw.place.key, option.name), offset: raw.place.offset },
+                format!("missing; {plugin} needs it: {} ({option})", option.doc),
+            );
+        }
+    }
+    table.finish_with(|near, _| unknown(plugin, near, declared));
+    if let Err(more) = document.finish(Ok(())) {
+        faults.extend(more);
+    }
+    match Faults::new(faults) {
+        Some(faults) => Err(faults),
+        None => Ok(values),
+    }
+}
+
+/// One warning for each option given that its plugin wants to drop.
+pub fn deprecated_options(raw: &RawOptions, declared: &[OptionDecl]) -> Vec<Fault> {
+    let old = |entry: &Entry| {
+        let option = declared.iter().find(|option| option.name == entry.key)?;
+        let instead = option.deprecated.as_ref()?;
+        let place = Place { key: format!("{}.{}", raw.place.key, entry.key), offset: entry.key_span.start };
+        Some(raw.source.fault(&place, format!("will be dropped; use {instead}")))
+    };
+    raw.entries.iter().filter_map(old).collect()
+}
+
+fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String {
+    if let Some(option) = declared.iter().find(|option| near == Some(option.name.as_str())) {
+        return format!("{plugin} has no such option; did you mean \"{}\" ({option})?", option.name);
+    }
+    match declared.iter().map(|option| option.name.as_str()).collect::<Vec<_>>() {
+        names if names.is_empty() => format!("{plugin} has no options"),
+        names => format!("{plugin} has no such option; allowed here: {}", names.join(", ")),
+    }
+}
+
+impl OptionDecl {
+    /// What is wrong with the declaration itself; nothing for a sound one.
+    pub fn faults(&self) -> Vec<String> {
+        let mut faults = Vec::new();
+        let mut must = |sound: bool, rule: &str| {
+            if !sound {
+                faults.push(format!("option {:?}: {rule}", self.name));
+            }
+        };
+        let mut letters = self.name.chars();
+        let named = letters.next().is_some_and(|c| c.is_ascii_lowercase())
+            && letters.all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+        must(named, "the name must be a small letter, then small letters, digits and underscores");
+        must(!self.doc.trim().is_empty(), "a sentence of documentation is missing");
+        must(self.unit.as_deref().is_none_or(|unit| Unit::find(unit).is_some()), "the unit is unknown");
+        must(
+            self.kind != OptionType::Duration || self.unit().measures() == "time",
+            "the unit must be one of time",
+        );
+        must(self.min.zip(self.max).is_none_or(|(min, max)| min <= max), "min is above max");
+        must(
+            (self.kind == OptionType::Choice) != self.choices.is_empty(),
+            "choices are for a choice, which needs them",
+        );
+        must(!(self.required && self.default.is_some()), "a required option has no default");
+        must(!self.secret || self.kind == OptionType::String, "only a text can be secret");
+        faults.extend(
+            self.default_value(&format!("default of option {:?}", self.name))
+                .err()
+                .into_iter()
+                .flatten()
+                .map(|fault| fault.to_string()),
+        );
+        faults
+    }
+
+    /// The default, checked as a given value is. Relative paths are left as they are.
+    fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
+        let Some(default) = &self.default else { return Ok(None) };
+        let document = Document::parse(plugin, format!("{} = {default}", self.name));
+        let mut table = document.root();
+        let value = self.read(&mut table, Path::new("")).optional();
+        document.finish(value)
+    }
+
+    fn read<'d>(&self, table: &mut Table<'d>, folder: &Path) -> Field<'d, Value> {
+        let name = &self.name;
+        match self.kind {
+            OptionType::Bool => table.bool(name).map(Value::Bool),
+            OptionType::Int => table.node(name).try_map(|node| self.int(node)).map(Value::Int),
+            OptionType::Float | OptionType::Duration => {
+                table.node(name).try_map(|node| self.float(node)).map(Value::Float)
+            }
+            OptionType::String if self.secret => {
+                table.node(name).try_map(|node| secret(node, folder)).map(Value::String)
+            }
+            OptionType::String => table.string(name).map(Value::String),
+            OptionType::Choice => table.string(name).check(|found| self.chosen(found)).map(Value::String),
+            OptionType::Path => table.name(name).map(|path| Value::Path(folder.join(path))),
+            OptionType::Floats => table.node(name).try_map(|node| self.floats(node)).map(Value::Floats),
+        }
+    }
+
+    fn chosen(&self, found: &str) -> Result<(), String> {
+        if self.choices.iter().any(|choice| choice == found) {
+            return Ok(());
+        }
+        let near = nearest::suggestion(found, self.choices.iter().map(String::as_str));
+        Err(format!("found {found:?}, allowed {}{near}", self.choices.join(", ")))
+    }
+
+    fn int(&self, node: &Node) -> Result<i64, String> {
+        let value = match &node.kind {
+            Kind::Integer(value) => *value,
+            Kind::String(text) if self.unit.is_some() => whole(self.unit().read(text)?).ok_or_else(|| {
+                format!("found {text:?}, expected a whole number of {}", self.unit().symbol())
+            })?,
+            _ => return Err(format!("found {}, expected a whole number", node.describe())),
+        };
+        self.in_range(value as f64, node).map(|()| value)
+    }
+
+    fn float(&self, node: &Node) -> Result<f64, String> {
+        let measured = self.unit.is_some() || self.kind == OptionType::Duration;
+        let value = match (&node.kind, number(node)) {
+            (_, Some(value)) => value,
+            (Kind::String(text), _) if measured => self.unit().read(text)?,
+            _ => return Err(format!("found {}, expected a number", node.describe())),
+        };
+        self.in_range(value, node).map(|()| value)
+    }
+
+    fn floats(&self, node: &Node) -> Result<Vec<f64>, String> {
+        match &node.kind {
+            Kind::Array(values) => values.iter().map(|value| self.float(value)).collect(),
+            _ => Err(format!("found {}, expected a list of numbers", node.describe())),
+        }
+    }
+
+    fn in_range(&self, value: f64, node: &Node) -> Result<(), String> {
+        let inside = self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max);
+        if inside { Ok(()) } else { Err(format!("found {}, allowed {}", node.describe(), self.range())) }
+    }
+
+    /// The declared unit; seconds for a duration without one.
+    fn unit(&self) -> Unit {
+        let default = if self.kind == OptionType::Duration { Unit::SECOND } else { Unit::ONE };
+        self.unit.as_deref().and_then(Unit::find).unwrap_or(default)
+    }
+
+    /// `0.6 to 130 m`.
+    fn range(&self) -> String {
+        let range = match (self.min, self.max) {
+            (Some(min), Some(max)) => format!("{min} to {max}"),
+            (Some(min), None) => format!("at least {min}"),
+            (None, Some(max)) => format!("at most {max}"),
+            (None, None) => return String::new(),
+        };
+        if self.unit() == Unit::ONE { range } else { format!("{range} {}", self.unit().symbol()) }
+    }
+}
+
+/// `float in m, 0.6 to 130 m, default 30`.
+impl fmt::Display for OptionDecl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.kind {
+            OptionType::Bool => "true or false",
+            OptionType::Int => "whole number",
+            OptionType::Float => "number",
+            OptionType::String => "text",
+            OptionType::Choice => "choice",
+            OptionType::Path => "path",
+            OptionType::Duration => "duration",
+            OptionType::Floats => "list of numbers",
+        })?;
+        if self.unit() != Unit::ONE {
+            write!(f, " in {}", self.unit().symbol())?;
+        }
+        if !self.choices.is_empty() {
+            write!(f, ": {}", self.choices.join(", "))?;
+        }
+        if self.min.or(self.max).is_some() {
+            write!(f, ", {}", self.range())?;
+        }
+        match &self.default {
+            Some(default) => write!(f, ", default {default}"),
+            None if self.required => f.write_str(", required"),
+            None => Ok(()),
+        }
+    }
+}
+
+fn whole(value: f64) -> Option<i64> {
+    // Beyond 2^53 a f64 no longer holds every whole number.
+    (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
+}
+
+/// A secret text, or where to find it: never quoted in a message.
+fn secret(node: &Node, folder: &Path) -> Result<String, String> {
+    let entries = match &node.kind {
+        Kind::String(text) => return Ok(text.clone()),
+        Kind::Table(entries) => entries.as_slice(),
+        _ => &[],
+    };
+    match entries {
+        [Entry { key, value: Node { kind: Kind::String(name), .. }, .. }] if key == "env" => {
+            std::env::var(name).map_err(|_| format!("the environment variable {name} is not set"))
+        }
+        [Entry { key, value: Node { kind: Kind::String(name), .. }, .. }] if key == "file" => {
+            let path = folder.join(name);
+            let text =
+                std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+            Ok(text.trim_end_matches(['\r', '\n']).to_owned())
+        }
+        _ => Err("expected a text, { env = \"NAME\" } or { file = \"PATH\" }".to_owned()),
+    }
+}

@@ -1,0 +1,51 @@
+//! The text of a file and the places in it.
+
+use std::ops::Range;
+
+use crate::Fault;
+
+/// The text of one file, with its name as the user gave it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Source {
+    pub(crate) file: String,
+    pub(crate) text: String,
+}
+
+/// A key and the place in the file that a message about it points at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// Dotted path of the key.
+    pub(crate) key: String,
+    /// Byte in the text.
+    pub(crate) offset: usize,
+}
+
+impl Place {
+    /// The dotted path of the key, as in [`Fault::key`].
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+}
+
+impl Source {
+    /// Line and column of a byte, both from 1, the column in characters.
+    pub(crate) fn line_column(&self, offset: usize) -> (usize, usize) {
+        let before = self.text.get(..offset).unwrap_or(&self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = before.bytes().filter(|&byte| byte == b'\n').count() + 1;
+        (line, before[line_start..].trim_start_matches('\u{feff}').chars().count() + 1)
+    }
+
+    /// Bytes of the line that holds `offset`, without its line end.
+    pub(crate) fn line_of(&self, offset: usize) -> Range<usize> {
+        let (before, after) = self.text.split_at_checked(offset).unwrap_or((&self.text, ""));
+        let start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        start..before.len() + after.find('\n').unwrap_or(after.len())
+    }
+
+    /// A fault at `place`.
+    pub(crate) fn fault(&self, place: &Place, message: String) -> Fault {
+        let (line, column) = self.line_column(place.offset);
+        Fault { file: self.file.clone(), line, column, key: place.key.clone(), message }
+    }
+}

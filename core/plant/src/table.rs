@@ -1,0 +1,241 @@
+//! The cursor over one table: every key is asked for by name and type, and what was not asked for is a fault.
+
+use crate::RawOptions;
+use crate::document::{Document, Reported};
+use crate::field::{Field, Located};
+use crate::nearest;
+use crate::node::{Entry, Kind, Node};
+use crate::source::Place;
+
+/// A cursor over one table of a [`Document`].
+///
+/// Each getter notes its key as known; [`Table::finish`] reports the others. Read every key, then finish, then take the
+/// values out: see [`Document`].
+#[derive(Debug)]
+#[must_use = "finish() reports the unknown keys"]
+pub struct Table<'d> {
+    document: &'d Document,
+    place: Place,
+    entries: &'d [Entry],
+    asked: Vec<String>,
+}
+
+impl<'d> Table<'d> {
+    pub(crate) fn new(document: &'d Document, place: Place, entries: &'d [Entry]) -> Self {
+        Self { document, place, entries, asked: Vec::new() }
+    }
+
+    /// The document, to record faults between several keys.
+    pub fn document(&self) -> &'d Document {
+        self.document
+    }
+
+    /// Where the table stands.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// Every key that stands in the table, for tables whose keys are names given by the user.
+    pub fn keys(&self) -> impl Iterator<Item = &'d str> + use<'d> {
+        self.entries.iter().map(|entry| entry.key.as_str())
+    }
+
+    /// Whether the key is there, of whatever type; does not count as asking for it.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.iter().any(|entry| entry.key == key)
+    }
+
+    /// true or false.
+    pub fn bool(&mut self, key: &str) -> Field<'d, bool> {
+        self.value(key, "true or false", |node| match node.kind {
+            Kind::Bool(value) => Some(value),
+            _ => None,
+        })
+    }
+
+    /// A whole number.
+    pub fn integer(&mut self, key: &str) -> Field<'d, i64> {
+        self.value(key, "a whole number", |node| match node.kind {
+            Kind::Integer(value) => Some(value),
+            _ => None,
+        })
+    }
+
+    /// A finite number, with or without decimals.
+    pub fn number(&mut self, key: &str) -> Field<'d, f64> {
+        self.value(key, "a number", number)
+    }
+
+    /// A text.
+    pub fn string(&mut self, key: &str) -> Field<'d, String> {
+        self.value(key, "a text", string)
+    }
+
+    /// A text that is not empty.
+    pub fn name(&mut self, key: &str) -> Field<'d, String> {
+        self.value(key, "a text", string).check(|name| match name.trim().is_empty() {
+            true => Err("is empty, must have at least one character".to_owned()),
+            false => Ok(()),
+        })
+    }
+
+    /// One of a few words.
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Field<'d, T> {
+        let words = || choices.iter().map(|(word, _)| *word);
+        self.value(key, "a text", string).try_map(|found| {
+            choices.iter().find(|(word, _)| *word == found).map(|(_, value)| *value).ok_or_else(|| {
+                let near = nearest::suggestion(&found, words());
+                format!("found {found:?}, allowed {}{near}", words().collect::<Vec<_>>().join(", "))
+            })
+        })
+    }
+
+    /// A list of finite numbers.
+    pub fn numbers(&mut self, key: &str) -> Field<'d, Vec<f64>> {
+        self.value(key, "a list of numbers", |node| match &node.kind {
+            Kind::Array(values) => values.iter().map(number).collect(),
+            _ => None,
+        })
+    }
+
+    /// A list of exactly `N` finite numbers: a point, a direction.
+    pub fn vector<const N: usize>(&mut self, key: &str) -> Field<'d, [f64; N]> {
+        self.value(key, &format!("a list of {N} numbers"), |node| match &node.kind {
+            Kind::Array(values) => values.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
+            _ => None,
+        })
+    }
+
+    /// A list of texts, each with its place.
+    pub fn strings(&mut self, key: &str) -> Field<'d, Vec<Located<String>>> {
+        let place = self.place_of(key);
+        self.value(key, "a list of texts", |node| match &node.kind {
+            Kind::Array(values) => values
+                .iter()
+                .map(|value| {
+                    let place = Place { key: place.clone(), offset: value.span.start };
+                    Some(Located { value: string(value)?, place })
+                })
+                .collect(),
+            _ => None,
+        })
+    }
+
+    /// A table below this one, missing or not.
+    pub fn table(&mut self, key: &str) -> Field<'d, Table<'d>> {
+        let (document, path) = (self.document, self.place_of(key));
+        self.value(key, "a table", |node| {
+            let place = Place { key: path.clone(), offset: node.span.start };
+            node.as_table().map(|entries| Self::new(document, place, entries))
+        })
+    }
+
+    /// A table below this one in which every key has a default: a missing one reads as empty.
+    ///
+    /// # Errors
+    /// [`Reported`] when the key is there and is no table.
+    pub fn section(&mut self, key: &str) -> Result<Table<'d>, Reported> {
+        let empty = Self::new(self.document, self.missing_place(key), &[]);
+        Ok(self.table(key).optional()?.unwrap_or(empty))
+    }
+
+    /// The elements of an array of tables (`[[key]]`) in their order; a missing one has none.
+    ///
+    /// # Errors
+    /// [`Reported`] when the key is there and is no array of tables.
+    pub fn tables(&mut self, key: &str) -> Result<Vec<Table<'d>>, Reported> {
+        let (document, path) = (self.document, self.place_of(key));
+        let field = self.value(key, &format!("tables, each under [[{path}]]"), |node| match &node.kind {
+            Kind::Array(values) => values
+                .iter()
+                .enumerate()
+                .map(|(i, value)| {
+                    let place = Place { key: format!("{path}[{}]", i + 1), offset: value.span.start };
+                    value.as_table().map(|entries| Self::new(document, place, entries))
+                })
+                .collect(),
+            _ => None,
+        });
+        Ok(field.optional()?.unwrap_or_default())
+    }
+
+    /// A table of options that only a plugin can check, kept with its places; a missing one is empty.
+    ///
+    /// # Errors
+    /// [`Reported`] when the key is there and is no table.
+    pub fn options(&mut self, key: &str) -> Result<RawOptions, Reported> {
+        let table = self.section(key)?;
+        Ok(RawOptions::new(self.document.source().clone(), table.place, table.entries.to_vec()))
+    }
+
+    /// The raw value, for keys that accept several types.
+    pub(crate) fn node(&mut self, key: &str) -> Field<'d, &'d Node> {
+        self.asked.push(key.to_owned());
+        let Some(entry) = self.entries.iter().find(|entry| entry.key == key) else {
+            return Field::new(self.document, self.missing_place(key), Ok(None));
+        };
+        let place = Place { key: self.place_of(key), offset: entry.value.span.start };
+        let state = match entry.value.kind {
+            Kind::Broken => Err(self.document.broken()),
+            _ => Ok(Some(&entry.value)),
+        };
+        Field::new(self.document, place, state)
+    }
+
+    /// Reports every key that was never asked for, with the nearest one that could have been meant.
+    pub fn finish(self) {
+        self.finish_with(|near, asked| match near {
+            Some(near) => format!("unknown key; did you mean \"{near}\"?"),
+            None => format!("unknown key; allowed here: {}", asked.join(", ")),
+        });
+    }
+
+    /// As [`Table::finish`], with the message made from the nearest key, if any, and all that were asked for.
+    pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
+        for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
+            let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };
+            let near = nearest::nearest(&entry.key, self.asked.iter().map(String::as_str));
+            self.document.fault(&place, message(near, &self.asked));
+        }
+    }
+
+    /// The value of `key` as `read` takes it; where `read` refuses, the fault names what was expected.
+    fn value<T>(
+        &mut self,
+        key: &str,
+        expected: &str,
+        read: impl FnOnce(&'d Node) -> Option<T>,
+    ) -> Field<'d, T> {
+        self.node(key).try_map(|node| {
+            read(node).ok_or_else(|| format!("found {}, expected {expected}", node.describe()))
+        })
+    }
+
+    fn missing_place(&self, key: &str) -> Place {
+        Place { key: self.place_of(key), offset: self.place.offset }
+    }
+
+    fn place_of(&self, key: &str) -> String {
+        match self.place.key.as_str() {
+            "" => key.to_owned(),
+            path => format!("{path}.{key}"),
+        }
+    }
+}
+
+/// A finite number; NaN and infinities are no measure of anything.
+pub(crate) fn number(node: &Node) -> Option<f64> {
+    match node.kind {
+        // Whole numbers above 2^53 lose their last digits; no quantity of a plant has so many.
+        Kind::Integer(value) => Some(value as f64),
+        Kind::Float(value) => value.is_finite().then_some(value),
+        _ => None,
+    }
+}
+
+fn string(node: &Node) -> Option<String> {
+    match &node.kind {
+        Kind::String(value) => Some(value.clone()),
+        _ => None,
+    }
+}
