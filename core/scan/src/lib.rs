@@ -11,6 +11,7 @@
 mod angle;
 mod column;
 mod lattice;
+pub mod orient;
 mod scan;
 
 pub use angle::{Direction, Window, wrap_azimuth};

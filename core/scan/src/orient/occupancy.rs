@@ -1,0 +1,117 @@
+//! Which cells were seen, one bit each, in memory that the number of cells justifies.
+
+use std::collections::VecDeque;
+
+/// Words of 64 rows that may be held beyond the cells seen; a lattice of any sensible filling stays far below.
+const FREE_WORDS: u64 = 1 << 16;
+/// Words that every cell seen justifies: 16 words are 1024 rows for one cell.
+const WORDS_PER_CELL: u64 = 16;
+
+/// A set of (row, column) that grows from wherever it is first touched.
+#[derive(Debug, Default)]
+pub(super) struct Occupancy {
+    columns: Vec<Rows>,
+    words: u64,
+    cells: u64,
+}
+
+/// Rows of one column: bit `r % 64` of word `r / 64 - base`.
+#[derive(Debug, Default)]
+struct Rows {
+    base: usize,
+    words: VecDeque<u64>,
+}
+
+/// What inserting a cell found.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Inserted {
+    /// A new cell.
+    New,
+    /// A cell that was there.
+    Twice,
+    /// A cell so far from all others that no memory is spent on it.
+    TooFar,
+}
+
+impl Occupancy {
+    /// Adds a cell.
+    pub(super) fn insert(&mut self, row: u32, column: u32) -> Inserted {
+        let column = column as usize;
+        if column >= self.columns.len() {
+            self.columns.resize_with(column + 1, Rows::default);
+        }
+        let word = row as usize / 64;
+        let rows = &mut self.columns[column];
+        let missing = rows.missing(word) as u64;
+        self.words += missing;
+        if self.words > FREE_WORDS + WORDS_PER_CELL * self.cells {
+            return Inserted::TooFar;
+        }
+        if missing > 0 {
+            rows.reach(word);
+        }
+        let bit = 1 << (row % 64);
+        let held = &mut rows.words[word - rows.base];
+        if *held & bit != 0 {
+            return Inserted::Twice;
+        }
+        *held |= bit;
+        self.cells += 1;
+        Inserted::New
+    }
+}
+
+impl Rows {
+    /// Words to add until `word` is held.
+    fn missing(&self, word: usize) -> usize {
+        if self.words.is_empty() {
+            1
+        } else if word < self.base {
+            self.base - word
+        } else {
+            (word + 1).saturating_sub(self.base + self.words.len())
+        }
+    }
+
+    fn reach(&mut self, word: usize) {
+        if self.words.is_empty() {
+            self.base = word;
+        }
+        while word < self.base {
+            self.words.push_front(0);
+            self.base -= 1;
+        }
+        while word >= self.base + self.words.len() {
+            self.words.push_back(0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_is_new_once_whatever_the_order() {
+        let mut seen = Occupancy::default();
+        for row in (0..500).rev().chain(500..900) {
+            assert_eq!(seen.insert(row, 7), Inserted::New, "row {row}");
+        }
+        assert_eq!(seen.insert(499, 7), Inserted::Twice);
+        assert_eq!(seen.insert(499, 6), Inserted::New);
+    }
+
+    #[test]
+    fn scattered_indices_buy_no_memory() {
+        let mut seen = Occupancy::default();
+        let mut refused = false;
+        for column in 0..100_000_u32 {
+            seen.insert(0, column);
+            refused |= seen.insert(131_071, column) == Inserted::TooFar;
+            if refused {
+                break;
+            }
+        }
+        assert!(refused && seen.words < 200_000);
+    }
+}

@@ -1,0 +1,101 @@
+//! First look at the cells of a stored lattice.
+
+use super::occupancy::{Inserted, Occupancy};
+use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
+use crate::State;
+
+/// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
+pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;
+
+/// Range that no scanner of this trade reaches in metres, and nearly every one exceeds in millimetres.
+pub(super) const FAR: f64 = 350.0;
+/// Range below which no terrestrial scanner measures in metres.
+pub(super) const NEAR: f64 = 0.2;
+
+/// Sums over all cells of a stored lattice: one pass, memory by rows, columns and one bit per cell.
+#[derive(Debug, Default)]
+pub struct Survey {
+    pub(super) rows: Vec<Line>,
+    pub(super) columns: Vec<Line>,
+    occupancy: Occupancy,
+    pub(super) cells: u64,
+    pub(super) valid: u64,
+    pub(super) unflagged: u64,
+    pub(super) not_finite: u64,
+    pub(super) above_far: u64,
+    pub(super) above_far_mm: u64,
+    pub(super) below_near: u64,
+    pub(super) intensity: super::intensity::Observed,
+}
+
+impl Survey {
+    /// Takes a cell into account.
+    ///
+    /// # Errors
+    /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
+    pub fn add(&mut self, cell: &RawCell) -> Result<(), OrientError> {
+        let (row, column) = (cell.row, cell.column);
+        if row.max(column) > MAX_INDEX {
+            return Err(OrientError::IndexOutOfRange { row, column, max: MAX_INDEX + 1 });
+        }
+        match self.occupancy.insert(row, column) {
+            Inserted::New => {}
+            Inserted::Twice => return Err(OrientError::DuplicateCell { row, column }),
+            Inserted::TooFar => return Err(self.too_sparse()),
+        }
+        self.cells += 1;
+        let row = line(&mut self.rows, row);
+        let column = line(&mut self.columns, column);
+        row.cells += 1;
+        column.cells += 1;
+        if true_state(cell) == State::Valid {
+            let [x, y, z] = cell.xyz;
+            let range = (x * x + y * y + z * z).sqrt();
+            let elevation = z.atan2(x.hypot(y));
+            let unit = cell.xyz.map(|c| c / range);
+            row.add(unit, elevation);
+            column.add(unit, elevation);
+            self.valid += 1;
+            self.above_far += u64::from(range > FAR);
+            self.above_far_mm += u64::from(range > FAR * 1000.0);
+            self.below_near += u64::from(range < NEAR);
+            self.intensity.add(cell.intensity);
+        } else if cell.state == State::Valid {
+            let finite = cell.xyz.iter().all(|c| c.abs() < NO_NUMBER);
+            self.not_finite += u64::from(!finite);
+            self.unflagged += u64::from(finite);
+        }
+        Ok(())
+    }
+
+    /// Cells seen so far.
+    pub fn cells(&self) -> u64 {
+        self.cells
+    }
+
+    pub(super) fn too_sparse(&self) -> OrientError {
+        let n_rows = stored_range(&self.rows).len() as u32;
+        let n_columns = stored_range(&self.columns).len() as u32;
+        OrientError::TooSparse {
+            cells: self.cells,
+            n_rows,
+            n_columns,
+            percent: 100.0 * self.cells as f64 / (f64::from(n_rows) * f64::from(n_columns)),
+            needed: 100.0 * super::decide::MIN_FILL,
+        }
+    }
+}
+
+/// First to last line that holds a cell.
+pub(super) fn stored_range(lines: &[Line]) -> std::ops::Range<usize> {
+    let first = lines.iter().position(|line| line.cells > 0).unwrap_or(0);
+    first..lines.len()
+}
+
+fn line(lines: &mut Vec<Line>, number: u32) -> &mut Line {
+    let number = number as usize;
+    if number >= lines.len() {
+        lines.resize(number + 1, Line::default());
+    }
+    &mut lines[number]
+}
