@@ -42,7 +42,7 @@ impl Scale {
     /// Chooses the scale: the declared one where it holds what was seen, else the smallest usual scale that
     /// does, else what was seen. The sentence says what a reader of the figures should know.
     pub(super) fn choose(declared: Option<(f64, f64)>, seen: &Observed) -> (Self, Option<String>) {
-        if seen.min > seen.max || seen.min == seen.max {
+        if seen.min >= seen.max {
             let range = (seen.min.is_finite()).then(|| format!("all intensities are {}", seen.min));
             return (Self { low: 0.0, high: 65535.0, range: (0, 65535) }, range);
         }
