@@ -12,6 +12,7 @@ pub mod mesh;
 mod outline;
 mod patch;
 mod plate;
+pub mod task;
 
 pub use flatten::{Chart, Flatten, FlattenError};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
