@@ -1,0 +1,120 @@
+//! The document that says all about a plate: blank, shape, pose.
+
+use crate::{PlateError, Shape, Vec3};
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+/// Everything about a plate at one moment. This is what description files hold and what the press serves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlateState {
+    /// The rectangle it was cut as.
+    pub blank: Blank,
+    /// Shape of the mid-surface.
+    pub shape: Shape,
+    /// Where it lies.
+    #[serde(default)]
+    pub pose: Pose,
+    /// Strokes applied so far.
+    #[serde(default)]
+    pub strokes: u32,
+}
+
+/// The rectangle and the painted markers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Blank {
+    /// Extent along u.
+    pub width_mm: f64,
+    /// Extent along v.
+    pub height_mm: f64,
+    /// Thickness.
+    pub thickness_mm: f64,
+    /// Middles of dark discs painted on the upper face, (u, v).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub markers_mm: Vec<[f64; 2]>,
+}
+
+/// Where the plate's middle lies and how the plate is turned, scanner frame.
+///
+/// The plate is rolled about x, then pitched about y, then turned by `yaw_deg` about z (so that its u axis points
+/// there), then moved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// Middle of the mid-surface.
+    pub centre_mm: [f64; 3],
+    /// About z, counter-clockwise from above.
+    pub yaw_deg: f64,
+    /// About y.
+    #[serde(default)]
+    pub pitch_deg: f64,
+    /// About x.
+    #[serde(default)]
+    pub roll_deg: f64,
+}
+
+impl Default for Pose {
+    /// Seven metres in front of a scanner that stands 3.6 m above the plate.
+    fn default() -> Self {
+        Self { centre_mm: [6000.0, 0.0, -3600.0], yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 }
+    }
+}
+
+impl Pose {
+    /// The transform from the plate's local frame to the scanner frame, metres.
+    pub fn scanner_from_plate(&self) -> Isometry3<f64> {
+        let [x, y, z] = self.centre_mm.map(|c| c * 1e-3);
+        let turn = UnitQuaternion::from_euler_angles(
+            self.roll_deg.to_radians(),
+            self.pitch_deg.to_radians(),
+            self.yaw_deg.to_radians(),
+        );
+        Isometry3::from_parts(Translation3::new(x, y, z), turn)
+    }
+
+    /// The pose of a rotation (columns: local x, y, z in the scanner frame) and a position, metres.
+    pub fn from_parts(rotation: &Rotation3<f64>, centre: Vec3) -> Self {
+        let (roll, pitch, yaw) = rotation.euler_angles();
+        Self {
+            centre_mm: (centre * 1e3).into(),
+            yaw_deg: yaw.to_degrees(),
+            pitch_deg: pitch.to_degrees(),
+            roll_deg: roll.to_degrees(),
+        }
+    }
+}
+
+impl PlateState {
+    /// A flat plate of these measures in the default pose.
+    pub fn flat(width_mm: f64, height_mm: f64, thickness_mm: f64) -> Self {
+        Self {
+            blank: Blank { width_mm, height_mm, thickness_mm, markers_mm: Vec::new() },
+            shape: Shape::Flat,
+            pose: Pose::default(),
+            strokes: 0,
+        }
+    }
+
+    /// Checks the measures of the blank and the numbers of the pose.
+    pub(crate) fn check(&self) -> Result<(), PlateError> {
+        let blank = &self.blank;
+        for (key, found, least) in [
+            ("blank.width_mm", blank.width_mm, 10.0),
+            ("blank.height_mm", blank.height_mm, 10.0),
+            ("blank.thickness_mm", blank.thickness_mm, 0.1),
+        ] {
+            if !(found.is_finite() && found >= least && found <= 1e5) {
+                return Err(PlateError::Description { key, found, advice: "write a length in millimetres" });
+            }
+        }
+        let pose = &self.pose;
+        let angles = [pose.yaw_deg, pose.pitch_deg, pose.roll_deg];
+        match pose.centre_mm.into_iter().chain(angles).find(|value| !value.is_finite()) {
+            Some(found) => {
+                Err(PlateError::Description { key: "pose", found, advice: "write finite numbers" })
+            }
+            None => Ok(()),
+        }
+    }
+}
