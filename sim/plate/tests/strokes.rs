@@ -1,4 +1,5 @@
 //! Strokes, programmes and documents.
+#![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{
     Handling, Plan, Plate, PlateError, PlateState, Pose, Programme, Reply, Request, Shape, Stroke,
