@@ -1,8 +1,8 @@
 //! A triangulated disk with four corners: the type that every flattening may rely on.
 
-use std::collections::BTreeMap;
 use std::ops::Deref;
 
+use super::topology::check_topology;
 use crate::Vec3;
 
 /// What a [`DiskMesh`] is made of: plain data, unchecked.
@@ -91,11 +91,11 @@ impl Deref for DiskMesh {
     }
 }
 
-fn malformed(what: impl Into<String>) -> MeshError {
+pub(super) fn malformed(what: impl Into<String>) -> MeshError {
     MeshError::Malformed { what: what.into() }
 }
 
-fn not_a_disk(what: impl Into<String>) -> MeshError {
+pub(super) fn not_a_disk(what: impl Into<String>) -> MeshError {
     MeshError::NotADisk { what: what.into() }
 }
 
@@ -142,60 +142,6 @@ fn check_loop(parts: &DiskParts) -> Result<(), MeshError> {
         }
     }
     Ok(())
-}
-
-/// One disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
-/// together through edges, and V - E + F = 1. Together these exclude pinched vertices and handles.
-fn check_topology(triangles: &[[u32; 3]], boundary: &[u32], n_vertices: usize) -> Result<(), MeshError> {
-    let mut left_of = BTreeMap::new();
-    let mut used = vec![false; n_vertices];
-    for (t, tri) in triangles.iter().enumerate() {
-        for i in 0..3 {
-            let (a, b) = (tri[i], tri[(i + 1) % 3]);
-            *used.get_mut(a as usize).ok_or_else(|| malformed(format!("triangle {t} names vertex {a}")))? =
-                true;
-            if a == b || left_of.insert((a, b), t).is_some() {
-                return Err(not_a_disk(format!("edge {a}-{b} is used twice in one direction")));
-            }
-        }
-    }
-    if let Some(v) = used.iter().position(|u| !u) {
-        return Err(not_a_disk(format!("vertex {v} belongs to no triangle")));
-    }
-    let open = left_of.keys().filter(|(a, b)| !left_of.contains_key(&(*b, *a))).count();
-    let matched = (0..boundary.len())
-        .filter(|&i| {
-            let (a, b) = (boundary[i], boundary[(i + 1) % boundary.len()]);
-            left_of.contains_key(&(a, b)) && !left_of.contains_key(&(b, a))
-        })
-        .count();
-    if open != boundary.len() || matched != open {
-        return Err(not_a_disk(format!(
-            "{open} open edges, {matched} of them on the loop of {}",
-            boundary.len()
-        )));
-    }
-    let n_edges = (left_of.len() + open) / 2;
-    if n_vertices + triangles.len() != n_edges + 1 || reached(triangles, &left_of) != triangles.len() {
-        return Err(not_a_disk(format!("{n_vertices} vertices, {n_edges} edges, {} faces", triangles.len())));
-    }
-    Ok(())
-}
-
-/// Number of triangles that hang together with the first one through edges.
-fn reached(triangles: &[[u32; 3]], left_of: &BTreeMap<(u32, u32), usize>) -> usize {
-    let mut seen = vec![false; triangles.len()];
-    let mut stack: Vec<usize> = (0..triangles.len().min(1)).collect();
-    let mut count = 0;
-    while let Some(t) = stack.pop() {
-        if std::mem::replace(&mut seen[t], true) {
-            continue;
-        }
-        count += 1;
-        let tri = triangles[t];
-        stack.extend((0..3).filter_map(|i| left_of.get(&(tri[(i + 1) % 3], tri[i])).copied()));
-    }
-    count
 }
 
 #[cfg(test)]
