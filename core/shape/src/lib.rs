@@ -12,6 +12,7 @@ pub mod mesh;
 mod outline;
 mod patch;
 mod plate;
+pub mod sparse;
 pub mod task;
 
 pub use flatten::{Chart, Flatten, FlattenError};
