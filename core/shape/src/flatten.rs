@@ -1,5 +1,16 @@
 //! The flattening as the pipeline sees it: every vertex of the mid-surface mesh gets its place on the rectangle.
 
+#[cfg(any(test, feature = "closed-form"))]
+pub mod closed_form;
+mod domain;
+mod laplace;
+
+pub use domain::{
+    UnfitMesh, boundary_by_arc_length, check_fit, edges_of_vertices, first_turned, interior, plane_picture,
+    signed_area,
+};
+pub use laplace::{cotangents, fixed_boundary};
+
 use crate::mesh::DiskMesh;
 
 /// A flattening's result: the place of every mesh vertex on the original rectangle.
@@ -74,3 +85,6 @@ impl Chart {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

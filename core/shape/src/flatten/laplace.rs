@@ -1,0 +1,64 @@
+//! Maps with the boundary fixed: minimise sum k_ij |p_i - p_j|^2 over the interior vertices.
+
+use super::domain::{interior, plane_picture};
+use crate::mesh::DiskMesh;
+use crate::sparse::{Graph, SparseError, Spd};
+
+/// Cotangents of the three angles of every triangle of the mesh, at its corners in their order.
+pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
+    let of_triangle = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+        let double_area = (b - a).cross(&(c - a)).norm();
+        [(b - a).dot(&(c - a)), (c - b).dot(&(a - b)), (a - c).dot(&(b - c))].map(|dot| dot / double_area)
+    };
+    mesh.triangles.iter().map(of_triangle).collect()
+}
+
+/// The map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at `boundary`
+/// (one place per boundary vertex, in the loop's order); metres.
+///
+/// `weights` has three numbers per triangle, one per corner; k_ij is the sum over the one or two triangles at the edge
+/// ij of the number at the corner opposite to it. Cotangents give the harmonic map (paper, equation 4), ones Tutte's.
+/// Cost: one sparse Cholesky factorisation, two right-hand sides.
+///
+/// # Errors
+/// [`SparseError::NotPositiveDefinite`] when the weights do not hold the interior.
+pub fn fixed_boundary(
+    mesh: &DiskMesh,
+    weights: &[[f64; 3]],
+    boundary: &[[f64; 2]],
+) -> Result<Vec<[f64; 2]>, SparseError> {
+    let (node_of, inner) = interior(mesh);
+    let picture = plane_picture(mesh);
+    let points: Vec<_> = inner.iter().map(|&v| picture[v as usize]).collect();
+    let mut uv = vec![[0.0; 2]; mesh.vertices.len()];
+    for (&v, &place) in mesh.boundary.iter().zip(boundary) {
+        uv[v as usize] = place;
+    }
+    let mut spd = Spd::<1>::analyse(&Graph::of_elements(&mesh.triangles, &node_of, inner.len()), &points)?;
+    let mut rhs = [vec![[0.0]; inner.len()], vec![[0.0]; inner.len()]];
+    let mut diagonal = vec![0.0; inner.len()];
+    for (t, k) in mesh.triangles.iter().zip(weights) {
+        for corner in 0..3 {
+            let ends = [t[(corner + 1) % 3], t[(corner + 2) % 3]];
+            let nodes = ends.map(|v| node_of[v as usize]);
+            for (node, other) in [(nodes[0], ends[1]), (nodes[1], ends[0])] {
+                let Some(node) = node else { continue };
+                diagonal[node as usize] += k[corner];
+                if node_of[other as usize].is_none() {
+                    (0..2).for_each(|c| rhs[c][node as usize][0] += k[corner] * uv[other as usize][c]);
+                }
+            }
+            if let [Some(i), Some(j)] = nodes {
+                spd.add(i, j, [[-k[corner]]]);
+            }
+        }
+    }
+    diagonal.iter().enumerate().for_each(|(i, &k)| spd.add(i as u32, i as u32, [[k]]));
+    spd.factor()?;
+    spd.solve(&mut rhs)?;
+    for (&v, (u, v_coordinate)) in inner.iter().zip(rhs[0].iter().zip(&rhs[1])) {
+        uv[v as usize] = [u[0], v_coordinate[0]];
+    }
+    Ok(uv)
+}
