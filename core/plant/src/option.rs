@@ -63,21 +63,34 @@ pub struct OptionDecl {
     pub deprecated: Option<String>,
 }
 
-/// A checked value. Numbers are in the declared unit.
+/// A checked value. Numbers are in the declared unit, durations in seconds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// Of a [`OptionType::Bool`].
     Bool(bool),
     /// Of a [`OptionType::Int`].
     Int(i64),
-    /// Of a [`OptionType::Float`] or [`OptionType::Duration`].
+    /// Of a [`OptionType::Float`].
     Float(f64),
+    /// Of a [`OptionType::Duration`], seconds whatever the declared unit.
+    Duration(f64),
     /// Of a [`OptionType::String`] or [`OptionType::Choice`].
     String(String),
     /// Of a [`OptionType::Path`].
     Path(PathBuf),
     /// Of a [`OptionType::Floats`].
     Floats(Vec<f64>),
+}
+
+/// One option's value and where it came from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OptionValue {
+    /// Name of the option.
+    pub name: String,
+    /// Its value.
+    pub value: Value,
+    /// Whether the plant file gave it; else it is the default.
+    pub given: bool,
 }
 
 /// The options of one plugin as they stand in the plant file, unchecked, with their places.
@@ -121,16 +134,20 @@ pub fn check_options(
     plugin: &str,
     raw: &RawOptions,
     declared: &[OptionDecl],
-) -> Result<Vec<(String, Value)>, Faults> {
+) -> Result<Vec<OptionValue>, Faults> {
     let document = raw.document();
     let mut table = document.root();
     let mut faults = Vec::new();
     let mut values = Vec::new();
     for option in declared {
         match option.read(&mut table, raw.folder()).optional() {
-            Ok(Some(value)) => values.push((option.name.clone(), value)),
+            Ok(Some(value)) => values.push(OptionValue { name: option.name.clone(), value, given: true }),
             Ok(None) => match option.default_value(plugin) {
-                Ok(default) => values.extend(default.map(|value| (option.name.clone(), value))),
+                Ok(default) => values.extend(default.map(|value| OptionValue {
+                    name: option.name.clone(),
+                    value,
+                    given: false,
+                })),
                 Err(bad) => faults.extend(bad),
             },
             Err(Reported { .. }) => {}
@@ -223,9 +240,11 @@ impl OptionDecl {
         match self.kind {
             OptionType::Bool => table.bool(name).map(Value::Bool),
             OptionType::Int => table.node(name).try_map(|node| self.int(node)).map(Value::Int),
-            OptionType::Float | OptionType::Duration => {
-                table.node(name).try_map(|node| self.float(node)).map(Value::Float)
-            }
+            OptionType::Float => table.node(name).try_map(|node| self.float(node)).map(Value::Float),
+            OptionType::Duration => table
+                .node(name)
+                .try_map(|node| self.float(node))
+                .map(|value| Value::Duration(self.unit().to(value, Unit::SECOND))),
             OptionType::String if self.secret => {
                 table.node(name).try_map(|node| secret(node, folder)).map(Value::String)
             }

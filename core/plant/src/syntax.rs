@@ -104,11 +104,14 @@ fn under_header(source: &Source, node: &Node) -> bool {
 }
 
 fn duplicate(source: &Source, root: &Node, span: &Range<usize>) -> Fault {
-    let key = source.text.get(span.clone()).unwrap_or_default();
-    let first = match header_path(source, span.start) {
-        Some(path) => first_header(source, &path, span.start),
-        None => owner(source, root, span.start)
-            .and_then(|entries| first_key(source, entries, key.trim_matches(['"', '\'']), span.start)),
+    let name = source.text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']);
+    let (key, first) = match header_path(source, span.start) {
+        Some(path) => (path.clone(), first_header(source, &path, span.start)),
+        None => {
+            let (path, entries) = owner(source, root, span.start);
+            let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+            (key, first_key(source, entries, name, span.start))
+        }
     };
     let message = match first.map(|offset| source.line_column(offset)) {
         Some((line, column)) => {
@@ -116,7 +119,7 @@ fn duplicate(source: &Source, root: &Node, span: &Range<usize>) -> Fault {
         }
         None => "defined twice; remove one".to_owned(),
     };
-    source.fault(&Place { key: key.to_owned(), offset: span.start }, message)
+    source.fault(&Place { key, offset: span.start }, message)
 }
 
 /// The dotted path of the header that holds `offset`, when the line is a header.
@@ -137,28 +140,34 @@ fn first_header(source: &Source, path: &str, before: usize) -> Option<usize> {
     None
 }
 
-/// The entries of the table in which the key at `offset` stands: of the innermost braces round it, else of the last
-/// header before it.
-fn owner<'a>(source: &Source, root: &'a Node, offset: usize) -> Option<&'a [Entry]> {
-    let mut best: (Option<usize>, Option<&[Entry]>) = (None, root.as_table());
-    let mut stack: Vec<&Node> =
-        root.as_table().unwrap_or_default().iter().map(|entry| &entry.value).collect();
-    while let Some(node) = stack.pop() {
+/// Path and entries of the table in which the key at `offset` stands: of the innermost braces round it, else of the
+/// last header before it.
+fn owner<'a>(source: &Source, root: &'a Node, offset: usize) -> (String, &'a [Entry]) {
+    let mut best = (None, String::new(), root.as_table().unwrap_or_default());
+    let mut stack = vec![(String::new(), root)];
+    while let Some((path, node)) = stack.pop() {
         match &node.kind {
             Kind::Table(entries) => {
                 let braces = source.text.as_bytes().get(node.span.start) == Some(&b'{');
                 let holds = (braces && node.span.contains(&offset))
                     || (under_header(source, node) && node.span.end <= offset);
-                if holds && best.0.is_none_or(|start| start < node.span.start) {
-                    best = (Some(node.span.start), Some(entries));
+                if holds && !path.is_empty() && best.0.is_none_or(|start| start < node.span.start) {
+                    best = (Some(node.span.start), path.clone(), entries);
                 }
-                stack.extend(entries.iter().map(|entry| &entry.value));
+                let below = |entry: &'a Entry| match path.as_str() {
+                    "" => (entry.key.clone(), &entry.value),
+                    path => (format!("{path}.{}", entry.key), &entry.value),
+                };
+                stack.extend(entries.iter().map(below));
             }
-            Kind::Array(values) => stack.extend(values),
+            Kind::Array(values) => {
+                let numbered = |(i, value)| (format!("{path}[{}]", i + 1), value);
+                stack.extend(values.iter().enumerate().map(numbered));
+            }
             _ => {}
         }
     }
-    best.1
+    (best.1, best.2)
 }
 
 /// Where `key` is first written among `entries`, or below them by a dotted key.

@@ -110,7 +110,12 @@ impl Unit {
                 self.family()
             ));
         }
-        Ok(number * (given.numerator * self.denominator) / (given.denominator * self.numerator))
+        Ok(given.to(number, *self))
+    }
+
+    /// Converts a value of this unit to `other`, which measures the same.
+    pub(crate) fn to(self, value: f64, other: Self) -> f64 {
+        value * (self.numerator * other.denominator) / (self.denominator * other.numerator)
     }
 
     /// All symbols that convert to this unit.

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 use platen_plant::{
-    Document, OptionDecl, OptionType, RawOptions, Reported, Value, check_options, deprecated_options,
+    Document, OptionDecl, OptionType, OptionValue, RawOptions, Reported, Value, check_options,
+    deprecated_options,
 };
 
 /// Faults of `text` read as a table of known keys, without the file's name.
@@ -93,23 +94,23 @@ fn missing_and_unknown_keys_name_their_table() {
 
 #[test]
 fn doubled_keys_name_both_places() {
-    check(&format!("{GOOD}  id = 'B'\n"), &["4:3: id: defined twice, first at f.toml:2:1; remove one"]);
+    check(&format!("{GOOD}  id = 'B'\n"), &["4:3: plate.id: defined twice, first at f.toml:2:1; remove one"]);
     check(
         &format!("{GOOD}[[marker]]\nnumber = 1\n[[marker]]\nnumber = 2\nnumber = 3\n"),
-        &["8:1: number: defined twice, first at f.toml:7:1; remove one"],
+        &["8:1: marker[2].number: defined twice, first at f.toml:7:1; remove one"],
     );
     check(
         &format!("{GOOD}[plate] # again\nid = 'B'\n"),
         &[
             "4:2: plate: defined twice, first at f.toml:1:1; remove one",
-            "5:1: id: defined twice, first at f.toml:2:1; remove one",
+            "5:1: plate.id: defined twice, first at f.toml:2:1; remove one",
         ],
     );
     check(
         &format!("{GOOD}at_mm = {{id = 1, id = 2}}\n"),
         &[
             "4:9: plate.at_mm: found a table, expected a list of 2 numbers",
-            "4:18: id: defined twice, first at f.toml:4:10; remove one",
+            "4:18: plate.at_mm.id: defined twice, first at f.toml:4:10; remove one",
         ],
     );
 }
@@ -217,7 +218,7 @@ fn raw(text: &str) -> RawOptions {
     document.root().section("scanner").unwrap().options("options").unwrap()
 }
 
-fn checked(text: &str) -> Result<Vec<(String, Value)>, String> {
+fn checked(text: &str) -> Result<Vec<OptionValue>, String> {
     check_options("faro-stream", &raw(text), &stream_options()).map_err(|faults| faults.to_string())
 }
 
@@ -229,12 +230,15 @@ fn options_arrive_in_the_declared_unit_with_defaults_and_paths_resolved() {
         ("address", Value::String("192.0.2.7".to_owned())),
         ("range_max", Value::Float(10.0)),
         ("threads", Value::Int(2)),
-        ("deadline", Value::Float(5000.0)),
+        ("deadline", Value::Duration(5.0)),
         ("calibration", Value::Path("config/cal.json".into())),
         ("mirror", Value::Floats(vec![0.0, 0.5])),
         ("colour", Value::Bool(true)),
     ];
-    let expected = expected.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    let given = |name| name != "deadline";
+    let expected =
+        expected.map(|(name, value)| OptionValue { name: name.to_owned(), value, given: given(name) });
+    let expected = expected.to_vec();
     assert_eq!(checked(text), Ok(expected));
 }
 
@@ -264,7 +268,9 @@ fn a_secret_is_read_from_its_file_and_never_quoted() {
         let document = Document::parse(file.clone(), format!("[options]\naddress = 'a'\n{text}"));
         let raw = document.root().options("options").unwrap();
         check_options("faro-stream", &raw, &stream_options())
-            .map(|values| values.into_iter().find(|(name, _)| name == "password").map(|(_, value)| value))
+            .map(|values| {
+                values.into_iter().find(|option| option.name == "password").map(|option| option.value)
+            })
             .map_err(|faults| faults.to_string().replace(&file, ""))
     };
     assert_eq!(check("password = { file = 'key' }"), Ok(Some(Value::String("s3cret".to_owned()))));

@@ -1,0 +1,267 @@
+//! The plate file: one plate, what it is to become, and what is to be measured on it.
+
+mod place;
+mod target;
+mod template;
+
+pub use target::{Facing, RadiusOf, Target, TargetShape};
+pub use template::{Centre, PRESETS, Preset, Seat, Template};
+
+use std::path::Path;
+
+use crate::document::{Document, Reported};
+use crate::{Error, Faults, Table};
+use place::{Names, Rectangle};
+
+/// Smallest and largest side of a plate, millimetres: wide round the 2-5 m of the trade, narrow enough to catch metres.
+const SIDE_MM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
+/// Thinnest and thickest plate, millimetres.
+const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1.0..=300.0;
+
+/// A checked plate file. Lengths in metres, angles in radians, places as (u, v) on the original rectangle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlateFile {
+    /// The plate as ordered.
+    pub plate: Plate,
+    /// What it is to become; without it nothing can be judged.
+    pub target: Option<Target>,
+    /// Places to be reported.
+    pub markers: Vec<Marker>,
+    /// Lines to be reported, and for templates to lie on.
+    pub reference_lines: Vec<ReferenceLine>,
+    /// Boards to be laid on the plate.
+    pub templates: Vec<Template>,
+    /// Figures for the press's station registers, in their order.
+    pub stations: Vec<Station>,
+}
+
+/// The plate as ordered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plate {
+    /// Its name.
+    pub id: String,
+    /// Extent along u, metres.
+    pub width: f64,
+    /// Extent along v, metres.
+    pub height: f64,
+    /// Thickness, metres.
+    pub thickness: f64,
+    /// Where it rests while it is scanned; recorded, and compared between strokes.
+    pub supports: Option<String>,
+    /// How far inside the mid-surface's edge the scanned face ends (bevelled edges), metres.
+    pub face_inset: f64,
+}
+
+/// A place to be reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Name.
+    pub name: String,
+    /// Place, metres.
+    pub at: [f64; 2],
+}
+
+/// A straight line on the original rectangle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceLine {
+    /// Name.
+    pub name: String,
+    /// First point, metres.
+    pub from: [f64; 2],
+    /// Last point, metres.
+    pub to: [f64; 2],
+}
+
+/// A line, and its name even where the rest is faulty, so that a template on it is not called faulty too.
+#[derive(Debug, Clone)]
+struct NamedLine {
+    name: Result<String, Reported>,
+    line: Result<ReferenceLine, Reported>,
+}
+
+/// A place of which one figure goes to the press.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Station {
+    /// Name.
+    pub name: String,
+    /// Place, metres.
+    pub at: [f64; 2],
+    /// Which figure.
+    pub quantity: Quantity,
+}
+
+/// Figures of a station.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Measured minus target along the target's normal.
+    Deviation,
+    /// Gap of the nearest template.
+    Gap,
+    /// Target's curvature minus measured.
+    CurvatureDeficit,
+}
+
+impl PlateFile {
+    /// Reads a plate file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], or [`Error::Faulty`] with every fault of the file.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Ok(Self::take(Document::load(path)?)?)
+    }
+
+    /// Checks the text of a plate file; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// Every fault of the text.
+    pub fn parse(file: &str, text: &str) -> Result<Self, Faults> {
+        Self::take(Document::parse(file, text))
+    }
+
+    fn take(document: Document) -> Result<Self, Faults> {
+        let file = Self::read(document.root());
+        document.finish(file)
+    }
+
+    fn read(mut root: Table<'_>) -> Result<Self, Reported> {
+        let mut rectangle = None;
+        let plate = root.table("plate").required().and_then(|table| Plate::read(table, &mut rectangle));
+        let target = root.table("target").optional();
+        let target = target.and_then(|table| table.map(|table| Target::read(table, rectangle)).transpose());
+        let markers = read_all(&mut root, "marker", |table, names| Marker::read(table, names, rectangle));
+        let mut lines = Vec::new();
+        let reference_lines = read_all(&mut root, "reference_line", |table, names| {
+            let named = ReferenceLine::read(table, names, rectangle);
+            lines.push(named.clone());
+            named.line
+        });
+        let templates = read_all(&mut root, "template", |table, names| Template::read(table, names, &lines));
+        let stations = read_all(&mut root, "station", |table, names| Station::read(table, names, rectangle));
+        root.finish();
+        Ok(Self {
+            plate: plate?,
+            target: target?,
+            markers: markers?,
+            reference_lines: reference_lines?,
+            templates: templates?,
+            stations: stations?,
+        })
+    }
+}
+
+/// Reads every element of an array of tables before it gives up on any; `read` also gets the names taken so far.
+fn read_all<'d, T>(
+    root: &mut Table<'d>,
+    key: &str,
+    mut read: impl FnMut(Table<'d>, &mut Names) -> Result<T, Reported>,
+) -> Result<Vec<T>, Reported> {
+    let mut names = Names::default();
+    let mut all = Vec::new();
+    for table in root.tables(key)? {
+        names.number += 1;
+        all.push(read(table, &mut names));
+    }
+    all.into_iter().collect()
+}
+
+impl Plate {
+    /// Also sets `rectangle`, when both sides are sound, whatever else is not.
+    fn read(mut table: Table<'_>, rectangle: &mut Option<Rectangle>) -> Result<Self, Reported> {
+        let id = table.name("id").required();
+        let width = table.number("width_mm").in_range(SIDE_MM).required();
+        let height = table.number("height_mm").in_range(SIDE_MM).required();
+        let thickness = table.number("thickness_mm").in_range(THICKNESS_MM).located().required();
+        let supports = table.name("supports").optional();
+        let face_inset = table.number("face_inset_mm").at_least(0.0).located().optional();
+        let document = table.document();
+        table.finish();
+
+        let (width, height) = (width?, height?);
+        *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
+        let thickness = thickness?;
+        let shorter = width.min(height);
+        if thickness.value > shorter / 4.0 {
+            let message =
+                format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
+            return Err(document.fault(&thickness.place, message));
+        }
+        let face_inset = match face_inset? {
+            Some(inset) if inset.value > thickness.value => {
+                let message = format!(
+                    "found {}, must not be above the thickness of {} mm",
+                    inset.value, thickness.value
+                );
+                return Err(document.fault(&inset.place, message));
+            }
+            inset => inset.map_or(0.0, |inset| inset.value),
+        };
+        Ok(Self {
+            id: id?,
+            width: metres(width),
+            height: metres(height),
+            thickness: metres(thickness.value),
+            supports: supports?,
+            face_inset: metres(face_inset),
+        })
+    }
+}
+
+impl Marker {
+    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> Result<Self, Reported> {
+        let name = names.take(&mut table);
+        let at = place::point(&mut table, "at_mm", plate);
+        table.finish();
+        Ok(Self { name: name?, at: at? })
+    }
+}
+
+impl ReferenceLine {
+    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {
+        let name = names.take(&mut table);
+        let from = place::point(&mut table, "from_mm", plate);
+        let to = place::point(&mut table, "to_mm", plate);
+        let (document, place) = (table.document(), table.place().clone());
+        table.finish();
+        let line = name.clone().and_then(|name| {
+            let line = Self { name, from: from?, to: to? };
+            if line.from == line.to {
+                return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
+            }
+            Ok(line)
+        });
+        NamedLine { name, line }
+    }
+
+    /// Length on the original rectangle, metres.
+    pub fn length(&self) -> f64 {
+        (self.to[0] - self.from[0]).hypot(self.to[1] - self.from[1])
+    }
+}
+
+impl Station {
+    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> Result<Self, Reported> {
+        let name = names.take(&mut table);
+        let at = place::point(&mut table, "at_mm", plate);
+        let quantity = table.choice(
+            "quantity",
+            &[
+                ("deviation", Quantity::Deviation),
+                ("gap", Quantity::Gap),
+                ("curvature_deficit", Quantity::CurvatureDeficit),
+            ],
+        );
+        let quantity = quantity.required();
+        table.finish();
+        Ok(Self { name: name?, at: at?, quantity: quantity? })
+    }
+}
+
+/// Millimetres of the file to metres.
+fn metres(mm: f64) -> f64 {
+    mm / 1000.0
+}
+
+/// Metres to millimetres for a message, without the dust of the conversion.
+fn millimetres(m: f64) -> f64 {
+    (m * 1e6).round() / 1000.0
+}

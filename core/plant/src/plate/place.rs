@@ -1,0 +1,77 @@
+//! Places and names on the plate.
+
+use std::collections::BTreeMap;
+
+use super::{metres, millimetres};
+use crate::document::Reported;
+use crate::{Place, Table};
+
+/// The plate's original rectangle, metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rectangle {
+    pub(super) width: f64,
+    pub(super) height: f64,
+}
+
+impl Rectangle {
+    /// Length of the straight line through the middle in the direction `angle` (from u towards v), metres.
+    pub(super) fn through_middle(&self, angle: f64) -> f64 {
+        let along = |extent: f64, share: f64| if share == 0.0 { f64::INFINITY } else { extent / share.abs() };
+        along(self.width, angle.cos()).min(along(self.height, angle.sin()))
+    }
+}
+
+/// A point in millimetres on the plate, its edge included; metres.
+pub(super) fn point(
+    table: &mut Table<'_>,
+    key: &str,
+    plate: Option<Rectangle>,
+) -> Result<[f64; 2], Reported> {
+    let point = table.vector::<2>(key).try_map(|[u_mm, v_mm]| {
+        let (u, v) = (metres(u_mm), metres(v_mm));
+        match plate {
+            Some(Rectangle { width, height })
+                if !(0.0..=width).contains(&u) || !(0.0..=height).contains(&v) =>
+            {
+                let (width, height) = (millimetres(width), millimetres(height));
+                Err(format!("found [{u_mm}, {v_mm}], outside the plate of {width} x {height} mm"))
+            }
+            _ => Ok([u, v]),
+        }
+    });
+    point.required()
+}
+
+/// Names taken so far in one array of tables, each with its place.
+#[derive(Debug, Default)]
+pub(super) struct Names {
+    /// Number of the table being read, from 1.
+    pub(super) number: usize,
+    taken: BTreeMap<String, Place>,
+}
+
+impl Names {
+    /// The table's name, which no table before it has.
+    pub(super) fn take(&mut self, table: &mut Table<'_>) -> Result<String, Reported> {
+        let name = table.name("name").located().required()?;
+        self.claim(table, name.value, name.place)
+    }
+
+    /// Notes that `name` is taken at `place`.
+    pub(super) fn claim(
+        &mut self,
+        table: &Table<'_>,
+        name: String,
+        place: Place,
+    ) -> Result<String, Reported> {
+        let document = table.document();
+        if let Some(first) = self.taken.get(&name) {
+            let first = document.locate(first);
+            return Err(
+                document.fault(&place, format!("{name:?} is taken already, at {first}; choose another"))
+            );
+        }
+        self.taken.insert(name.clone(), place);
+        Ok(name)
+    }
+}

@@ -1,0 +1,204 @@
+//! Templates: boards laid on reference lines, with the rules of the trade as presets.
+
+use super::place::Names;
+use super::{NamedLine, ReferenceLine, metres, millimetres};
+use crate::document::Reported;
+use crate::field::Located;
+use crate::{Document, Table, nearest};
+
+/// A board whose edge is the target's section along a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Template {
+    /// Name; `T1`, `T2` by place in the file where none is given.
+    pub name: String,
+    /// Name of the reference line that it lies on.
+    pub line: String,
+    /// Length of the board, metres.
+    pub chord: f64,
+    /// Where its middle lies.
+    pub centre: Centre,
+    /// Largest gap that passes, metres.
+    pub limit: f64,
+    /// How it is held.
+    pub seat: Seat,
+    /// Where the rule comes from, to be printed beside its verdict.
+    pub source: Option<String>,
+}
+
+/// Where the middle of a board lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Centre {
+    /// Along the line from its first point, metres.
+    At(f64),
+    /// The place with the largest gap is searched along the line.
+    Worst,
+}
+
+/// How a board is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seat {
+    /// It rests where it comes to rest; judged balanced when it rocks.
+    Gravity,
+    /// Equal gaps at both ends.
+    Balanced,
+    /// Both ends are set on the profile.
+    Held,
+}
+
+/// A rule of the trade: what a template takes from it unless the file says otherwise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Preset {
+    /// Its name in the file.
+    pub name: &'static str,
+    /// Length of the board, millimetres.
+    pub chord_mm: f64,
+    /// Largest gap, millimetres.
+    pub limit_mm: f64,
+    /// Where the rule comes from, how sure that is, and what it is for.
+    pub source: &'static str,
+}
+
+/// The presets. Only rules whose numbers are known stand here; others belong in the plate file with their own `source`.
+pub const PRESETS: &[Preset] = &[
+    Preset {
+        name: "spherical-petal",
+        chord_mm: 2000.0,
+        limit_mm: 3.0,
+        source: "spherical tank petals, 2 m board, gap up to 3 mm (trade practice, one secondary source)",
+    },
+    Preset {
+        name: "api-650-peaking",
+        chord_mm: 900.0,
+        limit_mm: 13.0,
+        source: "API 650, 7.5.4, peaking: 900 mm board at nominal radius across a vertical weld, up to 13 mm \
+                 (weld seams only: even a flat plate passes it from 7.8 m radius on)",
+    },
+    Preset {
+        name: "api-650-banding",
+        chord_mm: 900.0,
+        limit_mm: 13.0,
+        source: "API 650, 7.5.4, banding: 900 mm straight board across a horizontal weld, up to 13 mm \
+                 (weld seams only; lay it along the straight lines of the target)",
+    },
+];
+
+impl Template {
+    pub(super) fn read(
+        mut table: Table<'_>,
+        names: &mut Names,
+        lines: &[NamedLine],
+    ) -> Result<Self, Reported> {
+        let name = name(&mut table, names);
+        let presets: Vec<(&str, Preset)> = PRESETS.iter().map(|preset| (preset.name, *preset)).collect();
+        let preset = table.choice("preset", &presets).located().optional();
+        let line =
+            table.name("line").located().required().and_then(|name| on_line(table.document(), &name, lines));
+        let chord = table.number("chord_mm").above(0.0).located();
+        let limit = table.number("limit_mm").above(0.0);
+        let (chord, limit) = match &preset {
+            Ok(None) => (chord.required(), limit.required()),
+            Ok(Some(Located { value: preset, place })) => {
+                let place = place.clone();
+                (chord.or(Located { value: preset.chord_mm, place }), limit.or(preset.limit_mm))
+            }
+            Err(reported) => (Err(*reported), limit.optional().and(Err(*reported))),
+        };
+        let centre = centre(&mut table);
+        let seat = table
+            .choice("seat", &[("gravity", Seat::Gravity), ("balanced", Seat::Balanced), ("held", Seat::Held)])
+            .or(Seat::Gravity);
+        let source = table.name("source").optional();
+        let document = table.document();
+        table.finish();
+
+        let (line, chord) = (line?, chord?);
+        fits(document, line, &chord)?;
+        let centre = match centre? {
+            Some(Located { value: Centre::Worst, .. }) => Centre::Worst,
+            Some(Located { value: Centre::At(at), place }) => {
+                let at = Located { value: at, place };
+                stays_on(document, line, chord.value, &at)?;
+                Centre::At(at.value)
+            }
+            None => Centre::At(line.length() / 2.0),
+        };
+        Ok(Self {
+            name: name?,
+            line: line.name.clone(),
+            chord: metres(chord.value),
+            centre,
+            limit: metres(limit?),
+            seat: seat?,
+            source: source?.or(preset?.map(|preset| preset.value.source.to_owned())),
+        })
+    }
+}
+
+/// The name given, or one from the place in the file: the second template is T2.
+fn name(table: &mut Table<'_>, names: &mut Names) -> Result<String, Reported> {
+    let default = Located { value: format!("T{}", names.number), place: table.place().clone() };
+    let name = table.name("name").located().or(default)?;
+    names.claim(table, name.value, name.place)
+}
+
+/// The line called `name`; a line that is faulty itself is not reported again.
+fn on_line<'a>(
+    document: &Document,
+    name: &Located<String>,
+    lines: &'a [NamedLine],
+) -> Result<&'a ReferenceLine, Reported> {
+    let called = |line: &&NamedLine| line.name.as_ref().is_ok_and(|known| *known == name.value);
+    if let Some(NamedLine { line, .. }) = lines.iter().find(called) {
+        return line.as_ref().map_err(|reported| *reported);
+    }
+    if let Some(reported) = lines.iter().find_map(|line| line.name.as_ref().err()) {
+        return Err(*reported);
+    }
+    let known: Vec<&str> = lines.iter().filter_map(|line| line.name.as_deref().ok()).collect();
+    let advice = match nearest::suggestion(&name.value, known.iter().copied()) {
+        near if !near.is_empty() => near,
+        _ if known.is_empty() => "; this file has none".to_owned(),
+        _ => format!("; the file has {}", known.join(", ")),
+    };
+    Err(document.fault(&name.place, format!("no reference line is called {:?}{advice}", name.value)))
+}
+
+/// `centre_mm`: a number along the line, or "worst".
+fn centre(table: &mut Table<'_>) -> Result<Option<Located<Centre>>, Reported> {
+    let centre = table.node("centre_mm").try_map(|node| match (&node.kind, crate::table::number(node)) {
+        (_, Some(mm)) => Ok(Centre::At(metres(mm))),
+        (crate::node::Kind::String(word), _) if word == "worst" => Ok(Centre::Worst),
+        _ => Err(format!("found {}, expected a number or \"worst\"", node.describe())),
+    });
+    centre.located().optional()
+}
+
+/// The board is no longer than its line.
+fn fits(document: &Document, line: &ReferenceLine, chord: &Located<f64>) -> Result<(), Reported> {
+    let length = millimetres(line.length());
+    if chord.value <= length {
+        return Ok(());
+    }
+    let message =
+        format!("a board of {} mm is longer than its line {:?} of {length} mm", chord.value, line.name);
+    Err(document.fault(&chord.place, message))
+}
+
+/// Both ends of the board lie on its line.
+fn stays_on(
+    document: &Document,
+    line: &ReferenceLine,
+    chord_mm: f64,
+    centre: &Located<f64>,
+) -> Result<(), Reported> {
+    let (at, length) = (millimetres(centre.value), millimetres(line.length()));
+    let (first, last) = (chord_mm / 2.0, length - chord_mm / 2.0);
+    if (first..=last).contains(&at) {
+        return Ok(());
+    }
+    let message = format!(
+        "found {at}, where the board of {chord_mm} mm hangs over an end of {:?}, {length} mm long; allowed {first} to {last}",
+        line.name
+    );
+    Err(document.fault(&centre.place, message))
+}

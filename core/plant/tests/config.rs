@@ -1,0 +1,61 @@
+//! Every file in `config/` loads, and the plate file of the manual says what the manual says.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
+
+use std::path::{Path, PathBuf};
+
+use platen_plant::PlateFile;
+use platen_plant::plate::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
+
+fn config() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config")
+}
+
+fn toml_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    files
+}
+
+#[test]
+fn every_plate_file_loads() {
+    let files = toml_files(&config().join("plates"));
+    assert!(files.len() >= 5, "{files:?}");
+    for path in files {
+        PlateFile::load(&path).unwrap_or_else(|error| panic!("{error}"));
+    }
+}
+
+#[test]
+fn the_spherical_petal_arrives_in_metres_and_radians() {
+    let file = PlateFile::load(&config().join("plates/plate-017.toml")).unwrap();
+    let plate = &file.plate;
+    assert_eq!((plate.id.as_str(), plate.supports.as_deref()), ("A17", Some("bed")));
+    assert_eq!((plate.width, plate.height, plate.thickness, plate.face_inset), (4.0, 4.0, 0.035, 0.0));
+    let target = file.target.unwrap();
+    assert_eq!(target.shape, TargetShape::Sphere { radius: 12.0 });
+    assert_eq!((target.radius_of, target.scanned_face), (RadiusOf::Inside, Facing::Inside));
+    assert_eq!((file.markers[1].name.as_str(), file.markers[1].at), ("M2", [3.0, 3.0]));
+    let line = &file.reference_lines[0];
+    assert_eq!((line.name.as_str(), line.from, line.to, line.length()), ("R1", [0.0, 1.0], [4.0, 1.0], 4.0));
+    let [first, second, _] = file.templates.as_slice() else { panic!("{:?}", file.templates) };
+    assert_eq!((first.name.as_str(), first.line.as_str()), ("T1", "R1"));
+    assert_eq!((first.chord, first.centre, first.limit), (2.0, Centre::At(2.0), 0.003));
+    assert_eq!((first.seat, first.source.as_deref()), (Seat::Gravity, None));
+    assert_eq!((second.name.as_str(), second.chord, second.limit), ("T2", 2.0, 0.003));
+    assert_eq!((second.seat, second.centre), (Seat::Gravity, Centre::Worst));
+    assert!(second.source.as_deref().is_some_and(|source| source.contains("one secondary source")));
+    assert_eq!((file.stations[0].at, file.stations[0].quantity), ([0.5, 0.5], Quantity::Deviation));
+}
+
+#[test]
+fn directions_become_radians_and_a_template_lies_in_the_middle_unless_said() {
+    let file = PlateFile::load(&config().join("plates/plate-021.toml")).unwrap();
+    let axis = std::f64::consts::FRAC_PI_2;
+    let expected = TargetShape::Cone { axis, radius_start: 6.0, radius_end: 6.6 };
+    assert_eq!(file.target.unwrap().shape, expected);
+    assert_eq!(file.templates[0].centre, Centre::At(1.5));
+    assert_eq!(file.plate.face_inset, 0.0104);
+}
