@@ -1,0 +1,286 @@
+//! E57 (ASTM E2807), structured: cells carry `rowIndex` and `columnIndex`.
+//!
+//! The file is checked before it is parsed: its length against its header, then the CRC-32C of every page.
+//! Coordinates may be Cartesian or spherical, float, double or scaled integer; missing cells may be flagged,
+//! left out, or written as the origin. The pose is reported and not applied: a lattice is seen from its scanner.
+//! Cells are placed by their indices, never by their order.
+
+use std::io::{Read, Seek, SeekFrom};
+
+use e57::{E57Reader, IndexBounds, PointCloud, RawValues, Record, RecordDataType, RecordName};
+use platen_scan::orient::RawCell;
+use platen_scan::{Direction, State};
+
+use crate::error::{Error, Result};
+use crate::source::{About, Source, Visit};
+
+const FORMAT: &str = "E57";
+const PAGE: u64 = 1024;
+
+/// Seconds from the Unix epoch to that of GPS, less the 18 leap seconds by which UTC lags since 2017.
+const GPS_EPOCH_UNIX_S: f64 = 315_964_800.0 - 18.0;
+
+/// One scan of an E57 file.
+pub(crate) struct E57<R: Read + Seek> {
+    reader: E57Reader<R>,
+    cloud: PointCloud,
+    fields: Fields,
+    about: About,
+}
+
+impl<R: Read + Seek> E57<R> {
+    /// Checks the file and finds the scan: `chosen` counts from 1 and may be left out when the file holds one.
+    pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
+        let length_note = check_length(&mut file)?;
+        E57Reader::validate_crc(&mut file).map_err(|e| Error::Damaged { format: FORMAT, what: chain(&e) })?;
+        file.rewind().map_err(Error::io("going back to the start"))?;
+        let reader = E57Reader::new(file).map_err(|e| unsound(chain(&e)))?;
+        let cloud = choose(reader.pointclouds(), chosen)?;
+        check_prototype(&cloud.prototype)?;
+        let fields = Fields::find(&cloud)?;
+        let mut about = describe(&cloud);
+        about.notes.extend(length_note);
+        if fields.return_index.is_some() {
+            about.notes.push("several echoes per beam: the first of each is used".to_owned());
+        }
+        Ok(Self { reader, cloud, fields, about })
+    }
+}
+
+impl<R: Read + Seek> Source for E57<R> {
+    fn about(&self) -> &About {
+        &self.about
+    }
+
+    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
+        let points = self.reader.pointcloud_raw(&self.cloud).map_err(|e| unsound(chain(&e)))?;
+        for (number, values) in points.enumerate() {
+            let values = values.map_err(|e| unsound(format!("point {number}: {}", chain(&e))))?;
+            let cell =
+                self.fields.cell(&values).map_err(|what| unsound(format!("point {number}: {what}")))?;
+            if let Some(cell) = cell {
+                visit(&cell)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unsound(what: String) -> Error {
+    Error::Unsound { format: FORMAT, what }
+}
+
+/// The crate's message with its causes, in one line.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        text = format!("{text}: {inner}");
+        cause = inner.source();
+    }
+    text
+}
+
+/// Compares the header's figures with the file; a sentence when they differ harmlessly.
+fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
+    let incomplete = |what| Err(Error::Incomplete { format: FORMAT, what });
+    let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
+    file.rewind().map_err(Error::io("going back to the start"))?;
+    if length < PAGE {
+        return incomplete(format!("{length} bytes, at least {PAGE} needed"));
+    }
+    let mut header = [0; 48];
+    file.read_exact(&mut header).map_err(Error::io("reading the header"))?;
+    file.rewind().map_err(Error::io("going back to the start"))?;
+    let field = |at: usize| header[at..at + 8].iter().rev().fold(0, |n, b| n << 8 | u64::from(*b));
+    let (declared, xml_offset, xml_length, page) = (field(16), field(24), field(32), field(40));
+    if page != PAGE {
+        return Err(unsound(format!("page size {page} instead of {PAGE}")));
+    }
+    let whole_pages = length.is_multiple_of(PAGE);
+    if length < declared.saturating_sub(1) || !whole_pages {
+        return incomplete(format!("{length} bytes, {declared} announced"));
+    }
+    if xml_offset >= length || xml_length > length {
+        return incomplete(format!("its table of contents ({xml_length} bytes at {xml_offset}) is missing"));
+    }
+    // Some writers are off by one here; every page is checked all the same.
+    if length.abs_diff(declared) == 1 {
+        return Ok(Some(format!("the header announces {declared} bytes, the file has {length}")));
+    }
+    if length > declared {
+        return Err(unsound(format!("{length} bytes, only {declared} announced")));
+    }
+    Ok(None)
+}
+
+/// The one scan that holds points, or the one asked for.
+fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> {
+    let held = clouds.len();
+    if let Some(chosen) = chosen {
+        let missing = Error::NoSuchCloud { format: FORMAT, held, chosen };
+        return chosen.checked_sub(1).and_then(|i| clouds.into_iter().nth(i)).ok_or(missing);
+    }
+    let name = |(i, cloud): (usize, &PointCloud)| {
+        format!("{}: {} points {}", i + 1, cloud.records, cloud.name.as_deref().unwrap_or("without name"))
+    };
+    let scans: Vec<String> = clouds.iter().enumerate().map(name).collect();
+    let mut filled = clouds.into_iter().filter(|cloud| cloud.records > 0);
+    match (filled.next(), filled.next()) {
+        (Some(cloud), None) => Ok(cloud),
+        (Some(_), Some(_)) => Err(Error::Several { format: FORMAT, scans }),
+        (None, _) => Err(unsound("it holds no points".to_owned())),
+    }
+}
+
+/// Refuses a prototype in which no record takes any bits: no data could ever run out, and the reader would
+/// fill all memory.
+fn check_prototype(prototype: &[Record]) -> Result<()> {
+    let takes_bits = |record: &Record| match record.data_type {
+        RecordDataType::Single { .. } | RecordDataType::Double { .. } => true,
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => max > min,
+    };
+    if prototype.iter().any(takes_bits) {
+        Ok(())
+    } else {
+        Err(unsound("no field of a point takes any space".to_owned()))
+    }
+}
+
+fn describe(cloud: &PointCloud) -> About {
+    let parts = [&cloud.sensor_vendor, &cloud.sensor_model, &cloud.sensor_serial];
+    let instrument: Vec<&str> =
+        parts.into_iter().flatten().map(|s| s.trim()).filter(|s| !s.is_empty()).collect();
+    let mut notes = Vec::new();
+    if let Some(pose) = &cloud.transform {
+        let (r, t) = (&pose.rotation, &pose.translation);
+        if (r.x, r.y, r.z, t.x, t.y, t.z) != (0.0, 0.0, 0.0, 0.0, 0.0, 0.0) {
+            notes.push(format!(
+                "the file's pose (quaternion {} {} {} {}, at {} {} {} m) is not applied: the lattice stays in the scanner's frame",
+                r.w, r.x, r.y, r.z, t.x, t.y, t.z
+            ));
+        }
+    }
+    About {
+        cells: cloud.records,
+        intensity: declared_intensity(cloud),
+        instrument: instrument.join(" "),
+        acquired_unix_s: cloud.acquisition_start.as_ref().map(|time| time.gps_time + GPS_EPOCH_UNIX_S),
+        notes,
+        ..About::default()
+    }
+}
+
+/// `intensityLimits`, which are in the unit of the values but may be written as raw scaled integers.
+fn declared_intensity(cloud: &PointCloud) -> Option<(f64, f64)> {
+    let limits = cloud.intensity_limits.as_ref()?;
+    let own = cloud.prototype.iter().find(|record| record.name == RecordName::Intensity)?;
+    let value = |limit: &e57::RecordValue| limit.to_f64(&own.data_type).ok();
+    Some((value(limits.intensity_min.as_ref()?)?, value(limits.intensity_max.as_ref()?)?))
+}
+
+/// One field of a point.
+#[derive(Debug, Clone)]
+struct Field {
+    index: usize,
+    data_type: RecordDataType,
+}
+
+/// Where the parts of a cell lie in a point, and what is allowed.
+#[derive(Debug)]
+struct Fields {
+    position: [Field; 3],
+    spherical: bool,
+    state: Option<Field>,
+    row: Field,
+    column: Field,
+    bounds: [(i64, i64); 2],
+    intensity: Option<Field>,
+    return_index: Option<Field>,
+}
+
+impl Fields {
+    fn find(cloud: &PointCloud) -> Result<Self> {
+        let find = |name: RecordName| {
+            let index = cloud.prototype.iter().position(|record| record.name == name)?;
+            Some(Field { index, data_type: cloud.prototype[index].data_type.clone() })
+        };
+        let all = |names: [RecordName; 3]| {
+            let [a, b, c] = names.map(find);
+            Some([a?, b?, c?])
+        };
+        let cartesian = all([RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ]);
+        let spherical = cartesian.is_none();
+        let position = cartesian
+            .or_else(|| {
+                all([
+                    RecordName::SphericalRange,
+                    RecordName::SphericalAzimuth,
+                    RecordName::SphericalElevation,
+                ])
+            })
+            .ok_or_else(|| unsound("its points have no position".to_owned()))?;
+        let state =
+            if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
+        let (Some(row), Some(column)) = (find(RecordName::RowIndex), find(RecordName::ColumnIndex)) else {
+            return Err(Error::Refused {
+                format: format!("unorganised E57 ({} points without row and column)", cloud.records),
+                instead: "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
+            });
+        };
+        Ok(Self {
+            position,
+            spherical,
+            state: find(state),
+            row,
+            column,
+            bounds: bounds(cloud.index_bounds.as_ref()),
+            intensity: find(RecordName::Intensity),
+            return_index: find(RecordName::ReturnIndex),
+        })
+    }
+
+    /// The cell of a point, `None` for the second and later echoes of a beam.
+    fn cell(&self, values: &RawValues) -> std::result::Result<Option<RawCell>, String> {
+        let whole = |field: &Field| values[field.index].to_i64(&field.data_type).map_err(|e| chain(&e));
+        let number = |field: &Field| values[field.index].to_f64(&field.data_type).map_err(|e| chain(&e));
+        if let Some(field) = &self.return_index
+            && whole(field)? > 0
+        {
+            return Ok(None);
+        }
+        let index = |field: &Field, name: &str, (min, max): (i64, i64)| {
+            let value = whole(field)?;
+            u32::try_from(value)
+                .ok()
+                .filter(|_| (min..=max).contains(&value))
+                .ok_or_else(|| format!("{name} {value} lies outside of the declared {min} to {max}"))
+        };
+        let row = index(&self.row, "row", self.bounds[0])?;
+        let column = index(&self.column, "column", self.bounds[1])?;
+        let state = match self.state.as_ref().map(whole).transpose()? {
+            None | Some(0) => State::Valid,
+            Some(1) => State::DirectionOnly,
+            Some(2) => State::NoReturn,
+            Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
+        };
+        let [a, b, c] = [number(&self.position[0])?, number(&self.position[1])?, number(&self.position[2])?];
+        let xyz = if self.spherical { from_spherical(a, b, c, state) } else { [a, b, c] };
+        let intensity = self.intensity.as_ref().map_or(Ok(0.0), number)?;
+        Ok(Some(RawCell { row, column, xyz, intensity, state }))
+    }
+}
+
+/// Smallest and largest row, then column. Without `indexBounds` any index that is not negative will do: the limits
+/// of the prototype say how many bits an index takes, not how large the lattice is.
+fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
+    let any = (0, i64::from(u32::MAX));
+    let or_any = |min: Option<i64>, max: Option<i64>| (min.unwrap_or(any.0), max.unwrap_or(any.1));
+    declared.map_or([any, any], |b| [or_any(b.row_min, b.row_max), or_any(b.column_min, b.column_max)])
+}
+
+/// A range that is not positive is no measurement; without a range the direction stands alone.
+fn from_spherical(range: f64, azimuth: f64, elevation: f64, state: State) -> [f64; 3] {
+    let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
+    Direction { azimuth, elevation }.unit().map(|c| c * range)
+}

@@ -1,0 +1,114 @@
+//! What can be wrong with a scan file, by who must act.
+
+use std::io;
+
+use platen_scan::orient::OrientError;
+use platen_sdk::ErrorKind;
+
+/// Result of reading a scan file.
+pub(crate) type Result<T> = std::result::Result<T, Error>;
+
+/// Why a file gives no lattice. The path is added where the error leaves the driver.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// The system would not read the file: the share, or who may read it.
+    #[error("{doing}: {source}")]
+    Io {
+        /// What was tried.
+        doing: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// The file is shorter than it says: still being written, or cut on the way.
+    #[error("{format} file is incomplete: {what}; wait until it is written, or copy it again")]
+    Incomplete {
+        /// Format.
+        format: &'static str,
+        /// Found and needed.
+        what: String,
+    },
+    /// A checksum does not fit: copy the file again.
+    #[error("{format} file is damaged: {what}; copy it again, or export it again")]
+    Damaged {
+        /// Format.
+        format: &'static str,
+        /// Where and what.
+        what: String,
+    },
+    /// The writer's mistake: export otherwise.
+    #[error("{format} file is not sound: {what}; export it again, as a structured scan")]
+    Unsound {
+        /// Format.
+        format: &'static str,
+        /// Where and what.
+        what: String,
+    },
+    /// A format that is recognised and cannot be read as a lattice.
+    #[error("{format}: {instead}")]
+    Refused {
+        /// What the file is.
+        format: String,
+        /// Why not, and what to export instead.
+        instead: &'static str,
+    },
+    /// Several scans and no word which.
+    #[error("{format} file holds {} scans ({}); choose one with the option cloud = 1 to {}", .scans.len(), .scans.join(", "), .scans.len())]
+    Several {
+        /// Format.
+        format: &'static str,
+        /// Name or size of each.
+        scans: Vec<String>,
+    },
+    /// The option names a scan that is not there.
+    #[error("{format} file holds {held} scans; there is no cloud {chosen}")]
+    NoSuchCloud {
+        /// Format.
+        format: &'static str,
+        /// Number of scans.
+        held: usize,
+        /// The option, counted from 1.
+        chosen: usize,
+    },
+    /// The cells are no lattice.
+    #[error("{0}")]
+    Orient(#[from] OrientError),
+    /// The host's answer: cancelled, or a frame refused.
+    #[error("{0}")]
+    Host(#[from] platen_sdk::Error),
+}
+
+impl Error {
+    /// For `map_err`: the system's answer with what was tried.
+    pub(crate) fn io(doing: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { doing, source }
+    }
+
+    /// True when the same file may be sound later.
+    pub(crate) fn may_pass(&self) -> bool {
+        matches!(
+            self,
+            Self::Io { .. }
+                | Self::Incomplete { .. }
+                | Self::Damaged { .. }
+                | Self::Orient(OrientError::Changed { .. })
+        )
+    }
+
+    /// The error as it crosses the boundary, with the file's name.
+    pub(crate) fn at(self, path: &std::path::Path) -> platen_sdk::Error {
+        let kind = match &self {
+            Self::Host(error) => return error.clone(),
+            Self::Io { source, .. } => match source.kind() {
+                io::ErrorKind::NotFound => ErrorKind::NotFound,
+                io::ErrorKind::PermissionDenied => ErrorKind::Denied,
+                _ => ErrorKind::Io,
+            },
+            Self::Incomplete { .. } => ErrorKind::NoData,
+            Self::Refused { .. } => ErrorKind::Unsupported,
+            Self::Several { .. } | Self::NoSuchCloud { .. } => ErrorKind::Config,
+            Self::Damaged { .. } | Self::Unsound { .. } | Self::Orient(_) => ErrorKind::BadData,
+        };
+        let error = platen_sdk::Error::new(kind, format!("{}: {self}", path.display()));
+        if self.may_pass() { error.retryable() } else { error }
+    }
+}

@@ -1,0 +1,91 @@
+//! From any file to columns: two passes over its cells.
+
+use platen_scan::orient::{Assembler, Expected, Mirror, Plan, RawCell, Survey};
+use platen_scan::{Column, ScanEnd, ScanHeader};
+
+use crate::error::Result;
+
+/// What a file says of its scan besides the cells.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct About {
+    /// Cells stored.
+    pub(crate) cells: u64,
+    /// Smallest and largest intensity declared.
+    pub(crate) intensity: Option<(f64, f64)>,
+    /// Set when the declared frame is left-handed.
+    pub(crate) mirror: Mirror,
+    /// Maker, model, serial number.
+    pub(crate) instrument: String,
+    /// Seconds since 1970 UTC.
+    pub(crate) acquired_unix_s: Option<f64>,
+    /// One sentence for everything that was decided while opening.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Takes one cell after the other.
+pub(crate) type Visit<'a> = dyn FnMut(&RawCell) -> Result<()> + 'a;
+
+/// A lattice in a file, read as often as wanted.
+pub(crate) trait Source {
+    /// What the file says.
+    fn about(&self) -> &About;
+    /// Visits all cells in the order of the file.
+    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()>;
+}
+
+/// Where a scan goes.
+pub(crate) trait Receiver {
+    /// Called often; an error ends the work.
+    fn check(&mut self, fraction: f64, phase: &str) -> Result<()>;
+    /// First.
+    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
+    /// In any order.
+    fn column(&mut self, column: &Column) -> Result<()>;
+    /// Last.
+    fn end(&mut self, end: &ScanEnd) -> Result<()>;
+}
+
+/// Cells between two looks at the receiver.
+const CHECK_EVERY: u64 = 1 << 16;
+
+/// First pass: decides what the cells are. `known` is what the plant says of the scanner.
+pub(crate) fn survey(source: &mut dyn Source, known: &Expected, out: &mut dyn Receiver) -> Result<Plan> {
+    let about = source.about().clone();
+    let mut survey = Survey::default();
+    source.cells(&mut |cell| {
+        survey.add(cell)?;
+        watch(survey.cells(), &about, "looking at the lattice", out)
+    })?;
+    let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
+    let mut plan = survey.decide(&Expected { intensity: about.intensity, mirror, ..*known })?;
+    plan.header.notes.splice(0..0, about.notes);
+    plan.header.instrument = about.instrument;
+    plan.header.acquired_unix_s = about.acquired_unix_s;
+    Ok(plan)
+}
+
+/// Both passes: decides, then delivers every column once, each as soon as the file completes it.
+pub(crate) fn deliver(source: &mut dyn Source, known: &Expected, out: &mut dyn Receiver) -> Result<()> {
+    let plan = survey(source, known, out)?;
+    let about = source.about().clone();
+    out.begin(&plan.header)?;
+    let mut assembler = Assembler::new(&plan);
+    let mut seen = 0;
+    source.cells(&mut |cell| {
+        if let Some(column) = assembler.push(cell)? {
+            out.column(&column)?;
+        }
+        seen += 1;
+        watch(seen, &about, "reading columns", out)
+    })?;
+    let (empty, end) = assembler.finish()?;
+    empty.iter().try_for_each(|column| out.column(column))?;
+    out.end(&end)
+}
+
+fn watch(seen: u64, about: &About, phase: &str, out: &mut dyn Receiver) -> Result<()> {
+    if seen.is_multiple_of(CHECK_EVERY) {
+        out.check(seen as f64 / about.cells.max(1) as f64, phase)?;
+    }
+    Ok(())
+}

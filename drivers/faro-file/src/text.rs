@@ -1,0 +1,114 @@
+//! Lines of numbers, as exporters write them: any line end, byte order mark, trailing blanks, decimal commas.
+
+use std::io::{BufRead, Read};
+
+use crate::error::{Error, Result};
+
+/// Longest line that is read; scan files stay below 300 bytes.
+const MAX_LINE: u64 = 4096;
+
+/// Most fields of a line that anyone asks for.
+pub(crate) const MAX_FIELDS: usize = 12;
+
+/// Reads lines one after the other into one buffer.
+pub(crate) struct Lines<R> {
+    reader: R,
+    line: Vec<u8>,
+    /// Number of the line last read, from 1.
+    pub(crate) number: u64,
+    /// Bytes read.
+    pub(crate) offset: u64,
+    /// False when the line last read ended with the file and not with a line end.
+    pub(crate) ended: bool,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// At the start of a file, or of a line.
+    pub(crate) fn new(reader: R) -> Self {
+        Self { reader, line: Vec::new(), number: 0, offset: 0, ended: true }
+    }
+
+    /// The next line without its end, `None` behind the last.
+    pub(crate) fn next(&mut self) -> Result<Option<&[u8]>> {
+        self.line.clear();
+        let mut bounded = self.reader.by_ref().take(MAX_LINE);
+        let n = bounded.read_until(b'\n', &mut self.line).map_err(Error::io("reading a line"))?;
+        if n == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        self.offset += n as u64;
+        self.ended = self.line.last() == Some(&b'\n');
+        if !self.ended && n as u64 == MAX_LINE {
+            let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
+            return Err(Error::Unsound { format: "text", what });
+        }
+        let mark: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
+        Ok(Some(self.line.strip_prefix(mark).unwrap_or(&self.line)))
+    }
+}
+
+/// Fields of a line, separated by blanks; at most [`MAX_FIELDS`], the count goes on.
+pub(crate) fn fields(line: &[u8]) -> ([&[u8]; MAX_FIELDS], usize) {
+    let mut fields: [&[u8]; MAX_FIELDS] = [&[]; MAX_FIELDS];
+    let mut n = 0;
+    for field in line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()) {
+        if let Some(slot) = fields.get_mut(n) {
+            *slot = field;
+        }
+        n += 1;
+    }
+    (fields, n)
+}
+
+/// A number, with a point or a comma before its decimals.
+pub(crate) fn number(field: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(field).ok()?;
+    if text.contains(',') { text.replacen(',', ".", 1).parse().ok() } else { text.parse().ok() }
+}
+
+/// Numbers of a whole line; `None` when there are not exactly `N`.
+pub(crate) fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
+    let (fields, n) = fields(line);
+    if n != N {
+        return None;
+    }
+    let mut out = [0.0; N];
+    for (slot, field) in out.iter_mut().zip(fields) {
+        *slot = number(field)?;
+    }
+    Some(out)
+}
+
+/// A whole number without sign.
+pub(crate) fn whole(field: &[u8]) -> Option<u32> {
+    if field.iter().all(u8::is_ascii_digit) { std::str::from_utf8(field).ok()?.parse().ok() } else { None }
+}
+
+/// The one whole number of a line.
+pub(crate) fn only_whole(line: &[u8]) -> Option<u32> {
+    let (fields, n) = fields(line);
+    if n == 1 { whole(fields[0]) } else { None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_end_mark_and_decimal_is_read() {
+        let mut lines = Lines::new(&b"\xef\xbb\xbf12 \r\n1,5\t-2.25 \n3e-1"[..]);
+        assert_eq!(only_whole(lines.next().unwrap().unwrap()), Some(12));
+        assert_eq!(numbers(lines.next().unwrap().unwrap()), Some([1.5, -2.25]));
+        assert!(lines.ended);
+        assert_eq!(numbers(lines.next().unwrap().unwrap()), Some([0.3]));
+        assert!(!lines.ended && lines.next().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_file_without_line_ends_takes_no_memory() {
+        let mut lines = Lines::new(std::io::BufReader::new(std::io::repeat(b'1').take(1 << 20)));
+        assert!(matches!(lines.next(), Err(Error::Unsound { .. })));
+        assert!(lines.line.capacity() <= 2 * MAX_LINE as usize);
+    }
+}
