@@ -1,1 +1,3 @@
-//! Measures plates on a press: loads plugins, runs strokes, command line.
+//! The host: loads plugins, measures plates, runs strokes, answers on the command line.
+
+pub mod plugin;

@@ -24,6 +24,7 @@ pub use document::{Document, Reported};
 pub use error::Error;
 pub use fault::{Fault, Faults};
 pub use field::{Field, Located};
+pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options, deprecated_options};
 pub use plate::PlateFile;
 pub use source::Place;

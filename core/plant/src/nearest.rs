@@ -5,7 +5,7 @@
 const LIKELY: f64 = 0.80;
 
 /// The allowed name most like `found`, if any is likely to be meant; on equal likeness the first.
-pub(crate) fn nearest<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let mut best: Option<(f64, &str)> = None;
     for name in allowed {
         let likeness = strsim::jaro_winkler(&found.to_lowercase(), &name.to_lowercase());
