@@ -7,6 +7,8 @@ use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
 
 use super::instance::InputFrame;
 use super::job::HostBuffer;
+use platen_plant::OptionValue;
+
 use super::{Instance, JobSpec, Kind, Library, PluginError};
 
 /// A flattening with its options.
@@ -21,11 +23,7 @@ impl Flattening {
     ///
     /// # Errors
     /// As [`Instance::create`].
-    pub fn create(
-        library: &Library,
-        values: &[(String, platen_plant::Value)],
-        limit: Duration,
-    ) -> Result<Self, PluginError> {
+    pub fn create(library: &Library, values: &[OptionValue], limit: Duration) -> Result<Self, PluginError> {
         let instance = Instance::create(library, Kind::Flattening, values)?;
         instance.open(limit)?;
         Ok(Self { instance, limit })

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use platen_abi as abi;
 use platen_abi::payload;
-use platen_plant::Value;
+use platen_plant::OptionValue;
 use platen_scan::Window;
 
 use super::job::{self, EmittedFrame, HostBuffer, JobSpec, Listed};
@@ -66,7 +66,7 @@ impl Instance {
     ///
     /// # Errors
     /// Wrong kind, or the plugin's own reason to refuse the values.
-    pub fn create(library: &Library, kind: Kind, values: &[(String, Value)]) -> Result<Self, PluginError> {
+    pub fn create(library: &Library, kind: Kind, values: &[OptionValue]) -> Result<Self, PluginError> {
         let descriptor = library.descriptor();
         let name = descriptor.id.clone();
         if descriptor.kind != kind {

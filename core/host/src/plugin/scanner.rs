@@ -7,6 +7,8 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 
 use super::instance::{InputFrame, raw_window};
 use super::job::HostBuffer;
+use platen_plant::OptionValue;
+
 use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError};
 
 /// Largest lattice believed: beyond the finest scanner's 17,351 x 40,960 cells.
@@ -31,7 +33,7 @@ impl Scanner {
     ///
     /// # Errors
     /// As [`Instance::create`].
-    pub fn create(library: &Library, values: &[(String, platen_plant::Value)]) -> Result<Self, PluginError> {
+    pub fn create(library: &Library, values: &[OptionValue]) -> Result<Self, PluginError> {
         Instance::create(library, Kind::Scanner, values).map(Self)
     }
 

@@ -5,7 +5,7 @@ use std::ffi::CString;
 use std::os::unix::ffi::OsStrExt;
 
 use platen_abi::{Value as Raw, option_type};
-use platen_plant::Value;
+use platen_plant::{OptionValue, Value};
 
 /// Values with the memory that they point to.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub(super) struct Values {
 unsafe impl Send for Values {}
 
 impl Values {
-    pub(super) fn new(values: &[(String, Value)]) -> Self {
+    pub(super) fn new(values: &[OptionValue]) -> Self {
         let (mut texts, mut lists) = (Vec::new(), Vec::new());
         let mut text = |bytes: &[u8]| {
             let text = CString::new(bytes.to_vec()).unwrap_or_default();
@@ -28,11 +28,11 @@ impl Values {
             pointer
         };
         let mut raw = Vec::new();
-        for (name, value) in values {
+        for OptionValue { name, value, given } in values {
             let mut row = Raw {
                 name: text(name.as_bytes()),
                 kind: 0,
-                from_default: 0,
+                from_default: i32::from(!given),
                 i: 0,
                 f: 0.0,
                 s: std::ptr::null(),
@@ -42,6 +42,7 @@ impl Values {
             match value {
                 Value::Bool(b) => (row.kind, row.i) = (option_type::BOOL, i64::from(*b)),
                 Value::Int(i) => (row.kind, row.i) = (option_type::INT, *i),
+                Value::Duration(d) => (row.kind, row.f) = (option_type::DURATION, *d),
                 Value::Float(f) => (row.kind, row.f) = (option_type::FLOAT, *f),
                 Value::String(s) => (row.kind, row.s) = (option_type::STRING, text(s.as_bytes())),
                 Value::Path(p) => (row.kind, row.s) = (option_type::PATH, text(p.as_os_str().as_bytes())),
