@@ -1,0 +1,461 @@
+//! The press: ram, plate, program and its faults, advanced one controller cycle at a time.
+//!
+//! [`Press::step`] reads the H block from the registers, runs the program, moves the ram and writes the P block; it
+//! is a function of the press, the registers and the time, so a test can run it without a clock or a socket.
+
+use std::time::Duration;
+
+use platen_sim_plate::{PlateState, Reply, Stroke};
+
+use crate::config::Config;
+use crate::faults::StrokePlan;
+use crate::program::{Cause, Event, Limits, Program, Request};
+use crate::registers::{HBlock, P_LEN, Table, ascii_words, control, h, p, status};
+use crate::steel::{Next, Steel};
+use crate::tally::{Taken, Tally, Witness, whole_ms};
+use crate::{Error, Result};
+
+/// How long part_end stands before the next part is laid in.
+const PART_END: Duration = Duration::from_millis(600);
+
+/// Where the ram is and what it waits for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// Registers are void until then.
+    Void { until: Duration },
+    /// Ram up; the next action not before then.
+    Rest { until: Duration },
+    /// Ram going down for this stroke.
+    Down { until: Duration, stroke: Stroke },
+    /// Ram going up.
+    Up { until: Duration },
+    /// A request waits for its result.
+    Wait,
+    /// The part leaves.
+    PartEnd { until: Duration },
+    /// All parts are done.
+    Done,
+}
+
+/// A press with one plate.
+#[derive(Clone, Debug)]
+pub struct Press {
+    config: Config,
+    program: Program,
+    steel: Steel,
+    phase: Phase,
+    plan: StrokePlan,
+    random: fastrand::Rng,
+    part_id: u32,
+    baseline_due: bool,
+    /// Until when a repeated trigger stands.
+    repeat_until: Option<Duration>,
+    /// When a hasty stroke's trigger falls.
+    hasty_until: Option<Duration>,
+    bounced: bool,
+    last_tail: u16,
+    /// The registers stand still until then.
+    pub(crate) halted_until: Option<Duration>,
+    /// Bits the tests hold up, whatever the program does.
+    pub(crate) forced: u16,
+    /// Bits the tests hold down.
+    pub(crate) masked: u16,
+    pub(crate) automatic: bool,
+    /// What the press saw.
+    pub tally: Tally,
+    /// Sees every write.
+    pub witness: Witness,
+}
+
+impl Press {
+    /// A press that starts at time 0.
+    ///
+    /// # Errors
+    /// [`Error::Config`] and [`Error::Plate`] for a configuration that cannot be.
+    pub fn new(config: &Config) -> Result<Self> {
+        config.check()?;
+        let mut random = fastrand::Rng::with_seed(config.seed);
+        let session_id = random.u16(1..);
+        let mut press = Self {
+            program: new_program(config, session_id, Duration::ZERO),
+            steel: Steel::new(&config.plate, config.strategy)?,
+            phase: Phase::Rest { until: Duration::from_millis(config.timings.start_ms) },
+            plan: StrokePlan::default(),
+            random,
+            part_id: config.part_id,
+            baseline_due: config.baseline,
+            repeat_until: None,
+            hasty_until: None,
+            bounced: false,
+            last_tail: config.stroke_id,
+            halted_until: None,
+            forced: 0,
+            masked: 0,
+            automatic: config.automatic,
+            tally: Tally { parts: 1, ..Tally::default() },
+            witness: Witness::default(),
+            config: config.clone(),
+        };
+        press.program.stroke_id = config.stroke_id;
+        Ok(press)
+    }
+
+    /// The plate as the scanner finds it, or why it cannot be scanned.
+    #[must_use]
+    pub fn plate(&self) -> Reply {
+        match self.phase {
+            Phase::Down { .. } | Phase::Up { .. } => {
+                Reply::Error(String::from("the plate is moving: wait for the ram"))
+            }
+            Phase::PartEnd { .. } | Phase::Done => Reply::Plate(None),
+            _ => Reply::Plate(Some(self.steel.state().clone())),
+        }
+    }
+
+    /// The plate, wherever it is.
+    #[must_use]
+    pub fn steel(&self) -> &PlateState {
+        self.steel.state()
+    }
+
+    /// The program.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// Whether the registers hold the map; a host must not write otherwise.
+    #[must_use]
+    pub fn speaks_the_map(&self) -> bool {
+        self.config.map_version == crate::registers::MAP_VERSION && !matches!(self.phase, Phase::Void { .. })
+    }
+
+    /// One cycle at `now`, counted from the start of the press.
+    ///
+    /// # Errors
+    /// [`Error::Plate`] when a stroke cannot be made.
+    pub fn step(&mut self, table: &mut Table, now: Duration) -> Result<()> {
+        self.tally.now_ms = whole_ms(now);
+        if self.halted_until.is_some_and(|until| now < until) {
+            return Ok(());
+        }
+        self.halted_until = None;
+        if let Phase::Void { until } = self.phase {
+            table.clear();
+            if now < until {
+                return Ok(());
+            }
+            let session_id = self.random.u16(1..);
+            self.program = new_program(&self.config, session_id, now);
+            self.phase = Phase::Rest { until: now };
+        }
+        let host = table.h_block();
+        for event in self.program.step(&host, now) {
+            self.note(event, now);
+        }
+        self.misbehave(table, &host, now)?;
+        if matches!(self.phase, Phase::Void { .. }) {
+            return Ok(());
+        }
+        self.advance(&host, now)?;
+        table.set_p_block(&self.p_block(now));
+        Ok(())
+    }
+
+    /// A stroke now, whatever the host is doing.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] after the last part, [`Error::Plate`] when the stroke cannot be made.
+    pub fn stroke(&mut self, now: Duration) -> Result<()> {
+        match (self.phase, self.steel.next(u16::MAX)) {
+            (Phase::Done | Phase::PartEnd { .. } | Phase::Void { .. }, _) => {
+                Err(Error::Refused("no plate lies in the press"))
+            }
+            (_, Next::Bend(stroke)) => {
+                self.steel.bend(&stroke)?;
+                self.raise(Cause::Stroke, now);
+                Ok(())
+            }
+            _ => Err(Error::Refused("the plate's programme has no further stroke")),
+        }
+    }
+
+    /// A baseline scan or a rescan now.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] while a request waits, or when there is no stroke to scan again.
+    pub fn request(&mut self, cause: Cause, now: Duration) -> Result<()> {
+        if self.program.request().is_some() {
+            return Err(Error::Refused("a request waits for its result already"));
+        }
+        if cause == Cause::Rescan && self.program.stroke_id == 0 {
+            return Err(Error::Refused("no stroke was made yet"));
+        }
+        self.raise(cause, now);
+        Ok(())
+    }
+
+    /// The part leaves; the next one follows if there is one to come.
+    pub fn end_part(&mut self, now: Duration) {
+        self.program.withdraw();
+        self.phase = Phase::PartEnd { until: now + PART_END };
+    }
+
+    /// The controller restarts: registers 0, then a new session; the plate stays as it is.
+    pub fn restart(&mut self, table: &mut Table, now: Duration) {
+        table.clear();
+        self.tally.restarts += 1;
+        self.repeat_until = None;
+        self.hasty_until = None;
+        self.phase = Phase::Void { until: now + Duration::from_millis(self.config.timings.restart_ms) };
+    }
+
+    /// A new session with the counter at `stroke_id`.
+    pub fn new_session(&mut self, stroke_id: u16) {
+        self.program.begin_session(self.random.u16(1..));
+        self.program.stroke_id = stroke_id;
+    }
+
+    /// The last stroke number, within the running session.
+    pub fn set_counter(&mut self, stroke_id: u16) {
+        self.program.stroke_id = stroke_id;
+    }
+
+    /// Another plant number or map version.
+    pub(crate) fn set_identity(&mut self, press_id: Option<u16>, map_version: Option<u16>) {
+        self.config.press_id = press_id.unwrap_or(self.config.press_id);
+        self.config.map_version = map_version.unwrap_or(self.config.map_version);
+    }
+
+    /// Other faults of the program from the next stroke on.
+    pub fn set_stroke_faults(&mut self, faults: crate::faults::StrokeFaults) {
+        self.config.stroke_faults = faults;
+    }
+
+    fn raise(&mut self, cause: Cause, now: Duration) {
+        if cause == Cause::Stroke {
+            self.plan = self.config.stroke_faults.draw(&mut self.random);
+            if self.plan.counter_back {
+                self.new_session(0);
+            }
+            if self.plan.skip {
+                self.program.stroke_id = crate::program::next_stroke_id(self.program.stroke_id);
+                self.tally.skipped += 1;
+            }
+        } else {
+            self.plan = StrokePlan::default();
+        }
+        self.program.withholds_ack = self.plan.no_ack;
+        self.repeat_until = None;
+        self.hasty_until = None;
+        if self.program.raise(cause, now).is_some() {
+            self.tally.superseded += 1;
+        }
+        match cause {
+            Cause::Stroke => self.tally.strokes += 1,
+            Cause::Baseline => self.tally.baselines += 1,
+            Cause::Rescan => self.tally.rescans += 1,
+        }
+        self.phase = Phase::Wait;
+    }
+
+    fn note(&mut self, event: Event, now: Duration) {
+        match event {
+            Event::Accepted => {}
+            Event::AcceptLate => self.tally.accepted_late += 1,
+            Event::ResultTimeout(request) => {
+                self.tally.result_timeouts += 1;
+                if request.cause == Cause::Baseline {
+                    self.baseline_due = false;
+                }
+            }
+            Event::HostDead(_) => self.tally.host_deaths += 1,
+            Event::Taken(request, host) => {
+                self.tally.judge(&host, self.config.recipe_id);
+                let taken = self.taken(&request, &host, now);
+                self.tally.taken.push(taken);
+                self.steel.learn(&host);
+                if request.cause == Cause::Baseline {
+                    self.baseline_due = false;
+                }
+                if self.plan.repeat_trigger {
+                    self.repeat_until =
+                        Some(now + Duration::from_millis(self.config.stroke_faults.repeat_ms));
+                }
+            }
+        }
+    }
+
+    fn taken(&self, request: &Request, host: &HBlock, now: Duration) -> Taken {
+        Taken {
+            cause: request.cause,
+            stroke_id: self.program.stroke_id,
+            session_id: self.program.session_id,
+            attempt: self.program.attempt,
+            part_id: self.part_id,
+            bends: self.steel.state().strokes,
+            accepted_ms: request.accepted.map_or(0, |at| whole_ms(at - request.raised)),
+            result_ms: whole_ms(now - request.raised),
+            verdict: host.verdict(),
+            words: host.0.to_vec(),
+        }
+    }
+
+    /// The faults that act while a request waits.
+    fn misbehave(&mut self, table: &mut Table, host: &HBlock, now: Duration) -> Result<()> {
+        self.repeat_until = self.repeat_until.filter(|&until| now < until);
+        let request = self.program.request().copied();
+        let accepted = request.is_some_and(|request| request.accepted.is_some());
+        if self.hasty_until.is_some_and(|until| now >= until) {
+            self.hasty_until = None;
+            if request.is_some() && !accepted {
+                self.program.withdraw();
+                self.tally.lost_while_busy += 1;
+            }
+        }
+        if self.plan.torn && host.word(h::ACK_STROKE_ID) == torn(self.program.stroke_id) {
+            let number = torn(self.program.stroke_id);
+            self.tally
+                .wrong(format!("stroke {}: the torn number {number} was accepted", self.program.stroke_id));
+            self.plan.torn = false;
+        }
+        if accepted && host.status(status::BUSY) {
+            if std::mem::take(&mut self.plan.hasty) {
+                let hold = Duration::from_millis(self.config.stroke_faults.hasty_ms);
+                self.stroke(now)?;
+                self.plan = StrokePlan::default();
+                self.hasty_until = (!hold.is_zero()).then(|| now + hold);
+            } else if std::mem::take(&mut self.plan.reboot) {
+                self.restart(table, now);
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves the ram and decides what comes next.
+    fn advance(&mut self, host: &HBlock, now: Duration) -> Result<()> {
+        let ms = Duration::from_millis;
+        match self.phase {
+            Phase::Rest { until } if now >= until && self.automatic => self.begin(host, now)?,
+            Phase::Down { until, stroke } if now >= until => {
+                self.steel.bend(&stroke)?;
+                self.phase = Phase::Up { until: now + ms(self.config.timings.up_ms) };
+            }
+            Phase::Up { until } if now >= until => self.raise(Cause::Stroke, now),
+            Phase::Wait if self.program.request().is_none() && self.repeat_until.is_none() => {
+                self.phase = Phase::Rest { until: now + ms(self.config.timings.between_ms) };
+            }
+            Phase::PartEnd { until } if now >= until => self.next_part(now)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The next action on this plate, once the host is ready for one.
+    fn begin(&mut self, host: &HBlock, now: Duration) -> Result<()> {
+        let ready = self.program.host_alive(now) && host.status(status::READY);
+        if self.config.wait_ready && !ready {
+            return Ok(());
+        }
+        if self.baseline_due {
+            self.raise(Cause::Baseline, now);
+            return Ok(());
+        }
+        let next = if self.steel.state().strokes < self.config.strokes {
+            self.steel.next(self.program.attempt)
+        } else {
+            Next::End
+        };
+        match next {
+            Next::Bend(stroke) => {
+                let until = now + Duration::from_millis(self.config.timings.down_ms);
+                self.phase = Phase::Down { until, stroke };
+            }
+            Next::Rescan => self.raise(Cause::Rescan, now),
+            Next::End => self.end_part(now),
+        }
+        Ok(())
+    }
+
+    fn next_part(&mut self, now: Duration) -> Result<()> {
+        if self.tally.parts >= u64::from(self.config.parts) {
+            self.tally.done = true;
+            self.phase = Phase::Done;
+            return Ok(());
+        }
+        self.tally.parts += 1;
+        self.part_id += 1;
+        self.steel = Steel::new(&self.config.plate, self.config.strategy)?;
+        self.baseline_due = self.config.baseline;
+        let stroke_id = self.program.stroke_id;
+        self.new_session(stroke_id);
+        self.phase = Phase::Rest { until: now };
+        Ok(())
+    }
+
+    /// The P block of this cycle.
+    fn p_block(&mut self, now: Duration) -> [u16; P_LEN] {
+        let moving = matches!(self.phase, Phase::Down { .. } | Phase::Up { .. });
+        let leaving = matches!(self.phase, Phase::PartEnd { .. } | Phase::Done);
+        let mut bits = control::ENABLE | self.program.control(now);
+        bits |= if moving { 0 } else { control::CLEAR_TO_SCAN };
+        bits |= if leaving { control::PART_END } else { 0 };
+        bits |= if self.repeat_until.is_some() { control::TRIGGER } else { 0 };
+        let stroke_id = self.program.stroke_id;
+        let [mut head, mut tail] = [stroke_id, stroke_id];
+        if let Some(Request { raised, accepted: None, .. }) = self.program.request() {
+            let since = now.saturating_sub(*raised);
+            let faults = &self.config.stroke_faults;
+            if self.plan.bounce && since < Duration::from_millis(faults.bounce_ms) {
+                self.bounced = !self.bounced;
+                bits &= if self.bounced { !control::TRIGGER } else { !0 };
+            }
+            if self.plan.torn && since < Duration::from_millis(faults.torn_ms) {
+                [head, tail] = [torn(stroke_id), self.last_tail];
+            }
+        }
+        self.last_tail = tail;
+        let [part_high, part_low] = [(self.part_id >> 16) as u16, self.part_id as u16];
+        let mut block = [0; P_LEN];
+        block[p::MAP_VERSION] = self.config.map_version;
+        block[p::HEARTBEAT] = self.program.heartbeat();
+        block[p::CONTROL] = (bits | self.forced) & !self.masked;
+        block[p::STROKE_ID] = head;
+        block[p::SESSION_ID] = self.program.session_id;
+        block[p::RECIPE_ID] = self.config.recipe_id;
+        block[p::PRESS_STATE] = match self.phase {
+            Phase::Down { .. } => 3,
+            Phase::Up { .. } => 5,
+            _ => 2,
+        };
+        block[p::PRESS_ID] = self.config.press_id;
+        block[p::PART_ID] = part_high;
+        block[p::PART_ID + 1] = part_low;
+        block[p::PART_NAME..p::PART_NAME + 8].copy_from_slice(&ascii_words(&self.config.part_name));
+        block[p::BEND_INDEX] = u16::try_from(self.steel.state().strokes).unwrap_or(u16::MAX);
+        block[p::THICKNESS] = (self.config.plate.blank.thickness_mm * 100.0).round() as u16;
+        block[p::ATTEMPT] = self.program.attempt;
+        block[p::STROKE_ID_TAIL] = tail;
+        block
+    }
+}
+
+/// What a number looks like while one of its bytes is still the old one.
+fn torn(stroke_id: u16) -> u16 {
+    stroke_id ^ 0x0100
+}
+
+fn new_program(config: &Config, session_id: u16, now: Duration) -> Program {
+    let ms = Duration::from_millis;
+    let times = &config.timings;
+    let limits = Limits {
+        accept: ms(times.accept_ms),
+        result: ms(times.result_ms),
+        host: ms(times.host_ms),
+        heartbeat: ms(times.heartbeat_ms),
+        ack_delay: ms(times.ack_ms),
+    };
+    let mut program = Program::new(limits, session_id, now);
+    program.takes_simulated = config.take_simulated;
+    program
+}

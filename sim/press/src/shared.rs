@@ -1,0 +1,150 @@
+//! The state that the program's cycle, the Modbus server, the line and the control port share.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+use crate::config::Config;
+use crate::faults::{LineFault, LineFaults};
+use crate::press::Press;
+use crate::registers::Table;
+use crate::{Error, Result};
+
+/// The press with its registers.
+#[derive(Debug)]
+pub(crate) struct Machine {
+    pub(crate) press: Press,
+    pub(crate) table: Table,
+}
+
+/// The line's faults.
+#[derive(Debug)]
+pub(crate) struct Line {
+    pub(crate) faults: LineFaults,
+    pub(crate) random: fastrand::Rng,
+    pub(crate) frozen_until: Option<Instant>,
+}
+
+/// Everything the tasks of one press share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    machine: Mutex<Machine>,
+    line: Mutex<Line>,
+    started: Instant,
+    /// Counts the cycles.
+    pub(crate) cycles: watch::Sender<u64>,
+    /// Counts up when all connections are to be cut.
+    pub(crate) cuts: watch::Sender<u64>,
+    /// Becomes true once.
+    pub(crate) stop: watch::Sender<bool>,
+}
+
+impl Shared {
+    pub(crate) fn new(config: &Config) -> Result<Self> {
+        Ok(Self {
+            machine: Mutex::new(Machine {
+                press: Press::new(config)?,
+                table: Table::new(config.p_base, config.h_base),
+            }),
+            line: Mutex::new(Line {
+                faults: config.line_faults.clone(),
+                random: fastrand::Rng::with_seed(config.seed),
+                frozen_until: None,
+            }),
+            started: Instant::now(),
+            cycles: watch::Sender::new(0),
+            cuts: watch::Sender::new(0),
+            stop: watch::Sender::new(false),
+        })
+    }
+
+    /// Time since the start.
+    pub(crate) fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    pub(crate) fn machine(&self) -> MutexGuard<'_, Machine> {
+        self.machine.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn line(&self) -> MutexGuard<'_, Line> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One cycle of the controller.
+    pub(crate) fn cycle(&self) -> Result<()> {
+        let now = self.now();
+        let mut machine = self.machine();
+        let Machine { press, table } = &mut *machine;
+        let restarts = press.tally.restarts;
+        press.step(table, now)?;
+        let restarted = press.tally.restarts != restarts;
+        drop(machine);
+        if restarted {
+            self.cut();
+        }
+        self.cycles.send_modify(|cycle| *cycle += 1);
+        Ok(())
+    }
+
+    /// Cuts all connections.
+    pub(crate) fn cut(&self) {
+        self.cuts.send_modify(|cut| *cut += 1);
+    }
+
+    /// Draws the fault of the next request and counts it.
+    pub(crate) fn draw_line_fault(&self) -> Option<LineFault> {
+        let mut line = self.line();
+        let Line { faults, random, .. } = &mut *line;
+        let fault = faults.draw(random)?;
+        drop(line);
+        *self.machine().press.tally.line_faults.entry(format!("{fault:?}")).or_default() += 1;
+        Some(fault)
+    }
+
+    /// Waits while the line is frozen.
+    pub(crate) async fn thaw(&self) {
+        loop {
+            let until = self.line().frozen_until;
+            match until {
+                Some(until) if until > Instant::now() => tokio::time::sleep_until(until).await,
+                _ => return,
+            }
+        }
+    }
+
+    /// Resolves when the press is to stop.
+    pub(crate) async fn stopped(&self) {
+        let mut stop = self.stop.subscribe();
+        // An error means that the sender is gone, and the sender is in `self`.
+        let _ = stop.wait_for(|&stop| stop).await;
+    }
+
+    /// Waits until `what` holds of the tally.
+    pub(crate) async fn until(
+        &self,
+        what: &str,
+        limit: Duration,
+        holds: impl Fn(&crate::tally::Tally) -> bool,
+    ) -> Result<crate::tally::Tally> {
+        let mut cycles = self.cycles.subscribe();
+        let wait = async {
+            loop {
+                if let Some(tally) = Some(&self.machine().press.tally).filter(|tally| holds(tally)) {
+                    return tally.clone();
+                }
+                // The sender is in `self`: this cannot fail.
+                let _ = cycles.changed().await;
+            }
+        };
+        match tokio::time::timeout(limit, wait).await {
+            Ok(tally) => Ok(tally),
+            Err(_) => {
+                let tally = serde_json::to_string(&self.machine().press.tally).unwrap_or_default();
+                Err(Error::Late { what: what.to_owned(), limit, tally })
+            }
+        }
+    }
+}
