@@ -112,6 +112,11 @@ impl RawOptions {
         Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Vec::new())
     }
 
+    /// A fault of the options as a whole.
+    pub(crate) fn fault(&self, message: String) -> Fault {
+        self.source.fault(&self.place, message)
+    }
+
     fn document(&self) -> Document {
         let span = self.place.offset..self.place.offset;
         let root = Node { span, kind: Kind::Table(self.entries.clone()) };

@@ -100,8 +100,13 @@ impl<'d> Table<'d> {
 
     /// A list of exactly `N` finite numbers: a point, a direction.
     pub fn vector<const N: usize>(&mut self, key: &str) -> Field<'d, [f64; N]> {
-        self.value(key, &format!("a list of {N} numbers"), |node| match &node.kind {
-            Kind::Array(values) => values.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
+        self.value(key, &format!("a list of {N} numbers"), vector)
+    }
+
+    /// `R` lists of exactly `N` finite numbers: the rows of a matrix.
+    pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> Field<'d, [[f64; N]; R]> {
+        self.value(key, &format!("{R} lists of {N} numbers"), |node| match &node.kind {
+            Kind::Array(rows) => rows.iter().map(vector).collect::<Option<Vec<_>>>()?.try_into().ok(),
             _ => None,
         })
     }
@@ -229,6 +234,13 @@ pub(crate) fn number(node: &Node) -> Option<f64> {
         // Whole numbers above 2^53 lose their last digits; no quantity of a plant has so many.
         Kind::Integer(value) => Some(value as f64),
         Kind::Float(value) => value.is_finite().then_some(value),
+        _ => None,
+    }
+}
+
+fn vector<const N: usize>(node: &Node) -> Option<[f64; N]> {
+    match &node.kind {
+        Kind::Array(values) => values.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
         _ => None,
     }
 }

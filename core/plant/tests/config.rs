@@ -4,8 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
-use platen_plant::PlateFile;
+use platen_plant::plant::{KeepScans, RegionOfInterest};
 use platen_plant::plate::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
+use platen_plant::{PlantFile, PlateFile};
 
 fn config() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config")
@@ -58,4 +59,72 @@ fn directions_become_radians_and_a_template_lies_in_the_middle_unless_said() {
     assert_eq!(file.target.unwrap().shape, expected);
     assert_eq!(file.templates[0].centre, Centre::At(1.5));
     assert_eq!(file.plate.face_inset, 0.0104);
+}
+
+#[test]
+fn every_plant_file_loads() {
+    let files = toml_files(&config());
+    let plants =
+        files.iter().filter(|path| path.file_name().unwrap().to_string_lossy().starts_with("plant-"));
+    let mut loaded = 0;
+    for path in plants {
+        PlantFile::load(path).unwrap_or_else(|error| panic!("{error}"));
+        loaded += 1;
+    }
+    assert!(loaded > 0, "no plant file in {files:?}");
+}
+
+const PLANT: &str = r#"
+[plant]
+name = "North hall, press 3"
+seed = 7
+[scanner]
+plugin = "faro-stream"
+options = { address = "192.0.2.20" }
+[frame]
+u_axis = [0.84, 0.54, -0.02]
+press_from_scanner = { rotation = [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]], translation_mm = [1500, 0, -250] }
+region_of_interest = { min_mm = [-4000, 2000, -3000], max_mm = [4000, 9000, 1000] }
+[plates]
+folder = "recipes"
+[flattening]
+plugin = "elastic"
+[[comparison]]
+plugin = "template"
+[output]
+folder = "/var/platen"
+keep_scans = "12 h"
+"#;
+
+#[test]
+fn a_plant_file_arrives_with_its_paths_resolved() {
+    let plant = PlantFile::parse("/etc/platen/plant-north.toml", PLANT).unwrap();
+    assert_eq!((plant.name.as_str(), plant.seed), ("North hall, press 3", 7));
+    assert_eq!(plant.scanner.as_ref().unwrap().plugin, "faro-stream");
+    assert_eq!(plant.frame.press_from_scanner.rotation[0], [0.6, 0.8, 0.0]);
+    assert_eq!(plant.frame.press_from_scanner.translation, [1.5, 0.0, -0.25]);
+    assert_eq!(plant.frame.u_axis, Some([0.84, 0.54, -0.02]));
+    let region = RegionOfInterest { min: [-4.0, 2.0, -3.0], max: [4.0, 9.0, 1.0] };
+    assert_eq!(plant.frame.region_of_interest, Some(region));
+    assert_eq!(plant.plate_path(17), Path::new("/etc/platen/recipes/plate-017.toml"));
+    assert_eq!(plant.flattening.plugin, "elastic");
+    assert_eq!(plant.comparisons.iter().map(|c| c.plugin.as_str()).collect::<Vec<_>>(), ["template"]);
+    assert_eq!(plant.output.folder, Path::new("/var/platen"));
+    assert_eq!(plant.output.history, Path::new("/var/platen/history.sqlite"));
+    assert_eq!(plant.output.keep_scans, KeepScans::For(std::time::Duration::from_secs(12 * 3600)));
+    let fault = plant.flattening.fault("plugin \"elastic\" is not installed").to_string();
+    assert_eq!(
+        fault,
+        "/etc/platen/plant-north.toml:15:10: flattening.plugin: plugin \"elastic\" is not installed"
+    );
+}
+
+#[test]
+fn an_empty_plant_file_says_what_the_default_says() {
+    let plant = PlantFile::parse("plant-north.toml", "").unwrap();
+    assert_eq!(plant, PlantFile { name: "plant-north".to_owned(), ..PlantFile::default() });
+    assert!(plant.scanner.is_none() && plant.frame.u_axis.is_none());
+    assert!(PlantFile::parse("p.toml", "comparison = []").unwrap().comparisons.is_empty());
+    let always = PlantFile::parse("p.toml", "[output]\nkeep_scans = 'always'").unwrap();
+    assert_eq!(always.output.keep_scans, KeepScans::Always);
 }

@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use platen_plant::PlateFile;
+use platen_plant::{Faults, PlantFile, PlateFile};
 
 #[test]
 fn every_fault_of_every_golden_file_is_reported_as_read_in_review() {
@@ -33,6 +33,9 @@ fn every_fault_of_every_golden_file_is_reported_as_read_in_review() {
 }
 
 fn faults(name: &str, text: &str) -> String {
-    let faults = PlateFile::parse(name, text).expect_err(name);
+    let faults: Faults = match name.starts_with("plant-") {
+        true => PlantFile::parse(name, text).expect_err(name),
+        false => PlateFile::parse(name, text).expect_err(name),
+    };
     format!("{faults}\n")
 }

@@ -1,0 +1,130 @@
+//! The plant file: which scanner, which algorithms, where the plates and the results are.
+//!
+//! Everything but `[scanner]` and `[press]` has a default, so that a scan can be measured without a plant file.
+//! Relative paths start at the folder of the plant file.
+
+mod frame;
+mod output;
+mod plugin_use;
+
+pub use frame::{Frame, RegionOfInterest, RigidTransform};
+pub use output::{KeepScans, Output};
+pub use plugin_use::PluginUse;
+
+use std::path::{Path, PathBuf};
+
+use crate::document::{Document, Reported};
+use crate::{Error, Faults, Table};
+
+/// Used where the plant file names no flattening.
+const FLATTENING: &str = "harmonic";
+/// Used where the plant file lists no comparison; `comparison = []` asks for none.
+const COMPARISONS: [&str; 2] = ["displacement", "template"];
+
+/// A checked plant file, but for the options of its plugins: those wait for the plugins' own declarations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlantFile {
+    /// Name for people; the file's name where none is given.
+    pub name: String,
+    /// From which every random choice is drawn, so that a measurement can be repeated to the last bit.
+    pub seed: u64,
+    /// Where scans come from; needed to run, not to measure a file.
+    pub scanner: Option<PluginUse>,
+    /// How the scanner stands to the press and the plate.
+    pub frame: Frame,
+    /// Folder of the plate files.
+    pub plates: PathBuf,
+    /// Turns the mesh into (u, v).
+    pub flattening: PluginUse,
+    /// What is compared after each stroke, in this order.
+    pub comparisons: Vec<PluginUse>,
+    /// Where results go.
+    pub output: Output,
+}
+
+impl Default for PlantFile {
+    /// What an empty plant file in the current folder would say.
+    fn default() -> Self {
+        Self {
+            name: "no plant file".to_owned(),
+            seed: 1,
+            scanner: None,
+            frame: Frame::default(),
+            plates: PathBuf::from("plates"),
+            flattening: PluginUse::by_default(FLATTENING),
+            comparisons: COMPARISONS.map(PluginUse::by_default).to_vec(),
+            output: Output::in_folder(Path::new("")),
+        }
+    }
+}
+
+impl PlantFile {
+    /// Reads a plant file.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`], or [`Error::Faulty`] with every fault of the file.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Ok(Self::take(Document::load(path)?, path)?)
+    }
+
+    /// Checks the text of a plant file; `file` is its path.
+    ///
+    /// # Errors
+    /// Every fault of the text.
+    pub fn parse(file: &str, text: &str) -> Result<Self, Faults> {
+        Self::take(Document::parse(file, text), Path::new(file))
+    }
+
+    /// The plate file of a recipe number: `plates/plate-017.toml` for 17.
+    pub fn plate_path(&self, recipe: u16) -> PathBuf {
+        self.plates.join(format!("plate-{recipe:03}.toml"))
+    }
+
+    fn take(document: Document, path: &Path) -> Result<Self, Faults> {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let plant = Self::read(document.root(), &stem, folder);
+        document.finish(plant)
+    }
+
+    fn read(mut root: Table<'_>, stem: &str, folder: &Path) -> Result<Self, Reported> {
+        let default = Self::default();
+        let plant = root.section("plant").and_then(|mut table| {
+            let name = table.name("name").or(stem.to_owned());
+            let seed = table.integer("seed").at_least(0).map(i64::unsigned_abs).or(default.seed);
+            table.finish();
+            Ok((name?, seed?))
+        });
+        let scanner = root.table("scanner").optional();
+        let scanner = scanner.and_then(|table| table.map(PluginUse::read).transpose());
+        let press = root.table("press").optional();
+        let frame = root.section("frame").and_then(Frame::read);
+        let plates = root.section("plates").and_then(|mut table| {
+            let plates = table.name("folder").map(PathBuf::from).or(default.plates);
+            table.finish();
+            plates
+        });
+        let flattening = root.table("flattening").optional();
+        let flattening = flattening.and_then(|table| table.map(PluginUse::read).transpose());
+        let listed = root.has("comparison");
+        let comparisons = root.tables("comparison").and_then(|tables| {
+            let uses: Vec<_> = tables.into_iter().map(PluginUse::read).collect();
+            uses.into_iter().collect::<Result<Vec<_>, _>>()
+        });
+        let output = root.section("output").and_then(|table| Output::read(table, folder));
+        root.finish();
+
+        let (name, seed) = plant?;
+        press?;
+        Ok(Self {
+            name,
+            seed,
+            scanner: scanner?,
+            frame: frame?,
+            plates: folder.join(plates?),
+            flattening: flattening?.unwrap_or(default.flattening),
+            comparisons: if listed { comparisons? } else { default.comparisons },
+            output: output?,
+        })
+    }
+}
