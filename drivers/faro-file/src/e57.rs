@@ -284,3 +284,41 @@ fn from_spherical(range: f64, azimuth: f64, elevation: f64, state: State) -> [f6
     let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
     Direction { azimuth, elevation }.unit().map(|c| c * range)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use e57::RecordValue;
+
+    /// PDAL writes states as floats, others as the widest integers there are.
+    #[test]
+    fn states_of_any_type_are_read() {
+        let field = |index, data_type: &RecordDataType| Field { index, data_type: data_type.clone() };
+        let double = RecordDataType::Double { min: None, max: None };
+        let integer = RecordDataType::Integer { min: i64::MIN, max: i64::MAX };
+        let single = RecordDataType::Single { min: None, max: None };
+        let integer_state: fn(i64) -> RecordValue = RecordValue::Integer;
+        let single_state: fn(i64) -> RecordValue = |n| RecordValue::Single(n as f32);
+        for (data_type, state) in [(&integer, integer_state), (&single, single_state)] {
+            let fields = Fields {
+                position: [0, 1, 2].map(|k| field(k, &double)),
+                spherical: false,
+                state: Some(field(3, data_type)),
+                row: field(4, &integer),
+                column: field(4, &integer),
+                bounds: bounds(None),
+                intensity: None,
+                return_index: None,
+            };
+            let read = |number| {
+                let mut values: RawValues = vec![RecordValue::Double(1.0); 3];
+                values.extend([state(number), RecordValue::Integer(5)]);
+                fields.cell(&values).map(|cell| cell.map(|cell| cell.state))
+            };
+            assert_eq!(read(0), Ok(Some(State::Valid)));
+            assert_eq!(read(1), Ok(Some(State::DirectionOnly)));
+            assert_eq!(read(2), Ok(Some(State::NoReturn)));
+            assert!(read(3).is_err() && read(-1).is_err());
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! Reads laser scans from files: structured E57 and PTX.
+//! Reads laser scans from files: structured E57, PTX, and XYZ with row and column.
 //!
 //! # What it does
 //! It recognises the format from the content, checks that the file is complete, decides from the geometry how rows
@@ -33,6 +33,7 @@ mod open;
 mod ptx;
 mod source;
 mod text;
+mod xyz;
 
 use std::path::PathBuf;
 
@@ -67,7 +68,7 @@ impl Scanner for FaroFile {
     const INFO: Info = Info::new(
         c"faro-file",
         c"FARO scan files",
-        c"Reads structured E57 and PTX scans; decides orientation, handedness and units from the geometry.",
+        c"Reads structured E57, PTX and XYZ scans; decides orientation, handedness and units from the geometry.",
         c"0.1.0",
     );
     type Options = Options;

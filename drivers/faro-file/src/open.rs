@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::ptx::Ptx;
 use crate::source::Source;
 use crate::text::{self, Lines};
+use crate::xyz::{self, Xyz};
 
 /// Bytes from which a format is told.
 const HEAD: u64 = 1 << 14;
@@ -23,6 +24,7 @@ const STRUCTURED: &str =
 pub(crate) enum Kind {
     E57,
     Ptx,
+    Xyz,
     /// Recognised and refused: what it is, what to do instead.
     Refused(String, &'static str),
 }
@@ -41,6 +43,7 @@ pub(crate) fn open(path: &Path, chosen: Option<usize>) -> Result<Box<dyn Source>
     match kind(&head, &extension(path))? {
         Kind::E57 => Ok(Box::new(E57::open(file, chosen)?)),
         Kind::Ptx => Ok(Box::new(Ptx::open(file, chosen)?)),
+        Kind::Xyz => Ok(Box::new(Xyz::open(file)?)),
         Kind::Refused(format, instead) => Err(Error::Refused { format, instead }),
     }
 }
@@ -106,36 +109,54 @@ pub(crate) fn kind(head: &[u8], extension: &str) -> Result<Kind> {
     text_kind(head, extension)
 }
 
-/// Tells text formats apart by how many numbers stand in the first lines.
+/// Tells text formats apart by the numbers of their first lines.
 fn text_kind(head: &[u8], extension: &str) -> Result<Kind> {
     let binary = head.contains(&0) || std::str::from_utf8(head).is_err_and(|e| e.error_len().is_some());
-    let sizes = if binary { Vec::new() } else { sample(head)? };
+    let lines = if binary { Vec::new() } else { sample(head)? };
+    let sizes: Vec<usize> = lines.iter().map(|line| line.numbers).collect();
+    // A first line that holds one number is a count of points.
+    let data = if sizes.first() == Some(&1) { &lines[1..] } else { &lines[..] };
     let unorganised =
         |what: &str| Ok(Kind::Refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
     match sizes.as_slice() {
         [1, 1] | [1, 1, 3, ..] => Ok(Kind::Ptx),
         [1] if extension == "ptx" => Ok(Kind::Ptx),
+        [_, ..] if !data.is_empty() && data.iter().all(|line| line.cell) => Ok(Kind::Xyz),
         [.., n] if extension == "pts" && *n >= 3 => unorganised("PTS point cloud"),
         [.., n] if *n >= 3 => unorganised("text point cloud"),
         _ => Ok(Kind::Refused("a file of unknown format".to_owned(), STRUCTURED)),
     }
 }
 
-/// Numbers in each of the first lines that are not comments; nothing when one holds something else.
-fn sample(head: &[u8]) -> Result<Vec<usize>> {
-    let mut lines = Lines::new(BufReader::new(head));
-    let mut sizes = Vec::new();
-    while sizes.len() < SAMPLE_LINES
+/// A line of a text file.
+struct Sampled {
+    /// Numbers in it.
+    numbers: usize,
+    /// True when they can be row, column and a point.
+    cell: bool,
+}
+
+/// The first lines that are no comments; nothing when one holds anything but numbers.
+fn sample(head: &[u8]) -> Result<Vec<Sampled>> {
+    // The last line is only whole when the file ends with it.
+    let whole = if (head.len() as u64) < HEAD {
+        head
+    } else {
+        head.rsplitn(2, |b| *b == b'\n').last().unwrap_or(head)
+    };
+    let mut lines = Lines::new(BufReader::new(whole));
+    let mut sampled = Vec::new();
+    while sampled.len() < SAMPLE_LINES
         && let Some(line) = lines.next()?
     {
-        if line.starts_with(b"#") || line.starts_with(b"//") {
+        if xyz::is_comment(line) {
             continue;
         }
         let (fields, n) = text::fields(line);
         if fields.iter().take(n).any(|field| text::number(field).is_none()) {
             return Ok(Vec::new());
         }
-        sizes.push(n);
+        sampled.push(Sampled { numbers: n, cell: xyz::is_cell(line) });
     }
-    Ok(sizes)
+    Ok(sampled)
 }

@@ -1,4 +1,7 @@
-//! Files written by others, and what happens to files that are not sound.
+//! Files written by others, the same lattice in every way of writing it, and files that are not sound.
 
 mod collect;
+mod damage;
+mod formats;
 mod samples;
+mod write;

@@ -76,6 +76,10 @@ fn the_pump_is_the_same_lattice_in_every_format() {
     let (worst, common) = compare(&e57, &pump("pumpA_lf.ptx.gz"), 0);
     assert!(worst < 5e-6 && common == 155_201, "{worst} m over {common} cells");
 
+    // Five decimals: half of the last one, and the last bit of a range stored as f32.
+    let (worst, common) = compare(&e57, &pump("pumpA_rowcol.xyz.gz"), 0);
+    assert!(worst < 5e-6 + 5e-7 && common == 155_201, "{worst} m over {common} cells");
+
     // The first 40 columns of a file whose columns run clockwise are the last 40 by azimuth.
     let (worst, common) = compare(&e57, &pump("pumpA_crlf_head.ptx.gz"), 345 - 40);
     assert!(worst < 5e-6 && common == 3579, "{worst} m over {common} cells");

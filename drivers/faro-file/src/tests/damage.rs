@@ -1,0 +1,103 @@
+//! Damage anywhere in a file ends in an error or in cells, never in a panic or in memory without bound.
+
+use std::io::Cursor;
+
+use platen_scan::orient::Expected;
+use proptest::prelude::*;
+
+use super::collect::Collected;
+use super::write::*;
+use crate::e57::E57;
+use crate::error::Error;
+use crate::open;
+use crate::ptx::Ptx;
+use crate::source::{Source, deliver};
+use crate::xyz::Xyz;
+
+/// Reads bytes by what they look like; `Ok` with the points delivered.
+fn read(bytes: &[u8]) -> Result<u64, Error> {
+    let file = Cursor::new(bytes);
+    let mut source: Box<dyn Source + '_> = match open::kind(&bytes[..bytes.len().min(1 << 14)], "")? {
+        open::Kind::E57 => Box::new(E57::open(file, None)?),
+        open::Kind::Ptx => Box::new(Ptx::open(file, None)?),
+        open::Kind::Xyz => Box::new(Xyz::open(file)?),
+        open::Kind::Refused(format, instead) => return Err(Error::Refused { format, instead }),
+    };
+    let mut collected = Collected::default();
+    deliver(source.as_mut(), &Expected::default(), &mut collected)?;
+    Ok(collected.end.unwrap().points)
+}
+
+fn files() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        ("e57", e57(PLAIN, 1)),
+        ("e57 spherical", e57(E57Style { spherical: true, gaps: Gaps::LeftOut, ..PLAIN }, 1)),
+        ("ptx", ptx(PTX, COLUMNS)),
+        ("xyz", xyz("", " 12", false, "\n")),
+    ]
+}
+
+/// Most cells in any of the files.
+const ALL: u64 = (ROWS * COLUMNS) as u64;
+
+#[test]
+fn a_file_cut_anywhere_is_refused() {
+    for (name, file) in files() {
+        for length in (0..file.len()).step_by(97) {
+            let cut = &file[..length];
+            let read = read(cut);
+            // Text cut at a line end cannot be told from a smaller scan where nothing announces the number.
+            let whole_lines = name == "xyz" && cut.ends_with(b"\n");
+            assert!(read.is_err() || whole_lines, "{name} cut at {length} gave {read:?}");
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_of_an_e57_is_found() {
+    let file = e57(PLAIN, 1);
+    for bit in (0..file.len() * 8).step_by(61) {
+        let mut damaged = file.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(read(&damaged).is_err(), "bit {bit}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Bytes replaced anywhere, with the checksums of an E57 mended so that the damage reaches the parser.
+    #[test]
+    fn no_damage_brings_the_reader_down(
+        which in 0_usize..4,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+    ) {
+        let (name, mut file) = files().swap_remove(which);
+        for (place, byte) in edits {
+            let at = place.index(file.len());
+            file[at] = byte;
+        }
+        if name.starts_with("e57") {
+            mend(&mut file);
+        }
+        if let Ok(points) = read(&file) {
+            prop_assert!(points <= ALL);
+        }
+    }
+
+    /// Anything at all.
+    #[test]
+    fn no_bytes_bring_the_reader_down(mut bytes in prop::collection::vec(any::<u8>(), 0..3000), head in 0..4) {
+        let head: &[u8] = [b"ASTM-E57".as_slice(), b"5\n4\n0 0 0\n", b"1 2 3 4 5\n", b""][head as usize];
+        bytes.splice(0..0, head.iter().copied());
+        let _ = read(&bytes);
+    }
+}
+
+/// Makes the checksum of every page right.
+fn mend(file: &mut [u8]) {
+    for page in file.chunks_exact_mut(1024) {
+        let crc = super::formats::crc32c(&page[..1020]);
+        page[1020..].copy_from_slice(&crc.to_be_bytes());
+    }
+}

@@ -1,0 +1,217 @@
+//! One small lattice, written in every way a format allows.
+
+use std::fmt::Write as _;
+use std::io::Cursor;
+
+use e57::{
+    E57Writer, IntensityLimits, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform,
+    Translation,
+};
+use platen_scan::Direction;
+
+pub(super) const ROWS: u32 = 24;
+pub(super) const COLUMNS: u32 = 32;
+const STEP: f64 = 0.012;
+
+/// True where the lattice has a gap.
+pub(super) fn missing(row: u32, column: u32) -> bool {
+    (3 * row + column).is_multiple_of(11)
+}
+
+/// Direction and range of a cell: row 0 at the top, columns by growing azimuth, across the seam at pi.
+pub(super) fn beam(row: u32, column: u32) -> (Direction, f64) {
+    let direction =
+        Direction { azimuth: 3.0 + STEP * f64::from(column), elevation: 0.1 - STEP * f64::from(row) };
+    (direction, 5.0 + 0.03 * f64::from(row) + 0.02 * f64::from(column))
+}
+
+/// The point of a cell, metres.
+pub(super) fn point(row: u32, column: u32) -> [f64; 3] {
+    let (direction, range) = beam(row, column);
+    direction.unit().map(|c| c * range)
+}
+
+pub(super) fn intensity(row: u32, column: u32) -> f64 {
+    f64::from(row * COLUMNS + column)
+}
+
+/// How missing cells are written.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Gaps {
+    Flagged,
+    LeftOut,
+    Zero,
+    Nan,
+}
+
+/// How an E57 file is written.
+#[derive(Clone, Copy)]
+pub(super) struct E57Style {
+    pub(super) spherical: bool,
+    pub(super) coordinates: fn(RecordName) -> Record,
+    pub(super) gaps: Gaps,
+    pub(super) offset: i64,
+    pub(super) posed: bool,
+    pub(super) scale: f64,
+    pub(super) azimuth_turns: f64,
+}
+
+pub(super) fn double(name: RecordName) -> Record {
+    Record { name, data_type: RecordDataType::Double { min: None, max: None } }
+}
+
+pub(super) fn single(name: RecordName) -> Record {
+    Record { name, data_type: RecordDataType::Single { min: None, max: None } }
+}
+
+/// Ten micrometres.
+pub(super) fn scaled(name: RecordName) -> Record {
+    let data_type =
+        RecordDataType::ScaledInteger { min: -2_000_000, max: 2_000_000, scale: 1e-5, offset: 0.25 };
+    Record { name, data_type }
+}
+
+fn narrow(name: RecordName) -> Record {
+    Record { name, data_type: RecordDataType::Integer { min: 0, max: 2 } }
+}
+
+pub(super) const PLAIN: E57Style = E57Style {
+    spherical: false,
+    coordinates: double,
+    gaps: Gaps::Flagged,
+    offset: 0,
+    posed: false,
+    scale: 1.0,
+    azimuth_turns: 0.0,
+};
+
+fn value(record: &Record, value: f64) -> RecordValue {
+    match record.data_type {
+        RecordDataType::Double { .. } => RecordValue::Double(value),
+        RecordDataType::Single { .. } => RecordValue::Single(value as f32),
+        RecordDataType::Integer { .. } => RecordValue::Integer(value as i64),
+        RecordDataType::ScaledInteger { scale, offset, .. } => {
+            RecordValue::ScaledInteger(((value - offset) / scale).round() as i64)
+        }
+    }
+}
+
+/// The lattice as an E57 file; `clouds` copies of it.
+pub(super) fn e57(style: E57Style, clouds: usize) -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut file, "file").unwrap();
+    for number in 0..clouds {
+        add_cloud(&mut writer, style, number);
+    }
+    writer.finalize().unwrap();
+    drop(writer);
+    file.into_inner()
+}
+
+fn add_cloud(writer: &mut E57Writer<&mut Cursor<Vec<u8>>>, style: E57Style, number: usize) {
+    use RecordName::*;
+    let (names, state) = if style.spherical {
+        ([SphericalRange, SphericalAzimuth, SphericalElevation], SphericalInvalidState)
+    } else {
+        ([CartesianX, CartesianY, CartesianZ], CartesianInvalidState)
+    };
+    let mut prototype: Vec<Record> = names.into_iter().map(style.coordinates).collect();
+    prototype.push(narrow(state));
+    prototype.push(Record { name: RowIndex, data_type: RecordDataType::Integer { min: 0, max: 16383 } });
+    prototype.push(Record { name: ColumnIndex, data_type: RecordDataType::Integer { min: 0, max: 16383 } });
+    prototype.push(Record { name: Intensity, data_type: RecordDataType::Integer { min: 0, max: 2047 } });
+    let mut cloud = writer.add_pointcloud(&format!("cloud {number}"), prototype.clone()).unwrap();
+    cloud.set_intensity_limits(Some(IntensityLimits {
+        intensity_min: Some(RecordValue::Integer(0)),
+        intensity_max: Some(RecordValue::Integer(2047)),
+    }));
+    if style.posed {
+        cloud.set_transform(Some(Transform {
+            rotation: Quaternion { w: 0.5, x: 0.5, y: 0.5, z: 0.5 },
+            translation: Translation { x: 100.0, y: -20.0, z: 3.0 },
+        }));
+    }
+    for column in 0..COLUMNS {
+        for row in 0..ROWS {
+            let gap = missing(row, column);
+            if gap && style.gaps == Gaps::LeftOut {
+                continue;
+            }
+            let (direction, range) = beam(row, column);
+            let position = if style.spherical {
+                let azimuth = direction.azimuth + style.azimuth_turns * std::f64::consts::TAU;
+                [range * style.scale, azimuth, direction.elevation]
+            } else {
+                point(row, column).map(|c| c * style.scale)
+            };
+            let (position, flag) = match style.gaps {
+                _ if !gap => (position, 0.0),
+                Gaps::Zero => ([0.0; 3], 0.0),
+                Gaps::Nan => ([f64::NAN; 3], 0.0),
+                Gaps::Flagged | Gaps::LeftOut => ([1.0; 3], 2.0),
+            };
+            let index = |i: u32| f64::from(i) + style.offset as f64;
+            let numbers =
+                position.into_iter().chain([flag, index(row), index(column), intensity(row, column)]);
+            let point = prototype.iter().zip(numbers).map(|(record, number)| value(record, number)).collect();
+            cloud.add_point(point).unwrap();
+        }
+    }
+    cloud.finalize().unwrap();
+}
+
+/// How a PTX file is written.
+#[derive(Clone, Copy)]
+pub(super) struct PtxStyle {
+    pub(super) header_end: &'static str,
+    pub(super) cell_end: &'static str,
+    pub(super) bottom_up: bool,
+    pub(super) clockwise: bool,
+    pub(super) left_handed: bool,
+    pub(super) colour: bool,
+    pub(super) mark: &'static str,
+}
+
+pub(super) const PTX: PtxStyle = PtxStyle {
+    header_end: "\n",
+    cell_end: "\n",
+    bottom_up: false,
+    clockwise: false,
+    left_handed: false,
+    colour: false,
+    mark: "",
+};
+
+/// The lattice as a PTX file; the first `columns` stored.
+pub(super) fn ptx(style: PtxStyle, columns: u32) -> Vec<u8> {
+    let mut text = style.mark.to_owned();
+    let end = style.header_end;
+    write!(text, "{columns}{end}{ROWS}{end}0 0 0{end}1 0 0{end}0 1 0{end}0 0 1{end}").unwrap();
+    let y = if style.left_handed { -1 } else { 1 };
+    write!(text, "1 0 0 0{end}0 {y} 0 0{end}0 0 1 0{end}0 0 0 1{end}").unwrap();
+    for column in 0..columns {
+        let column = if style.clockwise { COLUMNS - 1 - column } else { column };
+        for row in 0..ROWS {
+            let row = if style.bottom_up { ROWS - 1 - row } else { row };
+            let [x, y, z] = if missing(row, column) { [0.0; 3] } else { point(row, column) };
+            let y = if style.left_handed { -y } else { y };
+            let i = intensity(row, column) / 1000.0;
+            let colour = if style.colour { " 1 2 3" } else { "" };
+            write!(text, "{x:.7} {y:.7} {z:.7} {i:.4}{colour}{}", style.cell_end).unwrap();
+        }
+    }
+    text.into_bytes()
+}
+
+/// The lattice as XYZ text: `fields` behind row, column, x, y, z; rows and columns swapped when asked.
+pub(super) fn xyz(head: &str, tail: &str, swapped: bool, end: &str) -> Vec<u8> {
+    let mut text = head.to_owned();
+    for column in 0..COLUMNS {
+        for row in (0..ROWS).filter(|row| !missing(*row, column)) {
+            let [x, y, z] = point(row, column);
+            let (a, b) = if swapped { (column, row) } else { (row, column) };
+            write!(text, "{a} {b} {x:.7} {y:.7} {z:.7}{tail}{end}").unwrap();
+        }
+    }
+    text.into_bytes()
+}
