@@ -13,13 +13,17 @@ mod outline;
 mod patch;
 mod plate;
 pub mod sparse;
+pub mod surface;
 pub mod task;
+#[cfg(test)]
+mod testing;
 
 pub use flatten::{Chart, Flatten, FlattenError};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, Outline};
 pub use patch::{Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
+pub use surface::{Surface, SurfaceParts};
 
 /// A point or vector in space, metres, scanner frame unless said.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -1,0 +1,369 @@
+//! The symmetric matrix of a tensor spline fit, its Cholesky factor and the part of its inverse that is needed.
+//!
+//! Coefficients are ordered row after row of the control net along its longer axis. A B-spline meets those of the
+//! three rows before it, so the matrix has half-bandwidth 3 in blocks of one row, and so has its factor. The
+//! covariance of anything read off one place of the surface needs the inverse only inside the same band: block
+//! recursion of Takahashi, Fagan and Chen (1973), in blocks as in Golub and Plemmons (1980).
+//!
+//! All dense kernels run on one thread: the bits do not depend on the machine's load.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+/// Rows of the net that one B-spline reaches back to.
+const REACH: usize = 3;
+
+/// How the coefficients of a net are laid out in blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    n_u: usize,
+    n_v: usize,
+}
+
+impl Layout {
+    /// Blocks run along v when it is the longer axis.
+    fn v_is_outer(self) -> bool {
+        self.n_v >= self.n_u
+    }
+
+    fn n_rows(self) -> usize {
+        self.n_u.max(self.n_v)
+    }
+
+    fn block(self) -> usize {
+        self.n_u.min(self.n_v)
+    }
+
+    /// (outer, inner) place of the coefficient (i along u, k along v).
+    fn place(self, i: usize, k: usize) -> (usize, usize) {
+        if self.v_is_outer() { (k, i) } else { (i, k) }
+    }
+
+    /// Index in block order of the coefficient with index `c` in the net's order (v outer).
+    fn index(self, c: usize) -> usize {
+        let (row, inner) = self.place(c % self.n_u, c / self.n_u);
+        row * self.block() + inner
+    }
+
+    fn len(self) -> usize {
+        self.n_rows() * (REACH + 1) * self.block() * self.block()
+    }
+
+    /// Range of the block that couples row `row` to row `row - back`.
+    fn range(self, row: usize, back: usize) -> std::ops::Range<usize> {
+        let size = self.block() * self.block();
+        let start = (row * (REACH + 1) + back) * size;
+        start..start + size
+    }
+}
+
+/// A symmetric matrix over the coefficients of a net: blocks (row, row - 0..=3), column-major, lower triangle.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct BandMatrix {
+    layout: Layout,
+    blocks: Vec<f64>,
+}
+
+/// The lower Cholesky factor of a [`BandMatrix`], in the same layout.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct BandFactor {
+    layout: Layout,
+    blocks: Vec<f64>,
+}
+
+/// The matrix is not positive definite: some coefficients are determined neither by points nor by the penalty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct NotPositive;
+
+impl BandMatrix {
+    pub(crate) fn zeros(n_u: usize, n_v: usize) -> Self {
+        let layout = Layout { n_u, n_v };
+        Self { layout, blocks: vec![0.0; layout.len()] }
+    }
+
+    /// Adds `value` for the product of coefficient pair `i` along u with pair `k` along v, both ascending: to the
+    /// entries (i0,k0)-(i1,k1) and (i1,k0)-(i0,k1), once where they coincide.
+    pub(crate) fn add_pair(&mut self, i: [usize; 2], k: [usize; 2], value: f64) {
+        self.add((i[0], k[0]), (i[1], k[1]), value);
+        if i[0] != i[1] && k[0] != k[1] {
+            self.add((i[1], k[0]), (i[0], k[1]), value);
+        }
+    }
+
+    /// Adds `weight` times the Kronecker product of two banded matrices given by their upper diagonals.
+    pub(crate) fn add_kronecker(&mut self, along_u: &[[f64; 4]], along_v: &[[f64; 4]], weight: f64) {
+        for (k, v) in along_v.iter().enumerate() {
+            for (dk, fv) in v.iter().enumerate().filter(|(dk, _)| k + dk < along_v.len()) {
+                for (i, u) in along_u.iter().enumerate() {
+                    for (di, fu) in u.iter().enumerate().filter(|(di, _)| i + di < along_u.len()) {
+                        self.add_pair([i, i + di], [k, k + dk], weight * fv * fu);
+                    }
+                }
+            }
+        }
+    }
+
+    fn add(&mut self, a: (usize, usize), b: (usize, usize), value: f64) {
+        let (a, b) = (self.layout.place(a.0, a.1), self.layout.place(b.0, b.1));
+        let (high, low) = if a >= b { (a, b) } else { (b, a) };
+        let block = self.layout.range(high.0, high.0 - low.0).start;
+        self.blocks[block + low.1 * self.layout.block() + high.1] += value;
+    }
+
+    /// Product with a vector in the net's order.
+    pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
+        let (layout, m) = (self.layout, self.layout.block());
+        let mut sorted = vec![0.0; x.len()];
+        (0..x.len()).for_each(|c| sorted[layout.index(c)] = x[c]);
+        let mut product = vec![0.0; x.len()];
+        for row in 0..layout.n_rows() {
+            for back in 0..=REACH.min(row) {
+                let block = &self.blocks[layout.range(row, back)];
+                for (c, column) in block.chunks_exact(m).enumerate() {
+                    let first = if back == 0 { c } else { 0 };
+                    for (r, value) in column.iter().enumerate().skip(first) {
+                        let (i, j) = (row * m + r, (row - back) * m + c);
+                        product[i] += value * sorted[j];
+                        if i != j {
+                            product[j] += value * sorted[i];
+                        }
+                    }
+                }
+            }
+        }
+        (0..x.len()).map(|c| product[layout.index(c)]).collect()
+    }
+
+    /// Cholesky factorisation, left-looking over block rows.
+    pub(crate) fn factor(mut self) -> Result<BandFactor, NotPositive> {
+        let (layout, m) = (self.layout, self.layout.block());
+        let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(m, Par::Seq, Default::default()));
+        let mut work = Mat::<f64>::zeros(m, m);
+        for row in 0..layout.n_rows() {
+            for back in (0..=REACH.min(row)).rev() {
+                let column = row - back;
+                work.copy_from(view(&self.blocks[layout.range(row, back)], m));
+                for k in row.saturating_sub(REACH)..column {
+                    let left = view(&self.blocks[layout.range(row, row - k)], m);
+                    let right = view(&self.blocks[layout.range(column, column - k)], m);
+                    matmul(work.as_mut(), Accum::Add, left, right.transpose(), -1.0, Par::Seq);
+                }
+                if back == 0 {
+                    let stack = MemStack::new(&mut memory);
+                    cholesky_in_place(work.as_mut(), Default::default(), Par::Seq, stack, Default::default())
+                        .map_err(|_| NotPositive)?;
+                    (0..m).for_each(|c| work.col_mut(c).subrows_mut(0, c).fill(0.0));
+                } else {
+                    let diagonal = view(&self.blocks[layout.range(column, 0)], m);
+                    solve_lower_triangular_in_place(diagonal, work.as_mut().transpose_mut(), Par::Seq);
+                }
+                view_mut(&mut self.blocks[layout.range(row, back)], m).copy_from(&work);
+            }
+        }
+        if self.blocks.iter().any(|x| !x.is_finite()) {
+            return Err(NotPositive);
+        }
+        Ok(BandFactor { layout, blocks: self.blocks })
+    }
+}
+
+impl BandFactor {
+    /// A factor from its blocks; `None` when their number does not fit the net.
+    pub(crate) fn from_blocks(n_u: usize, n_v: usize, blocks: Vec<f64>) -> Option<Self> {
+        let layout = Layout { n_u, n_v };
+        (blocks.len() == layout.len()).then_some(Self { layout, blocks })
+    }
+
+    /// The blocks, to be stored or sent.
+    pub(crate) fn blocks(&self) -> &[f64] {
+        &self.blocks
+    }
+
+    /// Solves A X = B in place; rows of `x` in the net's order, one column per component.
+    pub(crate) fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
+        let mut work = self.forward(x);
+        let (layout, m) = (self.layout, self.layout.block());
+        for row in (0..layout.n_rows()).rev() {
+            let (done, rest) = work.as_mut().split_at_row_mut((row + 1) * m);
+            let mut target = done.subrows_mut(row * m, m);
+            for ahead in 1..=REACH.min(layout.n_rows() - 1 - row) {
+                let block = view(&self.blocks[layout.range(row + ahead, ahead)], m);
+                let known = rest.as_ref().subrows((ahead - 1) * m, m);
+                matmul(target.as_mut(), Accum::Add, block.transpose(), known, -1.0, Par::Seq);
+            }
+            let diagonal = view(&self.blocks[layout.range(row, 0)], m);
+            solve_upper_triangular_in_place(diagonal.transpose(), target, Par::Seq);
+        }
+        for (c, row) in x.iter_mut().enumerate() {
+            *row = std::array::from_fn(|d| work[(layout.index(c), d)]);
+        }
+    }
+
+    /// Variance `f' A^-1 f` of a linear functional with coefficients `f` in the net's order.
+    pub(crate) fn variance(&self, f: &[f64]) -> f64 {
+        let columns: Vec<[f64; 1]> = f.iter().map(|x| [*x]).collect();
+        self.forward(&columns).as_ref().squared_norm_l2()
+    }
+
+    /// L^-1 B in block order.
+    fn forward<const D: usize>(&self, b: &[[f64; D]]) -> Mat<f64> {
+        let (layout, m) = (self.layout, self.layout.block());
+        let mut work = Mat::<f64>::zeros(b.len(), D);
+        for (c, row) in b.iter().enumerate() {
+            (0..D).for_each(|d| work[(layout.index(c), d)] = row[d]);
+        }
+        for row in 0..layout.n_rows() {
+            let (done, rest) = work.as_mut().split_at_row_mut(row * m);
+            let mut target = rest.subrows_mut(0, m);
+            for back in 1..=REACH.min(row) {
+                let block = view(&self.blocks[layout.range(row, back)], m);
+                let known = done.as_ref().subrows((row - back) * m, m);
+                matmul(target.as_mut(), Accum::Add, block, known, -1.0, Par::Seq);
+            }
+            solve_lower_triangular_in_place(view(&self.blocks[layout.range(row, 0)], m), target, Par::Seq);
+        }
+        work
+    }
+
+    /// The inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
+    /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
+    pub(crate) fn local_inverse(&self) -> Vec<[f64; 49]> {
+        let band = self.inverse_band();
+        let layout = self.layout;
+        let (n_u, n_v) = (layout.n_u, layout.n_v);
+        let mut local = vec![[0.0; 49]; n_u * n_v];
+        for (c, slots) in local.iter_mut().enumerate() {
+            let (i, k) = (c % n_u, c / n_u);
+            for (slot, value) in slots.iter_mut().enumerate() {
+                let (di, dk) = (i + slot % 7, k + slot / 7);
+                if di < 3 || dk < 3 || di - 3 >= n_u || dk - 3 >= n_v {
+                    continue;
+                }
+                let (a, b) = (layout.place(i, k), layout.place(di - 3, dk - 3));
+                let (high, low) = if a >= b { (a, b) } else { (b, a) };
+                *value = band[layout.range(high.0, high.0 - low.0).start + low.1 * layout.block() + high.1];
+            }
+        }
+        local
+    }
+
+    /// Blocks (row, row - 0..=3) of the inverse, diagonal blocks in full.
+    fn inverse_band(&self) -> Vec<f64> {
+        let (layout, m) = (self.layout, self.layout.block());
+        let mut inverse = vec![0.0; self.blocks.len()];
+        let mut work = Mat::<f64>::zeros(m, m);
+        for row in (0..layout.n_rows()).rev() {
+            let reach = REACH.min(layout.n_rows() - 1 - row);
+            let diagonal = view(&self.blocks[layout.range(row, 0)], m);
+            // U_k = L_(row+k, row) L_(row, row)^-1.
+            let scaled: Vec<Mat<f64>> = (1..=reach)
+                .map(|k| {
+                    let mut u = view(&self.blocks[layout.range(row + k, k)], m).to_owned();
+                    solve_upper_triangular_in_place(
+                        diagonal.transpose(),
+                        u.as_mut().transpose_mut(),
+                        Par::Seq,
+                    );
+                    u
+                })
+                .collect();
+            for j in (1..=reach).rev() {
+                work.fill(0.0);
+                for (k, u) in (1..=reach).zip(&scaled) {
+                    let (high, low) = (j.max(k), j.min(k));
+                    let known = view(&inverse[layout.range(row + high, high - low)], m);
+                    let known = if j >= k { known } else { known.transpose() };
+                    matmul(work.as_mut(), Accum::Add, known, u.as_ref(), -1.0, Par::Seq);
+                }
+                view_mut(&mut inverse[layout.range(row + j, j)], m).copy_from(&work);
+            }
+            let mut own = Mat::<f64>::identity(m, m);
+            solve_lower_triangular_in_place(diagonal, own.as_mut(), Par::Seq);
+            matmul(work.as_mut(), Accum::Replace, own.transpose(), own.as_ref(), 1.0, Par::Seq);
+            for (k, u) in (1..=reach).zip(&scaled) {
+                let known = view(&inverse[layout.range(row + k, k)], m);
+                matmul(work.as_mut(), Accum::Add, known.transpose(), u.as_ref(), -1.0, Par::Seq);
+            }
+            view_mut(&mut inverse[layout.range(row, 0)], m).copy_from(&work);
+        }
+        inverse
+    }
+}
+
+fn view(block: &[f64], m: usize) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(block, m, m)
+}
+
+fn view_mut(block: &mut [f64], m: usize) -> MatMut<'_, f64> {
+    MatMut::from_column_major_slice_mut(block, m, m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::axis::Axis;
+    use nalgebra::DMatrix;
+
+    /// Gram matrix plus penalty over a small net, as a band and as a dense matrix.
+    fn example(spans_u: usize, spans_v: usize) -> (BandMatrix, DMatrix<f64>) {
+        let (u, v) = (Axis::new(0.0, 1.0, spans_u), Axis::new(0.0, 1.3, spans_v));
+        let mut band = BandMatrix::zeros(u.n_coefficients(), v.n_coefficients());
+        band.add_kronecker(&u.gram(), &v.gram(), 1.0);
+        band.add_kronecker(&u.roughness(), &v.gram(), 1e-7);
+        let full = |diagonals: &[[f64; 4]]| {
+            DMatrix::from_fn(diagonals.len(), diagonals.len(), |i, j| {
+                let (low, high) = (i.min(j), i.max(j));
+                if high - low > 3 { 0.0 } else { diagonals[low][high - low] }
+            })
+        };
+        let dense = full(&v.gram()).kronecker(&full(&u.gram()))
+            + full(&v.gram()).kronecker(&full(&u.roughness())) * 1e-7;
+        (band, dense)
+    }
+
+    #[test]
+    fn factor_solve_and_inverse_agree_with_dense_algebra() {
+        for (spans_u, spans_v) in [(4, 6), (6, 4), (1, 5), (3, 3)] {
+            let (band, dense) = example(spans_u, spans_v);
+            let n = dense.nrows();
+            let x: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
+            let b = band.times(&x);
+            let dense_b = &dense * DMatrix::from_column_slice(n, 1, &x);
+            assert!(b.iter().zip(dense_b.iter()).all(|(p, q)| (p - q).abs() < 1e-12));
+
+            let factor = band.factor().expect("positive definite");
+            let mut solved: Vec<[f64; 2]> = b.iter().map(|y| [*y, -*y]).collect();
+            factor.solve(&mut solved);
+            assert!(solved.iter().zip(&x).all(|(s, x)| (s[0] - x).abs() < 1e-8 && (s[1] + x).abs() < 1e-8));
+
+            let inverse = dense.try_inverse().expect("regular");
+            let scale = inverse.amax();
+            let (n_u, local) = (spans_u + 3, factor.local_inverse());
+            for a in 0..n {
+                for b in 0..n {
+                    let (di, dk) = ((b % n_u) as i64 - (a % n_u) as i64, (b / n_u) as i64 - (a / n_u) as i64);
+                    if di.abs() <= 3 && dk.abs() <= 3 {
+                        let got = local[a][((dk + 3) * 7 + di + 3) as usize];
+                        assert!(
+                            (got - inverse[(a, b)]).abs() < 1e-9 * scale,
+                            "{a} {b}: {got} {}",
+                            inverse[(a, b)]
+                        );
+                    }
+                }
+            }
+            let f: Vec<f64> = (0..n).map(|i| (i as f64 * 1.3).cos()).collect();
+            let column = DMatrix::from_column_slice(n, 1, &f);
+            let want = (column.transpose() * inverse * &column)[(0, 0)];
+            assert!((factor.variance(&f) / want - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn an_undetermined_net_is_refused() {
+        assert_eq!(BandMatrix::zeros(5, 6).factor().err(), Some(NotPositive));
+    }
+}

@@ -1,0 +1,172 @@
+//! Penalised weighted least squares of a tensor spline on scattered points.
+
+use super::axis::Axis;
+use super::band::{BandFactor, BandMatrix};
+use super::moments::Moments;
+use super::net::Net;
+use super::smoothing::Penalty;
+
+/// Points being gathered for a fit of `D` components over two axes.
+#[derive(Debug, Clone)]
+pub struct Fit<const D: usize> {
+    u: Axis,
+    v: Axis,
+    moments: Moments<D>,
+}
+
+/// A fitted spline with what is known of its coefficients.
+#[derive(Debug, Clone)]
+pub struct Fitted<const D: usize> {
+    /// The spline.
+    pub net: Net<D>,
+    /// Cholesky factor of the coefficients' precision, the same for every component.
+    pub(crate) precision: BandFactor,
+    /// Weighted sum of squared residuals over the points and components.
+    pub residual_square: f64,
+    /// Points with a positive weight.
+    pub n_points: usize,
+}
+
+/// The points do not determine the spline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("surface: {n_points} points do not determine the surface; scan again with the plate in full view")]
+pub struct Undetermined {
+    /// Points that were given.
+    pub n_points: usize,
+}
+
+impl<const D: usize> Fit<D> {
+    /// Starts a fit over two axes.
+    #[must_use]
+    pub fn new(u: Axis, v: Axis) -> Self {
+        Self { u, v, moments: Moments::new(u, v) }
+    }
+
+    /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points a little outside count for the
+    /// outermost span.
+    pub fn add(&mut self, u: f64, v: f64, y: [f64; D], w: f64) {
+        self.moments.add(u, v, y, w);
+    }
+
+    /// Solves with the penalty that the data make most likely, judged by the component along `direction`.
+    ///
+    /// # Errors
+    /// [`Undetermined`] when there are too few points, or all in one place.
+    pub fn solve(&self, direction: [f64; D]) -> Result<Fitted<D>, Undetermined> {
+        self.solve_with(self.moments.grid_values(direction).choose_penalty())
+    }
+
+    /// Solves with the given penalty.
+    pub(crate) fn solve_with(&self, penalty: Penalty) -> Result<Fitted<D>, Undetermined> {
+        let undetermined = Undetermined { n_points: self.moments.n_points };
+        let (data, rhs) = self.moments.normal_equations();
+        let mut matrix: BandMatrix = data.clone();
+        matrix.add_kronecker(&self.u.roughness(), &self.v.gram(), penalty.u);
+        matrix.add_kronecker(&self.u.gram(), &self.v.roughness(), penalty.v);
+        let precision = matrix.factor().map_err(|_| undetermined)?;
+        let mut control = rhs.clone();
+        precision.solve(&mut control);
+        let residual_square = residual_square(self.moments.square, &data, &rhs, &control);
+        let net = Net { u: self.u, v: self.v, control };
+        Ok(Fitted { net, precision, residual_square, n_points: self.moments.n_points })
+    }
+}
+
+/// y'y - 2 c'b + c'Nc over all components.
+fn residual_square<const D: usize>(
+    square: f64,
+    data: &BandMatrix,
+    rhs: &[[f64; D]],
+    control: &[[f64; D]],
+) -> f64 {
+    let mut sum = square;
+    for d in 0..D {
+        let c: Vec<f64> = control.iter().map(|row| row[d]).collect();
+        let image = data.times(&c);
+        sum += c.iter().zip(&image).zip(rhs).map(|((c, n), b)| c * (n - 2.0 * b[d])).sum::<f64>();
+    }
+    sum.max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Noise;
+
+    /// Scattered points of f with noise sigma, fitted on n x m spans.
+    fn fit(n_points: usize, spans: [usize; 2], sigma: f64, f: impl Fn(f64, f64) -> f64) -> Fitted<1> {
+        let mut noise = Noise::new(7);
+        let mut fit = Fit::new(Axis::new(0.0, 3.0, spans[0]), Axis::new(0.0, 2.0, spans[1]));
+        for _ in 0..n_points {
+            let (u, v) = (3.0 * noise.uniform(), 2.0 * noise.uniform());
+            fit.add(u, v, [f(u, v) + sigma * noise.normal()], sigma.max(1e-6).powi(-2));
+        }
+        fit.solve([1.0]).expect("determined")
+    }
+
+    fn rms(net: &Net<1>, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let n = 41;
+        let sum: f64 = (0..n * n)
+            .map(|k| (3.0 * (k % n) as f64 / (n - 1) as f64, 2.0 * (k / n) as f64 / (n - 1) as f64))
+            .map(|(u, v)| (net.point(u, v)[0] - f(u, v)).powi(2))
+            .sum();
+        (sum / (n * n) as f64).sqrt()
+    }
+
+    #[test]
+    fn a_quadratic_is_smoothed_without_bias() {
+        let f = |u: f64, v: f64| 0.1 * u * u - 0.05 * u * v + 0.02 * v * v + 0.3;
+        let fitted = fit(20_000, [40, 28], 5e-4, f);
+        // Nine free coefficients of 20,000 points: 0.5 mm / sqrt(20,000 / 9) = 0.011 mm.
+        let error = rms(&fitted.net, f);
+        assert!(error < 2.5e-5, "rms error {error}");
+        let per_point = fitted.residual_square / fitted.n_points as f64;
+        assert!((per_point - 1.0).abs() < 0.05, "{per_point}");
+    }
+
+    #[test]
+    fn a_narrow_bend_is_kept() {
+        // A bend of 0.15 1/m over 0.3 m, flat on both sides: its slope grows by 0.0225 rad.
+        let bend = |u: f64| {
+            let x = ((u - 1.5) / 0.3 + 0.5).clamp(0.0, 1.0);
+            let pi = std::f64::consts::PI;
+            // Twice integrated 0.15 (1 - cos 2 pi x) / 2 over x.
+            let inside = 0.15 * 0.5 * 0.09 * (0.5 * x * x - (1.0 - (2.0 * pi * x).cos()) / (4.0 * pi * pi));
+            inside + 0.15 * 0.5 * 0.3 * (u - 1.65).max(0.0)
+        };
+        let fitted = fit(120_000, [48, 32], 5e-4, |u, _| bend(u));
+        assert!(rms(&fitted.net, |u, _| bend(u)) < 3e-5);
+        let peak = fitted.net.jet(1.5, 1.0).uu[0];
+        assert!((peak - 0.15).abs() < 0.01, "peak curvature {peak}");
+    }
+
+    #[test]
+    fn the_stated_deviation_is_the_observed_one() {
+        // The scatter of independent repeats at one place against the posterior's own figure.
+        let f = |u: f64, v: f64| 0.05 * (2.0 * u).sin() + 0.1 * v * v;
+        let (mut square, mut stated) = (0.0, 0.0);
+        for seed in 0..40 {
+            let mut noise = Noise::new(1000 + seed);
+            let mut fit = Fit::new(Axis::new(0.0, 3.0, 20), Axis::new(0.0, 2.0, 14));
+            for _ in 0..3000 {
+                let (u, v) = (3.0 * noise.uniform(), 2.0 * noise.uniform());
+                fit.add(u, v, [f(u, v) + 1e-3 * noise.normal()], 1e6);
+            }
+            let fitted = fit.solve([1.0]).expect("determined");
+            square += (fitted.net.point(1.3, 0.8)[0] - f(1.3, 0.8)).powi(2) / 40.0;
+            let ((i, bu), (k, bv)) = (fitted.net.u.values(1.3), fitted.net.v.values(0.8));
+            let mut functional = vec![0.0; fitted.net.control.len()];
+            (0..16).for_each(|s| functional[(k + s / 4) * 23 + i + s % 4] = bv[s / 4] * bu[s % 4]);
+            stated += fitted.precision.variance(&functional) / 40.0;
+        }
+        let ratio = (square / stated).sqrt();
+        assert!((0.6..1.4).contains(&ratio), "observed over stated deviation {ratio}");
+    }
+
+    #[test]
+    fn too_few_points_are_refused() {
+        let mut fit = Fit::new(Axis::new(0.0, 1.0, 4), Axis::new(0.0, 1.0, 4));
+        fit.add(0.5, 0.5, [1.0], 1.0);
+        assert_eq!(fit.solve([1.0]).err(), Some(Undetermined { n_points: 1 }));
+    }
+}

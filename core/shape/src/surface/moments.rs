@@ -1,0 +1,143 @@
+//! Normal equations of a tensor spline fit, gathered as moments per cell of the knot grid.
+//!
+//! The 16 B-splines of a cell are polynomials of degree 3 x 3, so every product of two is one of degree 6 x 6: 49
+//! weighted moments per cell hold what 136 products per point would. Points are only touched to add their
+//! moments; the cells are turned into the normal matrix once, whatever the number of points.
+
+use super::axis::{Axis, BASIS, multiply, pairs};
+use super::band::BandMatrix;
+use super::smoothing::{GAUSS, GridValues};
+use nalgebra::{Matrix4, Vector4};
+
+/// Weighted sums over the points of one cell.
+#[derive(Debug, Clone, Copy)]
+struct Cell<const D: usize> {
+    gram: [[f64; 7]; 7],
+    rhs: [[[f64; D]; 4]; 4],
+    n_points: u32,
+}
+
+/// Points that a cell needs before its own values are read: twice the coefficients.
+const LEAST_POINTS: u32 = 8;
+/// Powers (of u, of v) of a bilinear function.
+const BILINEAR: [(usize, usize); 4] = [(0, 0), (1, 0), (0, 1), (1, 1)];
+
+impl<const D: usize> Cell<D> {
+    /// Coefficients of the least-squares bilinear function of the component along `direction`.
+    fn bilinear(&self, direction: [f64; D]) -> Option<Vector4<f64>> {
+        let gram =
+            Matrix4::from_fn(|a, b| self.gram[BILINEAR[a].1 + BILINEAR[b].1][BILINEAR[a].0 + BILINEAR[b].0]);
+        let rhs = Vector4::from_fn(|a, _| {
+            let sums = &self.rhs[BILINEAR[a].1][BILINEAR[a].0];
+            sums.iter().zip(&direction).map(|(x, y)| x * y).sum()
+        });
+        // Points spread over the whole cell give pivots down to 1/144 of their mass; a quarter of it will do.
+        let cholesky = gram.cholesky()?;
+        let least = cholesky.l_dirty().diagonal().iter().fold(f64::INFINITY, |a, x| a.min(x * x));
+        (least > self.gram[0][0] / 576.0).then(|| cholesky.solve(&rhs))
+    }
+}
+
+/// Sums over all points of a fit of `D` components.
+#[derive(Debug, Clone)]
+pub(crate) struct Moments<const D: usize> {
+    u: Axis,
+    v: Axis,
+    cells: Vec<Cell<D>>,
+    /// Sum of w y^2 over points and components.
+    pub(crate) square: f64,
+    /// Points with a positive weight.
+    pub(crate) n_points: usize,
+}
+
+impl<const D: usize> Moments<D> {
+    pub(crate) fn new(u: Axis, v: Axis) -> Self {
+        let empty = Cell { gram: [[0.0; 7]; 7], rhs: [[[0.0; D]; 4]; 4], n_points: 0 };
+        Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, n_points: 0 }
+    }
+
+    /// Adds the point `y` at (u, v) with weight `w`; weight 0 adds nothing.
+    pub(crate) fn add(&mut self, u: f64, v: f64, y: [f64; D], w: f64) {
+        if w <= 0.0 {
+            return;
+        }
+        let ((i, s), (k, t)) = (self.u.locate(u), self.v.locate(v));
+        let (p, q) = (powers(s), powers(t));
+        let cell = &mut self.cells[k * self.u.n_spans() + i];
+        cell.n_points += 1;
+        for (row, tq) in cell.gram.iter_mut().zip(q) {
+            let f = w * tq;
+            for (slot, sp) in row.iter_mut().zip(p) {
+                *slot += f * sp;
+            }
+        }
+        for (row, tq) in cell.rhs.iter_mut().zip(q) {
+            for (slot, sp) in row.iter_mut().zip(p) {
+                let f = w * tq * sp;
+                for d in 0..D {
+                    slot[d] += f * y[d];
+                }
+            }
+        }
+        self.square += w * y.iter().map(|x| x * x).sum::<f64>();
+        self.n_points += 1;
+    }
+
+    /// The normal matrix and the right-hand sides, in the net's order of control values.
+    pub(crate) fn normal_equations(&self) -> (BandMatrix, Vec<[f64; D]>) {
+        let mut matrix = BandMatrix::zeros(self.u.n_coefficients(), self.v.n_coefficients());
+        let mut rhs = vec![[0.0; D]; self.u.n_coefficients() * self.v.n_coefficients()];
+        let products: Vec<((usize, usize), [f64; 7])> =
+            pairs().map(|(i, j)| ((i, j), multiply(&BASIS[i], &BASIS[j]))).collect();
+        for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.gram[0][0] > 0.0) {
+            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
+            self.add_right_hand_side(cell, i, k, &mut rhs);
+            for ((a, b), pv) in &products {
+                // Moments of this pair of v-splines, left as a polynomial in u.
+                let row: [f64; 7] = std::array::from_fn(|p| (0..7).map(|q| pv[q] * cell.gram[q][p]).sum());
+                for ((c, d), pu) in &products {
+                    let value = row.iter().zip(pu).map(|(x, y)| x * y).sum();
+                    matrix.add_pair([i + c, i + d], [k + a, k + b], value);
+                }
+            }
+        }
+        (matrix, rhs)
+    }
+
+    /// Four values per cell of the component along `direction`: a bilinear function through each cell's points, read
+    /// at the Gauss places, where the noise of the four is independent and even. Nothing where too few points, or
+    /// badly spread ones, were seen.
+    pub(crate) fn grid_values(&self, direction: [f64; D]) -> GridValues {
+        let n_u = 2 * self.u.n_spans();
+        let mut values = vec![None; n_u * 2 * self.v.n_spans()];
+        for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points >= LEAST_POINTS) {
+            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
+            let Some(c) = cell.bilinear(direction) else { continue };
+            for (b, y) in GAUSS.into_iter().enumerate() {
+                for (a, x) in GAUSS.into_iter().enumerate() {
+                    let value = c[0] + c[1] * x + c[2] * y + c[3] * x * y;
+                    values[(2 * k + b) * n_u + 2 * i + a] = Some(value);
+                }
+            }
+        }
+        GridValues { u: self.u, v: self.v, values }
+    }
+
+    fn add_right_hand_side(&self, cell: &Cell<D>, i: usize, k: usize, rhs: &mut [[f64; D]]) {
+        for (b, bv) in BASIS.iter().enumerate() {
+            for (a, bu) in BASIS.iter().enumerate() {
+                let slot = &mut rhs[(k + b) * self.u.n_coefficients() + i + a];
+                for (fv, sums) in bv.iter().zip(&cell.rhs) {
+                    for (fu, sum) in bu.iter().zip(sums) {
+                        slot.iter_mut().zip(sum).for_each(|(x, y)| *x += fv * fu * y);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn powers(t: f64) -> [f64; 7] {
+    let (t2, t3) = (t * t, t * t * t);
+    [1.0, t, t2, t3, t2 * t2, t2 * t3, t3 * t3]
+}

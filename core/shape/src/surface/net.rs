@@ -1,0 +1,175 @@
+//! A tensor-product spline: a control net over two axes, with as many components as needed.
+
+use nalgebra::DMatrix;
+
+use super::axis::Axis;
+
+/// A bicubic spline map from (u, v) to `D` components.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Net<const D: usize> {
+    /// Axis of u.
+    pub u: Axis,
+    /// Axis of v.
+    pub v: Axis,
+    /// Control values, v outer, u inner: index `k * u.n_coefficients() + i`.
+    pub control: Vec<[f64; D]>,
+}
+
+/// Value and derivatives of a net: the order of the names is the order of differentiation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jet<const D: usize> {
+    /// Value.
+    pub p: [f64; D],
+    /// Derivative by u.
+    pub u: [f64; D],
+    /// Derivative by v.
+    pub v: [f64; D],
+    /// Second derivative by u.
+    pub uu: [f64; D],
+    /// Mixed derivative.
+    pub uv: [f64; D],
+    /// Second derivative by v.
+    pub vv: [f64; D],
+}
+
+impl<const D: usize> Net<D> {
+    /// A net of zeros.
+    #[must_use]
+    pub fn zeros(u: Axis, v: Axis) -> Self {
+        Self { u, v, control: vec![[0.0; D]; u.n_coefficients() * v.n_coefficients()] }
+    }
+
+    /// The spline nearest to `f` by least squares on a regular grid of two samples per span (and the ends).
+    #[must_use]
+    pub fn approximate(u: Axis, v: Axis, mut f: impl FnMut(f64, f64) -> [f64; D]) -> Self {
+        let (us, pu) = grid_projection(&u);
+        let (vs, pv) = grid_projection(&v);
+        let samples: Vec<Vec<[f64; D]>> = vs.iter().map(|&y| us.iter().map(|&x| f(x, y)).collect()).collect();
+        let mut net = Self::zeros(u, v);
+        for d in 0..D {
+            let values = DMatrix::from_fn(us.len(), vs.len(), |i, k| samples[k][i][d]);
+            let control = &pu * values * pv.transpose();
+            for (slot, value) in net.control.iter_mut().zip(control.iter()) {
+                slot[d] = *value;
+            }
+        }
+        net
+    }
+
+    /// The value at (u, v).
+    #[must_use]
+    pub fn point(&self, u: f64, v: f64) -> [f64; D] {
+        let ((i, bu), (k, bv)) = (self.u.values(u), self.v.values(v));
+        let mut p = [0.0; D];
+        for (row, wv) in bv.iter().enumerate() {
+            for (c, wu) in self.row(i, k + row).iter().zip(&bu) {
+                for d in 0..D {
+                    p[d] += wv * wu * c[d];
+                }
+            }
+        }
+        p
+    }
+
+    /// Value and first derivatives at (u, v): p, p_u, p_v.
+    #[must_use]
+    pub fn frame(&self, u: f64, v: f64) -> [[f64; D]; 3] {
+        let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
+        let mut out = [[0.0; D]; 3];
+        for row in 0..4 {
+            let (mut along, mut slope) = ([0.0; D], [0.0; D]);
+            for (i, c) in self.row(su.first, sv.first + row).iter().enumerate() {
+                for d in 0..D {
+                    along[d] += su.value[i] * c[d];
+                    slope[d] += su.d1[i] * c[d];
+                }
+            }
+            for d in 0..D {
+                out[0][d] += sv.value[row] * along[d];
+                out[1][d] += sv.value[row] * slope[d];
+                out[2][d] += sv.d1[row] * along[d];
+            }
+        }
+        out
+    }
+
+    /// Value and derivatives to second order at (u, v).
+    #[must_use]
+    pub fn jet(&self, u: f64, v: f64) -> Jet<D> {
+        let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
+        let mut jet = Jet { p: [0.0; D], u: [0.0; D], v: [0.0; D], uu: [0.0; D], uv: [0.0; D], vv: [0.0; D] };
+        for row in 0..4 {
+            for (i, c) in self.row(su.first, sv.first + row).iter().enumerate() {
+                for (d, x) in c.iter().enumerate() {
+                    jet.p[d] += su.value[i] * sv.value[row] * x;
+                    jet.u[d] += su.d1[i] * sv.value[row] * x;
+                    jet.v[d] += su.value[i] * sv.d1[row] * x;
+                    jet.uu[d] += su.d2[i] * sv.value[row] * x;
+                    jet.uv[d] += su.d1[i] * sv.d1[row] * x;
+                    jet.vv[d] += su.value[i] * sv.d2[row] * x;
+                }
+            }
+        }
+        jet
+    }
+
+    /// The four control values that row `k` gives to the span starting at coefficient `i`.
+    fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
+        let start = k * self.u.n_coefficients() + i;
+        &self.control[start..start + 4]
+    }
+}
+
+/// Sample places of an axis, two per span and the end, and the matrix from samples to least-squares coefficients.
+fn grid_projection(axis: &Axis) -> (Vec<f64>, DMatrix<f64>) {
+    let n = 2 * axis.n_spans().max(3);
+    let at: Vec<f64> =
+        (0..=n).map(|j| axis.start() + (axis.end() - axis.start()) * j as f64 / n as f64).collect();
+    let mut basis = DMatrix::zeros(n + 1, axis.n_coefficients());
+    for (j, x) in at.iter().enumerate() {
+        let (first, values) = axis.values(*x);
+        for (i, value) in values.iter().enumerate() {
+            basis[(j, first + i)] = *value;
+        }
+    }
+    let projection = (basis.transpose() * &basis).cholesky().map(|c| c.solve(&basis.transpose()));
+    (at, projection.unwrap_or_else(|| DMatrix::zeros(axis.n_coefficients(), n + 1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cubic(u: f64, v: f64) -> [f64; 2] {
+        [u * u * u * v - v * v, 1.0 + u * v * v * v + u * u]
+    }
+
+    #[test]
+    fn bicubics_are_reproduced_with_their_derivatives() {
+        let net = Net::approximate(Axis::new(0.0, 2.0, 6), Axis::new(-1.0, 1.0, 5), cubic);
+        for (u, v) in [(0.0, -1.0), (0.7, 0.3), (2.0, 1.0), (1.99, -0.2)] {
+            let jet = net.jet(u, v);
+            let frame = net.frame(u, v);
+            let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-10;
+            assert!(close(jet.p, cubic(u, v)) && close(net.point(u, v), jet.p) && close(frame[0], jet.p));
+            assert!(close(jet.u, [3.0 * u * u * v, v * v * v + 2.0 * u]) && close(frame[1], jet.u));
+            assert!(close(jet.v, [u * u * u - 2.0 * v, 3.0 * u * v * v]) && close(frame[2], jet.v));
+            assert!(close(jet.uu, [6.0 * u * v, 2.0]) && close(jet.uv, [3.0 * u * u, 3.0 * v * v]));
+            assert!(close(jet.vv, [-2.0, 6.0 * u * v]));
+        }
+    }
+
+    #[test]
+    fn a_smooth_function_is_met_with_the_fourth_order() {
+        let error = |n: usize| {
+            let f = |u: f64, v: f64| [(3.0 * u).sin() * (2.0 * v).cos()];
+            let net = Net::approximate(Axis::new(0.0, 1.0, n), Axis::new(0.0, 1.0, n), f);
+            (0..400)
+                .map(|k| (f64::from(k % 20) / 19.0, f64::from(k / 20) / 19.0))
+                .map(|(u, v)| (net.point(u, v)[0] - f(u, v)[0]).abs())
+                .fold(0.0, f64::max)
+        };
+        let order = (error(8) / error(16)).log2();
+        assert!((3.5..4.7).contains(&order), "order {order}");
+    }
+}

@@ -1,0 +1,224 @@
+//! How much to smooth: the two penalty weights of a fit, chosen from the data by restricted maximum likelihood.
+//!
+//! A fit minimises sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2. Third derivatives leave every shape of
+//! constant curvature alone; one weight per direction lets a narrow bend stay narrow across and be smoothed along
+//! the bend. The weights are the most likely ones when the third derivatives are taken as random with unknown
+//! variance (REML: Wood, *J. R. Stat. Soc. B* 73 (2011); P-splines: Eilers and Marx, *Stat. Sci.* 11 (1996)).
+//!
+//! The criterion is evaluated on a regular grid of four values per cell, taken from the cells' moments: there the
+//! normal matrix and the penalty are Kronecker products, one eigenvalue problem per axis makes them diagonal, and a
+//! pair of weights costs one pass over the coefficients instead of a factorisation. Unequal density of the points
+//! and holes only enter the choice of the weights this way, never the fit itself.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::axis::Axis;
+
+/// Weights of the penalty of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Penalty {
+    /// Of the squared third derivative by u, integrated over the rectangle.
+    pub(crate) u: f64,
+    /// Of the squared third derivative by v.
+    pub(crate) v: f64,
+}
+
+/// The two Gauss places of a span, from its middle: a function of degree 1 fitted to evenly spread noise has
+/// independent noise of equal size there.
+pub(crate) const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_812_9];
+
+/// Values at the Gauss places of all spans, `None` where nothing was seen.
+#[derive(Debug, Clone)]
+pub(crate) struct GridValues {
+    pub(crate) u: Axis,
+    pub(crate) v: Axis,
+    /// v outer, u inner.
+    pub(crate) values: Vec<Option<f64>>,
+}
+
+/// Nullity of the third-difference penalty along an axis: quadratics.
+const NULLITY: usize = 3;
+/// The search covers penalties whose largest eigenvalue is 10^x times that of the data, x in this range. Beyond the
+/// upper end rounding would bend the shapes that the penalty is to leave alone; beyond the lower the fit interpolates.
+const EXPONENTS: (f64, f64) = (-1.0, 10.0);
+/// Width of the last step of the search, in decades. The criterion is flat: a tenth of a decade changes nothing.
+const LAST_STEP: f64 = 0.2;
+
+impl GridValues {
+    /// The most likely penalty.
+    pub(crate) fn choose_penalty(&self) -> Penalty {
+        let (along_u, along_v) = (Spectrum::new(&self.u), Spectrum::new(&self.v));
+        let (mut filled, missing) = self.filled();
+        let mut criterion = Criterion::new(&along_u, &along_v, &filled);
+        let mut best = criterion.minimise();
+        if !missing.is_empty() {
+            // The first fill is crude: put the smoothed values there and choose again.
+            let smooth = criterion.smoothed(best);
+            missing.iter().for_each(|&cell| filled[cell] = smooth[cell]);
+            criterion = Criterion::new(&along_u, &along_v, &filled);
+            best = criterion.minimise();
+        }
+        let [scale_u, scale_v] = criterion.scales(best);
+        let noise = criterion.noise(best);
+        Penalty { u: scale_u / (noise * 0.5 * self.v.step()), v: scale_v / (noise * 0.5 * self.u.step()) }
+    }
+
+    /// The values with gaps filled by the seen values around them, weighted by distance; and the gaps.
+    fn filled(&self) -> (DMatrix<f64>, Vec<(usize, usize)>) {
+        let (n_u, n_v) = (2 * self.u.n_spans(), 2 * self.v.n_spans());
+        let at = |i: usize, k: usize| self.values[k * n_u + i];
+        let mut missing = Vec::new();
+        let filled = DMatrix::from_fn(n_u, n_v, |i, k| {
+            at(i, k).unwrap_or_else(|| {
+                missing.push((i, k));
+                let nearest = [
+                    (1..=i).find_map(|d| at(i - d, k).map(|y| (d, y))),
+                    (1..n_u - i).find_map(|d| at(i + d, k).map(|y| (d, y))),
+                    (1..=k).find_map(|d| at(i, k - d).map(|y| (d, y))),
+                    (1..n_v - k).find_map(|d| at(i, k + d).map(|y| (d, y))),
+                ];
+                let (sum, weight) = nearest
+                    .into_iter()
+                    .flatten()
+                    .fold((0.0, 0.0), |(s, w), (d, y)| (s + y / d as f64, w + 1.0 / d as f64));
+                if weight > 0.0 { sum / weight } else { 0.0 }
+            })
+        });
+        (filled, missing)
+    }
+}
+
+/// The basis of an axis that makes data and penalty diagonal.
+struct Spectrum {
+    /// From grid values to coordinates.
+    transform: DMatrix<f64>,
+    /// The penalty's eigenvalues relative to the data's, the null space exactly 0.
+    roughness: DVector<f64>,
+}
+
+impl Spectrum {
+    fn new(axis: &Axis) -> Self {
+        let n = axis.n_coefficients();
+        let mut basis = DMatrix::zeros(2 * axis.n_spans(), n);
+        for j in 0..2 * axis.n_spans() {
+            let (first, values) =
+                axis.values(axis.start() + axis.step() * ((j / 2) as f64 + 0.5 + GAUSS[j % 2]));
+            (0..4).for_each(|i| basis[(j, first + i)] = values[i]);
+        }
+        // Two places per span do not quite determine a spline of few spans: a touch of the identity does.
+        let gram = basis.transpose() * &basis + DMatrix::identity(n, n) * 1e-9;
+        let rough = axis.roughness();
+        let penalty = DMatrix::from_fn(n, n, |i, j| {
+            let (low, high) = (i.min(j), i.max(j));
+            if high - low > 3 { 0.0 } else { rough[low][high - low] }
+        });
+        let lower = gram.cholesky().map_or_else(|| DMatrix::identity(n, n), |c| c.unpack());
+        let solve = |m: &DMatrix<f64>| lower.solve_lower_triangular(m).unwrap_or_else(|| m.clone());
+        let whitened = solve(&solve(&penalty).transpose());
+        let eigen = SymmetricEigen::new((&whitened + whitened.transpose()) * 0.5);
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let vectors = DMatrix::from_fn(n, n, |i, j| eigen.eigenvectors[(i, order[j])]);
+        let roughness =
+            DVector::from_fn(n, |j, _| if j < NULLITY { 0.0 } else { eigen.eigenvalues[order[j]].max(0.0) });
+        Self { transform: vectors.transpose() * solve(&basis.transpose()), roughness }
+    }
+}
+
+/// The restricted likelihood of one grid of values.
+struct Criterion<'a> {
+    u: &'a Spectrum,
+    v: &'a Spectrum,
+    /// Coordinates of the values, u down, v across.
+    coordinates: DMatrix<f64>,
+    /// Their squares.
+    squares: DMatrix<f64>,
+    /// Sum of squares that no spline of this net can reach.
+    outside: f64,
+    n_values: usize,
+}
+
+impl<'a> Criterion<'a> {
+    fn new(u: &'a Spectrum, v: &'a Spectrum, values: &DMatrix<f64>) -> Self {
+        let coordinates = &u.transform * values * v.transform.transpose();
+        let squares = coordinates.map(|z| z * z);
+        let outside = (values.norm_squared() - squares.sum()).max(0.0);
+        Self { u, v, coordinates, squares, outside, n_values: values.len() }
+    }
+
+    /// The penalty's factors at exponents `x`.
+    fn scales(&self, x: [f64; 2]) -> [f64; 2] {
+        let largest = |s: &Spectrum| s.roughness.max().max(f64::MIN_POSITIVE);
+        [10f64.powf(x[0]) / largest(self.u), 10f64.powf(x[1]) / largest(self.v)]
+    }
+
+    /// Penalised sum of squares, and ln det of data + penalty over penalty, without the null space.
+    fn terms(&self, x: [f64; 2]) -> (f64, f64) {
+        let [su, sv] = self.scales(x);
+        let (mut square, mut log_det) = (self.outside, 0.0);
+        for (column, rv) in self.squares.column_iter().zip(self.v.roughness.iter()) {
+            let mut product = 1.0;
+            for (j, (z2, ru)) in column.iter().zip(self.u.roughness.iter()).enumerate() {
+                let d = su * ru + sv * rv;
+                square += z2 * d / (1.0 + d);
+                if d > 0.0 {
+                    product *= (1.0 + d) / d;
+                }
+                if j % 8 == 7 {
+                    log_det += product.ln();
+                    product = 1.0;
+                }
+            }
+            log_det += product.ln();
+        }
+        (square, log_det)
+    }
+
+    /// Variance of a grid value at exponents `x`.
+    fn noise(&self, x: [f64; 2]) -> f64 {
+        (self.terms(x).0 / (self.n_values - NULLITY * NULLITY) as f64).max(f64::MIN_POSITIVE)
+    }
+
+    /// -2 ln of the restricted likelihood, up to a constant.
+    fn value(&self, x: [f64; 2]) -> f64 {
+        let (square, log_det) = self.terms(x);
+        (self.n_values - NULLITY * NULLITY) as f64 * square.max(f64::MIN_POSITIVE).ln() + log_det
+    }
+
+    /// Exponents of the largest likelihood: a coarse grid, then a search with halved steps.
+    fn minimise(&self) -> [f64; 2] {
+        let (low, high) = EXPONENTS;
+        let coarse = |k: usize| low + (high - low) * k as f64 / 5.0;
+        let mut best = ([low, low], f64::INFINITY);
+        for x in (0..36).map(|k| [coarse(k % 6), coarse(k / 6)]) {
+            let value = self.value(x);
+            if value < best.1 {
+                best = (x, value);
+            }
+        }
+        let mut step = (high - low) / 10.0;
+        while step > 0.5 * LAST_STEP {
+            let from = best;
+            for [du, dv] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+                let x = [from.0[0] + du * step, from.0[1] + dv * step].map(|e: f64| e.clamp(low, high));
+                let value = self.value(x);
+                if value < best.1 {
+                    best = (x, value);
+                }
+            }
+            if best.0 == from.0 {
+                step *= 0.5;
+            }
+        }
+        best.0
+    }
+
+    /// The grid values of the spline at exponents `x`.
+    fn smoothed(&self, x: [f64; 2]) -> DMatrix<f64> {
+        let [su, sv] = self.scales(x);
+        let shrunk = DMatrix::from_fn(self.coordinates.nrows(), self.coordinates.ncols(), |i, k| {
+            self.coordinates[(i, k)] / (1.0 + su * self.u.roughness[i] + sv * self.v.roughness[k])
+        });
+        self.u.transform.transpose() * shrunk * &self.v.transform
+    }
+}
