@@ -5,8 +5,9 @@
 //! where the results say the template stands open.
 //!
 //! Correction: a board of chord L on a plate that is bent too little everywhere touches in its middle and opens at
-//! its ends, so the bend belongs between the plate's middle and the place of the gap. A bend by the angle a in the
-//! middle of the board lifts its ends by a L / 4; the press bends half of that angle and looks again.
+//! its ends, so the bend belongs between the plate's middle and the place of the gap. Where the plate is bent too far
+//! the board rests on its ends and opens in its middle: there it is bent back. A bend by the angle a in the
+//! middle of the board moves its ends by a L / 4; the press bends half of that angle and looks again.
 
 use platen_sim_plate::{Blank, Handling, Plan, PlateState, Pose, Programme, Shape, Stroke};
 use serde::{Deserialize, Serialize};
@@ -133,7 +134,8 @@ impl Steel {
         Ok(())
     }
 
-    /// A stroke between the plate's middle and the open place, by half the angle that would close the gap.
+    /// A stroke by half the angle that would close the gap: between the plate's middle and the open place, or at
+    /// that place where the plate is bent too far.
     /// Targets bent in two directions are corrected in them by turns.
     fn correction(&self, last: &HBlock) -> Option<Stroke> {
         let (gap_mm, [u_mm, v_mm]) = (last.gap_max_mm()?, last.gap_at_mm()?);
@@ -149,12 +151,8 @@ impl Steel {
         let closing_deg = (4.0 * gap_mm / self.config.chord_mm).to_degrees();
         let wanted_deg = -f64::from(last.sense()) * CORRECTION * closing_deg;
         let springback = self.config.plan.springback;
-        Some(Stroke {
-            at_mm: across_mm / 2.0,
-            angle_deg: wanted_deg / (1.0 - springback),
-            springback,
-            ..*model
-        })
+        let at_mm = if last.sense() < 0 { across_mm / 2.0 } else { across_mm };
+        Some(Stroke { at_mm, angle_deg: wanted_deg / (1.0 - springback), springback, ..*model })
     }
 
     /// Directions of the die in the programme, in order of appearance.

@@ -11,6 +11,8 @@ use platen_sim_press::faults::StrokeFaults;
 use platen_sim_press::{Cause, Command, Config, SimPress, Tally};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
+use tokio_modbus::client::{Context, tcp};
+use tokio_modbus::prelude::*;
 
 const LIMIT: Duration = Duration::from_secs(30);
 
@@ -27,10 +29,14 @@ fn quick() -> Config {
     Config { strokes: 12, timings, ..Config::default() }
 }
 
+async fn connect(press: &SimPress) -> Context {
+    tcp::connect_slave(press.modbus().unwrap(), Slave(1)).await.unwrap()
+}
+
 /// Runs the plainest host against `config` until the press is done.
 async fn run(config: Config) -> (SimPress, Tally) {
     let press = SimPress::start(config).await.unwrap();
-    let host = Host::connect(press.modbus().unwrap()).await;
+    let host = Host::on(connect(&press).await);
     let host = tokio::spawn(host.run(counted));
     let tally = press.until("done", LIMIT, |tally| tally.done).await.unwrap();
     host.abort();
@@ -102,11 +108,7 @@ async fn a_host_that_ignores_the_tail_is_caught() {
     };
     let press = SimPress::start(config).await.unwrap();
     press.until("a trigger", LIMIT, |tally| tally.strokes == 1).await.unwrap();
-    let mut client =
-        tokio_modbus::client::tcp::connect_slave(press.modbus().unwrap(), tokio_modbus::Slave(1))
-            .await
-            .unwrap();
-    use tokio_modbus::prelude::*;
+    let mut client = connect(&press).await;
     let p = client.read_holding_registers(0, 32).await.unwrap().unwrap();
     assert_ne!(p[3], p[31]);
     client.write_single_register(103, p[3]).await.unwrap().unwrap();
@@ -116,11 +118,7 @@ async fn a_host_that_ignores_the_tail_is_caught() {
 #[tokio::test]
 async fn writes_outside_and_before_sync_are_counted() {
     let press = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
-    let mut client =
-        tokio_modbus::client::tcp::connect_slave(press.modbus().unwrap(), tokio_modbus::Slave(1))
-            .await
-            .unwrap();
-    use tokio_modbus::prelude::*;
+    let mut client = connect(&press).await;
     client.write_single_register(100, 1).await.unwrap().unwrap();
     let tally = press.tally();
     assert_eq!((tally.writes, tally.writes_before_sync, tally.writes_outside), (1, 1, 0));
@@ -140,7 +138,7 @@ async fn writes_outside_and_before_sync_are_counted() {
 async fn a_rescan_is_a_new_attempt_of_the_same_stroke() {
     let press = SimPress::start(Config { baseline: false, automatic: false, ..quick() }).await.unwrap();
     assert!(press.command(Command::Rescan).is_err(), "nothing to scan again yet");
-    let host = tokio::spawn(Host::connect(press.modbus().unwrap()).await.run(counted));
+    let host = tokio::spawn(Host::on(connect(&press).await).run(counted));
     press.command(Command::Stroke).unwrap();
     press.until("the stroke", LIMIT, |tally| tally.taken.len() == 1).await.unwrap();
     press.command(Command::Rescan).unwrap();

@@ -1,12 +1,10 @@
 //! The plainest host that can take strokes: it trusts the link, keeps no journal and measures nothing. It says how
 //! often the plate was bent, as a gap, so that a result under the wrong stroke shows.
 
-use std::net::SocketAddr;
 use std::time::Duration;
 
 use platen_sim_press::frame::crc16;
-use tokio::net::TcpStream;
-use tokio_modbus::client::{Context, tcp};
+use tokio_modbus::client::Context;
 use tokio_modbus::prelude::*;
 
 const H_BASE: u16 = 100;
@@ -20,13 +18,11 @@ pub(crate) struct Host {
 }
 
 impl Host {
-    pub(crate) async fn connect(address: SocketAddr) -> Host {
-        let stream = TcpStream::connect(address).await.unwrap();
-        stream.set_nodelay(true).unwrap();
+    pub(crate) fn on(link: Context) -> Host {
         let mut h = [0; 64];
         h[0] = 1;
         h[49] = 4711;
-        Host { link: tcp::attach_slave(stream, Slave(1)), h, taken: None, armed: false }
+        Host { link, h, taken: None, armed: false }
     }
 
     pub(crate) async fn read_p(&mut self) -> Vec<u16> {
