@@ -43,6 +43,7 @@ const LONGEST: f64 = 0.05;
 struct Interval {
     middle: f64,
     half: f64,
+    curvature: [f64; N],
     angle: [f64; N],
     x: [f64; N],
     z: [f64; N],
@@ -124,6 +125,7 @@ impl Profile {
         Interval {
             middle,
             half,
+            curvature: series(|t| self.curvature(middle + half * t)),
             angle: series(at),
             x: integral(&series(|t| at(t).cos()), half),
             z: integral(&series(|t| at(t).sin()), half),
@@ -159,7 +161,7 @@ impl Profile {
         let angle = value(&interval.angle, inside);
         let beyond = (t - inside) * interval.half;
         let (sin, cos) = angle.sin_cos();
-        let curvature = if beyond == 0.0 { self.curvature(s) } else { 0.0 };
+        let curvature = if beyond == 0.0 { value(&interval.curvature, t) } else { 0.0 };
         Place {
             x: value(&interval.x, inside) + beyond * cos,
             z: value(&interval.z, inside) + beyond * sin,

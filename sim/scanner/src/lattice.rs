@@ -1,0 +1,81 @@
+//! The directions in which a scanner looks.
+
+use platen_sim_plate::Vec3;
+
+/// A regular lattice of directions, radians: columns by growing azimuth (counter-clockwise from +x), rows from the top down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimLattice {
+    /// Azimuth of column 0.
+    pub azimuth_start: f64,
+    /// Between columns.
+    pub azimuth_step: f64,
+    /// Columns.
+    pub n_columns: u32,
+    /// Elevation of row 0.
+    pub elevation_start: f64,
+    /// Between rows, positive.
+    pub elevation_step: f64,
+    /// Rows.
+    pub n_rows: u32,
+}
+
+impl SimLattice {
+    /// The lattice of one step that covers azimuths from `azimuth_start` over `azimuth_width` and elevations between
+    /// `elevation_min` and `elevation_max`. At least 2 x 2 cells.
+    pub fn covering(
+        azimuth_start: f64,
+        azimuth_width: f64,
+        elevation_min: f64,
+        elevation_max: f64,
+        step: f64,
+    ) -> Self {
+        let cells = |width: f64| ((width / step).floor() as u32 + 1).max(2);
+        Self {
+            azimuth_start,
+            azimuth_step: step,
+            n_columns: cells(azimuth_width),
+            elevation_start: elevation_max,
+            elevation_step: step,
+            n_rows: cells(elevation_max - elevation_min),
+        }
+    }
+
+    /// The lattice of one step that covers `points` (scanner frame) and `margin` radians round them. They must
+    /// lie within half a turn.
+    pub fn around(points: &[Vec3], margin: f64, step: f64) -> Self {
+        let middle = points.iter().sum::<Vec3>();
+        let middle = middle.y.atan2(middle.x);
+        let (mut azimuth, mut elevation) = ([0.0_f64; 2], [f64::INFINITY, f64::NEG_INFINITY]);
+        for point in points {
+            let turned = point.y.atan2(point.x) - middle;
+            let ahead = turned.sin().atan2(turned.cos());
+            azimuth = [azimuth[0].min(ahead), azimuth[1].max(ahead)];
+            let up = point.z.atan2(point.x.hypot(point.y));
+            elevation = [elevation[0].min(up), elevation[1].max(up)];
+        }
+        let start = middle + azimuth[0] - margin;
+        let width = azimuth[1] - azimuth[0] + 2.0 * margin;
+        Self::covering(start, width, elevation[0] - margin, elevation[1] + margin, step)
+    }
+
+    /// Nominal azimuth of a column, not wrapped.
+    pub fn azimuth(&self, column: u32) -> f64 {
+        self.azimuth_start + self.azimuth_step * f64::from(column)
+    }
+
+    /// Nominal elevation of a row.
+    pub fn elevation(&self, row: u32) -> f64 {
+        self.elevation_start - self.elevation_step * f64::from(row)
+    }
+
+    /// Number of cells.
+    pub fn n_cells(&self) -> usize {
+        self.n_columns as usize * self.n_rows as usize
+    }
+}
+
+/// Unit vector of a direction.
+pub(crate) fn unit(azimuth: f64, elevation: f64) -> Vec3 {
+    let ((sin_az, cos_az), (sin_el, cos_el)) = (azimuth.sin_cos(), elevation.sin_cos());
+    Vec3::new(cos_el * cos_az, cos_el * sin_az, sin_el)
+}

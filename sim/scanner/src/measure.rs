@@ -1,0 +1,260 @@
+//! From directions to measured columns.
+
+use crate::column::{SimColumn, SimState, TruthCell};
+use crate::instrument::{Instrument, strength};
+use crate::lattice::{SimLattice, unit};
+use crate::ray::{Hit, Label, Ray};
+use crate::scene::Scene;
+use platen_sim_plate::Vec3;
+use rand_distr::{Distribution, StandardNormal, StudentT};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::RngCore;
+
+/// Neighbours on one object whose ranges differ by more than this are seen across a fold, metres.
+const FOLD: f64 = 0.1;
+
+/// A cell counts as mixed when its footprint sees ranges this far apart, metres.
+const MIXED_SPREAD: f64 = 0.02;
+
+/// Standard deviation of a range before the laser is warm, metres.
+const WARM_UP_SIGMA: f64 = 0.03;
+
+/// Largest intensity.
+pub const INTENSITY_MAX: u16 = 2047;
+
+/// What the middle of every beam of one column hit, without errors of the range.
+#[derive(Debug)]
+pub(crate) struct Trace {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+}
+
+/// A scene seen by an instrument through a lattice.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) lattice: &'a SimLattice,
+    pub(crate) instrument: &'a Instrument,
+}
+
+/// What a column's random numbers are for; each purpose has its own stream, so that switching one error on
+/// leaves the others' numbers alone.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Angles = 0,
+    Ranges = 1,
+}
+
+impl View<'_> {
+    fn rng(&self, column: u32, purpose: Purpose) -> Pcg64 {
+        let stream = u128::from(column) * 2 + purpose as u128;
+        Pcg64::new(u128::from(self.instrument.seed), stream)
+    }
+
+    fn is_back(&self, column: u32) -> bool {
+        self.instrument.faces.is_some_and(|faces| column >= faces.seam_column)
+    }
+
+    /// Casts the middle ray of every cell of a column.
+    pub(crate) fn trace(&self, column: u32) -> Trace {
+        let mut rng = self.rng(column, Purpose::Angles);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let azimuth = self.lattice.azimuth(column);
+        let sigma = self.instrument.angular_sigma;
+        let rays: Vec<Ray> = (0..self.lattice.n_rows)
+            .map(|row| {
+                let elevation = self.lattice.elevation(row);
+                let (mut d_az, mut d_el) = self.systematic(column, elevation);
+                if sigma > 0.0 {
+                    d_az += sigma * normal();
+                    d_el += sigma * normal();
+                }
+                Ray { origin: self.origin(column), direction: unit(azimuth + d_az, elevation + d_el) }
+            })
+            .collect();
+        let hits = rays.iter().map(|ray| self.cast(ray)).collect();
+        Trace { rays, hits }
+    }
+
+    fn cast(&self, ray: &Ray) -> Option<Hit> {
+        let [nearest, farthest] = self.instrument.reach;
+        self.scene.cast(ray, farthest).filter(|hit| hit.range >= nearest)
+    }
+
+    fn origin(&self, column: u32) -> Vec3 {
+        match self.instrument.faces {
+            Some(faces) if self.is_back(column) => Vec3::from(faces.moved),
+            _ => Vec3::zeros(),
+        }
+    }
+
+    /// Errors of azimuth and elevation that change sign between the faces.
+    fn systematic(&self, column: u32, elevation: f64) -> (f64, f64) {
+        let Some(faces) = self.instrument.faces else { return (0.0, 0.0) };
+        let sign = if self.is_back(column) { -1.0 } else { 1.0 };
+        let azimuth = faces.collimation / elevation.cos() + faces.trunnion * elevation.tan();
+        (sign * azimuth, 0.0)
+    }
+
+    /// Measures a column, whose neighbours tell where edges are.
+    pub(crate) fn measure(
+        &self,
+        column: u32,
+        before: Option<&Trace>,
+        here: &Trace,
+        after: Option<&Trace>,
+    ) -> SimColumn {
+        let n = here.rays.len();
+        let mut rng = self.rng(column, Purpose::Ranges);
+        let mut out = SimColumn {
+            index: column,
+            back_face: self.is_back(column),
+            range_m: Vec::with_capacity(n),
+            azimuth: vec![self.lattice.azimuth(column); n],
+            elevation: (0..self.lattice.n_rows).map(|row| self.lattice.elevation(row)).collect(),
+            intensity: Vec::with_capacity(n),
+            state: Vec::with_capacity(n),
+            truth: Vec::with_capacity(n),
+        };
+        for row in 0..n {
+            let neighbours = [before, Some(here), after].into_iter().flatten();
+            let echo = if is_at_edge(row, here, neighbours) && self.instrument.footprint > 0.0 {
+                self.footprint_echo(&here.rays[row], here.hits[row])
+            } else {
+                here.hits[row].map(|hit| self.echo(&hit))
+            };
+            let (state, range, intensity) = self.receive(column, echo, &mut rng);
+            out.range_m.push(range as f32);
+            out.intensity.push(intensity);
+            out.state.push(state);
+            out.truth.push(TruthCell {
+                label: here.hits[row].map_or(Label::Nothing, |hit| hit.label),
+                mixed: echo.is_some_and(|echo| echo.mixed),
+                range: here.hits[row].map_or(0.0, |hit| hit.range),
+            });
+        }
+        out
+    }
+
+    fn echo(&self, hit: &Hit) -> Echo {
+        let marker = hit.label == Label::PlateTop && hit.uv.is_some_and(|uv| self.scene.is_marker(uv));
+        Echo { hit: *hit, strength: strength(hit, marker), mixed: false }
+    }
+
+    /// The echo of the whole footprint. A phase scanner adds up what comes back from everywhere under the spot:
+    /// the range is the mean, weighted by power, which falls with the square of the distance.
+    fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>) -> Option<Echo> {
+        let across = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
+        let up = across.cross(&ray.direction);
+        let (mut power, mut range, mut strength) = (0.0, 0.0, 0.0);
+        let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
+        let mut nearest_hit = middle;
+        for (x, y, weight) in SPOT {
+            let radius = self.instrument.footprint / 2.0;
+            let direction = (ray.direction + across * (x * radius) + up * (y * radius)).normalize();
+            let Some(hit) = self.cast(&Ray { origin: ray.origin, direction }) else { continue };
+            let echo = self.echo(&hit);
+            let received = weight * echo.strength / (hit.range * hit.range);
+            power += received;
+            range += received * hit.range;
+            strength += weight * echo.strength;
+            if hit.range < nearest {
+                (nearest, nearest_hit) = (hit.range, Some(hit));
+            }
+            farthest = farthest.max(hit.range);
+        }
+        if power == 0.0 {
+            return None;
+        }
+        let mixed = farthest - nearest > MIXED_SPREAD;
+        // Without a jump the middle of the beam says it more exactly than the mean of the samples.
+        let hit =
+            if mixed { Hit { range: range / power, ..nearest_hit? } } else { middle.or(nearest_hit)? };
+        Some(Echo { hit, strength, mixed })
+    }
+
+    /// What the receiver makes of an echo: state, range, intensity.
+    fn receive(&self, column: u32, echo: Option<Echo>, rng: &mut Pcg64) -> (SimState, f64, u16) {
+        // Every cell draws the same numbers, whatever it sees.
+        let lost = unit_interval(rng);
+        let error = self.unit_error(rng);
+        let gain: f64 = StandardNormal.sample(rng);
+        let Some(Echo { hit, strength, .. }) = echo else { return (SimState::NoEcho, 0.0, 0) };
+        if lost < self.instrument.loss(&hit, strength) {
+            return (SimState::NoEcho, 0.0, 0);
+        }
+        let mut sigma = self.instrument.sigma_at(hit.range, strength);
+        if column < self.instrument.warm_up_columns {
+            sigma = sigma.max(WARM_UP_SIGMA);
+        }
+        let range = hit.range + self.instrument.bias(hit.range) + sigma * error;
+        let level = f64::from(INTENSITY_MAX) * strength.sqrt() * (1.0 + 0.01 * gain);
+        if range < self.instrument.reach[0] {
+            return (SimState::NoEcho, 0.0, 0);
+        }
+        (SimState::Valid, range, level.clamp(1.0, f64::from(INTENSITY_MAX)) as u16)
+    }
+
+    /// A random number of variance 1.
+    fn unit_error(&self, rng: &mut Pcg64) -> f64 {
+        match self.instrument.tail_dof {
+            Some(dof) if dof > 2.0 => {
+                StudentT::new(dof).map_or(0.0, |t| t.sample(rng)) * ((dof - 2.0) / dof).sqrt()
+            }
+            _ => StandardNormal.sample(rng),
+        }
+    }
+}
+
+/// What comes back to the receiver.
+#[derive(Debug, Clone, Copy)]
+struct Echo {
+    hit: Hit,
+    strength: f64,
+    mixed: bool,
+}
+
+/// Samples of the spot (x, y in units of its 1/e^2 radius, weight of a Gaussian beam): the middle and two rings.
+const SPOT: [(f64, f64, f64); 19] = {
+    const INNER: f64 = 0.606_530_659_712_633_4; // exp(-2 * 0.5^2)
+    const OUTER: f64 = 0.135_335_283_236_612_7; // exp(-2)
+    const H: f64 = 0.866_025_403_784_438_6; // sin 60 degrees
+    [
+        (0.0, 0.0, 1.0),
+        (0.5, 0.0, INNER),
+        (0.25, 0.5 * H, INNER),
+        (-0.25, 0.5 * H, INNER),
+        (-0.5, 0.0, INNER),
+        (-0.25, -0.5 * H, INNER),
+        (0.25, -0.5 * H, INNER),
+        (1.0, 0.0, OUTER),
+        (H, 0.5, OUTER),
+        (0.5, H, OUTER),
+        (0.0, 1.0, OUTER),
+        (-0.5, H, OUTER),
+        (-H, 0.5, OUTER),
+        (-1.0, 0.0, OUTER),
+        (-H, -0.5, OUTER),
+        (-0.5, -H, OUTER),
+        (0.0, -1.0, OUTER),
+        (0.5, -H, OUTER),
+        (H, -0.5, OUTER),
+    ]
+};
+
+/// True when one of the eight neighbours lies on another object or across a fold.
+fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Trace>) -> bool {
+    let middle = here.hits[row];
+    let differs = |other: &Option<Hit>| match (&middle, other) {
+        (Some(a), Some(b)) => a.object != b.object || (a.range - b.range).abs() > FOLD,
+        (None, None) => false,
+        _ => true,
+    };
+    let rows = row.saturating_sub(1)..(row + 2).min(here.hits.len());
+    columns.into_iter().any(|column| column.hits[rows.clone()].iter().any(differs))
+}
+
+/// Uniform in [0, 1).
+fn unit_interval(rng: &mut Pcg64) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}

@@ -1,0 +1,195 @@
+//! Exact intersection of rays with the six curved faces of a plate.
+
+use crate::bounds::Bounds;
+use crate::ray::{Label, Ray};
+use platen_sim_plate::{Jet, Plate, Side, Vec3};
+
+/// Longest edge of a patch, metres.
+const PATCH: f64 = 0.12;
+
+/// By how much the boxes grow beyond the 5 x 5 points that they hold: the arc between points 30 mm apart rises
+/// 0.1 mm at a curvature of 1/m.
+const MARGIN: f64 = 1e-3;
+
+/// A root is found when the point lies this close to the ray, metres.
+const CLOSE: f64 = 1e-11;
+
+/// Faces and patches overlap by this, metres, so that no ray slips between them.
+const OVERLAP: f64 = 1e-9;
+
+/// Which of the six faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Face {
+    Top,
+    Underside,
+    Side(Side),
+}
+
+/// A rectangle in the two parameters of a face: (u, v), or (u or v, height above the mid-surface) on a side.
+#[derive(Debug, Clone)]
+pub(crate) struct Patch {
+    face: Face,
+    from: [f64; 2],
+    to: [f64; 2],
+}
+
+/// Where a ray meets a patch.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PatchHit {
+    pub(crate) range: f64,
+    pub(crate) normal: Vec3,
+    pub(crate) uv: [f64; 2],
+}
+
+impl Face {
+    fn sizes(self, plate: &Plate) -> [f64; 2] {
+        match self {
+            Self::Top | Self::Underside => [plate.width(), plate.height()],
+            Self::Side(Side::Bottom | Side::Top) => [plate.width(), plate.thickness()],
+            Self::Side(Side::Right | Side::Left) => [plate.height(), plate.thickness()],
+        }
+    }
+
+    /// Material point and height of the parameters (a, b).
+    fn material(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
+        let (width, height, half) = (plate.width(), plate.height(), plate.thickness() / 2.0);
+        match self {
+            Self::Top => [a, b, half],
+            Self::Underside => [a, b, -half],
+            Self::Side(Side::Bottom) => [a, 0.0, b - half],
+            Self::Side(Side::Right) => [width, a, b - half],
+            Self::Side(Side::Top) => [a, height, b - half],
+            Self::Side(Side::Left) => [0.0, a, b - half],
+        }
+    }
+
+    /// 1 where da x db points out of the plate, else -1.
+    fn outward(self) -> f64 {
+        match self {
+            Self::Top | Self::Side(Side::Bottom | Side::Right) => 1.0,
+            Self::Underside | Self::Side(Side::Top | Side::Left) => -1.0,
+        }
+    }
+
+    /// Point and derivatives by (a, b).
+    fn point(self, plate: &Plate, a: f64, b: f64) -> (Vec3, Vec3, Vec3) {
+        let [u, v, h] = self.material(plate, a, b);
+        let Jet { point, du, dv, normal, .. } = plate.jet(u, v, h);
+        match self {
+            Self::Top | Self::Underside => (point, du, dv),
+            Self::Side(Side::Bottom | Side::Top) => (point, du, normal),
+            Self::Side(Side::Right | Side::Left) => (point, dv, normal),
+        }
+    }
+}
+
+impl Patch {
+    /// All patches of a plate.
+    pub(crate) fn all(plate: &Plate) -> Vec<Self> {
+        let mut patches = Vec::new();
+        let faces = [Face::Top, Face::Underside].into_iter().chain(Side::ALL.map(Face::Side));
+        for face in faces {
+            let sizes = face.sizes(plate);
+            let [na, nb] = sizes.map(|size| (size / PATCH).ceil().max(1.0) as usize);
+            let place = |i: usize, n: usize, size: f64| size * i as f64 / n as f64;
+            for i in 0..na {
+                for j in 0..nb {
+                    patches.push(Self {
+                        face,
+                        from: [place(i, na, sizes[0]), place(j, nb, sizes[1])],
+                        to: [place(i + 1, na, sizes[0]), place(j + 1, nb, sizes[1])],
+                    });
+                }
+            }
+        }
+        patches
+    }
+
+    pub(crate) fn label(&self) -> Label {
+        match self.face {
+            Face::Top => Label::PlateTop,
+            Face::Underside => Label::PlateUnderside,
+            Face::Side(_) => Label::PlateSide,
+        }
+    }
+
+    /// Number of the face, 0 to 5.
+    pub(crate) fn object(&self) -> u16 {
+        match self.face {
+            Face::Top => 0,
+            Face::Underside => 1,
+            Face::Side(side) => 2 + side as u16,
+        }
+    }
+
+    pub(crate) fn bounds(&self, plate: &Plate) -> Bounds {
+        let mix = |k: usize, i: usize| self.from[k] + (self.to[k] - self.from[k]) * i as f64 / 4.0;
+        let points = (0..25).map(|i| self.face.point(plate, mix(0, i / 5), mix(1, i % 5)).0);
+        Bounds::of(points, MARGIN)
+    }
+
+    /// Where the ray enters the plate through this patch: a root of X(a, b) = origin + t direction by Newton's
+    /// method from the patch's middle. A patch is small against its radii, so that a root on it is reached in three
+    /// or four steps; a root elsewhere belongs to another patch. Near a horizon the ray may leave through the
+    /// patch that it entered by; then the other root is looked for from the scanner's side.
+    pub(crate) fn cast(&self, plate: &Plate, ray: &Ray) -> Option<PatchHit> {
+        let middle = [0, 1].map(|k| (self.from[k] + self.to[k]) / 2.0);
+        let first = self.root(plate, ray, middle);
+        let root = match first {
+            Some(root) if !self.leaves(&root, ray) => root,
+            // Near a horizon: the ray left here, or the tangent plane in the middle holds the ray.
+            _ => {
+                let [a, b] = first.map_or(middle, |root| root.parameters);
+                let (_, da, db) = self.face.point(plate, a, b);
+                let nearer = |x: f64, d: Vec3| x - PATCH * ray.direction.dot(&d) / d.norm_squared();
+                self.root(plate, ray, [nearer(a, da), nearer(b, db)])?
+            }
+        };
+        let [a, b] = root.parameters;
+        let inside = |x: f64, k: usize| (self.from[k] - OVERLAP..=self.to[k] + OVERLAP).contains(&x);
+        if !inside(a, 0) || !inside(b, 1) || root.range <= 0.0 || self.leaves(&root, ray) {
+            return None;
+        }
+        let [u, v, _] = self.face.material(plate, a, b);
+        Some(PatchHit { range: root.range, normal: root.normal.normalize(), uv: [u, v] })
+    }
+
+    fn leaves(&self, root: &Root, ray: &Ray) -> bool {
+        root.normal.dot(&ray.direction) * self.face.outward() > 0.0
+    }
+
+    /// Newton's method from `start`; gives up one patch away from this one.
+    fn root(&self, plate: &Plate, ray: &Ray, start: [f64; 2]) -> Option<Root> {
+        let [mut a, mut b] = start;
+        for _ in 0..12 {
+            let (point, da, db) = self.face.point(plate, a, b);
+            let normal = da.cross(&db);
+            let slope = normal.dot(&ray.direction);
+            if slope == 0.0 {
+                return None;
+            }
+            let range = normal.dot(&(point - ray.origin)) / slope;
+            let miss = ray.at(range) - point;
+            if miss.norm_squared() < CLOSE * CLOSE {
+                return Some(Root { range, parameters: [a, b], normal });
+            }
+            // The miss lies in the tangent plane: split it along da and db.
+            let area = normal.norm_squared();
+            a += miss.cross(&db).dot(&normal) / area;
+            b += da.cross(&miss).dot(&normal) / area;
+            let near =
+                |x: f64, k: usize| (self.from[k] - 2.0 * PATCH..=self.to[k] + 2.0 * PATCH).contains(&x);
+            if !near(a, 0) || !near(b, 1) {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// A point common to a ray and the surface of a patch, with da x db there.
+struct Root {
+    range: f64,
+    parameters: [f64; 2],
+    normal: Vec3,
+}

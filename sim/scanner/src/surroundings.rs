@@ -1,0 +1,187 @@
+//! A press shop round the plate.
+
+use crate::ray::Label;
+use crate::solid::Solid;
+use platen_sim_plate::{Plate, PlateState, Vec3};
+
+/// What stands in the shop. The scanner is `floor_m` above the floor and looks along +x to the press.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surroundings {
+    /// Height of the floor in the scanner frame, metres (negative).
+    pub floor: f64,
+    /// Distance to the wall behind the press, metres.
+    pub wall: f64,
+    /// Frame and ram behind the plate.
+    pub press: bool,
+    /// Somebody stands beside the plate, out of the way.
+    pub bystander: bool,
+    /// Somebody stands before the plate and hides part of its near edge.
+    pub person_in_front: bool,
+    /// A crane's chain hangs before the plate and hides a strip.
+    pub chain: bool,
+}
+
+impl Default for Surroundings {
+    fn default() -> Self {
+        Self { floor: -4.5, wall: 12.0, press: true, bystander: true, person_in_front: false, chain: false }
+    }
+}
+
+impl Surroundings {
+    /// An empty hall.
+    pub fn bare() -> Self {
+        Self { press: false, bystander: false, ..Self::default() }
+    }
+}
+
+/// Radius of the round head of a die, metres.
+const DIE_RADIUS: f64 = 0.07;
+
+/// Gap between table and plate, where the dies stand, metres.
+const UNDER_PLATE: f64 = 0.35;
+
+/// All solids round `plate` (or round the place where a plate of default pose would lie).
+pub(crate) fn solids(plate: Option<&Plate>, around: &Surroundings) -> Vec<(Label, Solid)> {
+    let home = PlateState::flat(3000.0, 2500.0, 36.0).pose.scanner_from_plate().translation.vector;
+    let centre = plate.map_or(home, |plate| plate.scanner_from_plate().translation.vector);
+    let lowest = plate.map_or(centre.z, |plate| {
+        let corners = plate.corners().map(|corner| corner.z);
+        corners.into_iter().fold(centre.z, f64::min)
+    });
+    let table_top = lowest - UNDER_PLATE;
+    // Directions away from the scanner and to its left, seen from the plate.
+    let away = Vec3::new(centre.x, centre.y, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
+    let left = Vec3::new(-away.y, away.x, 0.0);
+    let yaw = away.y.atan2(away.x);
+    let reach = plate.map_or(2.0, |plate| 0.5 * plate.width().hypot(plate.height()));
+    let place = Place { centre, away, left, yaw, reach, floor: around.floor, table_top };
+
+    let mut solids = vec![(Label::Floor, slab(around.floor))];
+    solids.extend(walls(around).map(|wall| (Label::Wall, wall)));
+    solids.push((Label::Cabinet, place.upright(2.5, reach + 2.5, 2.0, [0.6, 1.2, 2.0])));
+    solids.push((Label::Table, place.table()));
+    if let Some(plate) = plate {
+        solids.extend(dies(plate, table_top).map(|die| (Label::Die, die)));
+    }
+    if around.press {
+        solids.extend(place.press().map(|part| (Label::Press, part)));
+    }
+    if around.bystander {
+        solids.extend(place.person(1.2, -(reach + 0.4)).map(|limb| (Label::Person, limb)));
+    }
+    if around.person_in_front {
+        solids.extend(place.person(-(reach + 0.3), 0.35).map(|limb| (Label::Person, limb)));
+    }
+    if around.chain {
+        solids.extend(place.chain().map(|link| (Label::Chain, link)));
+    }
+    solids
+}
+
+fn slab(top: f64) -> Solid {
+    Solid::upright(Vec3::new(0.0, 0.0, top - 0.1), Vec3::new(200.0, 200.0, 0.2), 0.0)
+}
+
+fn walls(around: &Surroundings) -> impl Iterator<Item = Solid> {
+    let (height, middle) = (12.0, around.floor + 6.0);
+    let wall = around.wall;
+    [
+        Solid::upright(Vec3::new(wall + 0.15, 0.0, middle), Vec3::new(0.3, 60.0, height), 0.0),
+        Solid::upright(Vec3::new(-9.15, 0.0, middle), Vec3::new(0.3, 60.0, height), 0.0),
+        Solid::upright(Vec3::new(0.0, 15.15, middle), Vec3::new(60.0, 0.3, height), 0.0),
+        Solid::upright(Vec3::new(0.0, -15.15, middle), Vec3::new(60.0, 0.3, height), 0.0),
+    ]
+    .into_iter()
+}
+
+/// Dies in rows under the plate; their round heads touch its underside.
+fn dies(plate: &Plate, table_top: f64) -> impl Iterator<Item = Solid> {
+    let shares = [1.0 / 6.0, 0.5, 5.0 / 6.0];
+    let at = move |i: usize| (shares[i / 2] * plate.width(), (0.2 + 0.6 * (i % 2) as f64) * plate.height());
+    (0..6).map(move |i| {
+        let (u, v) = at(i);
+        let head = plate.underside(u, v) - plate.normal(u, v) * DIE_RADIUS;
+        Solid::Capsule { ends: [Vec3::new(head.x, head.y, table_top), head], radius: DIE_RADIUS }
+    })
+}
+
+/// The place of the press: directions seen from the plate.
+struct Place {
+    centre: Vec3,
+    away: Vec3,
+    left: Vec3,
+    yaw: f64,
+    reach: f64,
+    floor: f64,
+    table_top: f64,
+}
+
+impl Place {
+    fn at(&self, away: f64, left: f64, z: f64) -> Vec3 {
+        let flat = self.centre + self.away * away + self.left * left;
+        Vec3::new(flat.x, flat.y, z)
+    }
+
+    /// A box that stands on the floor; its edges run away, left and up.
+    fn upright(&self, away: f64, left: f64, height: f64, edges: [f64; 3]) -> Solid {
+        let middle = self.at(away, left, self.floor + height / 2.0);
+        Solid::upright(middle, Vec3::from(edges), self.yaw)
+    }
+
+    fn table(&self) -> Solid {
+        let height = self.table_top - self.floor;
+        let edge = 1.6 * self.reach;
+        self.upright(0.0, 0.0, height, [edge, edge, height])
+    }
+
+    /// Two columns, a beam and the ram behind the plate.
+    fn press(&self) -> impl Iterator<Item = Solid> {
+        let behind = self.reach + 0.6;
+        let aside = self.reach + 0.5;
+        let beam = self.at(behind, 0.0, self.floor + 4.6);
+        let ram = self.at(behind, 0.0, self.floor + 3.4);
+        [
+            self.upright(behind, aside, 5.0, [0.6, 0.5, 5.0]),
+            self.upright(behind, -aside, 5.0, [0.6, 0.5, 5.0]),
+            Solid::upright(beam, Vec3::new(0.8, 2.0 * aside, 0.8), self.yaw),
+            Solid::upright(ram, Vec3::new(0.5, 0.7, 1.6), self.yaw),
+        ]
+        .into_iter()
+    }
+
+    /// A person 1.78 m tall.
+    fn person(&self, away: f64, left: f64) -> impl Iterator<Item = Solid> {
+        let floor = self.floor;
+        let limb = move |side: f64, from: f64, to: f64, radius: f64| {
+            let at = |height: f64| self.at(away, left + side, floor + height);
+            Solid::Capsule { ends: [at(from), at(to)], radius }
+        };
+        [
+            limb(0.1, 0.08, 0.85, 0.08),
+            limb(-0.1, 0.08, 0.85, 0.08),
+            limb(0.0, 0.95, 1.4, 0.17),
+            limb(0.27, 0.9, 1.4, 0.05),
+            limb(-0.27, 0.9, 1.4, 0.05),
+            limb(0.0, 1.66, 1.67, 0.11),
+        ]
+        .into_iter()
+    }
+
+    /// Links of 20 mm steel from above the beam of sight down to the plate's height, every other one turned.
+    fn chain(&self) -> impl Iterator<Item = Solid> {
+        const PITCH: f64 = 0.08;
+        let top = 0.5;
+        let bottom = self.centre.z + 0.6;
+        let n = ((top - bottom) / PITCH) as usize;
+        (0..n).flat_map(move |i| {
+            let across = if i % 2 == 0 { self.left } else { self.away } * 0.025;
+            let middle = self.at(-1.2, -0.5, top - PITCH * i as f64);
+            let link = move |side: f64| {
+                let foot = middle + across * side;
+                let half = Vec3::z() * 0.05;
+                Solid::Capsule { ends: [foot - half, foot + half], radius: 0.01 }
+            };
+            [link(1.0), link(-1.0)]
+        })
+    }
+}
