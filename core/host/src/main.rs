@@ -1,2 +1,7 @@
 //! Program `platen`.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    platen_host::cli::main()
+}

@@ -1,0 +1,111 @@
+//! The command line: one module for each verb. Results go to stdout, the log to stderr.
+
+mod output;
+mod plugins;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::plugin::{Catalogue, PluginError};
+
+/// Measures plates on a press, stroke by stroke.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    arg_required_else_help = true,
+    after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or plant file.\n\
+                  PLATEN_LOG sets what is logged, e.g. PLATEN_LOG=debug or PLATEN_LOG=platen_press=trace."
+)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// What every verb takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Common {
+    /// Folder to look for plugins in first
+    #[arg(long, global = true, value_name = "DIR")]
+    plugins: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+impl Common {
+    /// Where plugins are looked for.
+    pub(crate) fn catalogue(&self) -> Catalogue {
+        Catalogue::new(self.plugins.as_deref())
+    }
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// What plugins are installed, and their options
+    Plugins(plugins::Command),
+}
+
+/// Why a verb ended without its result.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum CliError {
+    /// The user or the plant file is to be corrected: exit 2.
+    #[error("{0}")]
+    Usage(String),
+    /// Something failed: exit 1.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl From<PluginError> for CliError {
+    fn from(error: PluginError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<std::io::Error> for CliError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let code = if error.use_stderr() { 2 } else { 0 };
+            // A closed pipe at this point is nobody's loss.
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    start_log();
+    let result = match &cli.verb {
+        Verb::Plugins(command) => plugins::run(&cli.common, command),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            output::error(&error.to_string());
+            ExitCode::from(if matches!(error, CliError::Usage(_)) { 2 } else { 1 })
+        }
+    }
+}
+
+/// Log lines go to stderr; `PLATEN_LOG` says which, warnings and errors by default.
+fn start_log() {
+    use tracing_subscriber::filter::{EnvFilter, LevelFilter};
+    let filter = EnvFilter::builder()
+        .with_default_directive(LevelFilter::WARN.into())
+        .with_env_var("PLATEN_LOG")
+        .from_env_lossy();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .init();
+}

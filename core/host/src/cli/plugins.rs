@@ -1,0 +1,150 @@
+//! `platen plugins`: what is installed.
+
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use platen_plant::{OptionDecl, OptionType};
+use serde_json::{Value as Json, json};
+
+use super::{CliError, Common, output};
+use crate::plugin::{Descriptor, Listed};
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  platen plugins list\n  platen plugins describe faro-file\n  \
+                        platen plugins describe elastic --toml >> config/plant-north.toml")]
+pub(super) struct Command {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// One line for every library file in the plugin folders
+    List,
+    /// What a plugin does and its options
+    Describe {
+        /// Name as in plant files
+        name: String,
+        /// Print its options as TOML, commented out, to paste into a plant file
+        #[arg(long)]
+        toml: bool,
+    },
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let catalogue = common.catalogue();
+    match &command.verb {
+        Verb::List => {
+            let listed = catalogue.list();
+            if common.json {
+                output::json(&listed.iter().map(listed_json).collect::<Vec<_>>())?;
+            } else {
+                list(&listed)?;
+                let folders: Vec<String> =
+                    catalogue.folders().iter().map(|f| f.display().to_string()).collect();
+                output::line(&format!("looked in {}", folders.join(", ")))?;
+            }
+        }
+        Verb::Describe { name, toml } => {
+            let library = catalogue.load(name)?;
+            let descriptor = library.descriptor();
+            match (common.json, toml) {
+                (true, _) => output::json(&describe_json(descriptor))?,
+                (_, true) => output::line(&toml_block(descriptor))?,
+                _ => describe(descriptor)?,
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list(listed: &[Listed]) -> Result<(), CliError> {
+    let mut rows = vec![["plugin", "kind", "version", "state"].map(str::to_owned).to_vec()];
+    for Listed { path, plugin } in listed {
+        rows.push(match plugin {
+            Ok(p) => vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()],
+            Err(error) => {
+                let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                vec![file, "-".into(), "-".into(), format!("refused: {error}")]
+            }
+        });
+    }
+    output::table(&rows)
+}
+
+fn listed_json(listed: &Listed) -> Json {
+    match &listed.plugin {
+        Ok(p) => {
+            json!({ "path": listed.path, "state": "ready", "id": p.id, "kind": p.kind.name(), "version": p.version })
+        }
+        Err(error) => json!({ "path": listed.path, "state": "refused", "reason": error.to_string() }),
+    }
+}
+
+fn type_name(option: &OptionDecl) -> &'static str {
+    match option.kind {
+        OptionType::Bool => "true or false",
+        OptionType::Int => "whole number",
+        OptionType::Float => "number",
+        OptionType::String => "text",
+        OptionType::Choice => "choice",
+        OptionType::Path => "path",
+        OptionType::Duration => "duration",
+        OptionType::Floats => "list of numbers",
+    }
+}
+
+/// Type, unit, range and default in one line.
+fn rules(option: &OptionDecl) -> String {
+    let mut rules = match option.choices.as_slice() {
+        [] => type_name(option).to_owned(),
+        choices => choices.join(" | "),
+    };
+    if let Some(unit) = &option.unit {
+        rules += &format!(", {unit}");
+    }
+    match (option.min, option.max) {
+        (Some(min), Some(max)) => rules += &format!(", {min} to {max}"),
+        (Some(min), None) => rules += &format!(", at least {min}"),
+        (None, Some(max)) => rules += &format!(", at most {max}"),
+        (None, None) => {}
+    }
+    match (&option.default, option.required) {
+        (Some(default), _) => rules += &format!(", default {default}"),
+        (None, true) => rules += ", required",
+        (None, false) => rules += ", optional",
+    }
+    rules
+}
+
+fn describe(p: &Descriptor) -> Result<(), CliError> {
+    output::line(&format!("{} {} ({}), by {}, {}", p.id, p.version, p.kind.name(), p.vendor, p.license))?;
+    output::line(&format!("\n{}", p.doc))?;
+    output::line(&format!("\nreads {}, writes {}", p.inputs.join(", "), p.outputs.join(", ")))?;
+    output::line(if p.options.is_empty() { "\nno options" } else { "\noptions:" })?;
+    for option in &p.options {
+        output::line(&format!("  {} ({})\n      {}", option.name, rules(option), option.doc))?;
+    }
+    Ok(())
+}
+
+fn describe_json(p: &Descriptor) -> Json {
+    let option = |o: &OptionDecl| {
+        json!({ "name": o.name, "type": type_name(o), "unit": o.unit, "min": o.min, "max": o.max, "choices": o.choices,
+                "default": o.default, "required": o.required, "secret": o.secret, "doc": o.doc })
+    };
+    json!({ "id": p.id, "kind": p.kind.name(), "name": p.name, "vendor": p.vendor, "version": p.version, "doc": p.doc,
+            "license": p.license, "inputs": p.inputs, "outputs": p.outputs,
+            "options": p.options.iter().map(option).collect::<Vec<_>>() })
+}
+
+fn toml_block(p: &Descriptor) -> String {
+    let table = p.kind.name();
+    let head = if table == "comparison" { format!("[[{table}]]") } else { format!("[{table}]") };
+    let mut text = format!("{head}\nplugin = \"{}\"\n[{table}.options]", p.id);
+    for option in &p.options {
+        let default = option.default.clone().unwrap_or_else(|| "...".into());
+        text += &format!("\n# {} ({})\n# {} = {default}", option.doc, rules(option), option.name);
+    }
+    text
+}
