@@ -236,6 +236,19 @@ typedef struct platen_chart {
   platen_span uv, strain, sigma; /* f64: 2, 3 (e_uu, e_vv, e_uv), 2 each; strain and sigma may be absent */
 } platen_chart;
 
+/* Mid-surface S(u, v): bicubic B-spline over uniform knots, three beyond each end. Grids are v outer, u inner. */
+typedef struct platen_surface {
+  uint32_t struct_size, mask_u, mask_v, reserved;
+  double thickness;
+  platen_span knots_u, knots_v;
+  platen_span control;          /* f64, 3 each */
+  platen_span precision_factor; /* f64: Cholesky factor of the control values' precision; for each row of the net across
+                                   its longer axis the blocks that couple it to itself and to the three rows before, each
+                                   square over the shorter axis, column-major */
+  platen_span covariance;       /* f64, 49 a control point: with those up to three away, 7 x 7 */
+  platen_span seen;             /* u8 a mask cell: 1 seen */
+} platen_surface;
+
 typedef struct platen_grid {
   uint32_t struct_size, reserved, n_u, n_v, components, reserved_2;
   platen_span name, unit; /* UTF-8 */

@@ -189,6 +189,33 @@ header! {
 }
 
 header! {
+    /// Mid-surface S(u, v) as a bicubic B-spline, host to comparison. Attribute `role`: now, before or baseline.
+    Surface = c"platen.surface/1" {
+        /// Mask cells along u.
+        mask_u: u32,
+        /// Mask cells along v.
+        mask_v: u32,
+        /// 0.
+        reserved: u32,
+        /// Thickness of the plate.
+        thickness: f64,
+        /// f64, uniform, three knots beyond each end; the plate is 0 to W.
+        knots_u: Span,
+        /// f64, likewise 0 to H.
+        knots_v: Span,
+        /// f64, 3 a control point, v outer, u inner.
+        control: Span,
+        /// f64: Cholesky factor of the control values' precision, for each row of the net across its longer axis the
+        /// blocks that couple it to itself and to the three rows before, each square over the shorter axis, column-major.
+        precision_factor: Span,
+        /// f64, 49 a control point: covariances with those up to three away, 7 x 7, v outer, u inner.
+        covariance: Span,
+        /// u8 a mask cell, v outer: 1 seen.
+        seen: Span,
+    }
+}
+
+header! {
     /// A named field on a (u, v) grid, comparison to host.
     Grid = c"platen.grid/1" {
         /// 0.

@@ -4,6 +4,7 @@
 //! could as well be served from another process.
 
 mod catalogue;
+mod comparison;
 mod descriptor;
 mod error;
 mod flattening;
@@ -15,6 +16,7 @@ mod scanner;
 mod values;
 
 pub use catalogue::{Catalogue, Listed};
+pub use comparison::{Comparison, Field, NodeState, Report, Surfaces};
 pub use descriptor::{Descriptor, Kind};
 pub use error::PluginError;
 pub use flattening::Flattening;

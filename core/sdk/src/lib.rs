@@ -58,9 +58,13 @@ mod scanner;
 pub mod shim;
 mod sink;
 
+#[cfg(feature = "comparison")]
+mod comparison;
 #[cfg(feature = "flattening")]
 mod flattening;
 
+#[cfg(feature = "comparison")]
+pub use comparison::{Comparison, Field, Inputs, NodeState, Report};
 pub use error::{Error, ErrorKind, Result};
 #[cfg(feature = "flattening")]
 pub use flattening::Flattening;

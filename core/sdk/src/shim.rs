@@ -444,5 +444,7 @@ macro_rules! export {
     };
 }
 
+#[cfg(feature = "comparison")]
+pub use crate::comparison::ComparisonPlugin;
 #[cfg(feature = "flattening")]
 pub use crate::flattening::FlatteningPlugin;

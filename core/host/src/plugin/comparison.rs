@@ -1,0 +1,184 @@
+//! Comparisons as the host sees them.
+
+use std::time::Duration;
+
+use platen_abi::payload::{self, Header, Layout, Malformed};
+use platen_plant::OptionValue;
+use platen_shape::surface::Surface;
+use platen_shape::task::{Findings, Task};
+
+use super::instance::InputFrame;
+use super::job::HostBuffer;
+use super::{Instance, JobSpec, Kind, Library, PluginError};
+
+/// Largest field believed: 4 million numbers.
+const MAX_FIELD: usize = 1 << 22;
+
+/// A comparison with its options.
+#[derive(Debug)]
+pub struct Comparison {
+    instance: Instance,
+    limit: Duration,
+}
+
+/// What a comparison found.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Report {
+    /// Name of the plugin.
+    pub comparison: String,
+    /// Figures, judgement, sentences.
+    pub findings: Findings,
+    /// Fields over the plate.
+    pub fields: Vec<Field>,
+}
+
+/// A field on an even grid over the whole plate, v outer, u inner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Name, e.g. `displacement`.
+    pub name: String,
+    /// Unit, e.g. `m`.
+    pub unit: String,
+    /// Nodes along u and v.
+    pub nodes: [usize; 2],
+    /// Numbers a node.
+    pub components: usize,
+    /// Numbers, components innermost; what a node without data holds means nothing.
+    pub values: Vec<f64>,
+    /// What is known at each node.
+    pub state: Vec<NodeState>,
+}
+
+/// What is known at a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NodeState {
+    /// The plate was not seen here.
+    Unseen,
+    /// A value.
+    Seen,
+    /// A value below the level of detection: nothing changed.
+    Unchanged,
+}
+
+/// The surfaces of a plate that a comparison may look at.
+#[derive(Debug, Clone, Copy)]
+pub struct Surfaces<'a> {
+    /// The plate now.
+    pub now: &'a Surface,
+    /// The plate at the stroke before.
+    pub before: Option<&'a Surface>,
+    /// The plate before the first stroke.
+    pub baseline: Option<&'a Surface>,
+}
+
+impl Comparison {
+    /// Makes a comparison of checked options; `limit` is the time for one plate.
+    ///
+    /// # Errors
+    /// As [`Instance::create`].
+    pub fn create(library: &Library, values: &[OptionValue], limit: Duration) -> Result<Self, PluginError> {
+        let instance = Instance::create(library, Kind::Comparison, values)?;
+        instance.open(limit)?;
+        Ok(Self { instance, limit })
+    }
+
+    /// Name in plant files.
+    pub fn name(&self) -> &str {
+        self.instance.name()
+    }
+
+    /// Compares.
+    ///
+    /// # Errors
+    /// The plugin's reason, its deadline, or what was wrong with what it sent.
+    pub fn compare(&self, task: &Task, surfaces: Surfaces<'_>) -> Result<Report, PluginError> {
+        let misbehaved =
+            |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };
+        let mut inputs =
+            vec![task_frame(task).map_err(|e| misbehaved(format!("a task it cannot be sent: {e}")))?];
+        inputs.push(surface_frame(surfaces.now, c"now"));
+        inputs.extend(surfaces.before.map(|s| surface_frame(s, c"before")));
+        inputs.extend(surfaces.baseline.map(|s| surface_frame(s, c"baseline")));
+
+        let mut job = self.instance.start(JobSpec::untriggered(self.limit), inputs);
+        let (mut findings, mut fields) = (None, Vec::new());
+        while let Some(frame) = job.next_frame() {
+            let is = |format: &std::ffi::CStr| frame.format.as_bytes() == format.to_bytes();
+            if is(payload::FINDINGS) && findings.is_none() {
+                let read = serde_json::from_slice::<Findings>(frame.bytes());
+                findings = Some(read.map_err(|e| misbehaved(format!("findings that cannot be read: {e}")))?);
+            } else if is(payload::Grid::FORMAT) {
+                let field =
+                    field(frame.bytes()).map_err(|e| misbehaved(format!("a malformed field: {e}")))?;
+                fields.push(field.ok_or_else(|| misbehaved("a field that does not fit its grid".into()))?);
+            } else {
+                return Err(misbehaved(format!("a frame {} out of turn", frame.format)));
+            }
+        }
+        job.finish()?;
+        let findings = findings.ok_or_else(|| misbehaved("success without findings".into()))?;
+        Ok(Report { comparison: self.instance.name().to_owned(), findings, fields })
+    }
+}
+
+fn task_frame(task: &Task) -> Result<InputFrame, serde_json::Error> {
+    let text = serde_json::to_vec(task)?;
+    let mut buffer = HostBuffer::new(text.len());
+    buffer.bytes_mut().copy_from_slice(&text);
+    Ok(InputFrame { format: payload::TASK, role: None, buffer })
+}
+
+fn surface_frame(surface: &Surface, role: &'static std::ffi::CStr) -> InputFrame {
+    let parts = surface.to_parts();
+    let seen: Vec<u8> = parts.seen.iter().map(|seen| u8::from(*seen)).collect();
+    let mut layout = Layout::of::<payload::Surface>();
+    let head = payload::Surface {
+        struct_size: size_of::<payload::Surface>() as u32,
+        mask_u: parts.mask_cells[0] as u32,
+        mask_v: parts.mask_cells[1] as u32,
+        reserved: 0,
+        thickness: parts.thickness,
+        knots_u: layout.add::<f64>(parts.knots_u.len()),
+        knots_v: layout.add::<f64>(parts.knots_v.len()),
+        control: layout.add::<[f64; 3]>(parts.control.len()),
+        precision_factor: layout.add::<f64>(parts.precision_factor.len()),
+        covariance: layout.add::<[f64; 49]>(parts.covariance.len()),
+        seen: layout.add::<u8>(seen.len()),
+    };
+    let mut buffer = HostBuffer::new(layout.bytes());
+    let bytes = buffer.bytes_mut();
+    payload::put_header(bytes, &head);
+    payload::put(bytes, head.knots_u, &parts.knots_u);
+    payload::put(bytes, head.knots_v, &parts.knots_v);
+    payload::put(bytes, head.control, &parts.control);
+    payload::put(bytes, head.precision_factor, &parts.precision_factor);
+    payload::put(bytes, head.covariance, &parts.covariance);
+    payload::put(bytes, head.seen, &seen);
+    InputFrame { format: payload::Surface::FORMAT, role: Some(role), buffer }
+}
+
+/// `None` when the field does not fit its grid or holds numbers that are none.
+fn field(bytes: &[u8]) -> Result<Option<Field>, Malformed> {
+    let head: payload::Grid = payload::read(bytes)?;
+    let state = |code: &u8| match code {
+        1 => NodeState::Seen,
+        2 => NodeState::Unchanged,
+        _ => NodeState::Unseen,
+    };
+    let field = Field {
+        name: payload::text(bytes, head.name)?,
+        unit: payload::text(bytes, head.unit)?,
+        nodes: [head.n_u as usize, head.n_v as usize],
+        components: head.components as usize,
+        values: payload::slice::<f64>(bytes, head.values)?.to_vec(),
+        state: payload::slice::<u8>(bytes, head.state)?.iter().map(state).collect(),
+    };
+    let nodes = field.nodes[0].saturating_mul(field.nodes[1]);
+    let numbers = nodes.saturating_mul(field.components);
+    let sound =
+        (1..=MAX_FIELD).contains(&numbers) && field.values.len() == numbers && field.state.len() == nodes;
+    let known = |(i, value): (usize, &f64)| {
+        value.is_finite() || field.state.get(i / field.components) == Some(&NodeState::Unseen)
+    };
+    Ok((sound && field.values.iter().enumerate().all(known)).then_some(field))
+}
