@@ -7,6 +7,7 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+pub mod extract;
 pub mod flatten;
 pub mod mesh;
 mod outline;
@@ -21,7 +22,7 @@ mod testing;
 pub use flatten::{Chart, Flatten, FlattenError};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, Outline};
-pub use patch::{Patch, Sample};
+pub use patch::{Beyond, Crossing, Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
 pub use surface::{Surface, SurfaceParts};
 

@@ -17,11 +17,41 @@ pub struct Sample {
     pub intensity: u16,
 }
 
+/// What is seen next to a cell of the face along its row or column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beyond {
+    /// Something farther away than the face would be if it went on: the plate ends here.
+    Behind,
+    /// The plate's side face: it ends here too.
+    SideFace,
+    /// Something nearer: it hides what lies behind it, the plate may go on.
+    InFront,
+    /// No return: the plate ends in front of nothing, or it is a patch without echo.
+    Nothing,
+}
+
+/// Where a row or a column of the lattice leaves the face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// The last cell inside, as an index into [`Patch::samples`].
+    pub sample: u32,
+    /// The end of the face lies between this point, metres, scanner frame, ...
+    pub inside: Vec3,
+    /// ... and this one. Both lie on the smoothed face and its continuation.
+    pub outside: Vec3,
+    /// Unit normal of the face towards the scanner.
+    pub normal: Vec3,
+    /// What ends it.
+    pub beyond: Beyond,
+}
+
 /// The plate's scanned face: its samples without side faces and mixed pixels, by column, then by row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Patch {
     /// Samples, ordered by (column, row), each cell at most once.
     pub samples: Vec<Sample>,
+    /// Ends of the face along rows and columns, ordered by sample. Cells without return inside the face are none.
+    pub crossings: Vec<Crossing>,
     /// Angle between neighbouring columns, radians.
     pub azimuth_step: f64,
     /// Angle between neighbouring rows, radians.

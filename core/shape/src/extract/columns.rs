@@ -1,0 +1,179 @@
+//! The columns that have arrived, as far as the plate may lie in them.
+
+use std::ops::Range;
+
+use platen_scan::{Column, ScanHeader, State, wrap_azimuth};
+
+use super::regions::Regions;
+
+/// Cells that are kept around those of a component, to tell what lies beside it.
+pub(super) const MARGIN: u32 = 4;
+
+/// One cell as kept: 16 bytes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Cell {
+    pub(super) range_m: f32,
+    /// True direction minus the nominal one of the lattice, radians.
+    pub(super) azimuth_off: f32,
+    pub(super) elevation_off: f32,
+    pub(super) intensity: u16,
+    pub(super) valid: bool,
+    /// Inside the region of interest.
+    pub(super) inside: bool,
+}
+
+/// Consecutive cells of a column.
+#[derive(Debug, Clone)]
+pub(super) struct Segment {
+    pub(super) first_row: u32,
+    pub(super) cells: Vec<Cell>,
+}
+
+impl Segment {
+    fn end_row(&self) -> u32 {
+        self.first_row + self.cells.len() as u32
+    }
+}
+
+/// What is kept of a column.
+#[derive(Debug, Clone)]
+pub(super) struct Kept {
+    /// Its runs, by row.
+    pub(super) runs: Range<u32>,
+    /// By row, apart from each other.
+    pub(super) segments: Vec<Segment>,
+}
+
+impl Kept {
+    /// Range of a cell that is part of a run of this column and has not been dropped.
+    pub(super) fn range(&self, row: u32) -> f32 {
+        let holding = self.segments.iter().rev().find(|s| s.first_row <= row);
+        holding.and_then(|s| s.cells.get((row - s.first_row) as usize)).map_or(0.0, |cell| cell.range_m)
+    }
+
+    fn n_cells(&self) -> usize {
+        self.segments.iter().map(|s| s.cells.len()).sum()
+    }
+
+    /// Drops what is outside of `rows`, which are sorted and apart from each other.
+    fn retain(&mut self, rows: &[Range<u32>]) {
+        let mut kept = Vec::new();
+        for segment in &self.segments {
+            for wanted in rows {
+                let start = wanted.start.max(segment.first_row);
+                let end = wanted.end.min(segment.end_row());
+                if start < end {
+                    let cells = &segment.cells
+                        [(start - segment.first_row) as usize..(end - segment.first_row) as usize];
+                    kept.push(Segment { first_row: start, cells: cells.to_vec() });
+                }
+            }
+        }
+        self.segments = kept;
+    }
+}
+
+/// Copies a column into cells. `inside` says of a row and a range whether the sample is in the region of interest.
+pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32, f32) -> bool) -> Vec<Cell> {
+    let azimuth = header.azimuth_start + header.azimuth_step * f64::from(column.index);
+    let cell = |i: usize| {
+        if column.state[i] != State::Valid {
+            return Cell::default();
+        }
+        let row = column.first_row + i as u32;
+        let elevation = header.elevation_start - header.elevation_step * f64::from(row);
+        let range_m = column.range_m[i];
+        let azimuth_off = column.azimuth[i] - azimuth;
+        let azimuth_off = if azimuth_off.abs() < 3.0 { azimuth_off } else { wrap_azimuth(azimuth_off) };
+        Cell {
+            range_m,
+            azimuth_off: azimuth_off as f32,
+            elevation_off: (column.elevation[i] - elevation) as f32,
+            intensity: column.intensity[i],
+            valid: true,
+            inside: inside(row, range_m),
+        }
+    };
+    (0..column.len()).map(cell).collect()
+}
+
+/// All columns, with the bookkeeping of what can be dropped.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Columns {
+    kept: Vec<Option<Kept>>,
+    n_cells: usize,
+    sweep_at: usize,
+}
+
+/// Below this many cells (16 MB) nothing is dropped: it would save nothing that matters.
+const SWEEP_FROM: usize = 1 << 20;
+
+impl Columns {
+    pub(super) fn len(&self) -> u32 {
+        self.kept.len() as u32
+    }
+
+    pub(super) fn get(&self, index: u32) -> Option<&Kept> {
+        self.kept.get(index as usize)?.as_ref()
+    }
+
+    pub(super) fn insert(&mut self, index: u32, column: Kept) {
+        if self.kept.len() <= index as usize {
+            self.kept.resize(index as usize + 1, None);
+        }
+        self.n_cells += column.n_cells();
+        self.kept[index as usize] = Some(column);
+    }
+
+    /// Drops, once in a while, the cells that are not near a component of at most `limit_mm2`.
+    ///
+    /// Each time the store has doubled it is swept, so that the work stays linear in the cells that arrive. A
+    /// component only grows: what is dropped now would be dropped at the end too, whatever the order of arrival.
+    pub(super) fn sweep(&mut self, regions: &mut Regions, n_columns: u32, limit_mm2: u64) {
+        if self.n_cells < self.sweep_at.max(SWEEP_FROM) {
+            return;
+        }
+        let alive: Vec<Option<Vec<Range<u32>>>> =
+            self.kept.iter().map(|c| c.as_ref().map(|c| alive_rows(c, regions, limit_mm2))).collect();
+        let n = self.kept.len();
+        for index in 0..n {
+            let first = index.saturating_sub(MARGIN as usize);
+            let last = (index + MARGIN as usize).min((n_columns as usize).max(n) - 1);
+            let Some(around) = alive.get(first..=last).filter(|a| a.iter().all(Option::is_some)) else {
+                continue;
+            };
+            let wanted = union(around.iter().flatten().flatten().cloned());
+            if let Some(column) = &mut self.kept[index] {
+                column.retain(&wanted);
+            }
+        }
+        self.n_cells = self.kept.iter().flatten().map(Kept::n_cells).sum();
+        self.sweep_at = 2 * self.n_cells;
+    }
+}
+
+fn alive_rows(column: &Kept, regions: &mut Regions, limit_mm2: u64) -> Vec<Range<u32>> {
+    let mut rows = Vec::new();
+    for number in column.runs.clone() {
+        let root = regions.root(number);
+        if regions.extent(root).area_mm2 <= limit_mm2 {
+            let run = regions.run(number);
+            rows.push(run.first_row.saturating_sub(MARGIN)..run.end_row + MARGIN);
+        }
+    }
+    rows
+}
+
+/// Sorted, non-overlapping union of ranges.
+pub(super) fn union(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
+    let mut sorted: Vec<_> = ranges.collect();
+    sorted.sort_unstable_by_key(|r| (r.start, r.end));
+    let mut joined: Vec<Range<u32>> = Vec::new();
+    for range in sorted {
+        match joined.last_mut() {
+            Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+            _ => joined.push(range),
+        }
+    }
+    joined
+}

@@ -1,0 +1,77 @@
+//! The continuity criterion of the paper (3.1, eq. 1 and 2), without trigonometry per cell.
+
+use platen_scan::ScanHeader;
+
+/// 1 / (2 cos 0.4 pi): neighbours on one surface seen at an incidence below 0.4 pi (72 degrees) lie nearer to
+/// each other than this factor times the sum of their ranges times the angle between them (paper, eq. 1).
+const FACTOR: f64 = 1.618_033_988_749_895;
+
+/// Beams of neighbouring columns close up towards the zenith and the nadir, and with them the bound, until it
+/// falls below the range noise. It is not let below this part of the bound between rows.
+const LEAST_PART_OF_ROW_STEP: f64 = 0.25;
+
+/// The criterion between two beams a fixed angle t apart.
+///
+/// With ranges a and b the squared distance is (a - b)^2 + a b 2 (1 - cos t), the squared bound
+/// (1.62 d)^2 (a + b)^2, where d is t itself (the paper prints |p1| + |p2| on the left of eq. 2, a misprint).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Link {
+    chord: f32,
+    bound: f32,
+}
+
+impl Link {
+    fn new(angle: f64, bound_angle: f64) -> Self {
+        Self { chord: (2.0 * (1.0 - angle.cos())) as f32, bound: (FACTOR * bound_angle).powi(2) as f32 }
+    }
+
+    /// True when samples at ranges `a` and `b` (metres) are on one surface.
+    #[inline]
+    pub(super) fn joins(self, a: f32, b: f32) -> bool {
+        let difference = a - b;
+        let sum = a + b;
+        difference * difference + a * b * self.chord < self.bound * (sum * sum)
+    }
+}
+
+/// The criterion in both directions of a lattice, each with its own step.
+#[derive(Debug, Clone)]
+pub(super) struct Continuity {
+    /// Between a cell and the one below it.
+    pub(super) down: Link,
+    /// Per row, between a cell and the one in the next column.
+    pub(super) across: Vec<Link>,
+}
+
+impl Continuity {
+    pub(super) fn new(header: &ScanHeader) -> Self {
+        let row_step = header.elevation_step;
+        let across = (0..header.n_rows)
+            .map(|row| {
+                let elevation = header.elevation_start - row_step * f64::from(row);
+                let angle = header.azimuth_step * elevation.cos().abs();
+                Link::new(angle, angle.max(LEAST_PART_OF_ROW_STEP * row_step))
+            })
+            .collect();
+        Self { down: Link::new(row_step, row_step), across }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plane seen at an incidence just below 0.4 pi holds together, just above it falls apart.
+    #[test]
+    fn the_limit_is_an_incidence_of_72_degrees() {
+        let step = 8e-4_f64;
+        let link = Link::new(step, step);
+        for (incidence, joined) in [(0.398, true), (0.402, false)] {
+            // Beams `step` apart on a plane at distance 4 m from the scanner.
+            let incidence = incidence * std::f64::consts::PI;
+            let range = |angle: f64| (4.0 / angle.cos()) as f32;
+            let (a, b) = (range(incidence - step / 2.0), range(incidence + step / 2.0));
+            assert_eq!(link.joins(a, b), joined, "incidence {incidence}");
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! The plate's scanned face among the samples of a scan that arrives column by column.
+//!
+//! The steps of the paper's 3.1 in its order. While columns arrive: lattice neighbours that the continuity criterion
+//! joins (`continuity`) grow into components (`regions`), and cells that cannot belong to the plate are let go
+//! (`columns`). After the last column, for every component that may hold the plate: range noise from the scan
+//! itself (`noise`), mixed pixels (`mixed`), a low-pass copy and its normals (`smooth`), faces by region growing on
+//! them (`grow`). Pieces of a face that something cuts apart are joined (`pieces`), the plate is chosen by its
+//! size (`choose`), its face is taken to the cell (`trim`), and where rows and columns leave it is measured
+//! (`crossings`).
+//!
+//! Limits: the plate is one smooth face of known size, all of it nearer than what lies behind its edges; a
+//! component whose area across the beams exceeds four times the plate's is never looked at.
+
+mod choose;
+mod columns;
+mod continuity;
+mod crossings;
+mod grow;
+mod local;
+mod mixed;
+mod noise;
+mod pieces;
+mod refusal;
+mod regions;
+mod smooth;
+mod spread;
+mod surface;
+mod trim;
+mod window;
+
+use platen_scan::{Column, ColumnError, ScanHeader};
+
+use crate::{Patch, PlateSpec, Sample};
+use columns::{Cell, Columns, Kept, Segment, cells_of};
+use continuity::Continuity;
+use pieces::Piece;
+pub use refusal::Refusal;
+use regions::{Regions, Run};
+use spread::Spread;
+use surface::Surface;
+
+/// A component that outgrows the plate's area by this factor is dropped.
+const OUTGROWN: f64 = 4.0;
+
+/// Area across the beams, in parts of the plate's area, from which a component is looked at: a strip of the plate
+/// beside a chain, seen at a grazing angle.
+const LEAST_PART: f64 = 0.005;
+
+/// A component of at most this area and width, in parts of the plate's area and diagonal, holds little besides
+/// the plate. Larger ones are looked at only when no plate is found among these.
+const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
+
+/// A plate that reaches out of the region of interest over less than this is not cut by it, metres.
+const CUT_TOLERANCE: f64 = 0.05;
+
+/// Finds the plate's scanned face in a scan of which the columns may come in any order.
+///
+/// Same columns, same patch, to the last bit, whatever the order.
+#[derive(Debug, Clone)]
+pub struct Extractor {
+    header: ScanHeader,
+    spec: PlateSpec,
+    continuity: Continuity,
+    /// Sine and cosine of the nominal elevation of each row.
+    elevation: Vec<(f64, f64)>,
+    regions: Regions,
+    columns: Columns,
+    warm_up_columns: u32,
+}
+
+impl Extractor {
+    /// Prepares for the scan that `header` announces.
+    pub fn new(header: &ScanHeader, spec: &PlateSpec) -> Self {
+        let elevation = |row: u32| header.elevation_start - header.elevation_step * f64::from(row);
+        Self {
+            header: header.clone(),
+            spec: spec.clone(),
+            continuity: Continuity::new(header),
+            elevation: (0..header.n_rows).map(|row| elevation(row).sin_cos()).collect(),
+            regions: Regions::default(),
+            columns: Columns::default(),
+            warm_up_columns: 0,
+        }
+    }
+
+    /// Takes a column. One that has come before is ignored.
+    ///
+    /// # Errors
+    /// What [`Column::check`] finds; the column is then not taken.
+    pub fn push(&mut self, column: &Column) -> Result<(), ColumnError> {
+        column.check(self.header.n_rows)?;
+        if self.columns.get(column.index).is_some() {
+            return Ok(());
+        }
+        let azimuth = self.header.azimuth_start + self.header.azimuth_step * f64::from(column.index);
+        let (sin_az, cos_az) = azimuth.sin_cos();
+        let inside = |row: u32, range: f32| {
+            self.spec.region.as_ref().is_none_or(|region| {
+                let (sin_el, cos_el) = self.elevation[row as usize];
+                let unit = [cos_el * cos_az, cos_el * sin_az, sin_el];
+                (0..3).all(|k| (region.min[k]..=region.max[k]).contains(&(unit[k] * f64::from(range))))
+            })
+        };
+        let cells = cells_of(column, &self.header, inside);
+        let runs = self.add_runs(column.index, column.first_row, &cells);
+        let segments = vec![Segment { first_row: column.first_row, cells }];
+        self.columns.insert(column.index, Kept { runs, segments });
+        if let Some(before) = column.index.checked_sub(1) {
+            self.join(before);
+        }
+        self.join(column.index);
+        let limit_mm2 = self.plate_mm2(OUTGROWN);
+        self.columns.sweep(&mut self.regions, self.header.n_columns, limit_mm2);
+        Ok(())
+    }
+
+    /// Declares the first `columns` columns of each face laser warm-up: they are left out.
+    pub fn leave_out_warm_up(&mut self, columns: u32) {
+        self.warm_up_columns = columns;
+    }
+
+    /// The plate's face, once all columns have come.
+    ///
+    /// # Errors
+    /// Why there is none, or which of several it may be.
+    pub fn finish(mut self) -> Result<Patch, Refusal> {
+        self.check()?;
+        let (near_size, larger) = self.components();
+        let mut surfaces = self.surfaces(&near_size);
+        let mut pieces = self.pieces(&surfaces, 0);
+        let mut candidates = choose::candidates(&pieces);
+        if !candidates.iter().any(|c| c.fits(&self.spec)) {
+            let more = self.surfaces(&larger);
+            pieces.extend(self.pieces(&more, surfaces.len()));
+            surfaces.extend(more);
+            candidates = choose::candidates(&pieces);
+        }
+        let chosen = choose::choose(&candidates, &self.spec)?;
+        let chosen: Vec<&Piece> = chosen.pieces.iter().map(|&i| &pieces[i]).collect();
+        let (surface, regions) = self.plate_surface(&surfaces, &chosen);
+        self.patch(&surface, &regions)
+    }
+
+    fn check(&self) -> Result<(), Refusal> {
+        let ScanHeader { n_rows, azimuth_step, elevation_step, .. } = self.header;
+        let is_step = |step: f64| step > 0.0 && step < 0.1;
+        if n_rows == 0 || !is_step(azimuth_step) || !is_step(elevation_step) {
+            return Err(Refusal::NotALattice { n_rows, azimuth_step, elevation_step });
+        }
+        let PlateSpec { width, height, .. } = self.spec;
+        if !(width > 0.0 && height > 0.0) {
+            return Err(Refusal::NoSize { width_mm: width * 1000.0, height_mm: height * 1000.0 });
+        }
+        Ok(())
+    }
+
+    fn plate_mm2(&self, factor: f64) -> u64 {
+        (factor * self.spec.width * self.spec.height * 1e6) as u64
+    }
+
+    /// Splits the valid cells inside the region of interest into runs.
+    fn add_runs(&mut self, column: u32, first_row: u32, cells: &[Cell]) -> std::ops::Range<u32> {
+        let first = self.regions.n_runs();
+        let cell_angle = self.header.azimuth_step * self.header.elevation_step;
+        let usable = |cell: &Cell| cell.valid && cell.inside;
+        let mut at = 0;
+        while at < cells.len() {
+            if !usable(&cells[at]) {
+                at += 1;
+                continue;
+            }
+            let start = at;
+            let mut solid = 0.0;
+            loop {
+                let range = f64::from(cells[at].range_m);
+                solid += range * range * self.elevation[first_row as usize + at].1;
+                at += 1;
+                let joined = cells.get(at).is_some_and(|next| {
+                    usable(next) && self.continuity.down.joins(cells[at - 1].range_m, next.range_m)
+                });
+                if !joined {
+                    break;
+                }
+            }
+            let run = Run { column, first_row: first_row + start as u32, end_row: first_row + at as u32 };
+            self.regions.add(run, (solid.abs() * cell_angle * 1e6) as u64);
+        }
+        first..self.regions.n_runs()
+    }
+
+    /// Joins the runs of column `left` with those of the next one, when both are there.
+    fn join(&mut self, left: u32) {
+        let (Some(a), Some(b)) = (self.columns.get(left), self.columns.get(left + 1)) else { return };
+        self.regions.join_columns(
+            a.runs.clone(),
+            b.runs.clone(),
+            &self.continuity.across,
+            |row| a.range(row),
+            |row| b.range(row),
+        );
+    }
+
+    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
+    fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
+        let (least, most) = (self.plate_mm2(LEAST_PART), self.plate_mm2(OUTGROWN));
+        let diagonal = self.spec.width.hypot(self.spec.height);
+        let mut spread: std::collections::BTreeMap<u32, Spread> = std::collections::BTreeMap::new();
+        let mut order = Vec::new();
+        for index in 0..self.columns.len() {
+            let Some(column) = self.columns.get(index) else { continue };
+            let azimuth = self.header.azimuth_start + self.header.azimuth_step * f64::from(index);
+            let (sin_az, cos_az) = azimuth.sin_cos();
+            for number in column.runs.clone() {
+                let root = self.regions.root(number);
+                let area_mm2 = self.regions.extent(root).area_mm2;
+                if area_mm2 < least || area_mm2 > most {
+                    continue;
+                }
+                let run = self.regions.run(number);
+                let spread = spread.entry(root).or_insert_with(|| {
+                    order.push(root);
+                    Spread::default()
+                });
+                for row in [run.first_row, run.end_row - 1] {
+                    let (sin_el, cos_el) = self.elevation[row as usize];
+                    let range = f64::from(column.range(row));
+                    spread.add([cos_el * cos_az, cos_el * sin_az, sin_el].map(|c| c * range));
+                }
+            }
+        }
+        order.into_iter().partition(|root| {
+            let area = self.regions.extent(*root).area_mm2;
+            area <= self.plate_mm2(NEAR_SIZE.0) && spread[root].width() <= NEAR_SIZE.1 * diagonal
+        })
+    }
+
+    fn surfaces(&mut self, roots: &[u32]) -> Vec<Surface> {
+        roots.iter().map(|root| self.surface(&[*root])).collect()
+    }
+
+    fn surface(&mut self, roots: &[u32]) -> Surface {
+        let mut window = window::Window::of(roots, &mut self.regions, &self.columns, &self.header);
+        window.leave_out(self.warm_up_columns);
+        Surface::of(roots[0], window, &self.continuity)
+    }
+
+    /// The notable faces of surfaces that are numbered from `first` on.
+    fn pieces(&self, surfaces: &[Surface], first: usize) -> Vec<Piece> {
+        let least = LEAST_PART * self.spec.width * self.spec.height;
+        let numbered = surfaces.iter().zip(first..);
+        numbered.flat_map(|(surface, number)| surface.pieces(number, least)).collect()
+    }
+
+    /// The surface that holds all chosen pieces, and each piece as cells of it.
+    fn plate_surface(&mut self, surfaces: &[Surface], chosen: &[&Piece]) -> (Surface, Vec<Vec<bool>>) {
+        let mut roots = Vec::new();
+        for piece in chosen {
+            let root = surfaces[piece.surface].root;
+            if !roots.contains(&root) {
+                roots.push(root);
+            }
+        }
+        let whole = if roots.len() == 1 { surfaces[chosen[0].surface].clone() } else { self.surface(&roots) };
+        let regions = chosen.iter().map(|p| surfaces[p.surface].region(p.label, &whole.window)).collect();
+        (whole, regions)
+    }
+
+    fn patch(&self, surface: &Surface, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
+        let Surface { window, noise, mixed, .. } = surface;
+        let mut face = vec![false; window.cells.len()];
+        for region in regions {
+            for (cell, core) in face.iter_mut().zip(trim::core(window, region)) {
+                *cell |= core;
+            }
+        }
+        let face = trim::grow_back(window, noise, face);
+        let mut number = vec![0; face.len()];
+        let mut samples = Vec::new();
+        for cell in (0..face.len()).filter(|&cell| face[cell]) {
+            number[cell] = samples.len() as u32;
+            samples.push(Sample {
+                point: window.point(cell),
+                column: window.first_column + (cell / window.n_rows) as u32,
+                row: window.first_row + (cell % window.n_rows) as u32,
+                sigma: noise.at(cell),
+                intensity: window.cells[cell].intensity,
+            });
+        }
+        let (crossings, cut) = crossings::find(window, noise, &face, mixed, |cell| number[cell]);
+        if cut > CUT_TOLERANCE {
+            return Err(Refusal::CutByRegion { cut_mm: cut * 1000.0 });
+        }
+        Ok(Patch {
+            samples,
+            crossings,
+            azimuth_step: self.header.azimuth_step,
+            elevation_step: self.header.elevation_step,
+            noise: f64::from(noise.pooled),
+        })
+    }
+}

@@ -1,0 +1,79 @@
+//! Range noise, estimated from the scan itself.
+//!
+//! Third differences of the inverse range down a column vanish on every smooth surface at any incidence; what
+//! is left is noise. Its median absolute value, block by block, is a robust standard deviation: heavy tails, mixed
+//! pixels and edges hardly move it.
+
+use super::window::Window;
+
+/// Blocks of the estimate, columns and rows: small against a plate, large enough for a median.
+const BLOCK: (usize, usize) = (16, 32);
+
+/// A block with fewer differences takes the pooled value.
+const LEAST_COUNT: usize = 64;
+
+/// Median of |x| of a normal variable of unit variance.
+const NORMAL_MEDIAN_ABS: f32 = 0.674_489_75;
+
+/// Third differences of white noise have 1 + 9 + 9 + 1 times its variance.
+const THIRD_DIFFERENCE_GAIN: f32 = 20.0;
+
+/// Standard deviation of the range over a window.
+#[derive(Debug, Clone)]
+pub(super) struct Noise {
+    /// Over all blocks, metres.
+    pub(super) pooled: f32,
+    block: Vec<f32>,
+    blocks_down: usize,
+    n_rows: usize,
+}
+
+impl Noise {
+    /// Estimates from the cells where `usable` holds. Without any, the noise is 0.
+    pub(super) fn estimate(window: &Window, usable: &[bool]) -> Self {
+        let (n_columns, n_rows) = (window.n_columns, window.n_rows);
+        let blocks_down = n_rows.div_ceil(BLOCK.1);
+        let mut block = vec![f32::NAN; n_columns.div_ceil(BLOCK.0) * blocks_down];
+        let mut all = Vec::new();
+        let mut here = Vec::new();
+        for (number, value) in block.iter_mut().enumerate() {
+            let (across, down) = (number / blocks_down * BLOCK.0, number % blocks_down * BLOCK.1);
+            here.clear();
+            for column in across..(across + BLOCK.0).min(n_columns) {
+                let start = column * n_rows + down;
+                let end = start + BLOCK.1.min(n_rows - down);
+                third_differences(&window.inverse[start..end], &usable[start..end], &mut here);
+            }
+            if here.len() >= LEAST_COUNT {
+                *value = median(&mut here);
+            }
+            all.extend_from_slice(&here);
+        }
+        let scale = 1.0 / (NORMAL_MEDIAN_ABS * THIRD_DIFFERENCE_GAIN.sqrt());
+        let pooled = if all.is_empty() { 0.0 } else { median(&mut all) * scale };
+        for value in &mut block {
+            *value = if value.is_finite() { *value * scale } else { pooled };
+        }
+        Self { pooled, block, blocks_down, n_rows }
+    }
+
+    /// Standard deviation at a cell, metres.
+    pub(super) fn at(&self, index: usize) -> f32 {
+        let (column, row) = (index / self.n_rows, index % self.n_rows);
+        self.block[column / BLOCK.0 * self.blocks_down + row / BLOCK.1]
+    }
+}
+
+/// Appends |third difference of 1/r| r^2, which is that of the range to first order, in metres.
+fn third_differences(inverse: &[f32], usable: &[bool], out: &mut Vec<f32>) {
+    for (q, ok) in inverse.windows(4).zip(usable.windows(4)) {
+        if ok.iter().all(|ok| *ok) {
+            out.push(((q[3] - q[0]) - 3.0 * (q[2] - q[1])).abs() / (q[1] * q[2]));
+        }
+    }
+}
+
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}

@@ -1,0 +1,79 @@
+//! Why a scan yields no plate.
+
+use crate::Vec3;
+
+/// Why no plate was taken from a scan. One sentence: what was found, against what was expected, what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// The header describes no lattice.
+    #[error(
+        "the scan has {n_rows} rows, steps of {azimuth_step} rad and {elevation_step} rad: not a lattice; check the driver"
+    )]
+    NotALattice {
+        /// Rows of the header.
+        n_rows: u32,
+        /// Radians.
+        azimuth_step: f64,
+        /// Radians.
+        elevation_step: f64,
+    },
+    /// The plate file gives no plate.
+    #[error("the plate is {width_mm} x {height_mm} mm in the plate file; both must be above zero")]
+    NoSize {
+        /// Millimetres.
+        width_mm: f64,
+        /// Millimetres.
+        height_mm: f64,
+    },
+    /// Nothing in the scan comes near the plate's size.
+    #[error(
+        "no plate in the scan: the largest connected face {} has {largest_m2:.2} m2, the plate {expected_m2:.2} m2; \
+         check the scan window{}",
+        if *.region { "in the region of interest" } else { "that ends inside the scan" },
+        if *.region { " and the region of interest" } else { "" }
+    )]
+    NoPlate {
+        /// Area of the largest face found, square metres.
+        largest_m2: f64,
+        /// Area of the plate, square metres.
+        expected_m2: f64,
+        /// True when a region of interest was given.
+        region: bool,
+    },
+    /// A face of another size.
+    #[error(
+        "the face at ({:.1}, {:.1}, {:.1}) m measures about {:.0} x {:.0} mm, the plate file says {:.0} x {:.0} mm; \
+         check the recipe",
+        .at.x, .at.y, .at.z, .found_mm[0], .found_mm[1], .expected_mm[0], .expected_mm[1]
+    )]
+    WrongSize {
+        /// Middle of the face, metres.
+        at: Vec3,
+        /// Longer and shorter side of the smallest rectangle around it, millimetres.
+        found_mm: [f64; 2],
+        /// Longer and shorter side of the plate, millimetres.
+        expected_mm: [f64; 2],
+    },
+    /// Several faces could be the plate.
+    #[error(
+        "{count} faces have the plate's size, at ({:.1}, {:.1}, {:.1}) m and at ({:.1}, {:.1}, {:.1}) m; \
+         set a region of interest that holds one",
+        .first.x, .first.y, .first.z, .second.x, .second.y, .second.z
+    )]
+    SeveralPlates {
+        /// How many.
+        count: usize,
+        /// Middle of one, metres.
+        first: Vec3,
+        /// Middle of another, metres.
+        second: Vec3,
+    },
+    /// The region of interest cuts the plate.
+    #[error(
+        "the plate reaches out of the region of interest over {cut_mm:.0} mm of its edge; enlarge the region"
+    )]
+    CutByRegion {
+        /// Length of the cut, millimetres.
+        cut_mm: f64,
+    },
+}

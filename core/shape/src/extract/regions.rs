@@ -1,0 +1,166 @@
+//! Connected components of the lattice, grown while columns arrive.
+//!
+//! A column falls into *runs* of cells that are continuous downwards; runs of neighbouring columns are joined
+//! when any of their cells are continuous across. Components are sets of runs (union-find). What is summed over
+//! a component is integer, so that neither the sums nor the components depend on the order of arrival.
+
+use std::ops::Range;
+
+use super::continuity::Link;
+
+/// Cells `rows` of one column, each continuous with the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Run {
+    pub(super) column: u32,
+    pub(super) first_row: u32,
+    /// One past the last row.
+    pub(super) end_row: u32,
+}
+
+/// What is known of a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Extent {
+    /// Area across the beams, a lower bound of the surface's area, square millimetres.
+    pub(super) area_mm2: u64,
+    pub(super) cells: u64,
+    pub(super) columns: (u32, u32),
+    pub(super) rows: (u32, u32),
+}
+
+impl Extent {
+    fn merge(&mut self, other: Self) {
+        self.area_mm2 += other.area_mm2;
+        self.cells += other.cells;
+        self.columns = (self.columns.0.min(other.columns.0), self.columns.1.max(other.columns.1));
+        self.rows = (self.rows.0.min(other.rows.0), self.rows.1.max(other.rows.1));
+    }
+}
+
+/// Union-find over runs.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Regions {
+    runs: Vec<Run>,
+    parent: Vec<u32>,
+    extent: Vec<Extent>,
+}
+
+impl Regions {
+    /// Adds a run as a component of its own and returns its number.
+    pub(super) fn add(&mut self, run: Run, area_mm2: u64) -> u32 {
+        let number = self.runs.len() as u32;
+        self.runs.push(run);
+        self.parent.push(number);
+        self.extent.push(Extent {
+            area_mm2,
+            cells: u64::from(run.end_row - run.first_row),
+            columns: (run.column, run.column),
+            rows: (run.first_row, run.end_row - 1),
+        });
+        number
+    }
+
+    pub(super) fn run(&self, number: u32) -> Run {
+        self.runs[number as usize]
+    }
+
+    pub(super) fn n_runs(&self) -> u32 {
+        self.runs.len() as u32
+    }
+
+    /// Those of `runs` that belong to a component given by its root.
+    pub(super) fn runs_of(&mut self, roots: &[u32], runs: Range<u32>) -> Vec<Run> {
+        let mut own = Vec::new();
+        for number in runs {
+            if roots.contains(&self.root(number)) {
+                own.push(self.run(number));
+            }
+        }
+        own
+    }
+
+    /// The component of a run, as the number of its root. Halves paths on the way.
+    pub(super) fn root(&mut self, mut number: u32) -> u32 {
+        while self.parent[number as usize] != number {
+            let grandparent = self.parent[self.parent[number as usize] as usize];
+            self.parent[number as usize] = grandparent;
+            number = grandparent;
+        }
+        number
+    }
+
+    pub(super) fn extent(&self, root: u32) -> Extent {
+        self.extent[root as usize]
+    }
+
+    /// Extent of several components together.
+    pub(super) fn extent_of_all(&self, roots: &[u32]) -> Extent {
+        let none = Extent { area_mm2: 0, cells: 0, columns: (u32::MAX, 0), rows: (u32::MAX, 0) };
+        roots.iter().fold(none, |mut all, &root| {
+            all.merge(self.extent(root));
+            all
+        })
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a == b {
+            return;
+        }
+        let (into, from) =
+            if self.extent[a as usize].cells >= self.extent[b as usize].cells { (a, b) } else { (b, a) };
+        self.parent[from as usize] = into;
+        let joined = self.extent[from as usize];
+        self.extent[into as usize].merge(joined);
+    }
+
+    /// Joins the runs of a column and of the next one where `across` says that their cells are continuous.
+    ///
+    /// `range_a(row)` and `range_b(row)` give ranges inside the runs. Overlapping runs are joined at the first row
+    /// that links them; the rest of the overlap need not be looked at.
+    pub(super) fn join_columns(
+        &mut self,
+        a: Range<u32>,
+        b: Range<u32>,
+        across: &[Link],
+        range_a: impl Fn(u32) -> f32,
+        range_b: impl Fn(u32) -> f32,
+    ) {
+        let (mut i, mut j) = (a.start, b.start);
+        while i < a.end && j < b.end {
+            let (left, right) = (self.run(i), self.run(j));
+            let overlap = left.first_row.max(right.first_row)..left.end_row.min(right.end_row);
+            if overlap.clone().any(|row| across[row as usize].joins(range_a(row), range_b(row))) {
+                self.join(i, j);
+            }
+            if left.end_row <= right.end_row {
+                i += 1;
+            } else {
+                j += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_do_not_depend_on_the_order_of_joins() {
+        let build = |order: &[(u32, u32)]| {
+            let mut regions = Regions::default();
+            for column in 0..5 {
+                regions.add(Run { column, first_row: column, end_row: column + 2 }, 10 + u64::from(column));
+            }
+            for &(a, b) in order {
+                regions.join(a, b);
+            }
+            let roots: Vec<_> = (0..5).map(|n| regions.root(n)).collect();
+            roots.into_iter().map(|root| regions.extent(root)).collect::<Vec<_>>()
+        };
+        let one = build(&[(0, 1), (1, 2), (3, 4)]);
+        assert_eq!(one, build(&[(3, 4), (0, 2), (2, 1)]));
+        assert_eq!(one[0], Extent { area_mm2: 33, cells: 6, columns: (0, 2), rows: (0, 3) });
+        assert_ne!(one[0], one[3]);
+    }
+}

@@ -1,0 +1,126 @@
+//! A low-pass copy of the inverse range and the normals it gives.
+//!
+//! Taubin's filter (A signal processing approach to fair surface design, 1995; reference 7 of the paper): steps
+//! of diffusion with a positive and a slightly larger negative factor in turn. Filtering the inverse range and
+//! not the positions moves samples along their beams only and leaves planes where they are. The copy serves the
+//! normals and nothing else.
+
+use super::continuity::Continuity;
+use super::window::Window;
+use crate::Vec3;
+
+/// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
+const FACTORS: [f32; 2] = [0.5, -0.53];
+
+/// Pairs of half steps. Ten bring the noise of a slope down to a quarter (flat, unit lattice).
+const PAIRS: usize = 10;
+
+/// Smoothed inverse ranges of the cells where `usable` holds; those of the others are left as they are.
+pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity) -> Vec<f32> {
+    let n_rows = window.n_rows;
+    let n = window.cells.len();
+    // Weight of the link to the cell below, and to the cell in the next column.
+    let mut down = vec![0.0_f32; n];
+    let mut across = vec![0.0_f32; n];
+    for index in 0..n - n_rows {
+        if !usable[index] {
+            continue;
+        }
+        let row = index % n_rows;
+        let range = |i: usize| window.cells[i].range_m;
+        if row + 1 < n_rows && usable[index + 1] && continuity.down.joins(range(index), range(index + 1)) {
+            down[index] = 1.0;
+        }
+        let link = continuity.across[window.first_row as usize + row];
+        if usable[index + n_rows] && link.joins(range(index), range(index + n_rows)) {
+            across[index] = 1.0;
+        }
+    }
+    let per_link: Vec<f32> = (0..n)
+        .map(|i| {
+            let up = if i > 0 { down[i - 1] } else { 0.0 };
+            let back = if i >= n_rows { across[i - n_rows] } else { 0.0 };
+            1.0 / (down[i] + across[i] + up + back).max(1.0)
+        })
+        .collect();
+    let mut from = window.inverse.clone();
+    let mut to = from.clone();
+    for factor in std::iter::repeat_n(FACTORS, PAIRS).flatten() {
+        diffuse(&from, &mut to, &down, &across, &per_link, n_rows, factor);
+        std::mem::swap(&mut from, &mut to);
+    }
+    from
+}
+
+/// One half step. The first and the last column of a window are margin and stay as they are.
+fn diffuse(
+    from: &[f32],
+    to: &mut [f32],
+    down: &[f32],
+    across: &[f32],
+    per_link: &[f32],
+    n_rows: usize,
+    factor: f32,
+) {
+    let n = from.len();
+    let span = n_rows..n - n_rows;
+    let len = span.len();
+    let (here, below, above) = (&from[span.clone()], &from[n_rows + 1..][..len], &from[n_rows - 1..][..len]);
+    let (next, previous) = (&from[2 * n_rows..][..len], &from[..len]);
+    let (w_below, w_above) = (&down[span.clone()], &down[n_rows - 1..][..len]);
+    let (w_next, w_previous) = (&across[span.clone()], &across[..len]);
+    let (per_link, to) = (&per_link[span.clone()], &mut to[span]);
+    for i in 0..len {
+        let q = here[i];
+        let sum = w_below[i] * (below[i] - q)
+            + w_above[i] * (above[i] - q)
+            + w_next[i] * (next[i] - q)
+            + w_previous[i] * (previous[i] - q);
+        to[i] = q + factor * per_link[i] * sum;
+    }
+}
+
+/// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour.
+///
+/// On the plane n . x = h the inverse range along the unit direction d is n . d / h: the normal is the gradient of
+/// the inverse range continued homogeneously, q d + q_el e_el + q_az / cos el e_az.
+pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool]) -> Vec<nalgebra::Vector3<f32>> {
+    let n_rows = window.n_rows;
+    let header = &window.header;
+    let mut normals = vec![nalgebra::Vector3::zeros(); smooth.len()];
+    for column in 1..window.n_columns.saturating_sub(1) {
+        let (sin_az, cos_az) = window.nominal(column as f64, 0.0).azimuth.sin_cos();
+        for row in 1..n_rows.saturating_sub(1) {
+            let index = column * n_rows + row;
+            if !usable[index] {
+                continue;
+            }
+            let slope = |stride: usize| slope(smooth, usable, index, stride);
+            let (Some(q_down), Some(q_next)) = (slope(1), slope(n_rows)) else { continue };
+            let (sin_el, cos_el) = window.nominal(0.0, row as f64).elevation.sin_cos();
+            let q = f64::from(smooth[index]);
+            let q_el = -f64::from(q_down) / header.elevation_step;
+            let q_az = f64::from(q_next) / (header.azimuth_step * cos_el);
+            let outward = q * cos_el - q_el * sin_el;
+            let gradient = Vec3::new(
+                outward * cos_az - q_az * sin_az,
+                outward * sin_az + q_az * cos_az,
+                q * sin_el + q_el * cos_el,
+            );
+            normals[index] = (-gradient.normalize()).cast();
+        }
+    }
+    normals
+}
+
+/// Central difference, one-sided where only one neighbour is usable.
+#[inline]
+fn slope(values: &[f32], usable: &[bool], index: usize, stride: usize) -> Option<f32> {
+    let (before, after) = (index - stride, index + stride);
+    match (usable[before], usable[after]) {
+        (true, true) => Some(0.5 * (values[after] - values[before])),
+        (true, false) => Some(values[index] - values[before]),
+        (false, true) => Some(values[after] - values[index]),
+        (false, false) => None,
+    }
+}

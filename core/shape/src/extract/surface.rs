@@ -1,0 +1,54 @@
+//! All that is computed of one component, in order.
+
+use nalgebra::Vector3;
+
+use super::continuity::Continuity;
+use super::grow::{self, Face};
+use super::mixed;
+use super::noise::Noise;
+use super::pieces::Piece;
+use super::smooth;
+use super::window::Window;
+
+/// A component with its noise, mixed pixels, normals and faces.
+#[derive(Debug, Clone)]
+pub(super) struct Surface {
+    /// The component, or the first of several.
+    pub(super) root: u32,
+    pub(super) window: Window,
+    pub(super) noise: Noise,
+    pub(super) mixed: Vec<bool>,
+    normals: Vec<Vector3<f32>>,
+    labels: Vec<u32>,
+    faces: Vec<Face>,
+}
+
+impl Surface {
+    pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
+        let noise = Noise::estimate(&window, &window.own);
+        let mixed = mixed::mark(&window, &noise);
+        let usable: Vec<bool> = window.own.iter().zip(&mixed).map(|(own, mixed)| *own && !*mixed).collect();
+        let smooth = smooth::low_pass(&window, &usable, continuity);
+        let normals = smooth::normals(&window, &smooth, &usable);
+        let (labels, faces) = grow::faces(&window, &normals);
+        Self { root, window, noise, mixed, normals, labels, faces }
+    }
+
+    /// Faces of at least `least` square metres. `number` is the surface's own, for [`Piece::surface`].
+    pub(super) fn pieces(&self, number: usize, least: f64) -> impl Iterator<Item = Piece> {
+        let notable = self.faces.iter().filter(move |face| face.area >= least);
+        notable.map(move |face| Piece::new(number, &self.window, &self.labels, face, &self.normals))
+    }
+
+    /// The cells of a face as cells of another window that holds this one.
+    pub(super) fn region(&self, label: u32, into: &Window) -> Vec<bool> {
+        let mut region = vec![false; into.cells.len()];
+        let columns = (self.window.first_column - into.first_column) as usize;
+        let rows = (self.window.first_row - into.first_row) as usize;
+        for (cell, _) in self.labels.iter().enumerate().filter(|(_, l)| **l == label) {
+            let (column, row) = (cell / self.window.n_rows, cell % self.window.n_rows);
+            region[(column + columns) * into.n_rows + row + rows] = true;
+        }
+        region
+    }
+}

@@ -1,0 +1,134 @@
+//! The cells of the chosen face, to the cell.
+//!
+//! Normals of the low-pass copy tell faces apart but not where one ends: they turn over a few cells, and where a side
+//! face is only a few cells wide the region runs over onto it. So the region is worn down first, and then grown again
+//! cell by cell as far as the raw ranges continue the surface.
+
+use std::collections::BTreeMap;
+
+use super::local::LocalFace;
+use super::noise::Noise;
+use super::window::Window;
+
+/// Cells by which the region is worn down: more than half of the widest side face that smoothing bridges.
+const WEAR: usize = 2;
+
+/// Largest residual of a cell of the face, in standard deviations of its prediction.
+const RESIDUAL_BOUND: f64 = 4.0;
+
+/// Wears `region` down and keeps its largest connected part: the core of the face.
+pub(super) fn core(window: &Window, region: &[bool]) -> Vec<bool> {
+    let near_edge = widen(&obstacles(window, region), window.n_rows, WEAR);
+    let core: Vec<bool> = region.iter().zip(&near_edge).map(|(region, near)| *region && !*near).collect();
+    largest_part(&core, window.n_rows)
+}
+
+/// Valid cells outside of the region, but for specks inside of it.
+fn obstacles(window: &Window, region: &[bool]) -> Vec<bool> {
+    let n_rows = window.n_rows;
+    let is_speck = |index: usize| {
+        let (column, row) = (index / n_rows, index % n_rows);
+        if column < 2 || row < 2 || column + 2 >= window.n_columns || row + 2 >= n_rows {
+            return false;
+        }
+        let around = (column - 2..=column + 2).flat_map(|c| (row - 2..=row + 2).map(move |r| c * n_rows + r));
+        // A straight edge leaves 10 of 25, a notch of a right angle 16.
+        around.filter(|&i| region[i]).count() > 16
+    };
+    (0..region.len()).map(|i| window.cells[i].valid && !region[i] && !is_speck(i)).collect()
+}
+
+/// Sets all cells within `by` rows and columns of a set one.
+fn widen(mask: &[bool], n_rows: usize, by: usize) -> Vec<bool> {
+    let along = |mask: &[bool], stride: usize| {
+        let mut wide = mask.to_vec();
+        for k in 1..=by {
+            let shift = k * stride;
+            if shift < mask.len() {
+                for i in shift..mask.len() {
+                    wide[i] |= mask[i - shift];
+                }
+                for i in 0..mask.len() - shift {
+                    wide[i] |= mask[i + shift];
+                }
+            }
+        }
+        wide
+    };
+    along(&along(mask, 1), n_rows)
+}
+
+fn largest_part(mask: &[bool], n_rows: usize) -> Vec<bool> {
+    let mut label = vec![0_u32; mask.len()];
+    let (mut best, mut best_size, mut number) = (0, 0, 0);
+    let mut front = Vec::new();
+    for seed in 0..mask.len() {
+        if !mask[seed] || label[seed] != 0 {
+            continue;
+        }
+        number += 1;
+        let mut size = 0;
+        label[seed] = number;
+        front.push(seed);
+        while let Some(at) = front.pop() {
+            size += 1;
+            for next in neighbours(at, n_rows, mask.len()) {
+                if mask[next] && label[next] == 0 {
+                    label[next] = number;
+                    front.push(next);
+                }
+            }
+        }
+        if size > best_size {
+            (best, best_size) = (number, size);
+        }
+    }
+    label.iter().map(|l| best != 0 && *l == best).collect()
+}
+
+/// The four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each other.
+fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize> {
+    [at.checked_sub(n_rows), at.checked_sub(1), Some(at + 1), Some(at + n_rows)]
+        .into_iter()
+        .flatten()
+        .filter(move |i| *i < n)
+}
+
+/// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
+///
+/// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it.
+pub(super) fn grow_back(window: &Window, noise: &Noise, core: Vec<bool>) -> Vec<bool> {
+    let n_rows = window.n_rows;
+    let mut face = core;
+    let mut judged = face.clone();
+    let mut ring: Vec<usize> = (0..face.len()).filter(|&i| face[i]).collect();
+    while !ring.is_empty() {
+        let mut by_tile: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+        for next in ring.iter().flat_map(|&at| neighbours(at, n_rows, face.len())) {
+            if !judged[next] {
+                judged[next] = true;
+                if window.cells[next].valid && window.cells[next].inside {
+                    by_tile.entry(LocalFace::tile(window, next)).or_default().push(next);
+                }
+            }
+        }
+        ring.clear();
+        for (tile, cells) in &by_tile {
+            if let Some(fit) = LocalFace::fit(window, &face, *tile) {
+                ring.extend(cells.iter().filter(|&&cell| continues(window, noise, &fit, cell)));
+            }
+        }
+        for &cell in &ring {
+            face[cell] = true;
+        }
+    }
+    face
+}
+
+fn continues(window: &Window, noise: &Noise, fit: &LocalFace, cell: usize) -> bool {
+    let (x, y) = window.place(cell);
+    fit.at(window, x, y).is_some_and(|predicted| {
+        let residual = f64::from(window.cells[cell].range_m) - predicted.range;
+        residual.abs() <= RESIDUAL_BOUND * f64::from(noise.at(cell)) * (1.0 + predicted.leverage).sqrt()
+    })
+}

@@ -1,0 +1,128 @@
+//! A component of the lattice and what lies right around it, as a dense grid.
+
+use platen_scan::{Direction, ScanHeader};
+
+use super::columns::{Cell, Columns, MARGIN, union};
+use super::regions::{Regions, Run};
+use crate::Vec3;
+
+/// Cells of one or more components with a margin, column after column: index `column * n_rows + row`, both counted from
+/// the window's own corner. Only cells within [`MARGIN`] of the component are filled.
+#[derive(Debug, Clone)]
+pub(super) struct Window {
+    pub(super) first_column: u32,
+    pub(super) first_row: u32,
+    pub(super) n_columns: usize,
+    pub(super) n_rows: usize,
+    pub(super) cells: Vec<Cell>,
+    /// Inverse range, 1/m; 0 where a cell is not valid. Along rows and columns of the lattice that of a plane is
+    /// a sine of the angle, straight to within the square of the step, at any incidence.
+    pub(super) inverse: Vec<f32>,
+    /// Cells of the component.
+    pub(super) own: Vec<bool>,
+    pub(super) header: ScanHeader,
+}
+
+impl Window {
+    /// The window around components, given by their roots.
+    pub(super) fn of(roots: &[u32], regions: &mut Regions, columns: &Columns, header: &ScanHeader) -> Self {
+        let extent = regions.extent_of_all(roots);
+        let first_column = extent.columns.0.saturating_sub(MARGIN);
+        let first_row = extent.rows.0.saturating_sub(MARGIN);
+        let end_column = extent.columns.1 + MARGIN + 1;
+        let end_row = (extent.rows.1 + MARGIN + 1).min(header.n_rows);
+        let (n_columns, n_rows) = ((end_column - first_column) as usize, (end_row - first_row) as usize);
+        let n = n_columns * n_rows;
+        let mut window = Self {
+            first_column,
+            first_row,
+            n_columns,
+            n_rows,
+            cells: vec![Cell::default(); n],
+            inverse: vec![0.0; n],
+            own: vec![false; n],
+            header: header.clone(),
+        };
+        let own: Vec<Vec<Run>> = (first_column..end_column)
+            .map(|index| regions.runs_of(roots, columns.get(index).map_or(0..0, |c| c.runs.clone())))
+            .collect();
+        for i in 0..n_columns {
+            let around = &own[i.saturating_sub(MARGIN as usize)..(i + MARGIN as usize + 1).min(n_columns)];
+            let rows = |run: &Run| run.first_row.saturating_sub(MARGIN)..(run.end_row + MARGIN).min(end_row);
+            window.fill(i, &union(around.iter().flatten().map(rows)), columns);
+            for run in &own[i] {
+                let at = |row: u32| i * n_rows + (row - first_row) as usize;
+                window.own[at(run.first_row)..at(run.end_row - 1) + 1].fill(true);
+            }
+        }
+        window
+    }
+
+    /// Makes invalid the first columns of each face of the scan.
+    pub(super) fn leave_out(&mut self, columns: u32) {
+        for start in [Some(0), self.header.seam_column].into_iter().flatten() {
+            let from = start.saturating_sub(self.first_column) as usize;
+            let to = ((start + columns).saturating_sub(self.first_column) as usize).min(self.n_columns);
+            if from < to {
+                let cells = from * self.n_rows..to * self.n_rows;
+                self.cells[cells.clone()].fill(Cell::default());
+                self.inverse[cells.clone()].fill(0.0);
+                self.own[cells].fill(false);
+            }
+        }
+    }
+
+    fn fill(&mut self, i: usize, wanted: &[std::ops::Range<u32>], columns: &Columns) {
+        let Some(column) = columns.get(self.first_column + i as u32) else { return };
+        for segment in &column.segments {
+            for rows in wanted {
+                let start = rows.start.max(segment.first_row);
+                let end = rows.end.min(segment.first_row + segment.cells.len() as u32);
+                for row in start..end {
+                    let cell = segment.cells[(row - segment.first_row) as usize];
+                    let at = i * self.n_rows + (row - self.first_row) as usize;
+                    self.cells[at] = cell;
+                    if cell.valid {
+                        self.inverse[at] = 1.0 / cell.range_m;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Direction of a place in the window, in cells and parts of cells, on the nominal lattice.
+    pub(super) fn nominal(&self, column: f64, row: f64) -> Direction {
+        Direction {
+            azimuth: self.header.azimuth_start
+                + self.header.azimuth_step * (f64::from(self.first_column) + column),
+            elevation: self.header.elevation_start
+                - self.header.elevation_step * (f64::from(self.first_row) + row),
+        }
+    }
+
+    /// True direction of a cell in cells and parts of cells, as (column, row).
+    #[inline]
+    pub(super) fn place(&self, index: usize) -> (f64, f64) {
+        let (column, row) = (index / self.n_rows, index % self.n_rows);
+        let cell = &self.cells[index];
+        (
+            column as f64 + f64::from(cell.azimuth_off) / self.header.azimuth_step,
+            row as f64 - f64::from(cell.elevation_off) / self.header.elevation_step,
+        )
+    }
+
+    /// True direction of a cell.
+    pub(super) fn direction(&self, index: usize) -> Direction {
+        let nominal = self.nominal((index / self.n_rows) as f64, (index % self.n_rows) as f64);
+        let cell = &self.cells[index];
+        Direction {
+            azimuth: nominal.azimuth + f64::from(cell.azimuth_off),
+            elevation: nominal.elevation + f64::from(cell.elevation_off),
+        }
+    }
+
+    /// Position of a valid cell, metres.
+    pub(super) fn point(&self, index: usize) -> Vec3 {
+        Vec3::from(self.direction(index).unit()) * f64::from(self.cells[index].range_m)
+    }
+}
