@@ -45,12 +45,44 @@ pub(crate) trait Receiver {
     fn end(&mut self, end: &ScanEnd) -> Result<()>;
 }
 
+/// Cells of a small file, kept from the first pass for the second: decoding takes most of the time.
+struct Remembered<'a> {
+    source: &'a mut dyn Source,
+    cells: Vec<RawCell>,
+    complete: bool,
+}
+
+/// Most cells that are kept, 200 MB; a larger file is decoded twice.
+const REMEMBERED: usize = 1 << 22;
+
+impl Remembered<'_> {
+    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
+        if self.complete {
+            return self.cells.iter().try_for_each(visit);
+        }
+        let (kept, mut fits) = (&mut self.cells, true);
+        self.source.cells(&mut |cell| {
+            if kept.len() < REMEMBERED {
+                kept.push(*cell);
+            } else {
+                fits = false;
+            }
+            visit(cell)
+        })?;
+        if !fits {
+            *kept = Vec::new();
+        }
+        self.complete = fits;
+        Ok(())
+    }
+}
+
 /// Cells between two looks at the receiver.
 const CHECK_EVERY: u64 = 1 << 16;
 
 /// First pass: decides what the cells are. `known` is what the plant says of the scanner.
-pub(crate) fn survey(source: &mut dyn Source, known: &Expected, out: &mut dyn Receiver) -> Result<Plan> {
-    let about = source.about().clone();
+fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver) -> Result<Plan> {
+    let about = source.source.about().clone();
     let mut survey = Survey::default();
     source.cells(&mut |cell| {
         survey.add(cell)?;
@@ -66,8 +98,9 @@ pub(crate) fn survey(source: &mut dyn Source, known: &Expected, out: &mut dyn Re
 
 /// Both passes: decides, then delivers every column once, each as soon as the file completes it.
 pub(crate) fn deliver(source: &mut dyn Source, known: &Expected, out: &mut dyn Receiver) -> Result<()> {
-    let plan = survey(source, known, out)?;
     let about = source.about().clone();
+    let mut source = Remembered { source, cells: Vec::new(), complete: false };
+    let plan = survey(&mut source, known, out)?;
     out.begin(&plan.header)?;
     let mut assembler = Assembler::new(&plan);
     let mut seen = 0;

@@ -4,4 +4,5 @@ mod collect;
 mod damage;
 mod formats;
 mod samples;
+mod speed;
 mod write;
