@@ -69,6 +69,21 @@ pub(crate) enum Error {
         /// The option, counted from 1.
         chosen: usize,
     },
+    /// The scan measured before, under whatever name.
+    #[error("the same points as the scan measured before: a copy, not a new scan")]
+    Repeated,
+    /// More than one scan where one is awaited.
+    #[error("{} new scans at once ({}); take all but one away, or let the pattern name the stroke", .names.len(), .names.join(", "))]
+    Ambiguous {
+        /// File names.
+        names: Vec<String>,
+    },
+    /// The time is over.
+    #[error("no scan in time: {why}")]
+    TooLate {
+        /// What was awaited last.
+        why: String,
+    },
     /// The cells are no lattice.
     #[error("{0}")]
     Orient(#[from] OrientError),
@@ -103,9 +118,10 @@ impl Error {
                 io::ErrorKind::PermissionDenied => ErrorKind::Denied,
                 _ => ErrorKind::Io,
             },
-            Self::Incomplete { .. } => ErrorKind::NoData,
+            Self::Incomplete { .. } | Self::Repeated => ErrorKind::NoData,
+            Self::TooLate { .. } => ErrorKind::Timeout,
             Self::Refused { .. } => ErrorKind::Unsupported,
-            Self::Several { .. } | Self::NoSuchCloud { .. } => ErrorKind::Config,
+            Self::Several { .. } | Self::NoSuchCloud { .. } | Self::Ambiguous { .. } => ErrorKind::Config,
             Self::Damaged { .. } | Self::Unsound { .. } | Self::Orient(_) => ErrorKind::BadData,
         };
         let error = platen_sdk::Error::new(kind, format!("{}: {self}", path.display()));

@@ -10,17 +10,28 @@
 //! applied. Formats that hold no lattice, or that only their maker's software reads (`.fls`, `.fws`, `.lsproj`,
 //! `.las`, `.pts`, `.pod`, `.cpe`), are refused with what to export instead.
 //!
+//! A scan is read from one file, or from the next one that appears in a watched folder. There a file counts as the
+//! scan when its name fits the pattern, when it is new or changed since the press was ready, when it stays the same
+//! for some polls, and when its own structure is sound (lengths, checksums, number of lines). What is refused is
+//! looked at again until the stroke's deadline; then the reason is the answer. Polling works on every share; no
+//! events are needed.
+//!
 //! # Example
 //! ```toml
 //! [scanner]
 //! plugin = "faro-file"
 //! [scanner.options]
-//! file = "scan.e57"
+//! folder = "/mnt/scans"
+//! pattern = "press3-{stroke}-*.e57"
 //! ```
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `file` | the scan |
+//! | `file` | the scan; or |
+//! | `folder` | where scans arrive |
+//! | `pattern` | names of scans, with `*`, `?`, `[..]`, and `{stroke}` or `{job}` for their numbers |
+//! | `poll_ms` | time between two looks into the folder |
+//! | `stable_polls` | looks for which a file must stay the same |
 //! | `cloud` | which scan of a file that holds several, from 1 |
 //! | `turn` | which way columns run in this scanner's files; the other way is refused as mirrored |
 //! | `mirror` | the axis to mirror where the exporter writes a left-handed frame |
@@ -33,18 +44,31 @@ mod open;
 mod ptx;
 mod source;
 mod text;
+mod watch;
 mod xyz;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use platen_scan::orient::{Expected, Mirror, Turn};
 use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
+
+use device::{Folder, Reading, ToHost, config};
 
 options! {
     /// Options of the file driver; the module head is their manual.
     pub struct Options {
         /// The scan file.
         file: Option<PathBuf>;
+        /// Folder in which scans arrive, instead of one file.
+        folder: Option<PathBuf>;
+        /// Names of scans in the folder: `*`, `?` and `[..]` as in a shell, `{stroke}` and `{job}` for the numbers of
+        /// the stroke and the job.
+        pattern: String = "*";
+        /// Time between two looks into the folder.
+        poll_ms: i64 = 500, unit "ms", min 20, max 60000;
+        /// Looks for which a file must stay the same before it is opened.
+        stable_polls: i64 = 3, min 1, max 100;
         /// Which scan of a file that holds several, from 1.
         cloud: Option<i64>, min 1;
         /// Which way columns run by growing number in this scanner's files, seen from above, where that is known:
@@ -60,15 +84,23 @@ options! {
 /// The driver.
 #[derive(Debug)]
 pub struct FaroFile {
-    options: Options,
-    known: Expected,
+    place: Place,
+    reading: Reading,
+    poll: Duration,
+}
+
+/// Where the scan comes from.
+#[derive(Debug)]
+enum Place {
+    File(PathBuf),
+    Folder(Folder),
 }
 
 impl Scanner for FaroFile {
     const INFO: Info = Info::new(
         c"faro-file",
         c"FARO scan files",
-        c"Reads structured E57, PTX and XYZ scans; decides orientation, handedness and units from the geometry.",
+        c"Reads structured E57, PTX and XYZ scans, one file or the next in a watched folder; decides orientation, handedness and units from the geometry.",
         c"0.1.0",
     );
     type Options = Options;
@@ -88,11 +120,57 @@ impl Scanner for FaroFile {
             cut_azimuth: options.cut_azimuth_deg.map(f64::to_radians),
             intensity: None,
         };
-        Ok(Self { options, known })
+        let place = match (options.file, options.folder) {
+            (Some(file), None) => Place::File(file),
+            (None, Some(path)) => {
+                let stable_polls = u32::try_from(options.stable_polls).unwrap_or(1).max(1);
+                let folder =
+                    Folder { path, pattern: options.pattern, stable_polls, before: None, measured: None };
+                folder.pattern(0, 0).map_err(|e| config(&format!("pattern: {e}"), "see its description"))?;
+                Place::Folder(folder)
+            }
+            (Some(_), Some(_)) => return Err(config("both file and folder are given", "keep one of them")),
+            (None, None) => return Err(config("no scan to read", "set the option file or folder")),
+        };
+        let cloud = options.cloud.and_then(|cloud| usize::try_from(cloud).ok());
+        let poll = Duration::from_millis(options.poll_ms.unsigned_abs());
+        Ok(Self { place, reading: Reading { cloud, known }, poll })
+    }
+
+    fn open(&mut self) -> Result<()> {
+        self.look()
+    }
+
+    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
+        job.check()?;
+        self.look()
     }
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
-        device::capture(&self.options, &self.known, job, out)
+        let mut host = ToHost { job, out };
+        match &mut self.place {
+            Place::File(path) => self.reading.file(path, &mut host).map_err(|error| error.at(path)),
+            Place::Folder(folder) => {
+                let pattern = folder.pattern(job.stroke(), job.id());
+                let pattern = pattern.map_err(|e| config(&format!("pattern: {e}"), "see its description"))?;
+                let poll = self.poll;
+                let mut pause = |why| device::pause(job, poll, why);
+                folder.follow(&self.reading, pattern, &mut host, &mut pause)
+            }
+        }
+    }
+}
+
+impl FaroFile {
+    /// What lies in the watched folder now was not made by the next stroke.
+    fn look(&mut self) -> Result<()> {
+        match &mut self.place {
+            Place::File(_) => Ok(()),
+            Place::Folder(folder) => {
+                let path = folder.path.clone();
+                folder.look().map_err(|error| error.at(&path))
+            }
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use platen_scan::orient::{Assembler, Expected, Mirror, Plan, RawCell, Survey};
 use platen_scan::{Column, ScanEnd, ScanHeader};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// What a file says of its scan besides the cells.
 #[derive(Debug, Clone, Default)]
@@ -81,11 +81,13 @@ impl Remembered<'_> {
 const CHECK_EVERY: u64 = 1 << 16;
 
 /// First pass: decides what the cells are. `known` is what the plant says of the scanner.
-fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver) -> Result<Plan> {
+fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver) -> Result<(Plan, u32)> {
     let about = source.source.about().clone();
     let mut survey = Survey::default();
+    let mut checksum = 0;
     source.cells(&mut |cell| {
         survey.add(cell)?;
+        checksum = add_to_checksum(checksum, cell);
         watch(survey.cells(), &about, "looking at the lattice", out)
     })?;
     let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
@@ -93,14 +95,36 @@ fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver)
     plan.header.notes.splice(0..0, about.notes);
     plan.header.instrument = about.instrument;
     plan.header.acquired_unix_s = about.acquired_unix_s;
-    Ok(plan)
+    Ok((plan, checksum))
+}
+
+/// CRC-32C of the numbers of all cells: no two real scans agree in all of them.
+fn add_to_checksum(checksum: u32, cell: &RawCell) -> u32 {
+    let mut bytes = [0; 40];
+    let [x, y, z] = cell.xyz;
+    for (slot, number) in bytes.chunks_exact_mut(8).zip([x, y, z, cell.intensity]) {
+        slot.copy_from_slice(&number.to_le_bytes());
+    }
+    bytes[32..36].copy_from_slice(&cell.row.to_le_bytes());
+    bytes[36..].copy_from_slice(&cell.column.to_le_bytes());
+    crc32c::crc32c_append(checksum, &bytes)
 }
 
 /// Both passes: decides, then delivers every column once, each as soon as the file completes it.
-pub(crate) fn deliver(source: &mut dyn Source, known: &Expected, out: &mut dyn Receiver) -> Result<()> {
+///
+/// Returns the checksum of the cells; a scan with the checksum `before` is the one that was measured before.
+pub(crate) fn deliver(
+    source: &mut dyn Source,
+    known: &Expected,
+    before: Option<u32>,
+    out: &mut dyn Receiver,
+) -> Result<u32> {
     let about = source.about().clone();
     let mut source = Remembered { source, cells: Vec::new(), complete: false };
-    let plan = survey(&mut source, known, out)?;
+    let (plan, checksum) = survey(&mut source, known, out)?;
+    if before == Some(checksum) {
+        return Err(Error::Repeated);
+    }
     out.begin(&plan.header)?;
     let mut assembler = Assembler::new(&plan);
     let mut seen = 0;
@@ -113,7 +137,8 @@ pub(crate) fn deliver(source: &mut dyn Source, known: &Expected, out: &mut dyn R
     })?;
     let (empty, end) = assembler.finish()?;
     empty.iter().try_for_each(|column| out.column(column))?;
-    out.end(&end)
+    out.end(&end)?;
+    Ok(checksum)
 }
 
 fn watch(seen: u64, about: &About, phase: &str, out: &mut dyn Receiver) -> Result<()> {

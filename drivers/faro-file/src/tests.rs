@@ -5,4 +5,5 @@ mod damage;
 mod formats;
 mod samples;
 mod speed;
+mod watching;
 mod write;

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use platen_scan::orient::Expected;
 use platen_scan::{Column, Lattice, ScanEnd, ScanHeader};
 
+use crate::device::Reading;
 use crate::error::{Error, Result};
-use crate::source::{Receiver, deliver};
+use crate::source::Receiver;
 
 /// Holds what was delivered, and insists on the order of begin, columns, end.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Collected {
     pub(super) lattice: Option<Lattice>,
     pub(super) columns: u32,
@@ -46,8 +47,7 @@ impl Receiver for Collected {
 /// Reads a file to the end.
 pub(super) fn read(path: &Path, chosen: Option<usize>) -> std::result::Result<Lattice, Error> {
     let mut collected = Collected::default();
-    let mut source = crate::open::open(path, chosen)?;
-    deliver(source.as_mut(), &Expected::default(), &mut collected)?;
+    Reading { cloud: chosen, known: Expected::default() }.file(path, &mut collected)?;
     let (lattice, end) = (collected.lattice.unwrap(), collected.end.unwrap());
     assert_eq!((collected.columns, lattice.n_columns()), (end.columns, end.columns as usize));
     assert_eq!(lattice.n_valid() as u64, end.points);

@@ -24,7 +24,7 @@ fn read(bytes: &[u8]) -> Result<u64, Error> {
         open::Kind::Refused(format, instead) => return Err(Error::Refused { format, instead }),
     };
     let mut collected = Collected::default();
-    deliver(source.as_mut(), &Expected::default(), &mut collected)?;
+    deliver(source.as_mut(), &Expected::default(), None, &mut collected)?;
     Ok(collected.end.unwrap().points)
 }
 
