@@ -1,0 +1,240 @@
+//! From a plate to columns.
+
+use crate::Options;
+use crate::error::Error;
+use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
+use platen_sdk::{Job, Result, ScanSink};
+use platen_sim_plate::{Plate, PlateState, Vec3};
+use platen_sim_scanner::{
+    Cyclic, INTENSITY_MAX, Instrument, Scene, SimColumn, SimLattice, SimState, Surroundings, scan,
+};
+use std::ops::ControlFlow;
+
+/// Period of the cyclic range error, metres.
+const CYCLIC_PERIOD: f64 = 1.2;
+
+/// Elevations that a scanner cannot reach: its own feet.
+const LOWEST_DEG: f64 = -62.5;
+
+/// Seeds of consecutive scans lie this far apart, so that no two runs with neighbouring seeds share a scan.
+const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// Seconds that one core takes for one cell.
+const SECONDS_PER_CELL: f64 = 2e-6;
+
+/// Who takes the columns.
+pub(crate) trait Receiver {
+    fn check(&mut self, done: f64) -> Result<()>;
+    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
+    fn column(&mut self, column: &Column) -> Result<()>;
+    fn end(&mut self, end: &ScanEnd) -> Result<()>;
+}
+
+/// The host.
+pub(crate) struct ToHost<'a, 'j, 's> {
+    pub(crate) job: &'a Job<'j>,
+    pub(crate) out: &'a mut ScanSink<'s>,
+}
+
+impl Receiver for ToHost<'_, '_, '_> {
+    fn check(&mut self, done: f64) -> Result<()> {
+        self.job.progress(done, "scanning");
+        self.job.check()
+    }
+
+    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
+        self.out.begin(header)
+    }
+
+    fn column(&mut self, column: &Column) -> Result<()> {
+        self.out.column(column)
+    }
+
+    fn end(&mut self, end: &ScanEnd) -> Result<()> {
+        self.out.end(end)
+    }
+}
+
+/// One scan about to be taken.
+#[derive(Debug)]
+pub(crate) struct Shot {
+    scene: Scene,
+    lattice: SimLattice,
+    instrument: Instrument,
+    threads: usize,
+    note: String,
+}
+
+impl Shot {
+    /// The `number`-th scan of a run, of a plate or of an empty press, of all that is interesting or of a window.
+    pub(crate) fn new(
+        options: &Options,
+        state: Option<PlateState>,
+        window: Option<&Window>,
+        number: u64,
+    ) -> std::result::Result<Self, Error> {
+        let note = match &state {
+            Some(state) => format!("simulated plate ({}), {} strokes", state.shape.name(), state.strokes),
+            None => "simulated press without a plate".to_owned(),
+        };
+        let plate = state.as_ref().map(Plate::new).transpose()?;
+        let lattice = lattice(options, plate.as_ref(), window)?;
+        Ok(Self {
+            scene: Scene::new(plate, &surroundings(options)),
+            lattice,
+            instrument: instrument(options, number),
+            threads: threads(options),
+            note,
+        })
+    }
+
+    /// Takes it.
+    pub(crate) fn take(&self, out: &mut impl Receiver) -> Result<()> {
+        out.begin(&self.header())?;
+        let mut points = 0;
+        let mut failed = None;
+        let ended = scan(&self.scene, &self.lattice, &self.instrument, self.threads, |column| {
+            let done = f64::from(column.index + 1) / f64::from(self.lattice.n_columns);
+            points += column.state.iter().filter(|state| **state == SimState::Valid).count() as u64;
+            match out.column(&converted(column)).and_then(|()| out.check(done)) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(error) => {
+                    failed = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        });
+        match (ended, failed) {
+            (ControlFlow::Break(()), Some(error)) => Err(error),
+            _ => out.end(&ScanEnd {
+                columns: self.lattice.n_columns,
+                points,
+                warm_up_columns: self.instrument.warm_up_columns,
+                outcome: Outcome::Complete,
+            }),
+        }
+    }
+
+    fn header(&self) -> ScanHeader {
+        ScanHeader {
+            n_rows: self.lattice.n_rows,
+            n_columns: self.lattice.n_columns,
+            azimuth_start: self.lattice.azimuth_start,
+            azimuth_step: self.lattice.azimuth_step,
+            elevation_start: self.lattice.elevation_start,
+            elevation_step: self.lattice.elevation_step,
+            seam_column: None,
+            intensity_range: (0, INTENSITY_MAX),
+            simulated: true,
+            instrument: "platen simulated scanner".to_owned(),
+            acquired_unix_s: None,
+            notes: vec![self.note.clone(), format!("seed {}", self.instrument.seed)],
+        }
+    }
+}
+
+/// Seconds that a scan takes here.
+pub(crate) fn estimate_s(options: &Options, window: Option<&Window>) -> f64 {
+    let step = options.step_deg.to_radians();
+    // Without a window: a plate of 5 m at 5 m distance.
+    let area = window.map_or(1.0, |w| w.azimuth_width * (w.elevation_max - w.elevation_min));
+    1.0 + area / (step * step) * SECONDS_PER_CELL
+}
+
+fn lattice(
+    options: &Options,
+    plate: Option<&Plate>,
+    window: Option<&Window>,
+) -> std::result::Result<SimLattice, Error> {
+    let step = options.step_deg.to_radians();
+    let lowest = LOWEST_DEG.to_radians();
+    // Directions are multiples of the step, as an encoder's are.
+    let snap = |angle: f64| (angle / step).floor() * step;
+    let all = match window {
+        Some(w) => {
+            let (low, high) = (w.elevation_min.max(lowest), w.elevation_max.min(std::f64::consts::FRAC_PI_2));
+            if high <= low {
+                return Err(Error::Options("the window lies below what the scanner reaches".into()));
+            }
+            SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step)
+        }
+        None => SimLattice::around(&interesting(plate), options.margin_deg.to_radians(), step),
+    };
+    let top = snap(all.elevation_start);
+    let rows = (((top - lowest) / step) as u32 + 1).min(all.n_rows);
+    Ok(SimLattice {
+        azimuth_start: snap(all.azimuth_start),
+        elevation_start: top,
+        n_rows: rows.max(2),
+        ..all
+    })
+}
+
+/// Points on the plate's outline; on an empty press, those where a plate would lie.
+fn interesting(plate: Option<&Plate>) -> Vec<Vec3> {
+    match plate {
+        Some(plate) => {
+            let (width, height) = (plate.width(), plate.height());
+            let at = |i: usize| i as f64 / 8.0;
+            let ring = |share: f64| {
+                [
+                    (share * width, 0.0),
+                    (share * width, height),
+                    (0.0, share * height),
+                    (width, share * height),
+                ]
+            };
+            (0..=8).flat_map(|i| ring(at(i))).map(|(u, v)| plate.top(u, v)).collect()
+        }
+        None => {
+            [(4.0, -1.5), (4.0, 1.5), (8.0, -1.5), (8.0, 1.5)].map(|(x, y)| Vec3::new(x, y, -3.6)).to_vec()
+        }
+    }
+}
+
+fn surroundings(options: &Options) -> Surroundings {
+    let height = options.scanner_m.as_ref().and_then(|position| position.get(2)).unwrap_or(&0.0);
+    let all = Surroundings::default();
+    let hides = |what: &str| options.hidden_by == what || options.hidden_by == "both";
+    Surroundings { floor: all.floor - height, person_in_front: hides("person"), chain: hides("chain"), ..all }
+}
+
+fn instrument(options: &Options, number: u64) -> Instrument {
+    let cyclic = Cyclic { amplitude: options.cyclic_mm * 1e-3, period: CYCLIC_PERIOD, phase: 0.0 };
+    Instrument {
+        range_sigma: options.noise_mm * 1e-3,
+        tail_dof: options.tail_dof,
+        footprint: options.footprint_mrad * 1e-3,
+        angular_sigma: options.angular_noise_urad * 1e-6,
+        dropout: options.dropout,
+        cyclic: (options.cyclic_mm > 0.0).then_some(cyclic),
+        warm_up_columns: u32::try_from(options.warm_up_columns).unwrap_or(0),
+        seed: options.seed.unsigned_abs().wrapping_add(number.wrapping_mul(SEED_STRIDE)),
+        ..Instrument::default()
+    }
+}
+
+fn threads(options: &Options) -> usize {
+    match usize::try_from(options.threads) {
+        Ok(0) | Err(_) => std::thread::available_parallelism().map_or(1, usize::from),
+        Ok(n) => n,
+    }
+}
+
+/// The column in the product's terms. The direction of a lost echo is known.
+fn converted(column: SimColumn) -> Column {
+    let state = |state: &SimState| match state {
+        SimState::Valid => State::Valid,
+        SimState::NoEcho => State::DirectionOnly,
+    };
+    Column {
+        index: column.index,
+        face: if column.back_face { Face::Back } else { Face::Front },
+        first_row: 0,
+        state: column.state.iter().map(state).collect(),
+        range_m: column.range_m,
+        azimuth: column.azimuth,
+        elevation: column.elevation,
+        intensity: column.intensity,
+    }
+}
