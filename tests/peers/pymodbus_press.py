@@ -3,7 +3,7 @@
 
     pip install pymodbus==3.16.1            (RTU besides: pyserial)
     python3 pymodbus_press.py --strokes 20
-    python3 pymodbus_press.py --serial /dev/pts/7 --baud 115200
+    python3 pymodbus_press.py --serial /dev/pts/7 --baud 115200 --parity N
 
 The first line on stdout is {"port": N}; the last is a summary with the words of every result. The exit code is 0
 when every stroke got its result and nothing was wrong, else 1. Registers: plate press - host, version 1, P block at
@@ -185,7 +185,8 @@ async def main(options):
     press = Press(options)
     device = SimDevice(id=1, simdata=[SimData(0, values=[0] * SIZE, datatype=DataType.REGISTERS)], action=press.action)
     if options.serial:
-        server = ModbusSerialServer(device, framer=FramerType.RTU, port=options.serial, baudrate=options.baud, parity="E")
+        server = ModbusSerialServer(device, framer=FramerType.RTU, port=options.serial, baudrate=options.baud,
+                                    parity=options.parity)
     else:
         server = ModbusTcpServer(device, address=("127.0.0.1", options.port))
     await server.serve_forever(background=True)
@@ -208,6 +209,7 @@ if __name__ == "__main__":
     parser.add_argument("--port", type=int, default=0, help="TCP port on loopback, 0: the system chooses")
     parser.add_argument("--serial", help="serial port instead of TCP")
     parser.add_argument("--baud", type=int, default=19200)
+    parser.add_argument("--parity", choices="NEO", default="E", help="N on a pseudo terminal, which refuses parity")
     parser.add_argument("--strokes", type=int, default=20)
     parser.add_argument("--first", type=int, default=1, help="number of the first stroke")
     parser.add_argument("--baseline", type=int, choices=(0, 1), default=1, help="1: a scan of the blank first")
