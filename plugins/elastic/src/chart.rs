@@ -1,0 +1,74 @@
+//! From the mesh to the chart: start, minimum, strain, uncertainty.
+
+use platen_sdk::Result;
+use platen_shape::flatten::{boundary_by_arc_length, cotangents, first_turned, fixed_boundary};
+use platen_shape::{Chart, DiskMesh};
+
+use crate::hold::Hold;
+use crate::membrane::{Membrane, Strained};
+use crate::minimum::{minimise, not_found, unsolved};
+use crate::spread::spread;
+
+/// The chart of least membrane energy; `go_on` is asked between the steps.
+pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, go_on: impl Fn() -> Result<()>) -> Result<Chart> {
+    let mut uv = start(mesh)?;
+    go_on()?;
+    let membrane = Membrane::new(mesh, poisson);
+    let hold = Hold::new(mesh, scatter(&membrane.strains(&uv)));
+    minimise(mesh, &membrane, &hold, &mut uv, go_on)?;
+    let strains = membrane.strains(&uv);
+    let mut sigma = spread(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
+    for (sigma, p) in sigma.iter_mut().zip(&uv) {
+        add_edges(sigma, *p, mesh);
+    }
+    let strain = strain_of_vertices(mesh, &strains);
+    Ok(Chart { uv, strain: Some(strain), sigma: Some(sigma) })
+}
+
+/// The harmonic map, or Tutte's where obtuse angles fold it.
+fn start(mesh: &DiskMesh) -> Result<Vec<[f64; 2]>> {
+    let boundary = boundary_by_arc_length(mesh);
+    let tutte = || vec![[1.0; 3]; mesh.triangles.len()];
+    for weights in [&|| cotangents(mesh), &tutte as &dyn Fn() -> Vec<[f64; 3]>] {
+        let uv = fixed_boundary(mesh, &weights(), &boundary).map_err(|e| unsolved(&e))?;
+        if first_turned(&mesh.triangles, &uv).is_none() {
+            return Ok(uv);
+        }
+    }
+    Err(not_found("the mesh folds over on the rectangle"))
+}
+
+/// Root mean square distance of the strain from its mean over the plate.
+fn scatter(strains: &[Strained]) -> f64 {
+    let area: f64 = strains.iter().map(|s| s.area).sum();
+    let mean = [0, 1, 2].map(|k| strains.iter().map(|s| s.area * s.strain[k]).sum::<f64>() / area);
+    let square = |s: &Strained| {
+        let [a, b, c] = [0, 1, 2].map(|k| s.strain[k] - mean[k]);
+        s.area * (a * a + b * b + 2.0 * c * c)
+    };
+    (strains.iter().map(square).sum::<f64>() / area).sqrt()
+}
+
+/// What the uncertainty of two opposite edges leaves between them.
+fn add_edges(sigma: &mut [f64; 2], p: [f64; 2], mesh: &DiskMesh) {
+    let [bottom, right, top, left] = mesh.edge_sigma;
+    for (axis, (low, high, size)) in
+        [(left, right, mesh.width), (bottom, top, mesh.height)].into_iter().enumerate()
+    {
+        let share = (p[axis] / size).clamp(0.0, 1.0);
+        sigma[axis] = sigma[axis].hypot((low * (1.0 - share)).hypot(high * share));
+    }
+}
+
+/// Mean strain of the triangles at each vertex, by area: uu, vv, uv.
+fn strain_of_vertices(mesh: &DiskMesh, strains: &[Strained]) -> Vec<[f64; 3]> {
+    let mut sums = vec![(0.0, [0.0; 3]); mesh.vertices.len()];
+    for (t, s) in mesh.triangles.iter().zip(strains) {
+        for &v in t {
+            let (area, sum) = &mut sums[v as usize];
+            *area += s.area;
+            (0..3).for_each(|k| sum[k] += s.area * s.strain[k]);
+        }
+    }
+    sums.into_iter().map(|(area, sum)| sum.map(|s| s / area)).collect()
+}

@@ -1,0 +1,314 @@
+//! The membrane energy of a map from the flat plate to a measured mesh, its gradient and a positive Hessian.
+//!
+//! The unknowns are the material places x = (u, v) of the mesh's vertices; the positions in space are given. In a
+//! triangle the deformation gradient F = [P1 - P0, P2 - P0] M^-1, M = [x1 - x0, x2 - x0], is constant, and
+//!
+//! ```text
+//! C = F'F = M^-T G M^-1      G: the triangle's metric in space
+//! E = (C - I) / 2            Green's strain
+//! psi = 1/2 S : E            S = ((1 - nu) E + nu tr(E) I) / (1 - nu^2), plane stress, Young's modulus 1
+//! W = sum over triangles of psi det(M) / 2
+//! ```
+//!
+//! W has the unit of an area; times Young's modulus and the thickness it is the energy of St. Venant and Kirchhoff.
+//! Moving the material places by dx = H x changes C by -(H'C + C H) and the area by tr H, so that
+//! dW = A (psi I - C S) : H, Eshelby's stress. The second derivative, in the frame where C is diagonal, falls into one
+//! 2 x 2 form of the stretches (H11, H22) and one of the shears (H12, H21); each is made positive semidefinite by
+//! dropping its negative eigenvalue. For small strain the forms are those of linear elasticity.
+
+use platen_shape::DiskMesh;
+use platen_shape::flatten::signed_area;
+use platen_shape::sparse::Spd;
+
+/// The membrane of one mesh.
+pub(crate) struct Membrane<'a> {
+    triangles: &'a [[u32; 3]],
+    /// Metric of each triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
+    metrics: Vec<[f64; 3]>,
+    poisson: f64,
+}
+
+/// A symmetric 2 x 2 tensor: 11, 22, 12.
+pub(crate) type Sym = [f64; 3];
+
+/// A triangle on the plate and what was done to it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Strained {
+    /// Area on the flat plate.
+    pub(crate) area: f64,
+    /// Green's strain.
+    pub(crate) strain: Sym,
+    /// Material place of its centre.
+    pub(crate) centre: [f64; 2],
+}
+
+/// The state of one triangle at given material places.
+struct State {
+    /// Area on the flat plate.
+    area: f64,
+    /// Gradients of the three hat functions.
+    hats: [[f64; 2]; 3],
+    stretch: Sym,
+    stress: Sym,
+    /// Energy density.
+    density: f64,
+}
+
+impl<'a> Membrane<'a> {
+    pub(crate) fn new(mesh: &'a DiskMesh, poisson: f64) -> Self {
+        let metric = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+            let (e1, e2) = (b - a, c - a);
+            [e1.dot(&e1), e1.dot(&e2), e2.dot(&e2)]
+        };
+        Self { triangles: &mesh.triangles, metrics: mesh.triangles.iter().map(metric).collect(), poisson }
+    }
+
+    /// The energy at the material places `x`; infinite when a triangle is turned over.
+    pub(crate) fn energy(&self, x: &[[f64; 2]]) -> f64 {
+        let mut sum = 0.0;
+        for (t, metric) in self.triangles.iter().zip(&self.metrics) {
+            match self.state(t, metric, x) {
+                Some(state) => sum += state.area * state.density,
+                None => return f64::INFINITY,
+            }
+        }
+        sum
+    }
+
+    /// Adds the energy's derivative by each material place to `gradient`.
+    pub(crate) fn add_gradient(&self, x: &[[f64; 2]], gradient: &mut [[f64; 2]]) {
+        for (t, metric) in self.triangles.iter().zip(&self.metrics) {
+            let Some(state) = self.state(t, metric, x) else { continue };
+            let eshelby = state.eshelby();
+            for (v, hat) in t.iter().zip(state.hats) {
+                let slot = &mut gradient[*v as usize];
+                slot[0] += state.area * (eshelby[0] * hat[0] + eshelby[2] * hat[1]);
+                slot[1] += state.area * (eshelby[2] * hat[0] + eshelby[1] * hat[1]);
+            }
+        }
+    }
+
+    /// Adds the positive part of each triangle's second derivative to `spd`, whose nodes are the vertices.
+    pub(crate) fn add_hessian(&self, x: &[[f64; 2]], spd: &mut Spd<2>) {
+        for (t, metric) in self.triangles.iter().zip(&self.metrics) {
+            let Some(state) = self.state(t, metric, x) else { continue };
+            let forms = Forms::of(&state, self.poisson, true);
+            for (a, b) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
+                spd.add(t[a], t[b], forms.block(state.hats[a], state.hats[b], state.area));
+            }
+        }
+    }
+
+    /// The strain of every triangle, in their order.
+    pub(crate) fn strains(&self, x: &[[f64; 2]]) -> Vec<Strained> {
+        let of_triangle = |(t, metric): (&[u32; 3], &Sym)| {
+            let [a, b, c] = t.map(|v| x[v as usize]);
+            let centre = [0, 1].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+            let state = self.state(t, metric, x);
+            let (area, strain) = state.map_or((0.0, [0.0; 3]), |state| (state.area, state.strain()));
+            Strained { area, strain, centre }
+        };
+        self.triangles.iter().zip(&self.metrics).map(of_triangle).collect()
+    }
+
+    fn state(&self, t: &[u32; 3], &[g11, g12, g22]: &Sym, x: &[[f64; 2]]) -> Option<State> {
+        let corners = t.map(|v| x[v as usize]);
+        let area = signed_area(corners);
+        if area.is_nan() || area <= 0.0 {
+            return None;
+        }
+        let [a, b, c] = corners;
+        let hat = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / (2.0 * area), (q[0] - p[0]) / (2.0 * area)];
+        let hats = [hat(b, c), hat(c, a), hat(a, b)];
+        // M^-1 has the gradients of the second and third hat function as its rows.
+        let [_, r, s] = hats;
+        let entry =
+            |i: usize, j: usize| r[i] * g11 * r[j] + (r[i] * s[j] + s[i] * r[j]) * g12 + s[i] * g22 * s[j];
+        let stretch = [entry(0, 0), entry(1, 1), entry(0, 1)];
+        let strain = green(stretch);
+        let stress = stress(strain, self.poisson);
+        let density = 0.5 * (stress[0] * strain[0] + stress[1] * strain[1] + 2.0 * stress[2] * strain[2]);
+        Some(State { area, hats, stretch, stress, density })
+    }
+}
+
+impl State {
+    fn strain(&self) -> Sym {
+        green(self.stretch)
+    }
+
+    /// psi I - C S; C and S commute, so it is symmetric.
+    fn eshelby(&self) -> Sym {
+        let ([c11, c22, c12], [s11, s22, s12]) = (self.stretch, self.stress);
+        [
+            self.density - (c11 * s11 + c12 * s12),
+            self.density - (c12 * s12 + c22 * s22),
+            -(c11 * s12 + c12 * s22),
+        ]
+    }
+}
+
+fn green(stretch: Sym) -> Sym {
+    [0.5 * (stretch[0] - 1.0), 0.5 * (stretch[1] - 1.0), 0.5 * stretch[2]]
+}
+
+/// Plane stress of a strain, Young's modulus 1.
+pub(crate) fn stress([e11, e22, e12]: Sym, poisson: f64) -> Sym {
+    let scale = 1.0 / (1.0 - poisson * poisson);
+    [scale * (e11 + poisson * e22), scale * (e22 + poisson * e11), scale * (1.0 - poisson) * e12]
+}
+
+/// The second derivative of a triangle's energy per area as two quadratic forms in H, in the frame of C.
+struct Forms {
+    /// Cosine and sine of the angle from u to the frame's first axis.
+    turn: [f64; 2],
+    /// In (H11, H22).
+    stretches: Sym,
+    /// In (H12, H21).
+    shears: Sym,
+}
+
+impl Forms {
+    fn of(state: &State, poisson: f64, positive: bool) -> Self {
+        let [c11, c22, c12] = state.stretch;
+        let (mean, half) = (0.5 * (c11 + c22), 0.5 * (c11 - c22));
+        let radius = (half * half + c12 * c12).sqrt();
+        // Half the angle whose cosine is half / radius; any frame serves where C is a multiple of I.
+        let cos = if radius > 0.0 { (0.5 * (1.0 + half / radius)).max(0.0).sqrt() } else { 1.0 };
+        let sin = (1.0 - cos * cos).max(0.0).sqrt().copysign(c12);
+        let [c1, c2] = [mean + radius, mean - radius];
+        let [s1, s2, _] = stress(green([c1, c2, 0.0]), poisson);
+        let ([p1, p2], psi) = ([c1 * s1, c2 * s2], state.density);
+        let young = 1.0 / (1.0 - poisson * poisson);
+        let shear = 0.5 * (1.0 - poisson) * young;
+        let stretches =
+            [p1 + young * c1 * c1, p2 + young * c2 * c2, psi - p1 - p2 + young * poisson * c1 * c2];
+        let shears = [c1 * s2 + shear * c1 * c1, c2 * s1 + shear * c2 * c2, p1 + p2 - psi + shear * c1 * c2];
+        let keep = |form| if positive { positive_part(form) } else { form };
+        Self { turn: [cos, sin], stretches: keep(stretches), shears: keep(shears) }
+    }
+
+    /// The 2 x 2 block of two vertices with the given hat gradients.
+    fn block(&self, a: [f64; 2], b: [f64; 2], area: f64) -> [[f64; 2]; 2] {
+        let [cos, sin] = self.turn;
+        let turned = |g: [f64; 2]| [cos * g[0] + sin * g[1], cos * g[1] - sin * g[0]];
+        let (a, b) = (turned(a), turned(b));
+        let ([aa, dd, ad], [bb, ee, be]) = (self.stretches, self.shears);
+        let k11 = area * (aa * a[0] * b[0] + bb * a[1] * b[1]);
+        let k22 = area * (ee * a[0] * b[0] + dd * a[1] * b[1]);
+        let k12 = area * (ad * a[0] * b[1] + be * a[1] * b[0]);
+        let k21 = area * (ad * a[1] * b[0] + be * a[0] * b[1]);
+        // Back: R K R' with the columns of R the frame's axes.
+        let (m11, m12) = (cos * k11 - sin * k21, cos * k12 - sin * k22);
+        let (m21, m22) = (sin * k11 + cos * k21, sin * k12 + cos * k22);
+        [[m11 * cos - m12 * sin, m11 * sin + m12 * cos], [m21 * cos - m22 * sin, m21 * sin + m22 * cos]]
+    }
+}
+
+/// The nearest positive semidefinite form.
+fn positive_part([a, d, b]: Sym) -> Sym {
+    let (mean, radius) = (0.5 * (a + d), (0.5 * (a - d)).hypot(b));
+    let [high, low] = [mean + radius, mean - radius];
+    if low >= 0.0 {
+        return [a, d, b];
+    }
+    if high <= 0.0 {
+        return [0.0; 3];
+    }
+    // high times the projector on its eigenvector, (form - low I) / (high - low).
+    let share = high / (high - low);
+    [share * (a - low), share * (d - low), share * b]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use platen_shape::flatten::closed_form::{ClosedForm, Random};
+
+    /// A small plate, its material places shaken by `strain`.
+    fn shaken(strain: f64, seed: u64) -> (DiskMesh, Vec<[f64; 2]>) {
+        let surface = |[u, v]: [f64; 2]| [u + 0.1 * v, v, 0.2 * u * v + 0.1 * u * u];
+        let plate = ClosedForm::new(surface, [1.0, 0.8], [4, 3], 0.2, seed);
+        let mut random = Random(seed);
+        let x = plate.uv.iter().map(|p| p.map(|x| x + strain * 0.25 * (random.unit() - 0.5))).collect();
+        (plate.mesh().unwrap(), x)
+    }
+
+    #[test]
+    fn the_gradient_is_the_energys_difference() {
+        for seed in 0..20 {
+            let (mesh, x) = shaken(0.3, seed);
+            let membrane = Membrane::new(&mesh, 0.3);
+            let mut gradient = vec![[0.0; 2]; x.len()];
+            membrane.add_gradient(&x, &mut gradient);
+            for (v, c) in (0..x.len()).flat_map(|v| [(v, 0), (v, 1)]) {
+                let at = |step: f64| {
+                    let mut x = x.clone();
+                    x[v][c] += step;
+                    membrane.energy(&x)
+                };
+                let h = 1e-4;
+                let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                assert!((gradient[v][c] - difference).abs() < 1e-9 * (1.0 + difference.abs()), "{v} {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_hessian_is_the_gradients_difference() {
+        for seed in 0..20 {
+            let (mesh, x) = shaken(0.3, seed);
+            let membrane = Membrane::new(&mesh, 0.3);
+            let (t, metric) = (membrane.triangles[0], membrane.metrics[0]);
+            let state = membrane.state(&t, &metric, &x).unwrap();
+            let forms = Forms::of(&state, 0.3, false);
+            let gradient = |x: &[[f64; 2]]| {
+                let state = membrane.state(&t, &metric, x).unwrap();
+                let m = state.eshelby();
+                state
+                    .hats
+                    .map(|g| [m[0] * g[0] + m[2] * g[1], m[2] * g[0] + m[1] * g[1]].map(|f| f * state.area))
+            };
+            for (b, c) in (0..3).flat_map(|b| [(b, 0), (b, 1)]) {
+                let at = |step: f64| {
+                    let mut x = x.clone();
+                    x[t[b] as usize][c] += step;
+                    gradient(&x)
+                };
+                let h = 1e-4;
+                let [p, m, p2, m2] = [at(h), at(-h), at(2.0 * h), at(-2.0 * h)];
+                for (a, r) in (0..3).flat_map(|a| [(a, 0), (a, 1)]) {
+                    let difference = (8.0 * (p[a][r] - m[a][r]) - (p2[a][r] - m2[a][r])) / (12.0 * h);
+                    let block = forms.block(state.hats[a], state.hats[b], state.area);
+                    assert!(
+                        (block[r][c] - difference).abs() < 1e-7 * (1.0 + difference.abs()),
+                        "{seed} {a}{r} {b}{c}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_positive_part_keeps_what_is_positive() {
+        assert_eq!(positive_part([2.0, 1.0, 0.5]), [2.0, 1.0, 0.5]);
+        assert_eq!(positive_part([-2.0, -1.0, 0.5]), [0.0; 3]);
+        // Eigenvalues 3 and -1 along the diagonals.
+        let [a, d, b] = positive_part([1.0, 1.0, 2.0]);
+        assert!((a - 1.5).abs() + (d - 1.5).abs() + (b - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_evenly_stretched_plate_has_its_closed_form_energy() {
+        let plate = ClosedForm::new(|[u, v]| [1.01 * u, 0.0, 0.98 * v], [2.0, 1.0], [6, 4], 0.3, 1);
+        let mesh = plate.mesh().unwrap();
+        let membrane = Membrane::new(&mesh, 0.3);
+        let (e1, e2) = (0.5 * (1.01_f64.powi(2) - 1.0), 0.5 * (0.98_f64.powi(2) - 1.0));
+        let density = (e1 * e1 + e2 * e2 + 2.0 * 0.3 * e1 * e2) / (2.0 * (1.0 - 0.09));
+        assert!((membrane.energy(&plate.uv) - 2.0 * density).abs() < 1e-15);
+        for Strained { strain: [a, b, c], .. } in membrane.strains(&plate.uv) {
+            assert!((a - e1).abs() < 1e-12 && (b - e2).abs() < 1e-12 && c.abs() < 1e-12);
+        }
+    }
+}
