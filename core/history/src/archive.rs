@@ -1,0 +1,276 @@
+//! Questions to a history.
+
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+use rusqlite::{Connection, Params, Row, named_params};
+
+use crate::{Error, Event, PlateRecord, Stroke, StrokeKey, Verdict, schema};
+
+/// A history for reading.
+#[derive(Debug)]
+pub struct Archive {
+    connection: Connection,
+    path: PathBuf,
+}
+
+/// Which strokes are asked for; an empty filter asks for all.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Filter {
+    /// Of this physical plate.
+    pub plate: Option<u32>,
+    /// Of this part number of the press.
+    pub part_id: Option<u32>,
+    /// Accepted at this time or later.
+    pub since: Option<Timestamp>,
+    /// Accepted before this time.
+    pub until: Option<Timestamp>,
+    /// With this judgement.
+    pub verdict: Option<Verdict>,
+    /// Only the newest so many.
+    pub newest: Option<u32>,
+}
+
+/// Columns of a stroke in the order that [`stroke`] reads them.
+const STROKE: &str = "SELECT s.run_id, s.press, s.session, s.stroke, s.attempt, s.plate, s.recipe, s.baseline, s.dry_run, \
+                      s.accepted, s.scanned, s.finished, s.acked, s.ack, s.seq, s.verdict, s.reason, s.figures, s.data, \
+                      s.publication, s.document, s.scan, s.scan_sha256 FROM stroke s";
+
+/// A stroke that was measured: there is something to compare with.
+const MEASURED: &str = "s.verdict IS NOT NULL AND s.verdict <> 'not_measured'";
+
+impl Archive {
+    /// Opens a history for reading, also while a host writes it.
+    ///
+    /// # Errors
+    /// [`Error::Unreachable`] when there is no such file, [`Error::Foreign`], [`Error::Storage`].
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        Ok(Self::new(schema::open_reader(path)?, path))
+    }
+
+    pub(crate) fn new(connection: Connection, path: &Path) -> Self {
+        Self { connection, path: path.to_owned() }
+    }
+
+    pub(crate) fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    pub(crate) fn connection_mut(&mut self) -> &mut Connection {
+        &mut self.connection
+    }
+
+    /// The database file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The strokes that `filter` asks for, oldest first.
+    ///
+    /// # Errors
+    /// [`Error::Storage`], [`Error::Damaged`].
+    pub fn strokes(&self, filter: &Filter) -> Result<Vec<Stroke>, Error> {
+        let sql = format!(
+            "SELECT * FROM ({STROKE} JOIN plate p USING (plate) WHERE (:plate IS NULL OR s.plate = :plate) \
+             AND (:part_id IS NULL OR p.part_id = :part_id) AND (:since IS NULL OR s.accepted >= :since) \
+             AND (:until IS NULL OR s.accepted < :until) AND (:verdict IS NULL OR s.verdict = :verdict) \
+             ORDER BY s.run_id DESC LIMIT ifnull(:newest, -1)) ORDER BY run_id"
+        );
+        self.query(
+            &sql,
+            named_params! {
+                ":plate": filter.plate, ":part_id": filter.part_id, ":since": filter.since.map(text),
+                ":until": filter.until.map(text), ":verdict": filter.verdict.map(Verdict::as_str),
+                ":newest": filter.newest,
+            },
+        )
+    }
+
+    /// One stroke.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
+    pub fn stroke(&self, run_id: u32) -> Result<Stroke, Error> {
+        let found = self.query(&format!("{STROKE} WHERE s.run_id = ?1"), [run_id])?.pop();
+        found.ok_or_else(|| Error::NoSuchRun { path: self.path.clone(), run_id })
+    }
+
+    /// The last stroke that a press had accepted.
+    ///
+    /// # Errors
+    /// [`Error::Storage`], [`Error::Damaged`].
+    pub fn last(&self, press: u16) -> Result<Option<Stroke>, Error> {
+        let sql = format!("{STROKE} WHERE s.press = ?1 ORDER BY s.run_id DESC LIMIT 1");
+        Ok(self.query(&sql, [press])?.pop())
+    }
+
+    /// The strokes of a press that were accepted and are not done with, oldest first.
+    ///
+    /// # Errors
+    /// [`Error::Storage`], [`Error::Damaged`].
+    pub fn open_strokes(&self, press: u16) -> Result<Vec<Stroke>, Error> {
+        self.query(&format!("{STROKE} WHERE s.press = ?1 AND s.acked IS NULL ORDER BY s.run_id"), [press])
+    }
+
+    /// The stroke to compare a run with: the last one measured on the same physical plate, trials and other attempts of
+    /// the same stroke left out. A baseline counts: it is the state before the first stroke.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
+    pub fn before(&self, run_id: u32) -> Result<Option<Stroke>, Error> {
+        let this = self.stroke(run_id)?;
+        let sql = format!(
+            "{STROKE} WHERE s.plate = ?1 AND s.run_id < ?2 AND {MEASURED} AND NOT s.dry_run \
+             AND NOT (s.session = ?3 AND s.stroke = ?4) ORDER BY s.run_id DESC LIMIT 1"
+        );
+        Ok(self.query(&sql, (this.plate, run_id, this.key.session, this.key.stroke))?.pop())
+    }
+
+    /// The scan of the blank that a run's (u, v) refer to: the last baseline measured on the same physical plate.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
+    pub fn baseline(&self, run_id: u32) -> Result<Option<Stroke>, Error> {
+        let this = self.stroke(run_id)?;
+        let sql = format!(
+            "{STROKE} WHERE s.plate = ?1 AND s.run_id < ?2 AND {MEASURED} AND s.baseline \
+             ORDER BY s.run_id DESC LIMIT 1"
+        );
+        Ok(self.query(&sql, (this.plate, run_id))?.pop())
+    }
+
+    /// All plates, oldest first.
+    ///
+    /// # Errors
+    /// [`Error::Storage`].
+    pub fn plates(&self) -> Result<Vec<PlateRecord>, Error> {
+        let sql = "SELECT p.plate, p.press, p.part_id, p.part_name, p.began, p.ended, \
+                   (SELECT count(*) FROM stroke s WHERE s.plate = p.plate), \
+                   (SELECT s.verdict FROM stroke s WHERE s.plate = p.plate AND s.verdict IS NOT NULL \
+                    ORDER BY s.run_id DESC LIMIT 1) FROM plate p ORDER BY p.plate";
+        let read = |row: &Row<'_>| {
+            let verdict: Option<String> = row.get(7)?;
+            Ok(PlateRecord {
+                plate: row.get(0)?,
+                press: row.get(1)?,
+                part_id: row.get(2)?,
+                part_name: row.get(3)?,
+                began: time(row, 4)?,
+                ended: optional_time(row, 5)?,
+                strokes: row.get(6)?,
+                verdict: verdict.as_deref().and_then(Verdict::from_text),
+            })
+        };
+        self.rows(sql, [], read).map_err(Error::storage(&self.path))
+    }
+
+    /// The audit, of one run or of all, oldest first.
+    ///
+    /// # Errors
+    /// [`Error::Storage`].
+    pub fn events(&self, run_id: Option<u32>) -> Result<Vec<Event>, Error> {
+        let sql = "SELECT at, kind, run_id, text FROM event WHERE ?1 IS NULL OR run_id = ?1 ORDER BY event";
+        let read = |row: &Row<'_>| {
+            Ok(Event { at: time(row, 0)?, kind: row.get(1)?, run_id: row.get(2)?, text: row.get(3)? })
+        };
+        self.rows(sql, [run_id], read).map_err(Error::storage(&self.path))
+    }
+
+    /// The strokes whose raw scan is still kept and was taken before `limit`, oldest first.
+    ///
+    /// # Errors
+    /// [`Error::Storage`], [`Error::Damaged`].
+    pub fn scans_before(&self, limit: Timestamp) -> Result<Vec<Stroke>, Error> {
+        let sql = format!("{STROKE} WHERE s.scan IS NOT NULL AND s.accepted < ?1 ORDER BY s.run_id");
+        self.query(&sql, [text(limit)])
+    }
+
+    /// What the run id of a row must not be lost in: a damaged row is named.
+    fn query(&self, sql: &str, values: impl Params) -> Result<Vec<Stroke>, Error> {
+        let rows = self
+            .rows(sql, values, |row| Ok((row.get(0)?, stroke(row))))
+            .map_err(Error::storage(&self.path))?;
+        let damaged = |run_id, error: rusqlite::Error| Error::Damaged {
+            path: self.path.clone(),
+            run_id,
+            why: error.to_string(),
+        };
+        rows.into_iter().map(|(run_id, stroke)| stroke.map_err(|error| damaged(run_id, error))).collect()
+    }
+
+    fn rows<T>(
+        &self,
+        sql: &str,
+        values: impl Params,
+        read: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> rusqlite::Result<Vec<T>> {
+        let mut statement = self.connection.prepare_cached(sql)?;
+        let rows = statement.query_map(values, read)?;
+        rows.collect()
+    }
+}
+
+/// The identity in a row whose first columns are press, session, stroke, attempt.
+pub(crate) fn key(row: &Row<'_>) -> rusqlite::Result<StrokeKey> {
+    key_from(row, 0)
+}
+
+fn key_from(row: &Row<'_>, first: usize) -> rusqlite::Result<StrokeKey> {
+    Ok(StrokeKey {
+        press: row.get(first)?,
+        session: row.get(first + 1)?,
+        stroke: row.get(first + 2)?,
+        attempt: row.get(first + 3)?,
+    })
+}
+
+fn stroke(row: &Row<'_>) -> rusqlite::Result<Stroke> {
+    let path =
+        |column: usize| Ok::<_, rusqlite::Error>(row.get::<_, Option<String>>(column)?.map(PathBuf::from));
+    let verdict: Option<String> = row.get(15)?;
+    let verdict = verdict.map(|verdict| {
+        Verdict::from_text(&verdict).ok_or_else(|| wrong(15, format!("unknown verdict {verdict:?}")))
+    });
+    let figures: String = row.get(17)?;
+    Ok(Stroke {
+        run_id: row.get(0)?,
+        key: key_from(row, 1)?,
+        plate: row.get(5)?,
+        recipe: row.get(6)?,
+        baseline: row.get(7)?,
+        dry_run: row.get(8)?,
+        accepted: time(row, 9)?,
+        scanned: optional_time(row, 10)?,
+        finished: optional_time(row, 11)?,
+        acked: optional_time(row, 12)?,
+        ack: row.get(13)?,
+        seq: row.get(14)?,
+        verdict: verdict.transpose()?,
+        reason: row.get(16)?,
+        figures: serde_json::from_str(&figures).map_err(|error| wrong(17, error.to_string()))?,
+        data: row.get(18)?,
+        publication: row.get(19)?,
+        document: path(20)?,
+        scan: path(21)?,
+        scan_sha256: row.get(22)?,
+    })
+}
+
+/// A time as it stands in the tables.
+pub(crate) fn text(time: Timestamp) -> String {
+    format!("{time:.3}")
+}
+
+fn time(row: &Row<'_>, column: usize) -> rusqlite::Result<Timestamp> {
+    let text: String = row.get(column)?;
+    text.parse().map_err(|error: jiff::Error| wrong(column, error.to_string()))
+}
+
+fn optional_time(row: &Row<'_>, column: usize) -> rusqlite::Result<Option<Timestamp>> {
+    let there: Option<String> = row.get(column)?;
+    there.map(|_| time(row, column)).transpose()
+}
+
+fn wrong(column: usize, why: String) -> rusqlite::Error {
+    rusqlite::Error::FromSqlConversionFailure(column, rusqlite::types::Type::Text, why.into())
+}

@@ -1,0 +1,331 @@
+//! The one writer: each step of a stroke, on the disk before it is promised.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use jiff::Timestamp;
+use rusqlite::{Connection, OptionalExtension, Transaction, named_params};
+
+use crate::archive::{self, Archive, text};
+use crate::lock::Lock;
+use crate::{Error, Stroke, StrokeKey, Verdict, schema};
+
+/// A press counts strokes to 65535 and begins again: the same key within half a turn is the same stroke, later another.
+const RECENT_RUNS: u32 = 32_768;
+
+/// The writer of a history, for the strokes of one press. Its methods block until the disk has what they record.
+#[derive(Debug)]
+pub struct History {
+    archive: Archive,
+    press: u16,
+    _lock: Lock,
+}
+
+/// What is known of a stroke when it is accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accepted {
+    /// Its identity; `press` is that of the [`History`].
+    pub key: StrokeKey,
+    /// Key of its record.
+    pub run_id: u32,
+    /// The press's number of the plate; 0 counts as none.
+    pub part_id: Option<u32>,
+    /// The press's name of the plate.
+    pub part_name: Option<String>,
+    /// Recipe that it is judged by.
+    pub recipe: Option<u16>,
+    /// A scan of the blank.
+    pub baseline: bool,
+    /// A trial.
+    pub dry_run: bool,
+    /// Everything that the press said, JSON.
+    pub data: String,
+}
+
+/// What came of a stroke.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finished {
+    /// The stroke.
+    pub key: StrokeKey,
+    /// Key of its record.
+    pub run_id: u32,
+    /// Count of published results that it goes out under.
+    pub seq: u16,
+    /// Judgement.
+    pub verdict: Verdict,
+    /// Why there is no measurement.
+    pub reason: Option<String>,
+    /// Named figures, in metres, radians, seconds and shares of one.
+    pub figures: BTreeMap<String, f64>,
+    /// The result as it goes to the press, JSON: published again word for word after a restart.
+    pub publication: String,
+}
+
+/// What a host must know when it starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recalled {
+    /// Random number of this installation, drawn once per press, never 0.
+    pub owner: u16,
+    /// `seq` of the last result, 0 before the first.
+    pub result_seq: u16,
+    /// Run id of the last stroke of any press, 0 before the first.
+    pub run_id: u32,
+    /// The last stroke accepted.
+    pub last: Option<Stroke>,
+    /// Highest attempt per stroke number in the session of [`last`](Self::last), over the last half turn of the press's
+    /// counter: the strokes not to scan again.
+    pub attempts: BTreeMap<u16, u16>,
+}
+
+impl History {
+    /// Opens the history of `press` for writing and makes it, with its folder, when it is new.
+    ///
+    /// # Errors
+    /// [`Error::InUse`] naming the other process, [`Error::Unreachable`], [`Error::Foreign`], [`Error::Storage`].
+    pub fn open(path: &Path, press: u16, now: Timestamp) -> Result<Self, Error> {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)
+                .map_err(|source| Error::Unreachable { path: folder.to_owned(), source })?;
+        }
+        let lock = Lock::take(path, now)?;
+        let connection = schema::open_writer(path)?;
+        let draw = "INSERT OR IGNORE INTO journal (press, owner) VALUES (?1, abs(random() % 65535) + 1)";
+        connection.execute(draw, [press]).map_err(Error::storage(path))?;
+        Ok(Self { archive: Archive::new(connection, path), press, _lock: lock })
+    }
+
+    /// The same history for reading.
+    pub fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    /// What was recorded last.
+    ///
+    /// # Errors
+    /// [`Error::Storage`], [`Error::Damaged`].
+    pub fn recall(&self) -> Result<Recalled, Error> {
+        let connection = self.archive.connection();
+        let journal = "SELECT owner, result_seq, (SELECT ifnull(max(run_id), 0) FROM stroke) \
+                       FROM journal WHERE press = ?1";
+        let (owner, result_seq, run_id) = connection
+            .query_row(journal, [self.press], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+            .map_err(self.storage())?;
+        let last = self.archive.last(self.press)?;
+        let attempts = match &last {
+            Some(last) => self.attempts(last).map_err(self.storage())?,
+            None => BTreeMap::new(),
+        };
+        Ok(Recalled { owner, result_seq, run_id, last, attempts })
+    }
+
+    fn attempts(&self, last: &Stroke) -> rusqlite::Result<BTreeMap<u16, u16>> {
+        let sql = "SELECT stroke, max(attempt) FROM stroke \
+                   WHERE press = ?1 AND session = ?2 AND run_id > ?3 GROUP BY stroke";
+        let mut statement = self.archive.connection().prepare_cached(sql)?;
+        let oldest = i64::from(last.run_id) - i64::from(RECENT_RUNS);
+        let rows = statement
+            .query_map((last.key.press, last.key.session, oldest), |row| Ok((row.get(0)?, row.get(1)?)))?;
+        rows.collect()
+    }
+
+    /// Records that a stroke is going to be echoed as accepted, then scanned. The same again changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Contradiction`] when the run id is another stroke's, or the stroke is on record under another run id:
+    /// it must not be measured twice. [`Error::Storage`].
+    pub fn accept(&mut self, stroke: &Accepted, now: Timestamp) -> Result<(), Error> {
+        self.own(stroke.key)?;
+        let contradiction = |why: String| Err(Error::Contradiction { key: stroke.key, why });
+        let (path, transaction) = self.begin()?;
+        let storage = Error::storage(&path);
+        let earlier = "SELECT press, session, stroke, attempt FROM stroke WHERE run_id = ?1";
+        let earlier = transaction.query_row(earlier, [stroke.run_id], archive::key).optional();
+        match earlier.map_err(&storage)? {
+            Some(key) if key == stroke.key => return Ok(()),
+            Some(key) => return contradiction(format!("run id {} is that of {key}", stroke.run_id)),
+            None => {}
+        }
+        if let Some(run_id) = newest(&transaction, stroke.key).map_err(&storage)?
+            && stroke.run_id.saturating_sub(run_id) < RECENT_RUNS
+        {
+            return contradiction(format!("is on record as run {run_id}; a stroke is measured once"));
+        }
+        let plate = plate(&transaction, stroke, now).map_err(&storage)?;
+        let sql = "INSERT INTO stroke (run_id, press, session, stroke, attempt, plate, recipe, baseline, dry_run, \
+                   accepted, data) VALUES (:run_id, :press, :session, :stroke, :attempt, :plate, :recipe, :baseline, \
+                   :dry_run, :accepted, :data)";
+        let values = named_params! {
+            ":run_id": stroke.run_id, ":press": stroke.key.press, ":session": stroke.key.session,
+            ":stroke": stroke.key.stroke, ":attempt": stroke.key.attempt, ":plate": plate,
+            ":recipe": stroke.recipe, ":baseline": stroke.baseline, ":dry_run": stroke.dry_run,
+            ":accepted": text(now), ":data": stroke.data,
+        };
+        transaction.execute(sql, values).map_err(&storage)?;
+        transaction.commit().map_err(&storage)
+    }
+
+    /// Records that the scan of a stroke is taken. The same again changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Contradiction`] when the stroke was never accepted; [`Error::Storage`].
+    pub fn scanned(&mut self, key: StrokeKey, now: Timestamp) -> Result<(), Error> {
+        let sql = "UPDATE stroke SET scanned = ifnull(scanned, ?2) WHERE run_id = ?1";
+        self.step(key, |transaction, run_id| transaction.execute(sql, (run_id, text(now))).map(drop))
+    }
+
+    /// Records the result of a stroke, before it is published. The same again changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Contradiction`] when the stroke was never accepted, or has another result already; [`Error::Storage`].
+    pub fn finish(&mut self, result: &Finished, now: Timestamp) -> Result<(), Error> {
+        let Finished { key, run_id, .. } = *result;
+        self.own(key)?;
+        let contradiction = |why: String| Err(Error::Contradiction { key, why });
+        let (path, transaction) = self.begin()?;
+        let storage = Error::storage(&path);
+        if newest(&transaction, key).map_err(&storage)? != Some(run_id) {
+            return contradiction(format!("has a result under run {run_id}, but was not accepted under it"));
+        }
+        let recorded = "SELECT publication FROM stroke WHERE run_id = ?1";
+        let recorded: Option<String> =
+            transaction.query_row(recorded, [run_id], |row| row.get(0)).map_err(&storage)?;
+        match recorded {
+            Some(same) if same == result.publication => return Ok(()),
+            Some(_) => return contradiction(format!("run {run_id} has another result already; it stands")),
+            None => {}
+        }
+        let sql = "UPDATE stroke SET finished = :now, seq = :seq, verdict = :verdict, reason = :reason, \
+                   figures = :figures, publication = :publication WHERE run_id = :run_id";
+        let figures = serde_json::to_string(&result.figures)
+            .map_err(|error| Error::Contradiction { key, why: format!("its figures: {error}") })?;
+        let values = named_params! {
+            ":now": text(now), ":seq": result.seq, ":verdict": result.verdict.as_str(), ":reason": result.reason,
+            ":figures": figures, ":publication": result.publication, ":run_id": run_id,
+        };
+        transaction.execute(sql, values).map_err(&storage)?;
+        let count = "UPDATE journal SET result_seq = ?2 WHERE press = ?1";
+        transaction.execute(count, (key.press, result.seq)).map_err(&storage)?;
+        transaction.commit().map_err(&storage)
+    }
+
+    /// Records that the press has the result, or never will; `how` in the press's words. The same again changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Contradiction`] when the stroke was never accepted; [`Error::Storage`].
+    pub fn acked(&mut self, key: StrokeKey, how: &str, now: Timestamp) -> Result<(), Error> {
+        let sql = "UPDATE stroke SET ack = ifnull(ack, ?3), acked = ifnull(acked, ?2) WHERE run_id = ?1";
+        self.step(key, |transaction, run_id| transaction.execute(sql, (run_id, text(now), how)).map(drop))
+    }
+
+    /// Records that the plate on the press is done with: strokes without a part number belong to the next one.
+    ///
+    /// # Errors
+    /// [`Error::Storage`].
+    pub fn part_end(&mut self, now: Timestamp) -> Result<(), Error> {
+        let sql = "UPDATE plate SET ended = ?2 WHERE press = ?1 AND ended IS NULL";
+        let ended = self.archive.connection().execute(sql, (self.press, text(now)));
+        ended.map(drop).map_err(self.storage())
+    }
+
+    /// Notes where the result document of a run lies.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`].
+    pub fn attach_document(&mut self, run_id: u32, document: &Path) -> Result<(), Error> {
+        let document = document.to_string_lossy();
+        self.change(run_id, "UPDATE stroke SET document = ?2 WHERE run_id = ?1", (run_id, document))
+    }
+
+    /// Notes where the raw scan of a run lies, and its SHA-256 in hexadecimal.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`].
+    pub fn attach_scan(&mut self, run_id: u32, scan: &Path, sha256: &str) -> Result<(), Error> {
+        let scan = scan.to_string_lossy();
+        let sql = "UPDATE stroke SET scan = ?2, scan_sha256 = ?3 WHERE run_id = ?1";
+        self.change(run_id, sql, (run_id, scan, sha256))
+    }
+
+    /// Notes that the raw scan of a run is no longer there; its SHA-256 stays.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`].
+    pub fn forget_scan(&mut self, run_id: u32) -> Result<(), Error> {
+        self.change(run_id, "UPDATE stroke SET scan = NULL WHERE run_id = ?1", [run_id])
+    }
+
+    /// Adds a line to the audit.
+    ///
+    /// # Errors
+    /// [`Error::Storage`].
+    pub fn note(&mut self, kind: &str, run_id: Option<u32>, what: &str, now: Timestamp) -> Result<(), Error> {
+        let sql = "INSERT INTO event (at, kind, run_id, text) VALUES (?1, ?2, ?3, ?4)";
+        let added = self.archive.connection().execute(sql, (text(now), kind, run_id, what));
+        added.map(drop).map_err(self.storage())
+    }
+
+    /// One change to the newest run of a stroke.
+    fn step(
+        &mut self,
+        key: StrokeKey,
+        change: impl FnOnce(&Transaction<'_>, u32) -> rusqlite::Result<()>,
+    ) -> Result<(), Error> {
+        self.own(key)?;
+        let (path, transaction) = self.begin()?;
+        let storage = Error::storage(&path);
+        let Some(run_id) = newest(&transaction, key).map_err(&storage)? else {
+            return Err(Error::Contradiction { key, why: "was never accepted".to_owned() });
+        };
+        change(&transaction, run_id).map_err(&storage)?;
+        transaction.commit().map_err(&storage)
+    }
+
+    fn change(&mut self, run_id: u32, sql: &str, values: impl rusqlite::Params) -> Result<(), Error> {
+        match self.archive.connection().execute(sql, values).map_err(self.storage())? {
+            0 => Err(Error::NoSuchRun { path: self.archive.path().to_owned(), run_id }),
+            _ => Ok(()),
+        }
+    }
+
+    /// The transaction rolls back when it is dropped without a commit.
+    fn begin(&mut self) -> Result<(PathBuf, Transaction<'_>), Error> {
+        let path = self.archive.path().to_owned();
+        let transaction = self.archive.connection_mut().transaction();
+        let transaction = transaction.map_err(Error::storage(&path))?;
+        Ok((path, transaction))
+    }
+
+    fn own(&self, key: StrokeKey) -> Result<(), Error> {
+        if key.press == self.press {
+            return Ok(());
+        }
+        Err(Error::Contradiction { key, why: format!("this history was opened for press {}", self.press) })
+    }
+
+    fn storage(&self) -> impl Fn(rusqlite::Error) -> Error + use<'_> {
+        Error::storage(self.archive.path())
+    }
+}
+
+/// Run id of the newest record of a stroke.
+fn newest(connection: &Connection, key: StrokeKey) -> rusqlite::Result<Option<u32>> {
+    let sql =
+        "SELECT max(run_id) FROM stroke WHERE press = ?1 AND session = ?2 AND stroke = ?3 AND attempt = ?4";
+    connection.query_row(sql, (key.press, key.session, key.stroke, key.attempt), |row| row.get(0))
+}
+
+/// The physical plate that a stroke is made on: the one of its part number, else the one that has not ended.
+fn plate(connection: &Connection, stroke: &Accepted, now: Timestamp) -> rusqlite::Result<u32> {
+    let part_id = stroke.part_id.filter(|part_id| *part_id != 0);
+    let sql = "SELECT plate FROM plate WHERE press = ?1 AND part_id IS ?2 AND (?2 IS NOT NULL OR ended IS NULL) \
+               ORDER BY plate DESC LIMIT 1";
+    let known: Option<u32> =
+        connection.query_row(sql, (stroke.key.press, part_id), |row| row.get(0)).optional()?;
+    if let Some(plate) = known {
+        connection.execute("UPDATE plate SET ended = NULL WHERE plate = ?1", [plate])?;
+        return Ok(plate);
+    }
+    let sql = "INSERT INTO plate (press, part_id, part_name, began) VALUES (?1, ?2, ?3, ?4) RETURNING plate";
+    let values = (stroke.key.press, part_id, &stroke.part_name, text(now));
+    connection.query_row(sql, values, |row| row.get(0))
+}

@@ -1,0 +1,454 @@
+//! What is recorded is what is asked for, and what does not follow is refused.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use jiff::{SignedDuration, Timestamp};
+use platen_history::{
+    Accepted, Archive, Difference, Error, Filter, Finished, History, Stage, StrokeKey, Verdict, compare,
+    write_csv,
+};
+
+const PRESS: u16 = 3;
+
+/// A history in a folder of its own, and a clock that ticks a second per step.
+struct Bench {
+    folder: tempfile::TempDir,
+    history: Option<History>,
+    now: Timestamp,
+    run_id: u32,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let now = "2026-03-02T06:00:00Z".parse().unwrap();
+        let mut bench = Self { folder, history: None, now, run_id: 0 };
+        bench.reopen();
+        bench
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("results/history.sqlite")
+    }
+
+    fn reopen(&mut self) {
+        self.history = None;
+        self.history = Some(History::open(&self.path(), PRESS, self.now).unwrap());
+    }
+
+    fn history(&mut self) -> &mut History {
+        self.history.as_mut().unwrap()
+    }
+
+    fn tick(&mut self) -> Timestamp {
+        self.now += SignedDuration::from_secs(1);
+        self.now
+    }
+
+    fn accept(&mut self, session: u16, stroke: u16, part_id: Option<u32>) -> u32 {
+        self.accept_as(session, stroke, 0, part_id, |_| {})
+    }
+
+    fn accept_as(
+        &mut self,
+        session: u16,
+        stroke: u16,
+        attempt: u16,
+        part_id: Option<u32>,
+        change: impl FnOnce(&mut Accepted),
+    ) -> u32 {
+        self.run_id += 1;
+        let mut accepted = accepted(key(session, stroke, attempt), self.run_id);
+        accepted.part_id = part_id;
+        change(&mut accepted);
+        let now = self.tick();
+        self.history().accept(&accepted, now).unwrap();
+        self.run_id
+    }
+
+    /// Accepts, scans and judges a stroke.
+    fn measure(&mut self, session: u16, stroke: u16, part_id: Option<u32>, verdict: Verdict) -> u32 {
+        let run_id = self.accept(session, stroke, part_id);
+        self.conclude(key(session, stroke, 0), run_id, verdict);
+        run_id
+    }
+
+    fn conclude(&mut self, key: StrokeKey, run_id: u32, verdict: Verdict) {
+        let now = self.tick();
+        self.history().scanned(key, now).unwrap();
+        let now = self.tick();
+        self.history().finish(&finished(key, run_id, verdict), now).unwrap();
+    }
+
+    fn archive(&self) -> &platen_history::Archive {
+        self.history.as_ref().unwrap().archive()
+    }
+
+    fn before(&self, run_id: u32) -> Option<u32> {
+        self.archive().before(run_id).unwrap().map(|stroke| stroke.run_id)
+    }
+}
+
+fn key(session: u16, stroke: u16, attempt: u16) -> StrokeKey {
+    StrokeKey { press: PRESS, session, stroke, attempt }
+}
+
+fn accepted(key: StrokeKey, run_id: u32) -> Accepted {
+    Accepted {
+        key,
+        run_id,
+        part_id: None,
+        part_name: None,
+        recipe: Some(17),
+        baseline: false,
+        dry_run: false,
+        data: r#"{"die_id":4}"#.to_owned(),
+    }
+}
+
+fn finished(key: StrokeKey, run_id: u32, verdict: Verdict) -> Finished {
+    Finished {
+        key,
+        run_id,
+        seq: run_id as u16,
+        verdict,
+        reason: (verdict == Verdict::NotMeasured).then(|| "coverage".to_owned()),
+        figures: BTreeMap::from([("gap.max".to_owned(), 0.001 * f64::from(run_id))]),
+        publication: format!(r#"{{"seq":{run_id}}}"#),
+    }
+}
+
+#[test]
+fn a_new_history_has_an_owner_that_stays() {
+    let mut bench = Bench::new();
+    let new = bench.history().recall().unwrap();
+    assert_ne!(new.owner, 0);
+    assert_eq!((new.result_seq, new.run_id, new.last.is_none(), new.attempts.len()), (0, 0, true, 0));
+    bench.reopen();
+    assert_eq!(bench.history().recall().unwrap(), new);
+}
+
+#[test]
+fn every_stage_is_on_record_with_its_time_and_survives_reopening() {
+    let mut bench = Bench::new();
+    let run_id = bench.accept(9, 41, Some(700));
+    let stages = |bench: &mut Bench| {
+        bench.reopen();
+        let recalled = bench.history().recall().unwrap();
+        (recalled.last.unwrap().stage(), recalled.result_seq)
+    };
+    assert_eq!(stages(&mut bench), (Stage::Accepted, 0));
+    let key = key(9, 41, 0);
+    let now = bench.tick();
+    bench.history().scanned(key, now).unwrap();
+    assert_eq!(stages(&mut bench), (Stage::Scanned, 0));
+    let now = bench.tick();
+    bench.history().finish(&finished(key, run_id, Verdict::Fail), now).unwrap();
+    assert_eq!(stages(&mut bench), (Stage::Finished, 1));
+    let now = bench.tick();
+    bench.history().acked(key, "explicit", now).unwrap();
+    assert_eq!(stages(&mut bench), (Stage::Acked, 1));
+
+    bench.history().attach_document(run_id, "results/1/result.json".as_ref()).unwrap();
+    bench.history().attach_scan(run_id, "results/1/scan.e57".as_ref(), "ab12").unwrap();
+    let stroke = bench.archive().stroke(run_id).unwrap();
+    let times = [Some(stroke.accepted), stroke.scanned, stroke.finished, stroke.acked];
+    let times = times.map(|time| time.unwrap().to_string());
+    let expected = ["06:00:01", "06:00:02", "06:00:03", "06:00:04"].map(|t| format!("2026-03-02T{t}Z"));
+    assert_eq!(times, expected);
+    assert_eq!((stroke.key, stroke.recipe, stroke.verdict), (key, Some(17), Some(Verdict::Fail)));
+    assert_eq!((stroke.seq, stroke.ack.as_deref()), (Some(1), Some("explicit")));
+    assert_eq!(stroke.figures, BTreeMap::from([("gap.max".to_owned(), 0.001)]));
+    assert_eq!(
+        (stroke.data.as_str(), stroke.publication.as_deref()),
+        (r#"{"die_id":4}"#, Some(r#"{"seq":1}"#))
+    );
+    assert_eq!(stroke.document.as_deref(), Some("results/1/result.json".as_ref()));
+    assert_eq!((stroke.scan_sha256.as_deref(), stroke.reason), (Some("ab12"), None));
+
+    bench.history().forget_scan(run_id).unwrap();
+    let stroke = bench.archive().stroke(run_id).unwrap();
+    assert_eq!((stroke.scan, stroke.scan_sha256.as_deref()), (None, Some("ab12")));
+}
+
+#[test]
+fn the_same_step_again_changes_nothing() {
+    let mut bench = Bench::new();
+    let run_id = bench.measure(1, 1, None, Verdict::Pass);
+    let key = key(1, 1, 0);
+    let now = bench.tick();
+    bench.history().acked(key, "explicit", now).unwrap();
+    let once = bench.archive().stroke(run_id).unwrap();
+    for _ in 0..2 {
+        let now = bench.tick();
+        bench.history().accept(&accepted(key, run_id), now).unwrap();
+        bench.history().scanned(key, now).unwrap();
+        bench.history().finish(&finished(key, run_id, Verdict::Pass), now).unwrap();
+        bench.history().acked(key, "never", now).unwrap();
+    }
+    assert_eq!(bench.archive().strokes(&Filter::default()).unwrap(), [once]);
+}
+
+#[test]
+fn what_does_not_follow_is_refused_and_leaves_no_trace() {
+    let mut bench = Bench::new();
+    let run_id = bench.measure(1, 7, None, Verdict::Pass);
+    let before = bench.archive().strokes(&Filter::default()).unwrap();
+    let now = bench.now;
+    let history = bench.history();
+    let check = |result: Result<(), Error>, expected: &str| {
+        assert_eq!(result.unwrap_err().to_string(), expected);
+    };
+    check(
+        history.accept(&accepted(key(1, 7, 0), 2), now),
+        "press 3 session 1 stroke 7: is on record as run 1; a stroke is measured once",
+    );
+    check(
+        history.accept(&accepted(key(1, 8, 0), run_id), now),
+        "press 3 session 1 stroke 8: run id 1 is that of press 3 session 1 stroke 7",
+    );
+    check(history.scanned(key(1, 8, 2), now), "press 3 session 1 stroke 8 attempt 2: was never accepted");
+    check(history.acked(key(2, 7, 0), "explicit", now), "press 3 session 2 stroke 7: was never accepted");
+    check(
+        history.finish(&finished(key(1, 7, 0), 5, Verdict::Fail), now),
+        "press 3 session 1 stroke 7: has a result under run 5, but was not accepted under it",
+    );
+    let other = Finished { publication: "{}".to_owned(), ..finished(key(1, 7, 0), run_id, Verdict::Fail) };
+    check(
+        history.finish(&other, now),
+        "press 3 session 1 stroke 7: run 1 has another result already; it stands",
+    );
+    check(
+        history.accept(&accepted(StrokeKey { press: 4, ..key(1, 9, 0) }, 9), now),
+        "press 4 session 1 stroke 9: this history was opened for press 3",
+    );
+    assert_eq!(bench.archive().strokes(&Filter::default()).unwrap(), before);
+}
+
+#[test]
+fn a_stroke_number_may_come_back_after_a_turn_of_the_counter() {
+    let mut bench = Bench::new();
+    bench.measure(1, 7, None, Verdict::Pass);
+    bench.run_id = 65_535;
+    let again = bench.measure(1, 7, None, Verdict::Fail);
+    assert_eq!(again, 65_536);
+    let recalled = bench.history().recall().unwrap();
+    assert_eq!((recalled.run_id, recalled.last.unwrap().verdict), (65_536, Some(Verdict::Fail)));
+    let now = bench.tick();
+    bench.history().acked(key(1, 7, 0), "explicit", now).unwrap();
+    assert_eq!(bench.archive().stroke(1).unwrap().stage(), Stage::Finished);
+    assert_eq!(bench.archive().stroke(again).unwrap().stage(), Stage::Acked);
+}
+
+#[test]
+fn attempts_of_the_running_session_are_recalled_for_half_a_turn() {
+    let mut bench = Bench::new();
+    bench.measure(1, 5, None, Verdict::Pass);
+    bench.measure(2, 6, None, Verdict::Pass);
+    bench.run_id = 40_000;
+    bench.measure(2, 7, None, Verdict::Pass);
+    bench.accept_as(2, 7, 1, None, |_| {});
+    bench.accept(2, 8, None);
+    let recalled = bench.history().recall().unwrap();
+    assert_eq!(recalled.attempts, BTreeMap::from([(7, 1), (8, 0)]));
+    assert_eq!(recalled.last.unwrap().key, key(2, 8, 0));
+}
+
+#[test]
+fn a_plate_is_its_part_number_else_what_lies_between_two_ends_of_part() {
+    let mut bench = Bench::new();
+    let numbered =
+        [bench.accept(1, 1, Some(700)), bench.accept(1, 2, Some(701)), bench.accept(1, 3, Some(700))];
+    let nameless = [bench.accept(1, 4, None), bench.accept(1, 5, Some(0))];
+    let now = bench.tick();
+    bench.history().part_end(now).unwrap();
+    let next = bench.accept(1, 6, None);
+    let back = bench.accept(1, 7, Some(701));
+    let plate = |run_id| bench.archive().stroke(run_id).unwrap().plate;
+    assert_eq!(numbered.map(plate), [1, 2, 1]);
+    assert_eq!(nameless.map(plate), [3, 3]);
+    assert_eq!((plate(next), plate(back)), (4, 2));
+    let plates = bench.archive().plates().unwrap();
+    let ended: Vec<bool> = plates.iter().map(|plate| plate.ended.is_some()).collect();
+    assert_eq!(ended, [true, false, true, false]);
+    let strokes: Vec<u32> = plates.iter().map(|plate| plate.strokes).collect();
+    assert_eq!(strokes, [2, 2, 2, 1]);
+}
+
+#[test]
+fn the_stroke_before_is_the_last_measured_one_of_the_same_plate() {
+    let mut bench = Bench::new();
+    let blank = bench.accept_as(1, 1, 0, Some(700), |stroke| stroke.baseline = true);
+    bench.conclude(key(1, 1, 0), blank, Verdict::CannotTell);
+    let first = bench.measure(1, 2, Some(700), Verdict::Fail);
+    let failed = bench.measure(1, 3, Some(700), Verdict::NotMeasured);
+    let other = bench.measure(1, 4, Some(701), Verdict::Pass);
+    let trial = bench.accept_as(1, 5, 0, Some(700), |stroke| stroke.dry_run = true);
+    bench.conclude(key(1, 5, 0), trial, Verdict::Pass);
+    let unfinished = bench.accept(1, 6, Some(700));
+    let second = bench.measure(1, 7, Some(700), Verdict::Fail);
+    let rescan = bench.accept_as(1, 7, 1, Some(700), |_| {});
+    bench.conclude(key(1, 7, 1), rescan, Verdict::Pass);
+    let third = bench.accept(1, 8, Some(700));
+
+    assert_eq!(bench.before(blank), None);
+    assert_eq!(bench.before(first), Some(blank));
+    assert_eq!(bench.before(failed), Some(first));
+    assert_eq!(bench.before(other), None);
+    assert_eq!(bench.before(unfinished), Some(first));
+    assert_eq!(bench.before(second), Some(first));
+    assert_eq!(bench.before(rescan), Some(first));
+    assert_eq!(bench.before(third), Some(rescan));
+    let baseline = |run_id| bench.archive().baseline(run_id).unwrap().map(|stroke| stroke.run_id);
+    assert_eq!((baseline(third), baseline(blank), baseline(other)), (Some(blank), None, None));
+    let plate = &bench.archive().plates().unwrap()[0];
+    assert_eq!((plate.strokes, plate.verdict), (8, Some(Verdict::Pass)));
+}
+
+#[test]
+fn strokes_are_found_by_plate_part_time_and_verdict() {
+    let mut bench = Bench::new();
+    for stroke in 1..=4 {
+        let verdict = if stroke < 4 { Verdict::Fail } else { Verdict::Pass };
+        bench.measure(1, stroke, Some(700 + u32::from(stroke % 2)), verdict);
+    }
+    let runs = |filter: Filter| -> Vec<u32> {
+        bench.archive().strokes(&filter).unwrap().iter().map(|stroke| stroke.run_id).collect()
+    };
+    let at = |text: &str| Some(text.parse().unwrap());
+    assert_eq!(runs(Filter::default()), [1, 2, 3, 4]);
+    assert_eq!(runs(Filter { plate: Some(2), ..Filter::default() }), [2, 4]);
+    assert_eq!(runs(Filter { part_id: Some(701), ..Filter::default() }), [1, 3]);
+    assert_eq!(runs(Filter { verdict: Some(Verdict::Pass), ..Filter::default() }), [4]);
+    assert_eq!(runs(Filter { newest: Some(2), ..Filter::default() }), [3, 4]);
+    assert_eq!(runs(Filter { since: at("2026-03-02T06:00:04Z"), ..Filter::default() }), [2, 3, 4]);
+    assert_eq!(runs(Filter { until: at("2026-03-02T06:00:04Z"), ..Filter::default() }), [1]);
+    let open: Vec<u32> = bench.archive().open_strokes(PRESS).unwrap().iter().map(|s| s.run_id).collect();
+    assert_eq!(open, [1, 2, 3, 4]);
+    let missing = bench.archive().stroke(9).unwrap_err().to_string();
+    assert!(missing.ends_with("no stroke has the run id 9; `platen history list` shows them"), "{missing}");
+}
+
+#[test]
+fn raw_scans_are_found_by_age_until_they_are_forgotten() {
+    let mut bench = Bench::new();
+    let old = bench.measure(1, 1, None, Verdict::Pass);
+    let limit = bench.tick();
+    let new = bench.measure(1, 2, None, Verdict::Pass);
+    for run_id in [old, new] {
+        bench.history().attach_scan(run_id, format!("{run_id}.e57").as_ref(), "00").unwrap();
+    }
+    let expired = |bench: &Bench| -> Vec<u32> {
+        bench.archive().scans_before(limit).unwrap().iter().map(|stroke| stroke.run_id).collect()
+    };
+    assert_eq!(expired(&bench), [old]);
+    bench.history().forget_scan(old).unwrap();
+    assert_eq!(expired(&bench), [0_u32; 0]);
+    assert!(matches!(bench.history().forget_scan(77), Err(Error::NoSuchRun { run_id: 77, .. })));
+}
+
+#[test]
+fn two_strokes_compare_figure_by_figure_and_all_export_as_csv() {
+    let mut bench = Bench::new();
+    let first = bench.measure(1, 1, Some(700), Verdict::Fail);
+    let second = bench.accept(1, 2, Some(700));
+    let mut result = finished(key(1, 2, 0), second, Verdict::NotMeasured);
+    result.figures = BTreeMap::from([("gap.max".to_owned(), 0.002), ("deviation.max".to_owned(), 0.01)]);
+    result.reason = Some("two loops, \"chain\"".to_owned());
+    let now = bench.tick();
+    bench.history().finish(&result, now).unwrap();
+    let strokes = bench.archive().strokes(&Filter::default()).unwrap();
+    let difference = |name: &str, first, second| Difference { name: name.to_owned(), first, second };
+    assert_eq!(
+        compare(&strokes[0], &strokes[1]),
+        [difference("deviation.max", None, Some(0.01)), difference("gap.max", Some(0.001), Some(0.002)),]
+    );
+    let mut csv = Vec::new();
+    write_csv(&strokes, &mut csv).unwrap();
+    let expected = "run_id,press,session,stroke,attempt,plate,recipe,baseline,dry_run,accepted,scanned,finished,acked,\
+        verdict,reason,deviation.max,gap.max\r\n\
+        1,3,1,1,0,1,17,false,false,2026-03-02T06:00:01.000Z,2026-03-02T06:00:02.000Z,2026-03-02T06:00:03.000Z,,fail,,,0.001\r\n\
+        2,3,1,2,0,1,17,false,false,2026-03-02T06:00:04.000Z,,2026-03-02T06:00:05.000Z,,not_measured,\
+        \"two loops, \"\"chain\"\"\",0.01,0.002\r\n";
+    assert_eq!(String::from_utf8(csv).unwrap(), expected);
+    assert_eq!(first, 1);
+}
+
+#[test]
+fn the_audit_keeps_its_order() {
+    let mut bench = Bench::new();
+    let run_id = bench.accept(1, 1, None);
+    let now = bench.tick();
+    bench.history().note("start", None, "platen 0.1.0", now).unwrap();
+    bench.history().note("refused_write", Some(run_id), "register 99", now).unwrap();
+    let kinds = |run_id| -> Vec<String> {
+        bench.archive().events(run_id).unwrap().into_iter().map(|event| event.kind).collect()
+    };
+    assert_eq!(kinds(None), ["start", "refused_write"]);
+    assert_eq!(kinds(Some(run_id)), ["refused_write"]);
+}
+
+#[test]
+fn a_second_writer_is_told_who_the_first_is_and_readers_are_not_in_the_way() {
+    let mut bench = Bench::new();
+    let path = bench.path();
+    let refused = History::open(&path, PRESS, bench.now).unwrap_err().to_string();
+    let program = std::env::current_exe().unwrap();
+    let program = program.file_name().unwrap().to_string_lossy().into_owned();
+    let process = std::process::id();
+    assert_eq!(
+        refused,
+        format!(
+            "{}: in use by {program}, process {process}, since 2026-03-02T06:00:00Z; \
+             one history belongs to one host, stop that one first",
+            path.display()
+        )
+    );
+    let reader = Archive::open(&path).unwrap();
+    bench.measure(1, 1, None, Verdict::Pass);
+    assert_eq!(reader.strokes(&Filter::default()).unwrap().len(), 1);
+    bench.reopen();
+    assert_eq!(reader.strokes(&Filter::default()).unwrap().len(), 1);
+}
+
+#[test]
+fn files_that_are_no_history_are_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let now = Timestamp::UNIX_EPOCH;
+    let check = |name: &str, expected: &str| {
+        let path = folder.path().join(name);
+        let before = std::fs::read(&path).ok();
+        let error = History::open(&path, PRESS, now).unwrap_err().to_string();
+        assert_eq!(error, format!("{}: {expected}", path.display()));
+        assert_eq!(std::fs::read(&path).ok(), before);
+    };
+    std::fs::write(folder.path().join("plate.toml"), "[plate]\nid = 'A17'\n".repeat(50)).unwrap();
+    check("plate.toml", "is no database; name another file");
+    let database = |name: &str, sql: &str| {
+        rusqlite::Connection::open(folder.path().join(name)).unwrap().execute_batch(sql).unwrap();
+    };
+    database("other.sqlite", "CREATE TABLE t (x)");
+    check("other.sqlite", "is a database, but no history of platen; name another file");
+    database(
+        "newer.sqlite",
+        "CREATE TABLE t (x); PRAGMA application_id = 0x706c746e; PRAGMA user_version = 2",
+    );
+    check("newer.sqlite", "has format 2, this program knows 1; use the program that wrote it");
+    let absent = folder.path().join("absent.sqlite");
+    let error = Archive::open(&absent).unwrap_err().to_string();
+    assert_eq!(error, format!("{}: No such file or directory (os error 2)", absent.display()));
+    assert!(!absent.exists());
+}
+
+#[test]
+fn a_row_changed_by_hand_is_named() {
+    let mut bench = Bench::new();
+    bench.measure(1, 1, None, Verdict::Pass);
+    let other = rusqlite::Connection::open(bench.path()).unwrap();
+    other.execute("UPDATE stroke SET verdict = 'good'", []).unwrap();
+    let error = bench.archive().stroke(1).unwrap_err().to_string();
+    assert!(error.contains("run 1: ") && error.contains("unknown verdict \"good\""), "{error}");
+}

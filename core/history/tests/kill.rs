@@ -1,0 +1,304 @@
+//! `kill -9` at every point of a stroke: none is scanned twice, none is lost without a word, no result changes.
+//!
+//! The test plays the press and lives on; the host is this same test binary started again as a child, talks over its
+//! pipes, and is killed: at each named point while it stands still there, then at moments that nobody chose.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use jiff::Timestamp;
+use platen_history::{Accepted, Finished, History, Recalled, Stage, Stroke, StrokeKey, Verdict};
+
+const PRESS: u16 = 1;
+const SESSION: u16 = 5;
+const CHILD: &str = "PLATEN_HISTORY_CHILD";
+const STOP: &str = "PLATEN_HISTORY_STOP";
+
+/// Where the child stands still when [`STOP`] names it: round every promise of stroke 2.
+const POINTS: [&str; 10] = [
+    "before accept",
+    "after accept",
+    "before scan",
+    "after scan",
+    "after scanned",
+    "before finish",
+    "after finish",
+    "after publish",
+    "before acked",
+    "after acked",
+];
+
+/// What the press saw.
+#[derive(Default)]
+struct Witness {
+    scans: BTreeMap<u16, u32>,
+    /// Sequence number and result of each stroke.
+    results: BTreeMap<u16, (u16, String)>,
+    owner: Option<String>,
+}
+
+struct Host {
+    child: Child,
+    orders: ChildStdin,
+    reports: BufReader<ChildStdout>,
+}
+
+impl Host {
+    fn start(database: &Path, stop: &str) -> Self {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "the_host_that_is_killed", "--nocapture", "--quiet"])
+            .env(CHILD, database)
+            .env(STOP, stop)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit())
+            .spawn()
+            .unwrap();
+        let orders = child.stdin.take().unwrap();
+        let reports = BufReader::new(child.stdout.take().unwrap());
+        Self { child, orders, reports }
+    }
+
+    fn order(&mut self, order: &str) {
+        // A child that died no longer reads; the end of its reports says so.
+        let _ = writeln!(self.orders, "{order}");
+    }
+
+    /// The next report. A child that ends without being killed has failed: its own words are on the standard error.
+    fn report(&mut self) -> String {
+        loop {
+            let mut line = String::new();
+            assert!(self.reports.read_line(&mut line).unwrap() > 0, "the host died by itself");
+            if let Some(report) = line.trim_end().strip_prefix("host: ") {
+                return report.to_owned();
+            }
+        }
+    }
+
+    fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+impl Witness {
+    fn see(&mut self, report: &str) {
+        let mut words = report.split(' ');
+        let number = |word: Option<&str>| word.unwrap().parse::<u16>().unwrap();
+        match words.next().unwrap() {
+            "scan" => *self.scans.entry(number(words.next())).or_default() += 1,
+            "result" => {
+                let (stroke, seq) = (number(words.next()), number(words.next()));
+                let result = (seq, words.next().unwrap().to_owned());
+                let first = self.results.entry(stroke).or_insert_with(|| result.clone());
+                assert_eq!(*first, result, "stroke {stroke} was published with two results");
+            }
+            "owner" => {
+                let owner = words.next().unwrap().to_owned();
+                assert_eq!(*self.owner.get_or_insert_with(|| owner.clone()), owner);
+            }
+            _ => {}
+        }
+    }
+
+    /// No stroke scanned twice, none silent, every sequence number used once and in order.
+    fn judge(&self, strokes: u16, database: &Path) {
+        assert!(self.scans.values().all(|&scans| scans == 1), "scans: {:?}", self.scans);
+        assert_eq!(self.results.keys().copied().collect::<Vec<_>>(), (1..=strokes).collect::<Vec<_>>());
+        let seqs: Vec<u16> = self.results.values().map(|(seq, _)| *seq).collect();
+        assert_eq!(seqs, (1..=strokes).collect::<Vec<_>>());
+        let history = History::open(database, PRESS, Timestamp::UNIX_EPOCH).unwrap();
+        assert_eq!(history.archive().open_strokes(PRESS).unwrap(), []);
+        let rows = history.archive().strokes(&platen_history::Filter::default()).unwrap();
+        assert_eq!(rows.len(), usize::from(strokes));
+        for row in &rows {
+            let (seq, result) = &self.results[&row.key.stroke];
+            assert_eq!((row.seq, row.publication.as_deref()), (Some(*seq), Some(result.as_str())));
+            let measured = row.verdict != Some(Verdict::NotMeasured);
+            assert_eq!(measured, result == "measured");
+            assert!(
+                !measured || self.scans.contains_key(&row.key.stroke),
+                "stroke {} unseen",
+                row.key.stroke
+            );
+        }
+    }
+}
+
+/// Runs `strokes` strokes; `fatal` says after each report whether the host dies now.
+fn press(database: &Path, strokes: u16, stop: &str, mut fatal: impl FnMut(&str) -> bool) -> (Witness, u32) {
+    let mut witness = Witness::default();
+    let mut deaths = 0;
+    let mut host = Host::start(database, stop);
+    let mut stroke = 1;
+    host.order("trigger 1");
+    while stroke <= strokes {
+        let report = host.report();
+        witness.see(&report);
+        if fatal(&report) {
+            deaths += 1;
+            host.kill();
+            host = Host::start(database, "");
+            host.order(&format!("trigger {stroke}"));
+            continue;
+        }
+        match report.as_str() {
+            done if done == format!("acked {stroke}") => {
+                stroke += 1;
+                if stroke <= strokes {
+                    host.order(&format!("trigger {stroke}"));
+                }
+            }
+            result if result.starts_with(&format!("result {stroke} ")) => {
+                host.order(&format!("ack {stroke}"))
+            }
+            _ => {}
+        }
+    }
+    host.kill();
+    (witness, deaths)
+}
+
+#[test]
+fn killed_at_every_point_of_a_stroke() {
+    for point in POINTS {
+        let folder = tempfile::tempdir().unwrap();
+        let database = folder.path().join("history.sqlite");
+        let (witness, deaths) = press(&database, 4, point, |report| report == "standing");
+        assert_eq!(deaths, 1, "the host never stood still {point}");
+        witness.judge(4, &database);
+        let interrupted = matches!(
+            point,
+            "after accept" | "before scan" | "after scan" | "after scanned" | "before finish"
+        );
+        let expected = if interrupted { "interrupted" } else { "measured" };
+        assert_eq!(witness.results[&2].1, expected, "killed {point}");
+    }
+}
+
+#[test]
+fn killed_at_moments_that_nobody_chose() {
+    let seed = 20_260_302;
+    println!("seed {seed}");
+    let mut state: u64 = seed;
+    let mut random = move |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % below
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("history.sqlite");
+    // The report is read, the child runs on: the kill lands wherever it has come to, often inside a commit.
+    let (witness, deaths) = press(&database, 60, "", |_| random(12) == 0);
+    assert!(deaths >= 20, "only {deaths} kills");
+    witness.judge(60, &database);
+}
+
+/// The child: a host with a scanner that only counts. Does nothing unless it was started by the tests above.
+#[test]
+fn the_host_that_is_killed() {
+    let Some(database) = std::env::var_os(CHILD) else { return };
+    let stop = std::env::var(STOP).unwrap();
+    let mut history = History::open(Path::new(&database), PRESS, Timestamp::now()).unwrap();
+    let recalled = history.recall().unwrap();
+    report(&format!("owner {}", recalled.owner));
+    let mut seq = recalled.result_seq;
+    let mut run_id = recalled.run_id;
+    settle(&mut history, &recalled, &mut seq);
+    for order in std::io::stdin().lines() {
+        let order = order.unwrap();
+        let (verb, stroke) = order.split_once(' ').unwrap();
+        let key = StrokeKey { press: PRESS, session: SESSION, stroke: stroke.parse().unwrap(), attempt: 0 };
+        let at = |point: &str| {
+            if stop == point && key.stroke == 2 {
+                stand_still();
+            }
+        };
+        match verb {
+            "trigger" => {
+                let known = history.recall().unwrap().attempts.contains_key(&key.stroke);
+                if known {
+                    again(&history, key);
+                } else {
+                    run_id += 1;
+                    measure(&mut history, key, run_id, &mut seq, at);
+                }
+            }
+            "ack" => {
+                at("before acked");
+                history.acked(key, "explicit", Timestamp::now()).unwrap();
+                at("after acked");
+                report(&format!("acked {}", key.stroke));
+            }
+            other => panic!("unknown order {other}"),
+        }
+    }
+}
+
+/// At the start: a stroke that was accepted and has no result is reported as interrupted, never scanned again.
+fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
+    let unfinished = |last: &&Stroke| last.stage() < Stage::Finished;
+    if let Some(last) = recalled.last.as_ref().filter(unfinished) {
+        *seq += 1;
+        let result = result(last.key, last.run_id, *seq, Verdict::NotMeasured, "interrupted");
+        history.finish(&result, Timestamp::now()).unwrap();
+    }
+}
+
+/// The press still holds the trigger of a stroke that is on record: what is on record is published again.
+fn again(history: &History, key: StrokeKey) {
+    let last = history.archive().last(PRESS).unwrap().unwrap();
+    assert_eq!(last.key, key);
+    let stroke = key.stroke;
+    report(&format!("result {stroke} {} {}", last.seq.unwrap(), last.publication.unwrap()));
+}
+
+fn measure(history: &mut History, key: StrokeKey, run_id: u32, seq: &mut u16, at: impl Fn(&str)) {
+    let accepted = Accepted {
+        key,
+        run_id,
+        part_id: None,
+        part_name: None,
+        recipe: None,
+        baseline: false,
+        dry_run: false,
+        data: "{}".to_owned(),
+    };
+    at("before accept");
+    history.accept(&accepted, Timestamp::now()).unwrap();
+    at("after accept");
+    report(&format!("accepted {}", key.stroke));
+    at("before scan");
+    report(&format!("scan {}", key.stroke));
+    at("after scan");
+    history.scanned(key, Timestamp::now()).unwrap();
+    at("after scanned");
+    *seq += 1;
+    at("before finish");
+    history.finish(&result(key, run_id, *seq, Verdict::Pass, "measured"), Timestamp::now()).unwrap();
+    at("after finish");
+    report(&format!("result {} {seq} measured", key.stroke));
+    at("after publish");
+}
+
+fn result(key: StrokeKey, run_id: u32, seq: u16, verdict: Verdict, publication: &str) -> Finished {
+    let figures = BTreeMap::from([("gap.max".to_owned(), 0.001)]);
+    Finished { key, run_id, seq, verdict, reason: None, figures, publication: publication.to_owned() }
+}
+
+fn report(what: &str) {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "host: {what}").unwrap();
+    out.flush().unwrap();
+}
+
+/// Tells the press and waits to be killed.
+fn stand_still() -> ! {
+    report("standing");
+    loop {
+        std::thread::park();
+    }
+}
