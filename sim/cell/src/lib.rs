@@ -1,1 +1,0 @@
-//! Program platen-sim: simulated press, scanner or both on one plate.

@@ -1,0 +1,97 @@
+//! Verb `press`.
+
+use crate::error::Error;
+use clap::Args;
+use platen_sim_press::config::LinkConfig;
+use platen_sim_press::{Config, SimPress};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use tokio::signal::unix::{SignalKind, signal};
+
+/// What the command line says of the press; options overrule the file.
+#[derive(Debug, Args)]
+pub(crate) struct Command {
+    /// Description of press, plate and faults; without it a press with one 4 x 4 m plate
+    config: Option<PathBuf>,
+    /// Port of Modbus TCP; 0 lets the system choose
+    #[arg(long, value_name = "PORT")]
+    modbus_port: Option<u16>,
+    /// Port on which the plate is served; 0 lets the system choose
+    #[arg(long, value_name = "PORT")]
+    plate_port: Option<u16>,
+    /// Strokes per part, at most
+    #[arg(long)]
+    strokes: Option<u32>,
+    /// Seed of springback, sessions and faults
+    #[arg(long)]
+    seed: Option<u64>,
+    /// End when standard input closes, so that the press never outlives who started it
+    #[arg(long)]
+    with_parent: bool,
+}
+
+impl Command {
+    /// The file with the options on top.
+    fn config(&self) -> Result<Config, Error> {
+        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), read)?;
+        if let Some(port) = self.modbus_port {
+            config.link = LinkConfig::Tcp { port };
+        }
+        config.control_port = self.plate_port.unwrap_or(config.control_port);
+        config.strokes = self.strokes.unwrap_or(config.strokes);
+        if let Some(seed) = self.seed {
+            config.seed = seed;
+            config.plate.plan.seed = seed;
+            config.plate.handling.seed = seed;
+        }
+        Ok(config)
+    }
+}
+
+fn read(path: &Path) -> Result<Config, Error> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.into(), source })?;
+    toml::from_str(&text).map_err(|error| {
+        let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
+        let line = before.matches('\n').count() + 1;
+        Error::Config { path: path.into(), line, message: error.message().to_owned() }
+    })
+}
+
+/// Runs the press until it is told to end.
+pub(crate) async fn run(command: &Command) -> Result<(), Error> {
+    let mut press = SimPress::start(command.config()?).await?;
+    announce(&press)?;
+    let mut terminate = signal(SignalKind::terminate())?;
+    tokio::select! {
+        ended = press.ended() => ended?,
+        _ = terminate.recv() => {}
+        interrupted = tokio::signal::ctrl_c() => interrupted?,
+        () = orphaned(), if command.with_parent => {}
+    }
+    if let Ok(tally) = serde_json::to_string(&press.tally()) {
+        tracing::info!(%tally, "press ends");
+    }
+    Ok(())
+}
+
+/// Says where the ports are, in one line. A press on a serial line has no Modbus port.
+fn announce(press: &SimPress) -> Result<(), Error> {
+    let modbus = press.modbus().map(|address| address.to_string());
+    let line = serde_json::json!({ "modbus": modbus, "plate": press.control().to_string() });
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}")?;
+    out.flush()?;
+    Ok(())
+}
+
+/// Resolves when standard input closes. A thread of its own waits for that: the runtime could not end while one of its
+/// threads does.
+async fn orphaned() {
+    let (closed, wait) = tokio::sync::oneshot::channel();
+    std::thread::spawn(move || {
+        let ended = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        // Nobody listens any more when the press has ended for another reason.
+        let _ = closed.send(ended);
+    });
+    let _ = wait.await;
+}
