@@ -117,6 +117,29 @@ impl Recalled {
     pub fn empty(owner: u16) -> Self {
         Self { owner, result_seq: 0, run_id: 0, last: None, attempts: BTreeMap::new() }
     }
+
+    /// Takes in the next record of a journal that is read from its beginning.
+    pub fn replay(&mut self, record: &Record) {
+        if let Record::Accepted { key, run_id, data } = record {
+            if self.last.as_ref().is_some_and(|last| last.key.session != key.session) {
+                self.attempts.clear();
+            }
+            self.attempts.insert(key.stroke, key.attempt);
+            self.run_id = *run_id;
+            let data = StrokeData::clone(data);
+            let (key, run_id) = (*key, *run_id);
+            self.last = Some(Entry { key, run_id, data, stage: Stage::Accepted, publication: None });
+        }
+        if let Record::Finished(publication) = record {
+            self.result_seq = publication.seq;
+        }
+        if let Some(last) = self.last.as_mut().filter(|last| last.key == record.key()) {
+            last.stage = record.stage();
+            if let Record::Finished(publication) = record {
+                last.publication = Some((**publication).clone());
+            }
+        }
+    }
 }
 
 /// Remembers strokes of one press. Opened by one process at a time: a second host must fail to open it.

@@ -23,8 +23,9 @@ pub struct Refused {
 }
 
 impl WriteAllow {
-    /// Default of [`max_writes_per_s`](Self::max_writes_per_s): two heartbeats and two strokes' worth of steps.
-    pub const MAX_WRITES_PER_S: u32 = 20;
+    /// Default of [`max_writes_per_s`](Self::max_writes_per_s): two heartbeats and six strokes of eight writes, far
+    /// more than a press makes, far less than its controller can take.
+    pub const MAX_WRITES_PER_S: u32 = 50;
 
     /// These registers, at the default rate. Neighbouring and overlapping ranges become one.
     pub fn new(ranges: impl IntoIterator<Item = RangeInclusive<u16>>) -> Self {

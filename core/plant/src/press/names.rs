@@ -183,6 +183,11 @@ names! {
 }
 
 impl Output {
+    /// Whether it is a bit of the status.
+    pub fn is_status(self) -> bool {
+        self.dimension() == Dimension::Switch
+    }
+
     /// The figure that stands in this field unless the plant file says otherwise (`from`); `None` for fields of
     /// the handshake and for the stations, which are a list.
     pub fn measure(self) -> Option<Measure> {

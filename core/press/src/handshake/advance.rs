@@ -1,0 +1,76 @@
+//! The transitions of the handshake: one `match`, in the order of their urgency.
+
+use std::time::Duration;
+
+use super::machine::Handshake;
+use super::{LinkState, Transition, Work};
+use crate::Code;
+
+impl Handshake {
+    /// Takes one transition that is due, if there is one. What the press wants counts only on line; the stroke in hand
+    /// lives on without a link.
+    pub(super) fn advance(&mut self, now: Duration) -> Option<Transition> {
+        use Transition::*;
+        match (self.link, self.work) {
+            (LinkState::Stopped { .. }, _) => None,
+            _ if self.stop => Some(self.end()),
+            (LinkState::Boot, _) => self.enter(LinkState::Offline, T1),
+            (LinkState::Offline, _) if self.connected => Some(self.begin_sync(now, T2)),
+            (LinkState::Sync | LinkState::Online, _) if !self.connected => {
+                self.enter(LinkState::Offline, T21)
+            }
+            (LinkState::Fault(_), _) if self.reset && self.connected => Some(self.begin_sync(now, T23)),
+            (LinkState::Fault(_), _) if self.reset => self.enter(LinkState::Offline, T23),
+            (LinkState::Sync | LinkState::Online, _) if self.fault.is_some() => Some(self.fail(T22)),
+            (LinkState::Sync | LinkState::Online, _) if self.wrong_press() => Some(self.leave_wrong_press()),
+            (LinkState::Sync, _) if self.foreign.is_some_and(|host| host.alive) => {
+                Some(self.fail_as(Code::SecondHost, T4))
+            }
+            (LinkState::Sync, _) if self.synchronised(now) => Some(self.enter_online(now)),
+            (LinkState::Online, _) if self.intruder => Some(self.fail_as(Code::SecondHost, T22)),
+            (LinkState::Online, _) if self.newly_stale(now) => Some(self.press_stale()),
+            (LinkState::Online, work) if work.is_busy() && self.another_stroke() => Some(self.miss()),
+
+            (LinkState::Online, Work::Idle) if self.blocked() => self.turn(Work::Blocked, now, T9),
+            (LinkState::Online, Work::Blocked) if !self.blocked() => self.turn(Work::Idle, now, T10),
+            (LinkState::Online, Work::WaitAck | Work::Idle | Work::Blocked) if self.acknowledged() => {
+                Some(self.acked(now))
+            }
+            (LinkState::Online, Work::WaitAck) if self.ack_overdue(now) => Some(self.go_on_without_ack(now)),
+            (LinkState::Online, Work::Clear) if self.ack_dropped(now) => self.turn(Work::Idle, now, T19),
+            (LinkState::Online, Work::Idle | Work::WaitAck) if self.stroke_waits() => {
+                Some(self.accept_stroke(now, T11))
+            }
+            (LinkState::Online, Work::Idle | Work::WaitAck) if self.rescan_wanted() => {
+                Some(self.accept_rescan(now, T27))
+            }
+            (LinkState::Online, Work::Publish) if self.written && self.journaled() => {
+                Some(self.published(now))
+            }
+            (LinkState::Online, Work::Accepted) if self.clear_to_start() => Some(self.start_scan(now)),
+
+            (_, Work::Accepted | Work::Scanning) if self.given_up(now).is_some() => Some(self.give_up(now)),
+            (_, Work::Scanning) if self.scan_complete() => Some(self.begin_evaluation(now)),
+            (_, Work::Evaluating) if self.evaluated(now) => Some(self.conclude(now)),
+            (_, Work::Aborted) if self.journaled() => self.turn(Work::Publish, now, T16),
+            (_, Work::Accepted | Work::Aborted | Work::Publish) if self.journal_overdue(now) => {
+                self.journal_failed();
+                None
+            }
+            _ => None,
+        }
+    }
+
+    fn enter(&mut self, link: LinkState, transition: Transition) -> Option<Transition> {
+        self.link = link;
+        Some(transition)
+    }
+
+    fn turn(&mut self, work: Work, now: Duration, transition: Transition) -> Option<Transition> {
+        self.work = work;
+        if let Some(job) = &mut self.job {
+            job.since = now;
+        }
+        Some(transition)
+    }
+}

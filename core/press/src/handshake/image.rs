@@ -1,0 +1,93 @@
+//! What the registers say in each state: nothing but a function of it.
+
+use std::time::Duration;
+
+use platen_plant::press::{Measure, OnMissed};
+
+use super::machine::{Handshake, Job};
+use super::{LinkState, Work};
+use crate::{Code, Figures, HostImage, Publication, Severity, Verdict};
+
+impl Work {
+    /// Whether a stroke is in hand: another one would be missed.
+    pub(super) fn is_busy(self) -> bool {
+        matches!(self, Self::Accepted | Self::Scanning | Self::Evaluating | Self::Aborted | Self::Publish)
+    }
+}
+
+impl Job {
+    /// Adds the times that the machine itself knows, where the host has not given better ones.
+    pub(super) fn add_times(&self, figures: &mut Figures, now: Duration) {
+        let mut add = |measure, from: Option<Duration>, to: Option<Duration>| {
+            if let (Some(from), Some(to)) = (from, to) {
+                figures.values.entry(measure).or_insert(to.saturating_sub(from).as_secs_f64());
+            }
+        };
+        add(Measure::ScanTime, self.scan_started_at, self.acquired_at);
+        add(Measure::EvaluateTime, self.acquired_at, Some(now));
+        add(Measure::StrokeToResultTime, Some(self.accepted_at), Some(now));
+    }
+}
+
+impl Handshake {
+    /// Follows the state, but for a stroke whose acceptance is not on the disk yet: it is not promised.
+    pub(super) fn refresh_image(&mut self) {
+        if self.work != Work::Accepted || self.journaled() {
+            self.image = self.present_image();
+        }
+    }
+
+    fn present_image(&self) -> HostImage {
+        let result = self.result();
+        let online = self.link == LinkState::Online;
+        let stopped = matches!(self.link, LinkState::Stopped { .. });
+        let waiting = self.work == Work::Publish && result.is_none();
+        let busy = self.work.is_busy() && (self.work != Work::Publish || waiting);
+        let standing = self.work == Work::Publish || self.unacked.is_some() && self.work != Work::Clear;
+        let stroke = self.stroke().or(self.last);
+        HostImage {
+            ready: online && !busy && !self.blocked() && !self.held(),
+            busy: busy && !stopped,
+            valid: result.is_some() && standing && !stopped,
+            scan_done: self.job.as_ref().is_some_and(|job| job.acquired_at.is_some()) && !stopped,
+            missed: self.missed && !stopped,
+            missed_count: self.missed_count,
+            simulated: self.config.simulated && !stopped,
+            storage_degraded: !self.storage_ok && !stopped,
+            calibration_invalid: self.scanner == Err(Code::CalibrationInvalid) && !stopped,
+            ack_stroke_id: stroke.map_or(0, |key| key.stroke),
+            session: stroke.map_or(0, |key| key.session),
+            attempt: stroke.map_or(0, |key| key.attempt),
+            error: self.error(result).filter(|_| !stopped),
+            warning: self.present_warning(result).filter(|_| !stopped),
+            result_seq: result.map_or(self.image.result_seq, |result| result.seq),
+            result: result.cloned(),
+            owner: self.owner,
+            host_state: self.state().number(),
+        }
+    }
+
+    /// The result that may stand in the registers: the last one, once it is journalled.
+    fn result(&self) -> Option<&Publication> {
+        let pending = self.work == Work::Aborted || self.work == Work::Publish && !self.journaled();
+        self.job.as_ref().filter(|_| !pending)?.publication.as_ref()
+    }
+
+    /// The most urgent error: a fault, what keeps the host from being ready, why the last stroke was not measured.
+    fn error(&self, result: Option<&Publication>) -> Option<Code> {
+        let fault = if let LinkState::Fault(code) = self.link { Some(code) } else { None };
+        let obstacle = self.obstacle().filter(|code| code.alarm().severity == Severity::Error);
+        let missed = self.missed && self.config.policy.on_missed_stroke != OnMissed::Warn;
+        let unmeasured = result.and_then(|result| match result.measurement.verdict {
+            Verdict::NotMeasured(code) => Some(code),
+            Verdict::Pass | Verdict::Fail | Verdict::CannotTell => None,
+        });
+        fault.or(obstacle).or(unmeasured).or(missed.then_some(Code::MissedStroke))
+    }
+
+    fn present_warning(&self, result: Option<&Publication>) -> Option<Code> {
+        let stale = self.stale.then_some(Code::PressStale);
+        let storage = (!self.storage_ok).then_some(Code::StorageDegraded);
+        stale.or(storage).or(self.warning).or(result.and_then(|result| result.measurement.warning))
+    }
+}

@@ -1,0 +1,480 @@
+//! What the handshake knows, what it is told, what it asks for.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use platen_plant::press::{Counter, Input, Mode, Policy, Press, Timeouts};
+
+use super::edges::EdgeCounter;
+use super::{LinkState, State, Transition, Work};
+use crate::{
+    Code, Entry, HostImage, Measurement, PressImage, Publication, Recalled, Record, Stage, StrokeData,
+    StrokeKey,
+};
+
+/// Longest scan when neither the plant file nor the scanner says.
+const SCAN_LIMIT: Duration = Duration::from_secs(180);
+/// Share by which a scan may be longer than the scanner's own estimate.
+const SCAN_MARGIN: f64 = 1.5;
+
+/// What the plant file says about the handshake.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Plant number of the press.
+    pub press: u16,
+    /// Results are marked as simulated.
+    pub simulated: bool,
+    /// Time limits.
+    pub timeouts: Timeouts,
+    /// What to do when things go wrong.
+    pub policy: Policy,
+    /// The stroke counter; `None` when the press does not count.
+    pub counter: Option<Counter>,
+    /// The press counts requests for a rescan.
+    pub counts_attempts: bool,
+    /// Equal reads before a trigger counts.
+    pub debounce_reads: u8,
+}
+
+impl Config {
+    /// What the plant file says.
+    pub fn new(press: &Press) -> Self {
+        Self {
+            press: press.press_id,
+            simulated: press.mode == Mode::Simulate,
+            timeouts: press.timeouts.clone(),
+            policy: press.policy,
+            counter: press.map.counts_strokes().then_some(press.map.counter),
+            counts_attempts: press.map.input(Input::Attempt).is_some(),
+            debounce_reads: press.map.input(Input::Trigger).map_or(1, |field| field.debounce_reads),
+        }
+    }
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// A connection stands.
+    Connected,
+    /// The connection is gone.
+    Disconnected,
+    /// The press block was read, whole or, while nothing happens, its fast part.
+    Press(Box<PressImage>),
+    /// The host block was read back.
+    Host {
+        /// Who wrote there; `None` where the map has no such field.
+        owner: Option<u16>,
+        /// The heartbeat there; `None` where the map has no such field.
+        heartbeat: Option<u16>,
+        /// Whether this host may have written both.
+        mine: bool,
+    },
+    /// Every word of the present image has been echoed by the press.
+    Written,
+    /// The journal has, or could not, put a record on the disk.
+    Journaled {
+        /// The stroke.
+        key: StrokeKey,
+        /// The record.
+        stage: Stage,
+        /// Whether it would survive a power cut.
+        ok: bool,
+    },
+    /// Whether the scanner can take a scan, and how long it would take.
+    Scanner {
+        /// What is wrong with it.
+        ready: Result<(), Code>,
+        /// Its estimate of one scan.
+        estimate: Option<Duration>,
+    },
+    /// The scan of a stroke is complete.
+    Acquired(StrokeKey),
+    /// The result of a stroke.
+    Measured(StrokeKey, Box<Measurement>),
+    /// Scan or evaluation of a stroke failed.
+    Failed(StrokeKey, Code),
+    /// The press refuses to talk, or a write was refused: a fault until reset.
+    Fault(Code),
+    /// The operator resets faults.
+    Reset,
+    /// The host is going to end.
+    Stop,
+    /// Time has passed.
+    Tick,
+}
+
+/// Something to be done, in this order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// Write to the journal and answer with [`Event::Journaled`].
+    Journal(Record),
+    /// Scan a stroke and answer with [`Event::Acquired`] or [`Event::Failed`].
+    StartScan {
+        /// The stroke.
+        key: StrokeKey,
+        /// Key of its record.
+        run_id: u32,
+        /// What the press said about it.
+        data: Box<StrokeData>,
+    },
+    /// Judge the scan of a stroke and answer with [`Event::Measured`] or [`Event::Failed`]. Also after a restart.
+    Evaluate(StrokeKey),
+    /// Give up scan and evaluation of a stroke; its answers are of no use any more.
+    Cancel(StrokeKey),
+    /// The plate is finished and leaves.
+    PartEnd,
+    /// Drop the connection and build it again after a pause.
+    Reconnect,
+    /// Tell people, once per cause.
+    Alarm(Code),
+    /// A transition was taken, for log and tests.
+    Took(Transition),
+}
+
+/// The stroke in hand.
+#[derive(Debug, Clone)]
+pub(super) struct Job {
+    pub(super) key: StrokeKey,
+    pub(super) run_id: u32,
+    pub(super) data: StrokeData,
+    /// When it entered its present state.
+    pub(super) since: Duration,
+    pub(super) accepted_at: Duration,
+    pub(super) scan_started_at: Option<Duration>,
+    pub(super) acquired_at: Option<Duration>,
+    /// The record that its present state waits for is done with: `Some(true)` when it is on the disk.
+    pub(super) journaled: Option<bool>,
+    /// The scan is complete; not yet acted upon.
+    pub(super) acquired: bool,
+    /// The result, or why there is none; not yet acted upon.
+    pub(super) outcome: Option<Measurement>,
+    pub(super) publication: Option<Publication>,
+}
+
+impl Job {
+    pub(super) fn new(key: StrokeKey, run_id: u32, data: StrokeData, now: Duration) -> Self {
+        Self {
+            key,
+            run_id,
+            data,
+            since: now,
+            accepted_at: now,
+            scan_started_at: None,
+            acquired_at: None,
+            journaled: None,
+            acquired: false,
+            outcome: None,
+            publication: None,
+        }
+    }
+
+    fn from_entry(entry: &Entry) -> Self {
+        let publication = entry.publication.clone();
+        let job = Self::new(entry.key, entry.run_id, entry.data.clone(), Duration::ZERO);
+        Self { publication, ..job }
+    }
+}
+
+/// Another host's block, seen before the first write.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Foreign {
+    pub(super) heartbeat: Option<u16>,
+    pub(super) since: Duration,
+    pub(super) alive: bool,
+}
+
+/// The handshake.
+#[derive(Debug, Clone)]
+pub struct Handshake {
+    pub(super) config: Config,
+    pub(super) link: LinkState,
+    pub(super) work: Work,
+    pub(super) job: Option<Job>,
+
+    /// The last stroke accepted, and the press's count of rescan requests then.
+    pub(super) last: Option<StrokeKey>,
+    pub(super) asked: u16,
+    /// Where the press's stroke counter stood when it was last accounted for.
+    pub(super) counted: Option<(u16, u16)>,
+    /// Highest attempt per stroke of the session of `last`.
+    pub(super) attempts: BTreeMap<u16, u16>,
+    pub(super) result_seq: u16,
+    pub(super) run_id: u32,
+    pub(super) owner: u16,
+    /// The journal's last stroke, until the first synchronisation has dealt with it.
+    pub(super) recalled: Option<Entry>,
+
+    // What was seen.
+    pub(super) connected: bool,
+    pub(super) press: Option<PressImage>,
+    pub(super) held_reads: u8,
+    pub(super) heartbeat_at: Duration,
+    pub(super) stale: bool,
+    pub(super) host_seen: bool,
+    pub(super) foreign: Option<Foreign>,
+    pub(super) intruder: bool,
+    pub(super) written: bool,
+    pub(super) scanner: Result<(), Code>,
+    pub(super) scan_estimate: Option<Duration>,
+    pub(super) storage_ok: bool,
+    pub(super) fault: Option<Code>,
+    pub(super) reset: bool,
+    pub(super) stop: bool,
+    pub(super) rescan_rose: bool,
+    pub(super) edges: Option<EdgeCounter>,
+
+    // Latched until reset.
+    pub(super) missed_count: u16,
+    pub(super) missed_total: u64,
+    pub(super) missed: bool,
+    pub(super) warning: Option<Code>,
+
+    pub(super) link_error: Option<Code>,
+    /// The result that stands in the registers and is not acknowledged.
+    pub(super) unacked: Option<StrokeKey>,
+    /// The acknowledge was seen low since the last one.
+    pub(super) ack_was_low: bool,
+    pub(super) image: HostImage,
+
+    pub(super) effects: Vec<Effect>,
+}
+
+impl Handshake {
+    /// A handshake that goes on where the journal ends.
+    pub fn new(config: Config, recalled: Recalled) -> Self {
+        let edges = config.counter.is_none().then(|| EdgeCounter::new(config.debounce_reads, &recalled));
+        let last = recalled.last.as_ref().map(|entry| entry.key);
+        Self {
+            link: LinkState::Boot,
+            work: Work::Idle,
+            job: None,
+            last,
+            asked: last.map_or(0, |key| key.attempt),
+            counted: last.map(|key| (key.session, key.stroke)),
+            attempts: recalled.attempts,
+            result_seq: recalled.result_seq,
+            run_id: recalled.run_id,
+            owner: recalled.owner,
+            recalled: recalled.last.filter(|entry| entry.stage < Stage::Acked),
+            connected: false,
+            press: None,
+            held_reads: 0,
+            heartbeat_at: Duration::ZERO,
+            stale: false,
+            host_seen: false,
+            foreign: None,
+            intruder: false,
+            written: false,
+            scanner: Err(Code::ScannerNotReady),
+            scan_estimate: None,
+            storage_ok: true,
+            fault: None,
+            reset: false,
+            stop: false,
+            rescan_rose: false,
+            edges,
+            missed_count: 0,
+            missed_total: 0,
+            missed: false,
+            warning: None,
+            link_error: None,
+            unacked: None,
+            ack_was_low: false,
+            image: HostImage {
+                owner: recalled.owner,
+                result_seq: recalled.result_seq,
+                ..HostImage::default()
+            },
+            effects: Vec::new(),
+            config,
+        }
+    }
+
+    /// Takes note of an event, then every transition that is due. `now` never goes back.
+    pub fn step(&mut self, event: Event, now: Duration) -> Vec<Effect> {
+        self.note(event, now);
+        while let Some(transition) = self.advance(now) {
+            self.effects.push(Effect::Took(transition));
+        }
+        self.reset = false;
+        self.rescan_rose = false;
+        self.written = false;
+        self.refresh_image();
+        std::mem::take(&mut self.effects)
+    }
+
+    /// What the registers of the host shall say.
+    pub fn image(&self) -> &HostImage {
+        &self.image
+    }
+
+    /// Both regions of the state.
+    pub fn state(&self) -> State {
+        State { link: self.link, work: self.work }
+    }
+
+    /// Whether the registers of the host may be written now: never before the press is known to be the right one and
+    /// to have no other host.
+    pub fn may_write(&self) -> bool {
+        match self.link {
+            LinkState::Online | LinkState::Stopped { told: true } => true,
+            LinkState::Fault(code) => matches!(code, Code::DeviceFailure | Code::DeviceBusy),
+            LinkState::Boot | LinkState::Offline | LinkState::Sync | LinkState::Stopped { told: false } => {
+                false
+            }
+        }
+    }
+
+    /// What is wrong with the link, for `status` and log: it may not stand in the registers.
+    pub fn link_error(&self) -> Option<Code> {
+        match self.link {
+            LinkState::Fault(code) => Some(code),
+            _ => self.link_error,
+        }
+    }
+
+    /// The stroke in hand.
+    pub fn stroke(&self) -> Option<StrokeKey> {
+        self.job.as_ref().map(|job| job.key)
+    }
+
+    /// Strokes missed since the start, whatever was reset.
+    pub fn missed_total(&self) -> u64 {
+        self.missed_total
+    }
+
+    pub(super) fn scan_limit(&self) -> Duration {
+        let estimate = self.scan_estimate.map(|estimate| estimate.mul_f64(SCAN_MARGIN));
+        self.config.timeouts.scan.or(estimate).unwrap_or(SCAN_LIMIT)
+    }
+
+    fn note(&mut self, event: Event, now: Duration) {
+        match event {
+            Event::Connected => self.connected = true,
+            Event::Disconnected => {
+                self.connected = false;
+                self.press = None;
+            }
+            Event::Press(image) => self.note_press(*image, now),
+            Event::Host { owner, heartbeat, mine } => self.note_host(owner, heartbeat, mine, now),
+            Event::Written => self.written = true,
+            Event::Journaled { key, stage, ok } => self.note_journaled(key, stage, ok),
+            Event::Scanner { ready, estimate } => {
+                self.scanner = ready;
+                self.scan_estimate = estimate;
+            }
+            Event::Acquired(key) => {
+                if let Some(job) = self.job_of(key) {
+                    job.acquired = true;
+                }
+            }
+            Event::Measured(key, measurement) => {
+                if let Some(job) = self.job_of(key) {
+                    job.outcome.get_or_insert(*measurement);
+                }
+            }
+            Event::Failed(key, code) => {
+                if let Some(job) = self.job_of(key) {
+                    job.outcome.get_or_insert(Measurement::not_measured(code));
+                }
+            }
+            Event::Fault(code) => self.fault = Some(code),
+            Event::Reset => self.clear_latches(),
+            Event::Stop => self.stop = true,
+            Event::Tick => {}
+        }
+    }
+
+    /// The stroke in hand if it is this one; an answer about another one comes too late.
+    fn job_of(&mut self, key: StrokeKey) -> Option<&mut Job> {
+        self.job.as_mut().filter(|job| job.key == key)
+    }
+
+    fn note_journaled(&mut self, key: StrokeKey, stage: Stage, ok: bool) {
+        if ok {
+            self.storage_ok = true;
+        } else {
+            self.storage_failed();
+        }
+        let awaited = match self.work {
+            Work::Accepted => Some(Stage::Accepted),
+            Work::Aborted | Work::Publish => Some(Stage::Finished),
+            _ => None,
+        };
+        if let Some(job) = self.job_of(key).filter(|_| awaited == Some(stage)) {
+            job.journaled = Some(ok);
+        }
+    }
+
+    fn note_press(&mut self, mut image: PressImage, now: Duration) {
+        if let Some(edges) = &mut self.edges {
+            edges.number(&mut image);
+        }
+        let before = self.press.as_ref();
+        let rose = |bit: fn(&PressImage) -> bool| bit(&image) && before.is_some_and(|before| !bit(before));
+        let (reset, part_end, rescan) =
+            (rose(|it| it.error_reset), rose(|it| it.part_end), rose(|it| it.rescan));
+        let same = |before: &PressImage| {
+            before.trigger && (before.session_id, before.stroke_id) == (image.session_id, image.stroke_id)
+        };
+        self.held_reads = match before {
+            _ if !image.trigger => 0,
+            Some(before) if same(before) => self.held_reads.saturating_add(1),
+            _ => 1,
+        };
+        if before.is_none_or(|before| before.heartbeat != image.heartbeat) {
+            self.heartbeat_at = now;
+            self.stale = false;
+        }
+        self.ack_was_low |= !image.ack;
+        self.press = Some(image);
+        self.rescan_rose = rescan;
+        if reset {
+            self.clear_latches();
+        }
+        if part_end {
+            self.effects.push(Effect::PartEnd);
+        }
+    }
+
+    fn note_host(&mut self, owner: Option<u16>, heartbeat: Option<u16>, mine: bool, now: Duration) {
+        self.host_seen = true;
+        self.intruder = !mine;
+        let theirs = owner.is_some_and(|owner| owner != 0 && owner != self.owner);
+        self.foreign = theirs.then(|| match self.foreign {
+            Some(foreign) => Foreign { alive: foreign.alive || heartbeat != foreign.heartbeat, ..foreign },
+            None => Foreign { heartbeat, since: now, alive: false },
+        });
+    }
+
+    pub(super) fn storage_failed(&mut self) {
+        if self.storage_ok {
+            self.storage_ok = false;
+            self.alarm(Code::StorageFailed);
+        }
+    }
+
+    fn clear_latches(&mut self) {
+        self.reset = true;
+        self.missed = false;
+        self.missed_count = 0;
+        self.warning = None;
+        self.storage_ok = true;
+    }
+
+    pub(super) fn alarm(&mut self, code: Code) {
+        self.effects.push(Effect::Alarm(code));
+    }
+
+    /// A warning that stays until reset.
+    pub(super) fn warn(&mut self, code: Code) {
+        self.warning = Some(code);
+        self.alarm(code);
+    }
+
+    pub(super) fn take_recalled(&mut self, now: Duration) -> Option<(Stage, Job)> {
+        let entry = self.recalled.take()?;
+        let job = Job { since: now, accepted_at: now, ..Job::from_entry(&entry) };
+        Some((entry.stage, job))
+    }
+}

@@ -1,0 +1,88 @@
+//! What the press asks for, and whether it is granted.
+
+use platen_plant::press::{NoAck, OnMissed, OnStorageFull};
+
+use super::machine::Handshake;
+use super::{Transition, Work};
+use crate::{Code, PressImage};
+
+impl Handshake {
+    /// Why no stroke is accepted, when something is wrong.
+    pub(super) fn obstacle(&self) -> Option<Code> {
+        let policy = self.config.policy;
+        let storage = !self.storage_ok && policy.on_storage_full == OnStorageFull::Stop;
+        let missed = self.missed && policy.on_missed_stroke == OnMissed::Block;
+        None.or(self.scanner.err())
+            .or(self.stale.then_some(Code::PressStale))
+            .or(storage.then_some(Code::StorageFailed))
+            .or(missed.then_some(Code::MissedStroke))
+    }
+
+    pub(super) fn blocked(&self) -> bool {
+        self.obstacle().is_some() || self.press.as_ref().is_some_and(|press| !press.enable)
+    }
+
+    /// Whether a result that is not acknowledged keeps the next stroke waiting.
+    pub(super) fn held(&self) -> bool {
+        self.work == Work::WaitAck && self.config.policy.no_ack == NoAck::Hold
+    }
+
+    /// The press's image, when it asks for a stroke that it has not asked for before: the trigger has stood long
+    /// enough, and there is a stroke number.
+    pub(super) fn settled_trigger(&self) -> Option<&PressImage> {
+        let needed = if self.config.counter.is_some() { self.config.debounce_reads } else { 1 };
+        let none =
+            |press: &PressImage| self.config.counter.is_some_and(|it| it.first == 1) && press.stroke_id == 0;
+        self.press.as_ref().filter(|press| press.trigger && self.held_reads >= needed.max(1) && !none(press))
+    }
+
+    pub(super) fn stroke_waits(&self) -> bool {
+        let new = |press: &&PressImage| {
+            self.last.is_none_or(|last| (press.session_id, press.stroke_id) != (last.session, last.stroke))
+        };
+        !self.blocked() && !self.held() && self.settled_trigger().filter(new).is_some()
+    }
+
+    pub(super) fn rescan_wanted(&self) -> bool {
+        let Some(press) = self.press.as_ref().filter(|press| press.rescan) else { return false };
+        let asked = if self.config.counts_attempts { press.attempt != self.asked } else { self.rescan_rose };
+        let same = self.last.is_some_and(|last| self.press_is_at(last));
+        asked && same && !self.blocked() && !self.held()
+    }
+
+    pub(super) fn another_stroke(&self) -> bool {
+        let here = |press: &PressImage| (press.session_id, press.stroke_id);
+        let job = self.stroke().map(|key| (key.session, key.stroke));
+        self.settled_trigger()
+            .is_some_and(|press| Some(here(press)) != job && Some(here(press)) != self.counted)
+    }
+
+    /// A stroke came while another was in hand: the plate has moved, it is not queued.
+    pub(super) fn miss(&mut self) -> Transition {
+        if let Some(press) = &self.press {
+            let here = (press.session_id, press.stroke_id);
+            let missed = self.steps_to(here).map_or(1, |(steps, back)| if back { 1 } else { steps });
+            self.counted = Some(here);
+            self.count_missed(missed);
+        }
+        Transition::T26
+    }
+
+    /// Steps of the stroke counter from where it was last accounted for, and whether it went back; `None` in another
+    /// session or without a counter.
+    pub(super) fn steps_to(&self, (session, stroke): (u16, u16)) -> Option<(u32, bool)> {
+        let counter = self.config.counter?;
+        let (_, before) = self.counted.filter(|&(counted_session, _)| counted_session == session)?;
+        let steps = counter.distance(before, stroke);
+        Some((steps, steps > u32::from(counter.wrap) / 2))
+    }
+
+    pub(super) fn count_missed(&mut self, strokes: u32) {
+        if strokes > 0 {
+            self.missed = true;
+            self.missed_total += u64::from(strokes);
+            self.missed_count = self.missed_count.saturating_add(u16::try_from(strokes).unwrap_or(u16::MAX));
+            self.warn(Code::MissedStroke);
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! The stroke in hand: from its acceptance to the press's acknowledge.
+
+use std::time::Duration;
+
+use platen_plant::press::OnStorageFull;
+
+use super::machine::{Effect, Handshake, Job};
+use super::{LinkState, Transition, Work};
+use crate::{Acked, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
+
+/// A journal that has not answered after this long counts as failed for this record.
+const JOURNAL_LIMIT: Duration = Duration::from_secs(10);
+
+impl Handshake {
+    pub(super) fn accept_stroke(&mut self, now: Duration, transition: Transition) -> Transition {
+        let Some(press) = self.press.clone() else { return transition };
+        let here = (press.session_id, press.stroke_id);
+        match self.steps_to(here) {
+            Some((_, true)) => self.warn(Code::CounterBack),
+            Some((steps, false)) => self.count_missed(steps.saturating_sub(1)),
+            None => {}
+        }
+        self.accept(press, now);
+        transition
+    }
+
+    pub(super) fn accept_rescan(&mut self, now: Duration, transition: Transition) -> Transition {
+        if let Some(press) = self.press.clone() {
+            self.accept(press, now);
+        }
+        transition
+    }
+
+    pub(super) fn accept(&mut self, press: PressImage, now: Duration) {
+        if let Some(key) = self.unacked.take() {
+            self.close(key, Acked::NextStroke);
+        }
+        if self.last.is_some_and(|last| last.session != press.session_id) {
+            self.attempts.clear();
+        }
+        let known = self.attempts.get(&press.stroke_id);
+        let attempt = known.map_or(press.attempt, |known| press.attempt.max(known.saturating_add(1)));
+        self.attempts.insert(press.stroke_id, attempt);
+        self.forget_old_lap(press.stroke_id);
+        let key = StrokeKey {
+            press: self.config.press,
+            session: press.session_id,
+            stroke: press.stroke_id,
+            attempt,
+        };
+        self.run_id = self.run_id.wrapping_add(1);
+        self.last = Some(key);
+        self.asked = press.attempt;
+        self.counted = Some((key.session, key.stroke));
+        let data = Box::new(press.data.clone());
+        self.effects.push(Effect::Journal(Record::Accepted { key, run_id: self.run_id, data }));
+        self.job = Some(Job::new(key, self.run_id, press.data, now));
+        self.work = Work::Accepted;
+    }
+
+    /// Strokes ahead of the counter are those of its last turn: they may come again.
+    pub(super) fn forget_old_lap(&mut self, stroke: u16) {
+        if let Some(counter) = self.config.counter {
+            let half = u32::from(counter.wrap) / 2;
+            self.attempts.retain(|&known, _| counter.distance(known, stroke) <= half);
+        }
+    }
+
+    pub(super) fn journaled(&self) -> bool {
+        self.job.as_ref().is_some_and(|job| job.journaled.is_some())
+    }
+
+    pub(super) fn journal_overdue(&self, now: Duration) -> bool {
+        self.job
+            .as_ref()
+            .is_some_and(|job| job.journaled.is_none() && now.saturating_sub(job.since) >= JOURNAL_LIMIT)
+    }
+
+    pub(super) fn journal_failed(&mut self) {
+        if let Some(job) = &mut self.job {
+            job.journaled = Some(false);
+        }
+        self.storage_failed();
+    }
+
+    /// The press is clear, and the acceptance is on the disk, or the plant goes on without a journal.
+    pub(super) fn clear_to_start(&self) -> bool {
+        let stored = self.job.as_ref().and_then(|job| job.journaled);
+        let may = stored == Some(true) || stored.is_some() && !self.storage_stops();
+        may && self.press.as_ref().is_some_and(|press| press.clear_to_scan && press.enable && !press.abort)
+    }
+
+    pub(super) fn storage_stops(&self) -> bool {
+        self.config.policy.on_storage_full == OnStorageFull::Stop
+    }
+
+    pub(super) fn start_scan(&mut self, now: Duration) -> Transition {
+        if let Some(job) = &mut self.job {
+            job.scan_started_at = Some(now);
+            job.since = now;
+            let data = Box::new(job.data.clone());
+            self.effects.push(Effect::StartScan { key: job.key, run_id: job.run_id, data });
+        }
+        self.work = Work::Scanning;
+        Transition::T12
+    }
+
+    /// Why the scan of the stroke in hand must not go on.
+    pub(super) fn given_up(&self, now: Duration) -> Option<Code> {
+        let job = self.job.as_ref()?;
+        let scanning = self.work == Work::Scanning;
+        let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
+        let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
+        let failed = match &job.outcome {
+            Some(Measurement { verdict: Verdict::NotMeasured(code), .. }) if !job.acquired => Some(*code),
+            _ => None,
+        };
+        let overdue = now.saturating_sub(job.since) >= self.scan_limit();
+        let unstored = job.journaled == Some(false) && self.storage_stops() && !scanning;
+        failed
+            .or(asks(|press| press.abort).then_some(Code::ScanAborted))
+            .or(asks(|press| !press.enable).then_some(Code::PressDisabled))
+            .or((scanning && !job.acquired && asks(|press| !press.clear_to_scan)).then_some(Code::NotClear))
+            .or((overdue && scanning).then_some(Code::ScanTimeout))
+            .or((overdue && !scanning).then_some(Code::NotClear))
+            .or(unstored.then_some(Code::StorageFailed))
+    }
+
+    pub(super) fn give_up(&mut self, now: Duration) -> Transition {
+        let code = self.given_up(now).unwrap_or(Code::ScanFailed);
+        if let (Work::Scanning, Some(key)) = (self.work, self.stroke()) {
+            self.effects.push(Effect::Cancel(key));
+        }
+        self.finish(Measurement::not_measured(code), Work::Aborted, now);
+        Transition::T14
+    }
+
+    pub(super) fn scan_complete(&self) -> bool {
+        self.job.as_ref().is_some_and(|job| job.acquired || job.outcome.is_some())
+    }
+
+    pub(super) fn begin_evaluation(&mut self, now: Duration) -> Transition {
+        if let Some(job) = &mut self.job {
+            job.acquired_at = Some(now);
+            job.since = now;
+            self.effects.push(Effect::Journal(Record::Scanned { key: job.key }));
+            self.effects.push(Effect::Evaluate(job.key));
+        }
+        self.work = Work::Evaluating;
+        Transition::T13
+    }
+
+    pub(super) fn evaluated(&self, now: Duration) -> bool {
+        let limit = self.config.timeouts.evaluate;
+        self.job.as_ref().is_some_and(|job| job.outcome.is_some() || now.saturating_sub(job.since) >= limit)
+    }
+
+    pub(super) fn conclude(&mut self, now: Duration) -> Transition {
+        let outcome = self.job.as_mut().and_then(|job| job.outcome.take());
+        if outcome.is_none()
+            && let Some(key) = self.stroke()
+        {
+            self.effects.push(Effect::Cancel(key));
+        }
+        let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
+        let measured = !matches!(outcome.verdict, Verdict::NotMeasured(_));
+        self.finish(outcome, Work::Publish, now);
+        if measured { Transition::T15 } else { Transition::T16 }
+    }
+
+    /// Makes the result final and journals it; it is written once that is done.
+    pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
+        let Some(job) = &mut self.job else { return };
+        if let Verdict::NotMeasured(code) = measurement.verdict {
+            self.effects.push(Effect::Alarm(code));
+        } else {
+            job.add_times(&mut measurement.figures, now);
+        }
+        self.result_seq = self.result_seq.checked_add(1).unwrap_or(1);
+        let publication = Publication {
+            key: job.key,
+            run_id: job.run_id,
+            seq: self.result_seq,
+            recipe_id: job.data.recipe_id,
+            measurement,
+        };
+        self.effects.push(Effect::Journal(Record::Finished(Box::new(publication.clone()))));
+        job.publication = Some(publication);
+        job.journaled = None;
+        job.since = now;
+        self.work = next;
+    }
+
+    pub(super) fn published(&mut self, now: Duration) -> Transition {
+        self.unacked = self.stroke();
+        self.work = Work::WaitAck;
+        if let Some(job) = &mut self.job {
+            job.since = now;
+        }
+        Transition::T17
+    }
+
+    /// An acknowledge that stood before the result did belongs to another one.
+    pub(super) fn acknowledged(&self) -> bool {
+        let ack = self.press.as_ref().is_some_and(|press| press.ack);
+        ack && self.ack_was_low && self.unacked.is_some()
+    }
+
+    pub(super) fn acked(&mut self, now: Duration) -> Transition {
+        if let Some(key) = self.unacked {
+            self.close(key, Acked::Explicit);
+        }
+        self.ack_was_low = false;
+        self.work = Work::Clear;
+        if let Some(job) = &mut self.job {
+            job.since = now;
+        }
+        Transition::T18
+    }
+
+    pub(super) fn ack_overdue(&self, now: Duration) -> bool {
+        let waited = self.job.as_ref().map_or(Duration::MAX, |job| now.saturating_sub(job.since));
+        if self.held() { self.reset } else { waited >= self.config.timeouts.ack }
+    }
+
+    /// The result stays in the registers; the next stroke will acknowledge it.
+    pub(super) fn go_on_without_ack(&mut self, _now: Duration) -> Transition {
+        self.warn(Code::AckTimeout);
+        self.work = Work::Idle;
+        Transition::T20
+    }
+
+    pub(super) fn ack_dropped(&self, now: Duration) -> bool {
+        let waited = self.job.as_ref().map_or(Duration::MAX, |job| now.saturating_sub(job.since));
+        let ack = self.press.as_ref().is_some_and(|press| press.ack);
+        !ack || waited >= self.config.timeouts.clear
+    }
+}

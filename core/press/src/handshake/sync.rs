@@ -1,0 +1,181 @@
+//! The link region: finding, losing and leaving the press.
+
+use std::time::Duration;
+
+use platen_plant::press::{Input, OnInterrupted};
+
+use super::machine::{Effect, Handshake, Job};
+use super::{LinkState, Transition, Work};
+use crate::{Acked, Code, Measurement, Record, Stage, StrokeKey};
+
+/// A heartbeat of another host that stands still this long is that of a dead one.
+const OWNER_WATCH: Duration = Duration::from_secs(2);
+
+impl Handshake {
+    pub(super) fn end(&mut self) -> Transition {
+        if matches!(self.work, Work::Accepted | Work::Scanning | Work::Evaluating)
+            && let Some(job) = &self.job
+        {
+            self.effects.push(Effect::Cancel(job.key));
+        }
+        self.link = LinkState::Stopped { told: self.may_write() && self.connected };
+        Transition::T24
+    }
+
+    pub(super) fn begin_sync(&mut self, now: Duration, transition: Transition) -> Transition {
+        self.link = LinkState::Sync;
+        self.fault = None;
+        self.press = None;
+        self.held_reads = 0;
+        self.heartbeat_at = now;
+        self.stale = false;
+        self.host_seen = false;
+        self.foreign = None;
+        self.intruder = false;
+        transition
+    }
+
+    pub(super) fn fail(&mut self, transition: Transition) -> Transition {
+        let code = self.fault.take().unwrap_or(Code::DeviceFailure);
+        self.fail_as(code, transition)
+    }
+
+    pub(super) fn fail_as(&mut self, code: Code, transition: Transition) -> Transition {
+        self.link = LinkState::Fault(code);
+        self.alarm(code);
+        transition
+    }
+
+    pub(super) fn wrong_press(&self) -> bool {
+        self.press.as_ref().is_some_and(|press| press.wrong.is_some())
+    }
+
+    /// Nothing was written to it and nothing is; perhaps it is only starting.
+    pub(super) fn leave_wrong_press(&mut self) -> Transition {
+        let wrong = self.press.take().and_then(|press| press.wrong);
+        let code = if wrong.is_some_and(|wrong| wrong.input == Input::PressId) {
+            Code::PressId
+        } else {
+            Code::MapVersion
+        };
+        if self.link_error != Some(code) {
+            self.link_error = Some(code);
+            self.alarm(code);
+        }
+        self.connected = false;
+        self.link = LinkState::Offline;
+        self.effects.push(Effect::Reconnect);
+        Transition::T3
+    }
+
+    pub(super) fn synchronised(&self, now: Duration) -> bool {
+        let alone = self.foreign.is_none_or(|host| now.saturating_sub(host.since) >= OWNER_WATCH);
+        self.press.is_some() && self.host_seen && alone
+    }
+
+    /// From the first full picture of the press: what goes on, what waits, what is over.
+    pub(super) fn enter_online(&mut self, now: Duration) -> Transition {
+        self.link = LinkState::Online;
+        self.link_error = None;
+        self.intruder = false;
+        if let Some((stage, job)) = self.take_recalled(now) {
+            self.resume(stage, job, now)
+        } else if self.work.is_busy() || self.work == Work::WaitAck {
+            self.carry_on(now)
+        } else {
+            self.become_idle(now)
+        }
+    }
+
+    /// A stroke of the time before the restart.
+    pub(super) fn resume(&mut self, stage: Stage, job: Job, now: Duration) -> Transition {
+        let waits = self.press_is_at(job.key);
+        let may_rescan = self.config.policy.on_interrupted == OnInterrupted::Rescan
+            && self.press.as_ref().is_some_and(|press| press.trigger && press.clear_to_scan);
+        match stage {
+            Stage::Finished if waits => {
+                self.ack_was_low = true;
+                self.job = Some(Job { journaled: Some(true), ..job });
+                self.work = Work::Publish;
+                Transition::T5
+            }
+            Stage::Scanned if waits => {
+                self.effects.push(Effect::Evaluate(job.key));
+                self.job = Some(Job { acquired_at: Some(now), ..job });
+                self.work = Work::Evaluating;
+                Transition::T7
+            }
+            Stage::Accepted if waits && !may_rescan => {
+                self.job = Some(job);
+                self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
+                Transition::T7
+            }
+            _ => {
+                let key = job.key;
+                self.job = Some(job);
+                if stage < Stage::Finished {
+                    self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
+                }
+                self.close(key, Acked::Never);
+                if stage == Stage::Accepted && waits {
+                    return self.accept_rescan(now, Transition::T7);
+                }
+                self.become_idle(now)
+            }
+        }
+    }
+
+    /// A stroke of the time before the link broke.
+    pub(super) fn carry_on(&mut self, now: Duration) -> Transition {
+        let Some(key) = self.stroke() else { return self.become_idle(now) };
+        let concluded = matches!(self.work, Work::Publish | Work::WaitAck) && self.journaled();
+        if concluded && !self.press_is_at(key) {
+            let how = if self.work == Work::WaitAck { Acked::NextStroke } else { Acked::Never };
+            self.close(key, how);
+            return self.become_idle(now);
+        }
+        if self.work == Work::WaitAck {
+            self.work = Work::Publish;
+        }
+        self.ack_was_low |= concluded;
+        Transition::T5
+    }
+
+    /// Strokes that went by in the same session meanwhile are counted when the next one comes.
+    pub(super) fn become_idle(&mut self, now: Duration) -> Transition {
+        self.work = Work::Idle;
+        if let Some(press) = self.press.as_ref().filter(|press| !press.trigger && press.stroke_id != 0) {
+            let same_session = self.counted.filter(|(session, _)| *session == press.session_id);
+            self.counted = same_session.or(Some((press.session_id, press.stroke_id)));
+        }
+        if self.blocked() {
+            self.work = Work::Blocked;
+        } else if self.stroke_waits() {
+            return self.accept_stroke(now, Transition::T6);
+        }
+        Transition::T8
+    }
+
+    /// Ends a stroke that the press does not wait for any more.
+    pub(super) fn close(&mut self, key: StrokeKey, how: Acked) {
+        self.effects.push(Effect::Journal(Record::Acked { key, how }));
+        self.unacked = None;
+    }
+
+    pub(super) fn press_is_at(&self, key: StrokeKey) -> bool {
+        self.press
+            .as_ref()
+            .is_some_and(|press| (press.session_id, press.stroke_id) == (key.session, key.stroke))
+    }
+
+    pub(super) fn newly_stale(&self, now: Duration) -> bool {
+        let beats = self.press.as_ref().is_some_and(|press| press.heartbeat.is_some());
+        beats && !self.stale && now.saturating_sub(self.heartbeat_at) >= self.config.timeouts.heartbeat_in
+    }
+
+    pub(super) fn press_stale(&mut self) -> Transition {
+        self.stale = true;
+        self.alarm(Code::PressStale);
+        Transition::T25
+    }
+}

@@ -1,0 +1,251 @@
+//! Makes the registers of the host say what they shall say, whatever happens on the way.
+//!
+//! The wanted words are compared with those that the press is known to have (echoed, or read back); what differs is
+//! written until it is echoed. Data come first with the old commit word, then the commit word, then the status, so that
+//! a result is complete before it is valid; a result is withdrawn by its status first. Every write is harmless to
+//! repeat.
+
+use std::time::Duration;
+
+use platen_plant::press::{Mode, Output, Place, Press, RegisterMap};
+use tokio::time::Instant;
+
+use crate::{Client, HostImage, Link, LinkError};
+
+/// Heartbeats of this many beats ago may still be under way on a slow line.
+const OLD_BEATS: u16 = 16;
+
+/// When a register is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    /// For people only: rides along with data, and with each beat.
+    Idle,
+    Data,
+    Commit,
+    Status,
+}
+
+/// The block of the host: what it shall be, what it is known to be.
+#[derive(Debug)]
+pub(crate) struct Reconciler {
+    map: RegisterMap,
+    turns: Vec<Turn>,
+    /// Registers that one write may span: neighbours inside the same range of the allow-list.
+    spans: Vec<std::ops::Range<usize>>,
+    pretend: bool,
+    known: Option<Vec<u16>>,
+    heartbeat: u16,
+    beat_every: Duration,
+    next_beat: Instant,
+    budget: Budget,
+    /// Writes that repeated what had been echoed before: the press had lost or changed it.
+    pub(crate) rewrites: u64,
+}
+
+/// What a read of the host's own block says about who writes there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Witness {
+    pub(crate) owner: Option<u16>,
+    pub(crate) heartbeat: Option<u16>,
+    pub(crate) mine: bool,
+}
+
+impl Reconciler {
+    pub(crate) fn new(press: &Press) -> Self {
+        let now = Instant::now();
+        Self {
+            turns: turns(&press.map),
+            spans: spans(press),
+            pretend: press.mode == Mode::DryRun,
+            known: None,
+            heartbeat: 0,
+            beat_every: press.timeouts.heartbeat,
+            next_beat: now,
+            budget: Budget::new(press.write.max_writes_per_s, now),
+            map: press.map.clone(),
+            rewrites: 0,
+        }
+    }
+
+    /// Nothing is known about the registers any more.
+    pub(crate) fn forget(&mut self) {
+        self.known = None;
+    }
+
+    /// Whether the registers are known to say something else than they shall, or a beat is due.
+    pub(crate) fn is_due(&self, image: &HostImage) -> bool {
+        Instant::now() >= self.next_beat || !self.says(&image.encode(&self.map, self.heartbeat))
+    }
+
+    /// Takes note of the block as read back. `owner` is this host's number.
+    pub(crate) fn read_back(&mut self, words: Vec<u16>, owner: u16) -> Witness {
+        let field = |output, words: &[u16]| {
+            let offset = self.map.output(output).and_then(|field| field.place.offset())?;
+            words.get(usize::from(offset)).copied()
+        };
+        let (found_owner, found_beat) = (field(Output::Owner, &words), field(Output::Heartbeat, &words));
+        let before = self.known.as_deref();
+        let known = |output| before.and_then(|words| field(output, words));
+        let own = |found: u16| found == 0 || found == owner || Some(found) == known(Output::Owner);
+        let recent = |found: u16| {
+            found == 0
+                || Some(found) == known(Output::Heartbeat)
+                || self.heartbeat.wrapping_sub(found) < OLD_BEATS
+        };
+        let mine = found_owner.is_none_or(own) && found_beat.is_none_or(recent);
+        if before.is_none() {
+            self.heartbeat = found_beat.unwrap_or(0);
+            self.next_beat = Instant::now();
+        } else if before != Some(&words) {
+            self.rewrites += 1;
+        }
+        if !self.pretend || self.known.is_none() {
+            self.known = Some(words);
+        }
+        Witness { owner: found_owner, heartbeat: found_beat, mine }
+    }
+
+    /// Writes what differs. True when the registers are known to say all of `image`; false when the limit of writes per
+    /// second puts the rest off.
+    pub(crate) async fn write<L: Link>(
+        &mut self,
+        client: &mut Client<L>,
+        image: &HostImage,
+        last: bool,
+    ) -> Result<bool, LinkError> {
+        let now = Instant::now();
+        let beat = now >= self.next_beat;
+        if beat && !last {
+            self.heartbeat = self.heartbeat.wrapping_add(1);
+            self.next_beat = now + self.beat_every;
+        }
+        let wanted = image.encode(&self.map, self.heartbeat);
+        let Some(known) = &self.known else { return Ok(false) };
+        let withdraw = self.shows_valid(known) && !image.valid;
+        let order = if withdraw {
+            [Turn::Status, Turn::Data, Turn::Commit, Turn::Idle]
+        } else {
+            [Turn::Data, Turn::Commit, Turn::Status, Turn::Idle]
+        };
+        for turn in order.into_iter().filter(|&turn| turn != Turn::Idle || beat || last) {
+            for span in self.spans.clone() {
+                let Some(range) = self.differing(turn, &wanted, span) else { continue };
+                if !last && !self.budget.take(now) {
+                    return Ok(false);
+                }
+                self.write_range(client, turn, &wanted, range).await?;
+            }
+        }
+        Ok(self.says(&wanted))
+    }
+
+    /// Whether the registers that may be written are known to say this.
+    fn says(&self, wanted: &[u16]) -> bool {
+        let same = |known: &Vec<u16>| {
+            let mut registers = self.spans.iter().cloned().flatten().filter(|&i| self.turns[i] != Turn::Idle);
+            registers.all(|i| known[i] == wanted[i])
+        };
+        self.known.as_ref().is_some_and(same)
+    }
+
+    fn shows_valid(&self, words: &[u16]) -> bool {
+        let field = self.map.output(Output::StatusResultValid);
+        field.is_some_and(|field| match field.place {
+            Place::Bit(offset, bit) => {
+                words.get(usize::from(offset)).is_some_and(|word| (word >> bit & 1 == 1) != field.active_low)
+            }
+            Place::Register(offset) => words.get(usize::from(offset)).is_some_and(|&word| word != 0),
+            Place::Constant(_) => false,
+        })
+    }
+
+    /// From the first to the last register of this turn that differs within a span.
+    fn differing(
+        &self,
+        turn: Turn,
+        wanted: &[u16],
+        span: std::ops::Range<usize>,
+    ) -> Option<std::ops::Range<usize>> {
+        let known = self.known.as_ref()?;
+        let differs = |&i: &usize| self.turns[i] == turn && wanted[i] != known[i];
+        let first = span.clone().find(differs)?;
+        let last = span.rev().find(differs)?;
+        Some(first..last + 1)
+    }
+
+    /// Registers of other turns that lie between keep the words that the press has.
+    async fn write_range<L: Link>(
+        &mut self,
+        client: &mut Client<L>,
+        turn: Turn,
+        wanted: &[u16],
+        range: std::ops::Range<usize>,
+    ) -> Result<(), LinkError> {
+        let Some(known) = &mut self.known else { return Ok(()) };
+        let goes = |i: usize| self.turns[i] == turn || self.turns[i] == Turn::Idle;
+        let word = |i: usize| if goes(i) { wanted[i] } else { known[i] };
+        let words: Vec<u16> = range.clone().map(word).collect();
+        let start = self.map.write.start + range.start as u16;
+        if self.pretend {
+            tracing::info!(start, ?words, "dry run: would write");
+        } else {
+            client.guarded_write(start, &words).await?;
+        }
+        known[range].copy_from_slice(&words);
+        Ok(())
+    }
+}
+
+fn turns(map: &RegisterMap) -> Vec<Turn> {
+    let mut turns = vec![Turn::Data; usize::from(map.write.count)];
+    let mut set = |offset: Option<u16>, turn| {
+        if let Some(place) = offset.and_then(|offset| turns.get_mut(usize::from(offset))) {
+            *place = turn;
+        }
+    };
+    set(map.output(Output::HostState).and_then(|field| field.place.offset()), Turn::Idle);
+    set(map.output(Output::ResultSeq).and_then(|field| field.place.offset()), Turn::Commit);
+    let last = [Output::MapVersion, Output::Heartbeat, Output::AckStrokeId];
+    let status = map.outputs.iter().filter(|(output, _)| output.is_status() || last.contains(output));
+    for (_, field) in status {
+        set(field.place.offset(), Turn::Status);
+    }
+    turns
+}
+
+/// The parts of the write block that the allow-list leaves, as register offsets.
+fn spans(press: &Press) -> Vec<std::ops::Range<usize>> {
+    let block = press.map.write.addresses();
+    let inside = |range: &std::ops::RangeInclusive<u16>| {
+        let start = u32::from(*range.start()).max(block.start);
+        let end = (u32::from(*range.end()) + 1).min(block.end);
+        (start < end).then(|| (start - block.start) as usize..(end - block.start) as usize)
+    };
+    press.write.ranges().iter().filter_map(inside).collect()
+}
+
+/// A limit of writes per second, with a second's worth to spare.
+#[derive(Debug)]
+struct Budget {
+    per_second: f64,
+    left: f64,
+    at: Instant,
+}
+
+impl Budget {
+    fn new(per_second: u32, now: Instant) -> Self {
+        let per_second = f64::from(per_second);
+        Self { per_second, left: per_second, at: now }
+    }
+
+    fn take(&mut self, now: Instant) -> bool {
+        let earned = now.saturating_duration_since(self.at).as_secs_f64() * self.per_second;
+        self.left = (self.left + earned).min(self.per_second);
+        self.at = now;
+        let may = self.left >= 1.0;
+        if may {
+            self.left -= 1.0;
+        }
+        may
+    }
+}

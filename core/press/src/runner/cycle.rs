@@ -1,0 +1,455 @@
+//! The loop: poll, step, write; and what becomes of errors and effects.
+
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::Duration;
+
+use platen_plant::press::Press;
+use tokio::time::{Instant, sleep_until};
+
+use super::journal::{Done, JournalThread};
+use super::{Answer, Metrics, Order, PressSide, Status};
+use crate::handshake::{Effect, Event, Handshake, LinkState, Transition, Work};
+use crate::reconcile::Reconciler;
+use crate::{Client, Code, Consequence, Link, LinkError, PressImage, Torn, Verdict, consequence, saturates};
+
+/// Time between two reads of the host's own block, on a fast link and on a serial line.
+const READ_BACK: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(1)];
+/// Longest time between two looks at the timers of the handshake.
+const TICK: Duration = Duration::from_millis(100);
+/// Reads in a row that find the press writing before people are told.
+const TORN_LIMIT: u32 = 50;
+/// Time between two reports of how things stand.
+const STATUS: Duration = Duration::from_millis(200);
+/// Attempts to write the safe registers at the end.
+const LAST_WRITES: u32 = 3;
+
+/// Serves one press.
+pub(super) struct Runner<L> {
+    pub(super) press: Press,
+    pub(super) handshake: Handshake,
+    pub(super) registers: Reconciler,
+    pub(super) client: Client<L>,
+    pub(super) metrics: Metrics,
+    pub(super) journal: JournalThread,
+    pub(super) side: PressSide,
+    pub(super) clock: Clock,
+    pub(super) faults: Faults,
+    pub(super) last_press: Option<PressImage>,
+}
+
+/// When what is due.
+pub(super) struct Clock {
+    started: Instant,
+    next_connect: Instant,
+    backoff: Duration,
+    next_poll: Instant,
+    next_read_back: Instant,
+    read_back_every: Duration,
+    polled: Instant,
+    triggered: Instant,
+    busy_untold: bool,
+    next_status: Instant,
+}
+
+impl Clock {
+    pub(super) fn start(press: &Press) -> Self {
+        let now = Instant::now();
+        Self {
+            started: now,
+            next_connect: now,
+            backoff: press.link.backoff_min,
+            next_poll: now,
+            next_read_back: now,
+            read_back_every: READ_BACK[usize::from(press.link.is_serial())],
+            polled: now,
+            triggered: now,
+            busy_untold: false,
+            next_status: now,
+        }
+    }
+}
+
+/// Refusals and torn reads in a row.
+#[derive(Default)]
+pub(super) struct Faults {
+    exceptions: u32,
+    torn: u32,
+    unit_lost: bool,
+    unreachable_told: bool,
+}
+
+impl<L: Link> Runner<L> {
+    pub(super) async fn run(mut self) {
+        self.step(Event::Tick);
+        while !self.stopped() {
+            if let Err(error) = self.exchange().await {
+                self.fail(&error);
+            }
+            self.publish_status();
+            let until = self.next_due();
+            self.wait(until).await;
+            self.step(Event::Tick);
+        }
+        self.write_safe_registers().await;
+        self.publish_status();
+        self.client.disconnect();
+        self.journal.finish().await;
+    }
+
+    fn stopped(&self) -> bool {
+        matches!(self.handshake.state().link, LinkState::Stopped { .. })
+    }
+
+    /// Everything that is due now: a connection, a poll, a look at the own block, a write.
+    async fn exchange(&mut self) -> Result<(), LinkError> {
+        let now = Instant::now();
+        if !self.client.connected() || self.faults.unit_lost {
+            if now < self.clock.next_connect {
+                return Ok(());
+            }
+            self.connect().await?;
+        }
+        if now >= self.clock.next_poll {
+            self.clock.next_poll = now + self.press.link.poll;
+            self.poll().await?;
+        }
+        let syncing = self.handshake.state().link == LinkState::Sync;
+        if self.client.connected() && (syncing || Instant::now() >= self.clock.next_read_back) {
+            self.read_back().await?;
+        }
+        self.write().await
+    }
+
+    async fn connect(&mut self) -> Result<(), LinkError> {
+        if !self.client.connected() {
+            self.client.connect().await?;
+        }
+        self.registers.forget();
+        self.faults = Faults { unreachable_told: self.faults.unreachable_told, ..Faults::default() };
+        self.clock.next_poll = Instant::now();
+        self.step(Event::Connected);
+        Ok(())
+    }
+
+    /// Reads the press: its fast part while nothing happens on a slow line, else everything.
+    async fn poll(&mut self) -> Result<(), LinkError> {
+        let block = self.press.map.read;
+        let online = self.handshake.state().link == LinkState::Online;
+        let fast =
+            if self.press.link.is_serial() && online { self.press.map.fast_count() } else { block.count };
+        let seen = Instant::now();
+        let mut image = self.read_press(fast).await?;
+        if let Ok(part) = &image
+            && fast < block.count
+            && (part.trigger || part.rescan)
+        {
+            image = self.read_press(block.count).await?;
+        }
+        match image {
+            Ok(image) => {
+                self.faults.torn = 0;
+                self.last_press = Some(image.clone());
+                self.clock.polled = seen;
+                self.step(Event::Press(Box::new(image)));
+            }
+            Err(torn) => self.torn(torn),
+        }
+        Ok(())
+    }
+
+    async fn read_press(&mut self, count: u16) -> Result<Result<PressImage, Torn>, LinkError> {
+        let words = self.client.read(&self.press.map.read, count).await?;
+        self.faults.exceptions = 0;
+        Ok(PressImage::decode(&self.press.map, self.press.press_id, &words))
+    }
+
+    fn torn(&mut self, torn: Torn) {
+        self.metrics.torn_reads += 1;
+        self.faults.torn += 1;
+        self.clock.next_poll = Instant::now();
+        if self.faults.torn == TORN_LIMIT {
+            let detail = format!("stroke_id {} and stroke_id_tail {} differ", torn.head, torn.tail);
+            self.alarm(Code::TornBlock, Some(detail));
+        }
+        if self.faults.torn >= TORN_LIMIT {
+            self.clock.next_poll += self.press.link.poll;
+        }
+    }
+
+    /// Reads the host's own block: does another host write there, has the press lost it?
+    async fn read_back(&mut self) -> Result<(), LinkError> {
+        let block = self.press.map.write;
+        let words = self.client.read(&block, block.count).await?;
+        self.clock.next_read_back = Instant::now() + self.clock.read_back_every;
+        let seen = self.registers.read_back(words, self.handshake.image().owner);
+        self.metrics.rewrites = self.registers.rewrites;
+        self.step(Event::Host { owner: seen.owner, heartbeat: seen.heartbeat, mine: seen.mine });
+        Ok(())
+    }
+
+    async fn write(&mut self) -> Result<(), LinkError> {
+        if !self.client.connected() || !self.handshake.may_write() {
+            return Ok(());
+        }
+        let image = self.handshake.image().clone();
+        if !self.registers.is_due(&image) && self.handshake.state().work != Work::Publish {
+            return Ok(());
+        }
+        if self.registers.write(&mut self.client, &image, false).await? {
+            if image.busy && std::mem::take(&mut self.clock.busy_untold) {
+                self.metrics.trigger_to_busy.add(self.clock.triggered.elapsed());
+            }
+            self.step(Event::Written);
+        }
+        Ok(())
+    }
+
+    /// After a stop: nothing that stands in the registers may still look alive.
+    async fn write_safe_registers(&mut self) {
+        let image = self.handshake.image().clone();
+        for _ in 0..LAST_WRITES {
+            if !self.handshake.may_write() || !self.client.connected() {
+                return;
+            }
+            match self.registers.write(&mut self.client, &image, true).await {
+                Ok(_) => return,
+                Err(error) => tracing::warn!(%error, "writing the safe registers failed"),
+            }
+        }
+    }
+
+    /// What an error of the link means for the handshake.
+    fn fail(&mut self, error: &LinkError) {
+        tracing::debug!(%error, "link");
+        match error {
+            LinkError::Exception { code, .. } => self.refused(*code, error),
+            LinkError::Refused { .. } => self.fault(Code::WriteRefused, error),
+            LinkError::Connect { .. } | LinkError::ConnectTimeout { .. } => {
+                if !std::mem::replace(&mut self.faults.unreachable_told, true) {
+                    self.alarm(Code::PressUnreachable, Some(error.to_string()));
+                }
+                self.back_off();
+            }
+            LinkError::Timeout { .. } | LinkError::Broken { .. } | LinkError::Mismatch { .. } => {
+                self.alarm(Code::LinkBroken, Some(error.to_string()));
+                self.lose_link();
+            }
+        }
+    }
+
+    fn refused(&mut self, exception: u8, error: &LinkError) {
+        match consequence(exception) {
+            Consequence::Fault(code) => self.fault(code, error),
+            Consequence::UnitLost => {
+                self.faults.unit_lost = true;
+                self.alarm(Code::GatewayFailure, Some(error.to_string()));
+                self.lose_link();
+            }
+            Consequence::Retry { limit, pause, fault } => {
+                self.faults.exceptions += 1;
+                self.clock.next_poll = Instant::now() + pause;
+                if self.faults.exceptions > limit {
+                    self.fault(fault, error);
+                }
+            }
+        }
+    }
+
+    fn fault(&mut self, code: Code, error: &LinkError) {
+        if !matches!(self.handshake.state().link, LinkState::Fault(_)) {
+            tracing::error!(%error, "fault");
+        }
+        self.step(Event::Fault(code));
+    }
+
+    fn lose_link(&mut self) {
+        self.last_press = None;
+        self.step(Event::Disconnected);
+        self.back_off();
+    }
+
+    /// The pause before the next connection, doubled each time, a quarter more or less by chance: two hosts that lost
+    /// the same press shall not come back in step.
+    fn back_off(&mut self) {
+        let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
+        self.clock.next_connect = Instant::now() + self.clock.backoff.mul_f64(0.75 + 0.5 * chance);
+        self.clock.backoff = (self.clock.backoff * 2).min(self.press.link.backoff_max);
+    }
+
+    fn next_due(&self) -> Instant {
+        let tick = Instant::now() + TICK;
+        if !self.client.connected() || self.faults.unit_lost {
+            return tick.min(self.clock.next_connect);
+        }
+        tick.min(self.clock.next_poll)
+    }
+
+    /// Waits for the next thing: an answer of the host, of the journal, or the time. What they change in the registers
+    /// is written at once.
+    async fn wait(&mut self, until: Instant) {
+        tokio::select! {
+            biased;
+            answer = self.side.answers.recv() => self.answer(answer.unwrap_or(Answer::Stop)),
+            Some(done) = self.journal.done.recv() => self.journaled(done),
+            () = sleep_until(until) => {}
+        }
+    }
+
+    fn answer(&mut self, answer: Answer) {
+        let event = match answer {
+            Answer::Acquired(key) => Event::Acquired(key),
+            Answer::Result(key, mut measurement) => {
+                if measurement.warning.is_none() && saturates(&self.press.map, &measurement.figures) {
+                    measurement.warning = Some(Code::Saturated);
+                }
+                Event::Measured(key, measurement)
+            }
+            Answer::Failed(key, code) => Event::Failed(key, code),
+            Answer::Scanner { ready, estimate } => Event::Scanner { ready, estimate },
+            Answer::Reset => Event::Reset,
+            Answer::Stop => Event::Stop,
+        };
+        self.step(event);
+    }
+
+    fn journaled(&mut self, done: Done) {
+        if let Some(error) = &done.error {
+            tracing::error!(error, stroke = %done.key, "the journal cannot be written");
+        }
+        self.step(Event::Journaled { key: done.key, stage: done.stage, ok: done.error.is_none() });
+    }
+
+    fn step(&mut self, event: Event) {
+        let now = self.clock.started.elapsed();
+        for effect in self.handshake.step(event, now) {
+            self.carry_out(effect);
+        }
+    }
+
+    fn carry_out(&mut self, effect: Effect) {
+        match effect {
+            Effect::Journal(record) => {
+                if let Err(record) = self.journal.record(record) {
+                    tracing::error!(stroke = %record.key(), "the journal's thread is gone");
+                }
+            }
+            Effect::StartScan { key, run_id, data } => self.order(Order::StartScan { key, run_id, data }),
+            Effect::Evaluate(key) => self.order(Order::Evaluate(key)),
+            Effect::Cancel(key) => self.order(Order::Cancel(key)),
+            Effect::PartEnd => self.order(Order::PartEnd),
+            Effect::Alarm(code) => self.alarm(code, None),
+            Effect::Reconnect => {
+                self.client.disconnect();
+                self.last_press = None;
+                self.back_off();
+            }
+            Effect::Took(transition) => self.took(transition),
+        }
+    }
+
+    /// Nobody listens any more when the host has dropped its end; that stops the handshake by itself.
+    fn order(&self, order: Order) {
+        let _ = self.side.orders.send(order);
+    }
+
+    fn alarm(&mut self, code: Code, detail: Option<String>) {
+        self.order(Order::Alarm { code, stroke: self.handshake.stroke(), detail });
+    }
+
+    fn took(&mut self, transition: Transition) {
+        let state = self.handshake.state();
+        tracing::debug!(?transition, %state, stroke = ?self.handshake.stroke(), "handshake");
+        match transition {
+            Transition::T5 | Transition::T7 | Transition::T8 => self.arrived(),
+            Transition::T6 | Transition::T11 | Transition::T27 => {
+                self.arrived();
+                self.metrics.strokes += 1;
+                self.clock.triggered = self.clock.polled;
+                self.clock.busy_untold = true;
+            }
+            Transition::T17 => self.delivered(),
+            Transition::T20 => self.metrics.ack_timeouts += 1,
+            _ => {}
+        }
+    }
+
+    /// In step with the press: the next loss is a new one.
+    fn arrived(&mut self) {
+        self.clock.backoff = self.press.link.backoff_min;
+        self.faults.unreachable_told = false;
+    }
+
+    fn delivered(&mut self) {
+        let Some(result) = &self.handshake.image().result else { return };
+        self.metrics.stroke_to_result.add(self.clock.triggered.elapsed());
+        match result.measurement.verdict {
+            Verdict::NotMeasured(_) => self.metrics.not_measured += 1,
+            Verdict::Pass | Verdict::Fail | Verdict::CannotTell => self.metrics.measured += 1,
+        }
+    }
+
+    /// At every change of state, else a few times a second.
+    fn publish_status(&mut self) {
+        let now = Instant::now();
+        if now < self.clock.next_status && self.side.status.borrow().state == self.handshake.state() {
+            return;
+        }
+        self.clock.next_status = now + STATUS;
+        self.metrics.missed = self.handshake.missed_total();
+        let status = Status {
+            state: self.handshake.state(),
+            link_error: self.handshake.link_error(),
+            press: self.last_press.clone(),
+            host: self.handshake.image().clone(),
+            counts: self.client.counts().clone(),
+            metrics: self.metrics.clone(),
+        };
+        self.side.status.send_replace(status);
+    }
+}
+
+/// The mode `off`: leaves the press alone.
+pub(super) async fn wait_for_stop(mut side: PressSide) {
+    while !matches!(side.answers.recv().await, None | Some(Answer::Stop)) {}
+}
+
+/// The mode `listen`: reads, tells what changed, and never writes.
+pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut side: PressSide) {
+    let mut last = None;
+    let mut backoff = press.link.backoff_min;
+    loop {
+        let pause = match look(press, &mut client).await {
+            Ok(Ok(image)) => {
+                backoff = press.link.backoff_min;
+                if last.as_ref() != Some(&image) {
+                    last = Some(image.clone());
+                    // Nobody listens any more: the end comes through the other channel.
+                    let _ = side.orders.send(Order::Seen(Box::new(image)));
+                }
+                press.link.poll
+            }
+            Ok(Err(_)) => Duration::ZERO,
+            Err(error) => {
+                tracing::warn!(%error, "listening");
+                backoff = (backoff * 2).min(press.link.backoff_max);
+                backoff
+            }
+        };
+        side.status.send_modify(|status| {
+            status.press = last.clone();
+            status.counts = client.counts().clone();
+        });
+        tokio::select! {
+            answer = side.answers.recv() => if matches!(answer, None | Some(Answer::Stop)) { return },
+            () = tokio::time::sleep(pause) => {}
+        }
+    }
+}
+
+async fn look<L: Link>(press: &Press, client: &mut Client<L>) -> Result<Result<PressImage, Torn>, LinkError> {
+    if !client.connected() {
+        client.connect().await?;
+    }
+    let words = client.read(&press.map.read, press.map.read.count).await?;
+    Ok(PressImage::decode(&press.map, press.press_id, &words))
+}

@@ -1,0 +1,75 @@
+//! What happened to strokes since the start.
+
+use std::time::Duration;
+
+/// The latest durations of one kind, for percentiles.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Durations {
+    latest: std::collections::VecDeque<Duration>,
+    /// How many there were since the start.
+    pub count: u64,
+}
+
+impl Durations {
+    /// How many are kept.
+    pub const KEPT: usize = 1000;
+
+    /// Adds one.
+    pub fn add(&mut self, duration: Duration) {
+        if self.latest.len() == Self::KEPT {
+            self.latest.pop_front();
+        }
+        self.latest.push_back(duration);
+        self.count += 1;
+    }
+
+    /// The duration that `percent` of the latest ones do not exceed (nearest rank); `None` when there are none.
+    pub fn percentile(&self, percent: f64) -> Option<Duration> {
+        let mut sorted: Vec<_> = self.latest.iter().copied().collect();
+        sorted.sort_unstable();
+        let rank = (percent / 100.0 * sorted.len() as f64).ceil() as usize;
+        sorted.get(rank.clamp(1, sorted.len().max(1)) - 1).copied()
+    }
+}
+
+/// What happened to strokes since the start.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Metrics {
+    /// Strokes accepted, every attempt.
+    pub strokes: u64,
+    /// Results published, but for those without a measurement.
+    pub measured: u64,
+    /// Results published without a measurement.
+    pub not_measured: u64,
+    /// Strokes missed.
+    pub missed: u64,
+    /// Results that the press did not acknowledge in time.
+    pub ack_timeouts: u64,
+    /// Reads of the press's block while it was being written.
+    pub torn_reads: u64,
+    /// Reads of the host's own block that found it changed by the press.
+    pub rewrites: u64,
+    /// From the poll that saw the trigger to the echo of busy.
+    pub trigger_to_busy: Durations,
+    /// From the acceptance to the echo of the result.
+    pub stroke_to_result: Durations,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_nearest_ranks_of_the_latest() {
+        let mut durations = Durations::default();
+        assert_eq!(durations.percentile(50.0), None);
+        for ms in (1..=1100).rev() {
+            durations.add(Duration::from_millis(ms));
+        }
+        assert_eq!(durations.count, 1100);
+        assert_eq!(durations.percentile(0.0), Some(Duration::from_millis(1)));
+        assert_eq!(durations.percentile(50.0), Some(Duration::from_millis(500)));
+        assert_eq!(durations.percentile(99.0), Some(Duration::from_millis(990)));
+        assert_eq!(durations.percentile(100.0), Some(Duration::from_millis(1000)));
+    }
+}

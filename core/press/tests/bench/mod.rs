@@ -1,0 +1,153 @@
+//! A press, a host and a journal for tests, from nothing but the pages of the map and the handshake.
+
+#![allow(
+    dead_code,
+    unused_imports,
+    unreachable_pub,
+    reason = "each test program uses its own part of the bench"
+)]
+#![allow(clippy::unwrap_used, reason = "a bench that cannot go on shall fail its test")]
+
+pub mod memory;
+pub mod plc;
+pub mod server;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use platen_plant::press::Measure;
+use platen_press::{
+    Acked, Answer, Entry, Figures, Journal, Measurement, Order, Publication, Recalled, Record, Stage,
+    StrokeKey, Verdict,
+};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
+
+pub use plc::{Habits, Plc};
+
+pub type SharedPlc = Arc<Mutex<Plc>>;
+
+/// A journal in memory that outlives the host.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    pub records: Arc<Mutex<Vec<Record>>>,
+    pub full: Arc<Mutex<bool>>,
+    owner: u16,
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("disk full")]
+pub struct Full;
+
+impl Memory {
+    pub fn new(owner: u16) -> Self {
+        Self { records: Arc::default(), full: Arc::default(), owner }
+    }
+
+    /// The last publication of each stroke.
+    pub fn publications(&self) -> BTreeMap<StrokeKey, Publication> {
+        let records = self.records.lock().unwrap();
+        let publications = records.iter().filter_map(|record| match record {
+            Record::Finished(publication) => Some((publication.key, (**publication).clone())),
+            _ => None,
+        });
+        publications.collect()
+    }
+
+    pub fn acked(&self) -> Vec<(StrokeKey, Acked)> {
+        let records = self.records.lock().unwrap();
+        let acked = records.iter().filter_map(|record| match record {
+            Record::Acked { key, how } => Some((*key, *how)),
+            _ => None,
+        });
+        acked.collect()
+    }
+}
+
+impl Journal for Memory {
+    type Error = Full;
+
+    fn recall(&mut self) -> Result<Recalled, Full> {
+        let mut recalled = Recalled::empty(self.owner);
+        for record in self.records.lock().unwrap().iter() {
+            recalled.replay(record);
+        }
+        Ok(recalled)
+    }
+
+    fn record(&mut self, record: &Record) -> Result<(), Full> {
+        if *self.full.lock().unwrap() {
+            return Err(Full);
+        }
+        self.records.lock().unwrap().push(record.clone());
+        Ok(())
+    }
+}
+
+/// The figure that the fake scanner finds for a stroke: its number in hundredths of a millimetre.
+pub fn measurement(key: StrokeKey) -> Measurement {
+    let figure = f64::from(key.stroke % 30_000) * 1e-5;
+    Measurement {
+        verdict: if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail },
+        figures: Figures { values: [(Measure::DeviationMax, figure)].into(), stations: Vec::new() },
+        scanned_at: None,
+        warning: None,
+    }
+}
+
+/// A host that scans and judges after fixed times, and remembers what it scanned.
+pub async fn host(
+    mut orders: UnboundedReceiver<Order>,
+    answers: UnboundedSender<Answer>,
+    scan: Duration,
+    judge: Duration,
+    scans: Arc<Mutex<Vec<StrokeKey>>>,
+    alarms: Arc<Mutex<Vec<platen_press::Code>>>,
+) {
+    let ready = Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) };
+    let _ = answers.send(ready);
+    while let Some(order) = orders.recv().await {
+        let later = |wait: Duration, answer: Answer| {
+            let answers = answers.clone();
+            tokio::spawn(async move {
+                tokio::time::sleep(wait).await;
+                let _ = answers.send(answer);
+            });
+        };
+        match order {
+            Order::StartScan { key, .. } => {
+                scans.lock().unwrap().push(key);
+                later(scan, Answer::Acquired(key));
+            }
+            Order::Evaluate(key) => later(judge, Answer::Result(key, Box::new(measurement(key)))),
+            Order::Alarm { code, .. } => alarms.lock().unwrap().push(code),
+            Order::Cancel(_) | Order::PartEnd | Order::Seen(_) => {}
+        }
+    }
+}
+
+/// Runs the program of a press every 5 ms.
+pub async fn run_plc(plc: SharedPlc) {
+    let start = tokio::time::Instant::now();
+    let mut interval = tokio::time::interval(Duration::from_millis(5));
+    interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
+    loop {
+        interval.tick().await;
+        plc.lock().unwrap().cycle(start.elapsed());
+    }
+}
+
+/// Waits until something holds, at most `limit`.
+pub async fn until(limit: Duration, what: &str, mut holds: impl FnMut() -> bool) {
+    let waited = tokio::time::timeout(limit, async {
+        while !holds() {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    });
+    assert!(waited.await.is_ok(), "{what}: not within {limit:?}");
+}
+
+/// Never used by value: an entry of a journal as a test writes it.
+pub fn entry(key: StrokeKey, stage: Stage) -> Entry {
+    Entry { key, run_id: 1, data: Default::default(), stage, publication: None }
+}

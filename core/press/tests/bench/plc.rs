@@ -1,0 +1,219 @@
+//! A press controller written from the map's page, not from the host's code: registers and the reference program.
+
+use std::time::Duration;
+
+pub const P: usize = 0;
+pub const H: usize = 100;
+
+/// What this press does wrong.
+#[derive(Debug, Clone, Default)]
+pub struct Habits {
+    /// Falls back to no trigger for every other program cycle while it waits.
+    pub bounce: bool,
+    /// Leaves the trigger standing until the result is there.
+    pub keeps_trigger: bool,
+    /// Never acknowledges.
+    pub no_ack: bool,
+    /// Counts two up before this stroke (by order).
+    pub jump_at: Option<usize>,
+    /// Sets the counter back to 1 and changes the session before this stroke.
+    pub back_at: Option<usize>,
+    /// Leaves the tail of its block behind for some cycles at each stroke.
+    pub torn_cycles: u32,
+    /// Takes clear_to_scan away so many ms after acceptance.
+    pub unclear_after_ms: Option<u64>,
+}
+
+/// A result as this press read it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Result {
+    pub stroke: u16,
+    pub status: u16,
+    pub dev_max: u16,
+    pub error: u16,
+    pub seq: u16,
+}
+
+#[derive(Debug)]
+pub struct Plc {
+    pub regs: [u16; 256],
+    pub habits: Habits,
+    pub to_do: usize,
+    pub done: usize,
+    pub results: Vec<Result>,
+    pub gave_up: Vec<u16>,
+    pub writes: usize,
+    pub outside: usize,
+    pub now_ms: u64,
+    /// Time from the trigger to its acceptance as this program sees it.
+    pub accept_ms: Vec<u64>,
+    waiting: bool,
+    accepted: bool,
+    since_ms: u64,
+    accepted_ms: u64,
+    rest_until_ms: u64,
+    host_beat: u16,
+    host_beat_ms: u64,
+    cycle: u64,
+    torn_left: u32,
+    limit_ms: u64,
+}
+
+impl Plc {
+    pub fn new(press_id: u16, first_stroke: u16) -> Self {
+        let mut regs = [0; 256];
+        regs[P] = 1;
+        regs[P + 2] = 0b10_0001;
+        regs[P + 3] = first_stroke;
+        regs[P + 31] = first_stroke;
+        regs[P + 4] = 0xA001;
+        regs[P + 7] = press_id;
+        regs[P + 19] = 3500;
+        Self {
+            regs,
+            habits: Habits::default(),
+            to_do: 0,
+            done: 0,
+            results: Vec::new(),
+            gave_up: Vec::new(),
+            writes: 0,
+            outside: 0,
+            now_ms: 0,
+            accept_ms: Vec::new(),
+            waiting: false,
+            accepted: false,
+            since_ms: 0,
+            accepted_ms: 0,
+            rest_until_ms: 0,
+            host_beat: 0,
+            host_beat_ms: 0,
+            cycle: 0,
+            torn_left: 0,
+            limit_ms: 180_000,
+        }
+    }
+
+    pub fn idle(&self) -> bool {
+        self.to_do == 0 && !self.waiting && self.regs[P + 2] & 0b100 == 0
+    }
+
+    /// A power cut: registers lost, another session; a stroke that waited is forgotten.
+    pub fn restart(&mut self, session: u16) {
+        let press_id = self.regs[P + 7];
+        let stroke = self.regs[P + 3];
+        let fresh = Self::new(press_id, stroke);
+        self.regs = fresh.regs;
+        self.regs[P + 4] = session;
+        if self.waiting {
+            self.gave_up.push(stroke);
+        }
+        self.waiting = false;
+    }
+
+    pub fn read(&self, start: u16, count: u16) -> Option<Vec<u16>> {
+        let start = usize::from(start);
+        self.regs.get(start..start + usize::from(count)).map(<[u16]>::to_vec)
+    }
+
+    pub fn write(&mut self, start: u16, words: &[u16]) -> bool {
+        let start = usize::from(start);
+        self.writes += 1;
+        if start < H || start + words.len() > H + 64 {
+            self.outside += 1;
+            return false;
+        }
+        self.regs[start..start + words.len()].copy_from_slice(words);
+        true
+    }
+
+    fn set(&mut self, bit: u16, on: bool) {
+        let word = &mut self.regs[P + 2];
+        *word = if on { *word | 1 << bit } else { *word & !(1 << bit) };
+    }
+
+    fn next_stroke(&mut self) {
+        let id = self.regs[P + 3];
+        let next = |id: u16| id.checked_add(1).unwrap_or(1);
+        let mut id = next(id);
+        if self.habits.jump_at == Some(self.done) {
+            id = next(id);
+        }
+        if self.habits.back_at == Some(self.done) {
+            id = 1;
+            self.regs[P + 4] ^= 0x1111;
+        }
+        self.torn_left = self.habits.torn_cycles;
+        self.regs[P + 3] = id;
+        self.regs[P + 31] = if self.torn_left > 0 { id ^ 0x4000 } else { id };
+    }
+
+    /// One cycle of the reference program. The host works while `now - host_beat_ms <= 2000`.
+    pub fn cycle(&mut self, now: Duration) {
+        self.now_ms = now.as_millis() as u64;
+        self.cycle += 1;
+        if self.cycle.is_multiple_of(20) {
+            self.regs[P + 1] = self.regs[P + 1].wrapping_add(1);
+        }
+        if self.regs[H + 1] != self.host_beat {
+            self.host_beat = self.regs[H + 1];
+            self.host_beat_ms = self.now_ms;
+        }
+        if self.torn_left > 0 {
+            self.torn_left -= 1;
+            if self.torn_left == 0 {
+                self.regs[P + 31] = self.regs[P + 3];
+            }
+        }
+        let alive = self.now_ms - self.host_beat_ms <= 2000;
+        let status = self.regs[H + 2];
+        let ready = status & 1 == 1;
+        let acking = self.regs[P + 2] & 0b100 != 0;
+        if self.to_do > 0 && !self.waiting && !acking && ready && alive && self.now_ms >= self.rest_until_ms {
+            self.next_stroke();
+            self.to_do -= 1;
+            self.done += 1;
+            self.waiting = true;
+            self.accepted = false;
+            self.since_ms = self.now_ms;
+        }
+        let (stroke, session) = (self.regs[P + 3], self.regs[P + 4]);
+        let was_accepted = self.accepted;
+        self.accepted = self.waiting && self.regs[H + 3] == stroke && self.regs[H + 5] == session;
+        if self.accepted && !was_accepted {
+            self.accept_ms.push(self.now_ms - self.since_ms);
+            self.accepted_ms = self.now_ms;
+        }
+        let bounce = self.habits.bounce && self.cycle.is_multiple_of(2);
+        let holds = !self.accepted || self.habits.keeps_trigger;
+        self.set(1, self.waiting && holds && self.torn_left == 0 && !bounce);
+        let unclear =
+            |after| self.accepted && self.now_ms - self.accepted_ms >= after && status & 1 << 7 == 0;
+        self.set(5, !self.habits.unclear_after_ms.is_some_and(unclear));
+        let valid = self.accepted
+            && status & 1 << 2 != 0
+            && status & 1 << 9 == 0
+            && self.regs[H + 4] == stroke
+            && self.regs[H + 8] == self.regs[H + 53]
+            && alive;
+        if valid {
+            self.results.push(Result {
+                stroke,
+                status,
+                dev_max: self.regs[H + 10],
+                error: self.regs[H + 6],
+                seq: self.regs[H + 8],
+            });
+            self.waiting = false;
+            self.set(1, false);
+            self.set(2, !self.habits.no_ack);
+            self.rest_until_ms = self.now_ms + 30;
+        }
+        if self.regs[P + 2] & 0b100 != 0 && self.regs[H + 2] & 1 << 2 == 0 {
+            self.set(2, false);
+        }
+        if self.waiting && self.now_ms - self.since_ms > self.limit_ms {
+            self.waiting = false;
+            self.gave_up.push(stroke);
+        }
+    }
+}
