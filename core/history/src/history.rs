@@ -329,3 +329,39 @@ fn plate(connection: &Connection, stroke: &Accepted, now: Timestamp) -> rusqlite
     let values = (stroke.key.press, part_id, &stroke.part_name, text(now));
     connection.query_row(sql, values, |row| row.get(0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Accepted, History};
+    use crate::StrokeKey;
+
+    #[test]
+    fn a_full_disk_is_an_error_that_says_so_and_harms_nothing_recorded() {
+        let folder = tempfile::tempdir().unwrap();
+        let now = jiff::Timestamp::UNIX_EPOCH;
+        let mut history = History::open(&folder.path().join("history.sqlite"), 1, now).unwrap();
+        let stroke = |number: u16, data: String| Accepted {
+            key: StrokeKey { press: 1, session: 1, stroke: number, attempt: 0 },
+            run_id: u32::from(number),
+            part_id: None,
+            part_name: None,
+            recipe: None,
+            baseline: false,
+            dry_run: false,
+            data,
+        };
+        history.accept(&stroke(1, "{}".to_owned()), now).unwrap();
+        // SQLite's own limit on the size of the file raises the same error as a full disk.
+        let pages: u32 =
+            history.archive.connection().pragma_query_value(None, "page_count", |row| row.get(0)).unwrap();
+        history.archive.connection().pragma_update(None, "max_page_count", pages).unwrap();
+        let error = history.accept(&stroke(2, "x".repeat(100_000)), now).unwrap_err();
+        assert!(error.is_disk_full(), "{error}");
+        assert!(error.to_string().ends_with("database or disk is full"), "{error}");
+        assert_eq!(history.recall().unwrap().run_id, 1);
+
+        history.archive.connection().pragma_update(None, "max_page_count", pages + 100).unwrap();
+        history.accept(&stroke(2, "x".repeat(100_000)), now).unwrap();
+        assert_eq!(history.recall().unwrap().run_id, 2);
+    }
+}

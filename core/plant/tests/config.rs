@@ -120,6 +120,24 @@ fn a_plant_file_arrives_with_its_paths_resolved() {
 }
 
 #[test]
+fn the_plate_files_of_a_plant_are_those_that_a_recipe_number_finds() {
+    let plant = PlantFile::load(&config().join("plant-faro-file.toml")).unwrap();
+    let recipes: Vec<u16> = plant.plate_files().unwrap().into_iter().map(|(recipe, _)| recipe).collect();
+    assert_eq!(recipes, [1, 9, 17, 21, 22]);
+    let folder = tempfile::tempdir().unwrap();
+    let plant = PlantFile { plates: folder.path().to_owned(), ..PlantFile::default() };
+    for name in
+        ["plate-1000.toml", "plate-17.toml", "plate-002.toml", "plate-3.txt", "plate-x.toml", "notes.md"]
+    {
+        std::fs::write(folder.path().join(name), "").unwrap();
+    }
+    let expected = [(2, folder.path().join("plate-002.toml")), (1000, folder.path().join("plate-1000.toml"))];
+    assert_eq!(plant.plate_files().unwrap(), expected);
+    let absent = PlantFile { plates: folder.path().join("absent"), ..PlantFile::default() };
+    assert!(absent.plate_files().unwrap_err().to_string().contains("absent: No such file"));
+}
+
+#[test]
 fn an_empty_plant_file_says_what_the_default_says() {
     let plant = PlantFile::parse("plant-north.toml", "").unwrap();
     assert_eq!(plant, PlantFile { name: "plant-north".to_owned(), ..PlantFile::default() });

@@ -17,7 +17,7 @@ use crate::document::{Document, Reported};
 use crate::{Error, Faults, Table};
 
 /// Used where the plant file names no flattening.
-const FLATTENING: &str = "harmonic";
+const FLATTENING: &str = "elastic";
 /// Used where the plant file lists no comparison; `comparison = []` asks for none.
 const COMPARISONS: [&str; 2] = ["displacement", "template"];
 
@@ -78,6 +78,25 @@ impl PlantFile {
     /// The plate file of a recipe number: `plates/plate-017.toml` for 17.
     pub fn plate_path(&self, recipe: u16) -> PathBuf {
         self.plates.join(format!("plate-{recipe:03}.toml"))
+    }
+
+    /// All plate files with their recipe numbers, by number. Files of other names in the folder are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`] when there is no such folder.
+    pub fn plate_files(&self) -> Result<Vec<(u16, PathBuf)>, Error> {
+        let unreadable = |source| Error::Unreadable { path: self.plates.clone(), source };
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(&self.plates).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+            let recipe = stem.strip_prefix("plate-").and_then(|number| number.parse().ok());
+            files.extend(
+                recipe.filter(|recipe| self.plate_path(*recipe) == path).map(|recipe| (recipe, path)),
+            );
+        }
+        files.sort();
+        Ok(files)
     }
 
     fn take(document: Document, path: &Path) -> Result<Self, Faults> {
