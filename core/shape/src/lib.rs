@@ -10,7 +10,7 @@
 pub mod extract;
 pub mod flatten;
 pub mod mesh;
-mod outline;
+pub mod outline;
 mod patch;
 mod plate;
 pub mod sparse;
@@ -21,7 +21,7 @@ mod testing;
 
 pub use flatten::{Chart, Flatten, FlattenError};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
-pub use outline::{Corner, EdgeCurve, Outline};
+pub use outline::{Corner, EdgeCurve, Outline, OutlineError};
 pub use patch::{Beyond, Crossing, Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
 pub use surface::{Surface, SurfaceParts};

@@ -35,6 +35,8 @@ pub enum Beyond {
 pub struct Crossing {
     /// The last cell inside, as an index into [`Patch::samples`].
     pub sample: u32,
+    /// Step from it along the lattice: -1, 0 or 1 columns and rows, one of them 0.
+    pub step: [i8; 2],
     /// The end of the face lies between this point, metres, scanner frame, ...
     pub inside: Vec3,
     /// ... and this one. Both lie on the smoothed face and its continuation.

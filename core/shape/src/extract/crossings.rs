@@ -118,8 +118,14 @@ impl Scene<'_> {
             }
         };
         let (inside, outside) = (on_face(from)?, on_face(to)?);
-        let crossing =
-            Crossing { sample, inside: inside.point, outside: outside.point, normal: inside.normal, beyond };
+        let crossing = Crossing {
+            sample,
+            step: [step.0 as i8, step.1 as i8],
+            inside: inside.point,
+            outside: outside.point,
+            normal: inside.normal,
+            beyond,
+        };
         Some((crossing, cut))
     }
 

@@ -1,6 +1,26 @@
 //! The boundary of the scanned face: four corners and four edge curves.
+//!
+//! As in the paper's 3.2: the mesh of lattice neighbours and its longest boundary loop (`boundary`), corner candidates by
+//! the angle to the k-th neighbours, lines near them by RANSAC and their intersections (`corners`), a spline
+//! along each edge (`edge`). Beyond the paper: the edge is located between the lattice's samples, from the places
+//! where rows and columns leave the face, in the strip along it rolled out into the plane (`strip`). What hides a part
+//! of an edge or a corner's neighbourhood takes its crossings out (`rim`); the curve goes through what is left.
 
-use crate::Vec3;
+mod boundary;
+mod corners;
+mod edge;
+mod error;
+mod rim;
+mod spline;
+mod strip;
+
+pub use error::OutlineError;
+
+use crate::patch::{Crossing, Patch};
+use crate::{PlateSpec, Vec3};
+use corners::Plane;
+use edge::Edge;
+use rim::Rim;
 
 /// A corner of the scanned face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,4 +53,127 @@ pub struct Outline {
     pub corners: [Corner; 4],
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeCurve; 4],
+}
+
+/// Crossings nearer to a corner than this many lattice steps may belong to either edge.
+const CORNER_STEPS: f64 = 2.5;
+
+/// Spacing of the points of an edge curve, metres.
+const POINT_SPACING: f64 = 0.01;
+
+/// An edge counts as seen where a crossing lies within so many lattice steps.
+const SEEN_STEPS: f64 = 6.0;
+
+/// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not tell corners apart.
+const LARGEST_HINT_ANGLE: f64 = 35.0;
+
+/// An edge that differs by more than this part from the plate file is that of another plate. Cut blanks differ by
+/// millimetres, bending changes edges of the mid-surface by up to 11 mm.
+const SIZE_TOLERANCE: f64 = 0.01;
+
+/// The outline of a plate's face.
+///
+/// Corners and edges are those of the scanned face as it is seen, not of the rectangle; the known size is used to
+/// refuse another plate, never to move an edge.
+///
+/// # Errors
+/// Which corner, edge or side cannot be told, and why.
+pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError> {
+    let rim = Rim::of(patch, spec)?;
+    let corners = corners::find(&rim.flat, rim.step, spec.width.min(spec.height))?;
+    let near = corners.map(|corner| rim.lift(&corner));
+    let fit = |k: usize| {
+        let (from, to) = (near[k], near[(k + 1) % 4]);
+        let margin = CORNER_STEPS * rim.step;
+        let crossings: Vec<&Crossing> = rim
+            .between(corners[k].at, corners[(k + 1) % 4].at)
+            .filter(|c| (c.inside - from).norm() > margin && (c.inside - to).norm() > margin)
+            .collect();
+        Edge::fit(&crossings, from, to, rim.step, patch.noise)
+    };
+    let mut edges = [fit(0)?, fit(1)?, fit(2)?, fit(3)?];
+    let mut points = near;
+    for k in 0..4 {
+        let arriving = (k + 3) % 4;
+        let (point, to, from) = meet(&edges[arriving], &edges[k], near[k]);
+        points[k] = point;
+        edges[arriving].to = to;
+        edges[k].from = from;
+    }
+    let first = first_corner(&points, &rim.plane, spec.u_axis)?;
+    edges.rotate_left(first);
+    points.rotate_left(first);
+    check_size(&edges, spec)?;
+    let reach = SEEN_STEPS * rim.step;
+    let corner = |k: usize| {
+        let (arriving, leaving) = (&edges[(k + 3) % 4], &edges[k]);
+        Corner {
+            point: points[k],
+            sigma: [arriving.sigma(arriving.to), leaving.sigma(leaving.from)],
+            seen: arriving.is_seen(arriving.to, reach) && leaving.is_seen(leaving.from, reach),
+        }
+    };
+    let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]], reach);
+    Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve) })
+}
+
+/// Where two edges meet, and where that is along each.
+fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
+    /// Newton's method on two nearly straight curves: the third step no longer moves.
+    const STEPS: usize = 5;
+    const DIFFERENCE: f64 = 0.02;
+    let (mut a, mut b) = (arriving.along(near), leaving.along(near));
+    for _ in 0..STEPS {
+        let apart = leaving.point(b) - arriving.point(a);
+        let tangent = |edge: &Edge, at: f64| {
+            (edge.point(at + DIFFERENCE) - edge.point(at - DIFFERENCE)) / (2.0 * DIFFERENCE)
+        };
+        let (t_a, t_b) = (tangent(arriving, a), tangent(leaving, b));
+        // Least squares of a t_a - b t_b = apart.
+        let (aa, bb, ab) = (t_a.norm_squared(), t_b.norm_squared(), t_a.dot(&t_b));
+        let (ra, rb) = (t_a.dot(&apart), t_b.dot(&apart));
+        let determinant = aa * bb - ab * ab;
+        a += (ra * bb - ab * rb) / determinant;
+        b += (ab * ra - aa * rb) / determinant;
+    }
+    (0.5 * (arriving.point(a) + leaving.point(b)), a, b)
+}
+
+/// The corner that is (0, 0): the one from which the edge leaves that runs most along the hint. Without a hint, u runs
+/// to the right as the scanner sees it.
+fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result<usize, OutlineError> {
+    let hint = hint.map_or_else(nalgebra::Vector2::x, |hint| plane.direction(hint));
+    let angle = |k: usize| plane.direction(points[(k + 1) % 4] - points[k]).angle(&hint).to_degrees();
+    let first = (0..4).min_by(|&a, &b| angle(a).total_cmp(&angle(b))).unwrap_or(0);
+    let angle_deg = angle(first);
+    if angle_deg > LARGEST_HINT_ANGLE || angle_deg.is_nan() {
+        return Err(OutlineError::Hint { angle_deg });
+    }
+    Ok(first)
+}
+
+/// Compares the edges of the mid-surface with the plate file.
+fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
+    for (edge, (side, size)) in
+        edges.iter().zip([("width", spec.width), ("height", spec.height)].into_iter().cycle())
+    {
+        let expected = size - 2.0 * spec.face_inset;
+        let found = edge.length_below(0.5 * spec.thickness);
+        if (found - expected).abs() > SIZE_TOLERANCE * expected {
+            let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);
+            return Err(OutlineError::WrongSize { side, found_mm, expected_mm });
+        }
+    }
+    Ok(())
+}
+
+fn curve(edge: &Edge, ends: [Vec3; 2], reach: f64) -> EdgeCurve {
+    let length = edge.to - edge.from;
+    let n = (length / POINT_SPACING).ceil().max(1.0) as usize;
+    let places: Vec<f64> = (0..=n).map(|i| edge.from + length * i as f64 / n as f64).collect();
+    let mut points: Vec<Vec3> = places.iter().map(|&at| edge.point(at)).collect();
+    (points[0], points[n]) = (ends[0], ends[1]);
+    let mean_variance = places.iter().map(|&at| edge.sigma(at).powi(2)).sum::<f64>() / places.len() as f64;
+    let seen = places.iter().map(|&at| edge.is_seen(at, reach)).collect();
+    EdgeCurve { points, seen, sigma: mean_variance.sqrt() }
 }

@@ -1,0 +1,286 @@
+//! The mesh of lattice neighbours and its boundary loop.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+
+use crate::patch::{Beyond, Patch};
+
+/// A cell of the grid, by its index.
+type Cell = u32;
+
+/// Length of a side and of a diagonal of a lattice square, in fifths: close to 1 : sqrt 2 and exact.
+const SIDE: u32 = 5;
+const DIAGONAL: u32 = 7;
+
+/// The cells of the face in their bounding rectangle, one empty column and row around them; index
+/// `column * n_rows + row`. Cells that something hides, or that did not return, between two cells of the face belong
+/// to it; holes in the plate do not.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    n_columns: usize,
+    n_rows: usize,
+    /// Number of the sample plus one, 0 where there is none.
+    sample: Vec<u32>,
+    inside: Vec<bool>,
+}
+
+impl Grid {
+    pub(super) fn of(patch: &Patch) -> Self {
+        let columns = patch.samples.iter().map(|s| s.column);
+        let rows = patch.samples.iter().map(|s| s.row);
+        let span = |low: Option<u32>, high: Option<u32>| (low.unwrap_or(0), high.unwrap_or(0));
+        let (first_column, last_column) = span(columns.clone().min(), columns.max());
+        let (first_row, last_row) = span(rows.clone().min(), rows.max());
+        let n_columns = (last_column - first_column) as usize + 3;
+        let n_rows = (last_row - first_row) as usize + 3;
+        let mut grid = Self {
+            n_columns,
+            n_rows,
+            sample: vec![0; n_columns * n_rows],
+            inside: vec![false; n_columns * n_rows],
+        };
+        for (number, sample) in (1..).zip(&patch.samples) {
+            let (column, row) = (sample.column - first_column + 1, sample.row - first_row + 1);
+            let cell = column as usize * n_rows + row as usize;
+            grid.sample[cell] = number;
+            grid.inside[cell] = true;
+        }
+        grid.fill_hidden(patch);
+        grid
+    }
+
+    /// Per sample its place on a loop, or that of a neighbour: a cell that sticks out alone belongs to no triangle.
+    pub(super) fn places(&self, cells: &[Cell], n_samples: usize) -> Vec<Option<u32>> {
+        let mut places = vec![None; n_samples];
+        let sample = |cell: isize| {
+            let number = usize::try_from(cell).ok().and_then(|cell| self.sample.get(cell));
+            number.and_then(|number| number.checked_sub(1))
+        };
+        for (place, &cell) in (0..).zip(cells) {
+            let cell = cell as isize;
+            if let Some(sample) = sample(cell) {
+                places[sample as usize] = Some(place);
+            }
+        }
+        let on_loop = places.clone();
+        for (place, &cell) in (0..).zip(cells) {
+            let n_rows = self.n_rows as isize;
+            for beside in [-n_rows - 1, -n_rows, -n_rows + 1, -1, 1, n_rows - 1, n_rows, n_rows + 1] {
+                if let Some(sample) =
+                    sample(cell as isize + beside).filter(|s| on_loop[*s as usize].is_none())
+                {
+                    places[sample as usize] = Some(place);
+                }
+            }
+        }
+        places
+    }
+
+    /// Fills gaps along columns and rows, unless the plate is seen to end at one side of them.
+    fn fill_hidden(&mut self, patch: &Patch) {
+        let mut ends: Vec<[bool; 4]> = vec![[false; 4]; patch.samples.len()];
+        for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
+            ends[crossing.sample as usize][side(crossing.step)] = true;
+        }
+        let mut filled = Vec::new();
+        for column in 0..self.n_columns {
+            let line = (0..self.n_rows).map(|row| column * self.n_rows + row);
+            gaps(line, &self.sample, |a, b| !ends[a][side([0, 1])] && !ends[b][side([0, -1])], &mut filled);
+        }
+        for row in 0..self.n_rows {
+            let line = (0..self.n_columns).map(|column| column * self.n_rows + row);
+            gaps(line, &self.sample, |a, b| !ends[a][side([1, 0])] && !ends[b][side([-1, 0])], &mut filled);
+        }
+        for cell in filled {
+            self.inside[cell] = true;
+        }
+    }
+
+    /// Edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives two
+    /// triangles, one with three cells gives one.
+    fn boundary_edges(&self) -> Vec<(Cell, Cell)> {
+        let n_rows = self.n_rows;
+        // Corners of the square below and behind a cell: itself, below, next below, next.
+        let corners = |at: usize| [at, at + 1, at + n_rows + 1, at + n_rows];
+        let covered = |at: usize| {
+            let inside = corners(at).map(|c| self.inside[c]);
+            (inside.iter().filter(|i| **i).count() >= 3).then_some(inside)
+        };
+        let mut edges = Vec::new();
+        let mut add = |a: usize, b: usize| edges.push((a.min(b) as Cell, a.max(b) as Cell));
+        for column in 0..self.n_columns - 1 {
+            for row in 0..n_rows - 1 {
+                let at = column * n_rows + row;
+                let here = covered(at);
+                // The edges down and across from `at`, each shared with the square before it.
+                let before = if column > 0 { covered(at - n_rows) } else { None };
+                let above = if row > 0 { covered(at - 1) } else { None };
+                let down = (here.is_some_and(|i| i[0] && i[1]), before.is_some_and(|i| i[3] && i[2]));
+                let across = (here.is_some_and(|i| i[0] && i[3]), above.is_some_and(|i| i[1] && i[2]));
+                if down.0 != down.1 {
+                    add(at, at + 1);
+                }
+                if across.0 != across.1 {
+                    add(at, at + n_rows);
+                }
+                if let Some(missing) = here.and_then(|i| i.iter().position(|inside| !inside)) {
+                    let square = corners(at);
+                    add(square[(missing + 1) % 4], square[(missing + 3) % 4]);
+                }
+            }
+        }
+        edges
+    }
+
+    /// The longest boundary loop, as the paper finds it: the shortest way along the boundary from one end of a
+    /// boundary edge to the other, again and again until a loop is long enough.
+    ///
+    /// `enough` in lattice steps. Where no loop is, the longest.
+    pub(super) fn longest_loop(&self, enough: f64) -> Vec<Cell> {
+        let edges = self.boundary_edges();
+        let mut neighbours: BTreeMap<Cell, Vec<(Cell, u32)>> = BTreeMap::new();
+        for &(a, b) in &edges {
+            let weight = if self.is_diagonal(a, b) { DIAGONAL } else { SIDE };
+            neighbours.entry(a).or_default().push((b, weight));
+            neighbours.entry(b).or_default().push((a, weight));
+        }
+        let mut used = BTreeSet::new();
+        let (mut best, mut best_length) = (Vec::new(), 0);
+        for &(a, b) in &edges {
+            if used.contains(&(a, b)) {
+                continue;
+            }
+            let Some((length, way)) = shortest_way(&neighbours, a, b) else { continue };
+            for pair in way.windows(2) {
+                used.insert((pair[0].min(pair[1]), pair[0].max(pair[1])));
+            }
+            if length > best_length {
+                (best, best_length) = (way, length);
+            }
+            if f64::from(best_length) >= enough * f64::from(SIDE) {
+                break;
+            }
+        }
+        best
+    }
+
+    fn is_diagonal(&self, a: Cell, b: Cell) -> bool {
+        let apart = a.abs_diff(b) as usize;
+        apart != 1 && apart != self.n_rows
+    }
+}
+
+fn side(step: [i8; 2]) -> usize {
+    match step {
+        [0, -1] => 0,
+        [0, _] => 1,
+        [-1, _] => 2,
+        _ => 3,
+    }
+}
+
+/// Cells between consecutive samples of a line between which `open` (by their indices) says that the face goes on.
+fn gaps(
+    line: impl Iterator<Item = usize>,
+    sample: &[u32],
+    open: impl Fn(usize, usize) -> bool,
+    filled: &mut Vec<usize>,
+) {
+    let mut last: Option<usize> = None;
+    let mut between = Vec::new();
+    for cell in line {
+        match sample[cell].checked_sub(1) {
+            None => between.push(cell),
+            Some(here) => {
+                if last.is_some_and(|last| open(last, here as usize)) {
+                    filled.append(&mut between);
+                }
+                between.clear();
+                last = Some(here as usize);
+            }
+        }
+    }
+}
+
+/// Dijkstra's shortest way from `a` to `b` that does not use the edge between them.
+fn shortest_way(neighbours: &BTreeMap<Cell, Vec<(Cell, u32)>>, a: Cell, b: Cell) -> Option<(u32, Vec<Cell>)> {
+    let mut reached: BTreeMap<Cell, (u32, Cell)> = BTreeMap::from([(a, (0, a))]);
+    let mut front = BinaryHeap::from([Reverse((0, a))]);
+    while let Some(Reverse((length, at))) = front.pop() {
+        if at == b {
+            let mut way = vec![b];
+            let mut here = b;
+            while here != a {
+                here = reached[&here].1;
+                way.push(here);
+            }
+            return Some((length, way));
+        }
+        if length > reached[&at].0 {
+            continue;
+        }
+        for &(next, weight) in &neighbours[&at] {
+            if (at, next) == (a, b) {
+                continue;
+            }
+            let longer = length + weight;
+            if reached.get(&next).is_none_or(|(known, _)| longer < *known) {
+                reached.insert(next, (longer, at));
+                front.push(Reverse((longer, next)));
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+    use crate::patch::{Crossing, Sample};
+
+    fn patch(cells: impl Iterator<Item = (u32, u32)>) -> Patch {
+        let sample = |(column, row)| Sample { point: Vec3::zeros(), column, row, sigma: 1e-3, intensity: 0 };
+        Patch { samples: cells.map(sample).collect(), ..Patch::default() }
+    }
+
+    #[test]
+    fn the_loop_runs_around_dropouts_and_along_the_rim() {
+        let mut seed = crate::testing::Noise::new(7);
+        let cells = (0..40).flat_map(|c| (0..30).map(move |r| (c, r)));
+        let patch =
+            patch(cells.filter(|&(c, r)| seed.uniform() > 0.1 || c == 0 || r == 0 || c == 39 || r == 29));
+        let grid = Grid::of(&patch);
+        assert_eq!(grid.longest_loop(1000.0).len(), 2 * (39 + 29));
+    }
+
+    #[test]
+    fn a_hole_in_the_plate_stays_and_a_hidden_strip_is_bridged() {
+        let hole = |c: u32, r: u32| (10..14).contains(&c) && (10..14).contains(&r);
+        let strip = |c: u32| (20..24).contains(&c);
+        let cells = (0..40_u32).flat_map(|c| (0..30).map(move |r| (c, r)));
+        let mut patch = patch(cells.filter(|&(c, r)| !hole(c, r) && !strip(c)));
+        let samples = patch.samples.clone();
+        for (number, s) in (0..).zip(&samples) {
+            for step in [[0_i8, 1_i8], [0, -1], [1, 0], [-1, 0]] {
+                let (c, r) =
+                    (s.column.wrapping_add_signed(step[0].into()), s.row.wrapping_add_signed(step[1].into()));
+                let beyond = if strip(c) {
+                    Beyond::InFront
+                } else if hole(c, r) || c > 39 || r > 29 {
+                    Beyond::Behind
+                } else {
+                    continue;
+                };
+                let zero = Vec3::zeros();
+                let crossing =
+                    Crossing { sample: number, step, inside: zero, outside: zero, normal: zero, beyond };
+                patch.crossings.push(crossing);
+            }
+        }
+        let grid = Grid::of(&patch);
+        assert_eq!(grid.longest_loop(f64::MAX).len(), 2 * (39 + 29));
+        let at = |c: usize, r: usize| (c + 1) * grid.n_rows + r + 1;
+        assert!(grid.inside[at(22, 15)] && !grid.inside[at(12, 12)]);
+    }
+}

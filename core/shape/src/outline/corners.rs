@@ -1,0 +1,248 @@
+//! The four corners, to the millimetre: where to look (k-th neighbour angle), straight lines near there (RANSAC), and
+//! their intersections (paper, 3.2).
+
+use nalgebra::Vector2;
+
+use super::OutlineError;
+use crate::Vec3;
+
+type Vec2 = Vector2<f64>;
+
+/// Angle to the k-th neighbours on both sides below which a corner is looked for, degrees (paper, 3.2).
+const CORNER_ANGLE: f64 = 150.0;
+
+/// The paper's k = 128 at 6.3 mm spans 0.8 m of a 4 m plate: this part of the shorter side.
+const NEIGHBOUR_PART: f64 = 0.2;
+
+/// RANSAC: pairs tried per line, and the distance of a point that supports it, in lattice steps.
+const TRIALS: usize = 96;
+const SUPPORT_STEPS: f64 = 1.5;
+
+/// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
+/// by a few degrees only.
+const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
+
+/// Seen along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
+const BULGE: f64 = 0.03;
+
+/// The plate's principal plane.
+#[derive(Debug, Clone)]
+pub(super) struct Plane {
+    origin: Vec3,
+    axes: [Vec3; 2],
+}
+
+impl Plane {
+    /// The plane of points of which `normal` is the mean normal. Seen against `normal` its axes turn
+    /// counter-clockwise.
+    pub(super) fn new(origin: Vec3, normal: Vec3) -> Self {
+        let along = if normal.z.abs() < 0.9 { Vec3::z() } else { Vec3::x() };
+        let first = along.cross(&normal).normalize();
+        Self { origin, axes: [first, normal.normalize().cross(&first)] }
+    }
+
+    pub(super) fn project(&self, point: Vec3) -> Vec2 {
+        self.direction(point - self.origin)
+    }
+
+    pub(super) fn direction(&self, vector: Vec3) -> Vec2 {
+        Vec2::new(self.axes[0].dot(&vector), self.axes[1].dot(&vector))
+    }
+
+    pub(super) fn lift_direction(&self, vector: Vec2) -> Vec3 {
+        self.axes[0] * vector.x + self.axes[1] * vector.y
+    }
+}
+
+/// A corner in the plane, and the place on the loop where its two edges part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Corner {
+    pub(super) point: Vec2,
+    /// Index into the loop.
+    pub(super) at: usize,
+}
+
+/// Finds the four corners of a loop of seen boundary points, counter-clockwise in the plane.
+///
+/// `step` is the spacing of points, `shorter` the shorter side of the plate, metres.
+///
+/// # Errors
+/// [`OutlineError::Corners`] when there are not four.
+pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 4], OutlineError> {
+    let reach = NEIGHBOUR_PART * shorter;
+    let around = Loop::new(points);
+    let mut candidates = Vec::new();
+    for at in around.sharpest_turns(reach) {
+        let mut random = Random::new(at as u64);
+        let support = SUPPORT_STEPS * step;
+        let before = line(&around.before(at, reach), support, &mut random);
+        let after = line(&around.after(at, reach), support, &mut random);
+        if let (Some(before), Some(after)) = (before, after) {
+            candidates.extend(intersect(&before, &after).map(|point| Corner { point, at }));
+        }
+    }
+    best_four(points, &candidates).ok_or(OutlineError::Corners { found: candidates.len() })
+}
+
+/// Four of the candidates, in their order, between which most of the loop lies along straight lines.
+fn best_four(points: &[Vec2], candidates: &[Corner]) -> Option<[Corner; 4]> {
+    let n = candidates.len();
+    let mut best: Option<(usize, [Corner; 4])> = None;
+    for a in 0..n {
+        for b in a + 1..n {
+            for c in b + 1..n {
+                for d in c + 1..n {
+                    let four = [a, b, c, d].map(|i| candidates[i]);
+                    let support = support(points, &four);
+                    if best.is_none_or(|(known, _)| support > known) {
+                        best = Some((support, four));
+                    }
+                }
+            }
+        }
+    }
+    // Where three of four corners are right, a quarter of the loop or more has no line.
+    best.filter(|(support, _)| 4 * support > 3 * points.len()).map(|(_, four)| four)
+}
+
+/// Points near the side of the quadrilateral that the loop says they are on.
+fn support(points: &[Vec2], corners: &[Corner; 4]) -> usize {
+    let mut near = 0;
+    for side in 0..4 {
+        let (from, to) = (corners[side], corners[(side + 1) % 4]);
+        let chord = to.point - from.point;
+        let length = chord.norm();
+        let mut at = from.at;
+        while at != to.at {
+            let off = chord.perp(&(points[at] - from.point)) / length;
+            near += usize::from(off.abs() < BULGE * length);
+            at = (at + 1) % points.len();
+        }
+    }
+    near
+}
+
+struct Loop<'a> {
+    points: &'a [Vec2],
+    /// Length of the loop up to each point, and its whole length last.
+    length: Vec<f64>,
+}
+
+impl<'a> Loop<'a> {
+    fn new(points: &'a [Vec2]) -> Self {
+        let mut length = vec![0.0];
+        for i in 0..points.len() {
+            let next = points[(i + 1) % points.len()];
+            length.push(length[i] + (next - points[i]).norm());
+        }
+        Self { points, length }
+    }
+
+    fn n(&self) -> usize {
+        self.points.len()
+    }
+
+    /// The places where the loop turns left most sharply, one for each stretch that turns enough.
+    fn sharpest_turns(&self, reach: f64) -> Vec<usize> {
+        let limit = CORNER_ANGLE.to_radians();
+        let angles: Vec<f64> = (0..self.n()).map(|at| self.angle(at, reach)).collect();
+        let Some(start) = angles.iter().position(|a| *a >= limit) else { return Vec::new() };
+        let mut sharpest = Vec::new();
+        let mut best: Option<usize> = None;
+        for at in (0..=self.n()).map(|i| (start + i) % self.n()) {
+            if angles[at] < limit {
+                best = best.filter(|b| angles[*b] <= angles[at]).or(Some(at));
+            } else {
+                sharpest.extend(best.take());
+            }
+        }
+        sharpest.sort_unstable();
+        sharpest
+    }
+
+    /// Angle at a point between the points `reach` before and behind it; a right turn counts as none.
+    fn angle(&self, at: usize, reach: f64) -> f64 {
+        let before = self.before(at, reach).last().copied().unwrap_or(self.points[at]) - self.points[at];
+        let after = self.after(at, reach).last().copied().unwrap_or(self.points[at]) - self.points[at];
+        if after.perp(&before) <= 0.0 { std::f64::consts::PI } else { before.angle(&after) }
+    }
+
+    /// Points from `at` backwards over `reach`, at least one.
+    fn before(&self, at: usize, reach: f64) -> Vec<Vec2> {
+        self.walk(at, reach, self.n() - 1)
+    }
+
+    /// Points from `at` forwards over `reach`, at least one.
+    fn after(&self, at: usize, reach: f64) -> Vec<Vec2> {
+        self.walk(at, reach, 1)
+    }
+
+    fn walk(&self, at: usize, reach: f64, stride: usize) -> Vec<Vec2> {
+        let whole = self.length[self.n()];
+        let mut walked = vec![];
+        let mut here = at;
+        for _ in 1..self.n() {
+            here = (here + stride) % self.n();
+            let way = (self.length[here] - self.length[at]).rem_euclid(whole);
+            let way = if stride == 1 { way } else { (whole - way).rem_euclid(whole) };
+            if way > reach && !walked.is_empty() {
+                break;
+            }
+            walked.push(self.points[here]);
+        }
+        walked
+    }
+}
+
+/// A line by a point and a unit direction.
+struct Line {
+    point: Vec2,
+    direction: Vec2,
+}
+
+/// The line through most of the points (RANSAC), then by least squares through those.
+fn line(points: &[Vec2], support: f64, random: &mut Random) -> Option<Line> {
+    let off = |line: &Line, p: &Vec2| line.direction.perp(&(p - line.point)).abs();
+    let mut best: Option<(usize, Line)> = None;
+    for _ in 0..TRIALS {
+        let (a, b) = (points[random.below(points.len())], points[random.below(points.len())]);
+        let Some(direction) = (b - a).try_normalize(4.0 * support) else { continue };
+        let trial = Line { point: a, direction };
+        let count = points.iter().filter(|p| off(&trial, p) < support).count();
+        if best.as_ref().is_none_or(|(known, _)| count > *known) {
+            best = Some((count, trial));
+        }
+    }
+    let (_, rough) = best?;
+    let near: Vec<&Vec2> = points.iter().filter(|p| off(&rough, p) < support).collect();
+    let centre = near.iter().copied().sum::<Vec2>() / near.len() as f64;
+    let spread: nalgebra::Matrix2<f64> = near.iter().map(|p| (*p - centre) * (*p - centre).transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    let direction = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    Some(Line { point: centre, direction })
+}
+
+fn intersect(a: &Line, b: &Line) -> Option<Vec2> {
+    let sine = a.direction.perp(&b.direction);
+    let angle = sine.abs().atan2(a.direction.dot(&b.direction)).to_degrees();
+    CROSSING_ANGLE
+        .contains(&angle)
+        .then(|| a.point + a.direction * ((b.point - a.point).perp(&b.direction) / sine))
+}
+
+/// Random choices from a fixed seed (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self(seed ^ 0x706c_6174_656e)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % n as u64) as usize
+    }
+}

@@ -1,0 +1,53 @@
+//! Why a face has no outline.
+
+/// Why the outline of a plate's face could not be told.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutlineError {
+    /// The longest boundary loop is too short to be the plate's.
+    #[error(
+        "the longest boundary of the plate's face is about {found_mm:.0} mm long, the plate's is {expected_mm:.0} mm; \
+         clear what hides the plate"
+    )]
+    Loop {
+        /// Millimetres.
+        found_mm: f64,
+        /// Millimetres.
+        expected_mm: f64,
+    },
+    /// There are not four corners that straight edges join.
+    #[error("{found} corners of the plate can be told, not four; clear what hides its corners")]
+    Corners {
+        /// Corner candidates with straight edges on both sides.
+        found: usize,
+    },
+    /// An edge is hidden.
+    #[error(
+        "too little of one edge of the plate is seen ({crossings} lattice lines cross it); clear what hides it"
+    )]
+    Edge {
+        /// Rows and columns that are seen to cross it.
+        crossings: usize,
+    },
+    /// The hint does not tell the corners apart.
+    #[error(
+        "the u axis hint lies {angle_deg:.0} degrees from the nearest edge of the plate; turn it to within 35 degrees of \
+         the edge along which u grows"
+    )]
+    Hint {
+        /// Angle to the nearest edge, degrees.
+        angle_deg: f64,
+    },
+    /// A side differs from the plate file.
+    #[error(
+        "the plate's {side} measures {found_mm:.0} mm on its mid-surface, the plate file says {expected_mm:.0} mm; check \
+         the recipe and the u axis hint"
+    )]
+    WrongSize {
+        /// `width` or `height`.
+        side: &'static str,
+        /// Millimetres.
+        found_mm: f64,
+        /// Millimetres.
+        expected_mm: f64,
+    },
+}

@@ -1,0 +1,98 @@
+//! Penalised cubic splines of one variable.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::surface::Axis;
+
+/// A cubic spline over an axis.
+#[derive(Debug, Clone)]
+pub(super) struct Spline {
+    axis: Axis,
+    coefficients: DVector<f64>,
+}
+
+impl Spline {
+    pub(super) fn new(axis: Axis, coefficients: DVector<f64>) -> Self {
+        Self { axis, coefficients }
+    }
+
+    pub(super) fn at(&self, x: f64) -> f64 {
+        let (first, values) = self.axis.values(x);
+        (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
+    }
+}
+
+/// Normal equations of a spline: sums over data, and what is known of the curve before any.
+#[derive(Debug, Clone)]
+pub(super) struct Normal {
+    axis: Axis,
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+/// A difference of neighbouring coefficients that estimates a derivative.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Roughness {
+    /// Second derivative.
+    Curvature,
+    /// Third derivative.
+    CurvatureChange,
+}
+
+impl Normal {
+    /// Without data: a derivative that varies as white noise over `length` with the standard deviation `spread`.
+    pub(super) fn with_prior(axis: Axis, roughness: Roughness, spread: f64, length: f64) -> Self {
+        let n = axis.n_coefficients();
+        let mut matrix = DMatrix::zeros(n, n);
+        let (stencil, order): (&[f64], i32) = match roughness {
+            Roughness::Curvature => (&[1.0, -2.0, 1.0], 2),
+            Roughness::CurvatureChange => (&[-1.0, 3.0, -3.0, 1.0], 3),
+        };
+        let scale = axis.step() / (length * spread * spread) * axis.step().powi(-2 * order);
+        for start in 0..=n - stencil.len() {
+            for (i, a) in stencil.iter().enumerate() {
+                for (j, b) in stencil.iter().enumerate() {
+                    matrix[(start + i, start + j)] += scale * a * b;
+                }
+            }
+        }
+        Self { axis, matrix, right: DVector::zeros(n) }
+    }
+
+    /// Adds a value `y` at `x` with the weight `w` (one over its variance).
+    pub(super) fn add(&mut self, x: f64, y: f64, w: f64) {
+        let (first, values) = self.axis.values(x);
+        for i in 0..4 {
+            for j in 0..4 {
+                self.matrix[(first + i, first + j)] += w * values[i] * values[j];
+            }
+            self.right[first + i] += w * values[i] * y;
+        }
+    }
+
+    /// The spline, and the factor of its precision. `None` when the data leave it open.
+    pub(super) fn solve(self) -> Option<(Spline, Precision)> {
+        let factor = Cholesky::new(self.matrix)?;
+        let coefficients = factor.solve(&self.right);
+        Some((Spline::new(self.axis, coefficients), Precision { axis: self.axis, factor }))
+    }
+}
+
+/// How well a spline is known.
+#[derive(Debug, Clone)]
+pub(super) struct Precision {
+    axis: Axis,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Precision {
+    /// Variance of the spline at `x`.
+    pub(super) fn variance(&self, x: f64) -> f64 {
+        let (first, values) = self.axis.values(x);
+        let mut basis = DVector::zeros(self.axis.n_coefficients());
+        for i in 0..4 {
+            basis[first + i] = values[i];
+        }
+        basis.dot(&self.factor.solve(&basis))
+    }
+}
