@@ -2,6 +2,7 @@
 
 use crate::Options;
 use crate::error::Error;
+use crate::pace::Pace;
 use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::{Job, Result, ScanSink};
 use platen_sim_plate::{Plate, PlateState, Vec3};
@@ -9,6 +10,7 @@ use platen_sim_scanner::{
     Cyclic, INTENSITY_MAX, Instrument, Scene, SimColumn, SimLattice, SimState, Surroundings, scan,
 };
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// Period of the cyclic range error, metres.
 const CYCLIC_PERIOD: f64 = 1.2;
@@ -62,6 +64,7 @@ pub(crate) struct Shot {
     lattice: SimLattice,
     instrument: Instrument,
     threads: usize,
+    pace: Option<Pace>,
     note: String,
 }
 
@@ -82,6 +85,7 @@ impl Shot {
         Ok(Self {
             scene: Scene::new(plate, &surroundings(options)),
             lattice,
+            pace: Pace::new(options, width(&lattice))?,
             instrument: instrument(options, number),
             threads: threads(options),
             note,
@@ -90,13 +94,14 @@ impl Shot {
 
     /// Takes it.
     pub(crate) fn take(&self, out: &mut impl Receiver) -> Result<()> {
+        let started = Instant::now();
         out.begin(&self.header())?;
         let mut points = 0;
         let mut failed = None;
         let ended = scan(&self.scene, &self.lattice, &self.instrument, self.threads, |column| {
             let done = f64::from(column.index + 1) / f64::from(self.lattice.n_columns);
             points += column.state.iter().filter(|state| **state == SimState::Valid).count() as u64;
-            match out.column(&converted(column)).and_then(|()| out.check(done)) {
+            match self.deliver(column, started, done, out) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
                     failed = Some(error);
@@ -104,15 +109,27 @@ impl Shot {
                 }
             }
         });
-        match (ended, failed) {
-            (ControlFlow::Break(()), Some(error)) => Err(error),
-            _ => out.end(&ScanEnd {
-                columns: self.lattice.n_columns,
-                points,
-                warm_up_columns: self.instrument.warm_up_columns,
-                outcome: Outcome::Complete,
-            }),
+        if let (ControlFlow::Break(()), Some(error)) = (ended, failed) {
+            return Err(error);
         }
+        if let Some(pace) = &self.pace {
+            pace.wait_for_end(started, || out.check(1.0))?;
+        }
+        out.end(&ScanEnd {
+            columns: self.lattice.n_columns,
+            points,
+            warm_up_columns: self.instrument.warm_up_columns,
+            outcome: Outcome::Complete,
+        })
+    }
+
+    /// Hands a column over when it is due.
+    fn deliver(&self, column: SimColumn, started: Instant, done: f64, out: &mut impl Receiver) -> Result<()> {
+        if let Some(pace) = &self.pace {
+            pace.wait_for_column(started, done, || out.check(done))?;
+        }
+        out.column(&converted(column))?;
+        out.check(done)
     }
 
     fn header(&self) -> ScanHeader {
@@ -133,12 +150,18 @@ impl Shot {
     }
 }
 
-/// Seconds that a scan takes here.
-pub(crate) fn estimate_s(options: &Options, window: Option<&Window>) -> f64 {
+/// Seconds that a scan takes here; `None` when the options are at fault.
+pub(crate) fn estimate_s(options: &Options, window: Option<&Window>) -> Option<f64> {
     let step = options.step_deg.to_radians();
     // Without a window: a plate of 5 m at 5 m distance.
-    let area = window.map_or(1.0, |w| w.azimuth_width * (w.elevation_max - w.elevation_min));
-    1.0 + area / (step * step) * SECONDS_PER_CELL
+    let (width, height) = window.map_or((1.0, 1.0), |w| (w.azimuth_width, w.elevation_max - w.elevation_min));
+    let computing = 1.0 + width * height / (step * step) * SECONDS_PER_CELL;
+    let pace = Pace::new(options, width).ok()?;
+    Some(pace.map_or(computing, |pace| pace.duration_s().max(computing)))
+}
+
+fn width(lattice: &SimLattice) -> f64 {
+    lattice.azimuth_step * f64::from(lattice.n_columns)
 }
 
 fn lattice(

@@ -31,10 +31,12 @@
 //! | `warm_up_columns` | columns before the laser is warm |
 //! | `hidden_by` | what stands before the plate |
 //! | `seed` | of all random numbers |
+//! | `time_scale`, `rate_kpts` | share of a real scanner's time that a scan takes, and the rate it would have |
 //! | `threads` | 0: one per core |
 
 mod capture;
 mod error;
+mod pace;
 mod plate;
 
 #[cfg(test)]
@@ -89,6 +91,10 @@ options! {
         hidden_by: String = "nothing", choices ["nothing", "person", "chain", "both"];
         /// Seed of all random numbers.
         seed: i64 = 1, min 0;
+        /// Share of a real scanner's time that a scan takes; 0: no longer than the computer needs.
+        time_scale: f64 = 0.0, min 0.0, max 10.0;
+        /// Measuring rate that this time follows from, in thousands of points per second.
+        rate_kpts: String = "122", choices ["122", "244", "488", "976"];
         /// Threads; 0 takes one per core.
         threads: i64 = 0, min 0, max 256;
     }
@@ -112,6 +118,9 @@ impl Scanner for Simulated {
 
     fn new(options: Options) -> Result<Self> {
         plate::check(&options)?;
+        if options.time_scale > 0.0 {
+            pace::device(&options)?;
+        }
         Ok(Self { options, scans: 0 })
     }
 
@@ -124,7 +133,7 @@ impl Scanner for Simulated {
     }
 
     fn estimate_s(&mut self, window: Option<&Window>) -> Option<f64> {
-        Some(capture::estimate_s(&self.options, window))
+        capture::estimate_s(&self.options, window)
     }
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {

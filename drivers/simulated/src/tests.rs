@@ -1,7 +1,7 @@
 //! The driver without a host: plates from everywhere, windows, columns.
 
 use crate::capture::{Receiver, Shot};
-use crate::{Options, plate};
+use crate::{Options, capture, plate};
 use platen_scan::{Column, Direction, Lattice, ScanEnd, ScanHeader, Window};
 use platen_sdk::{ErrorKind, Result};
 use platen_sim_plate::{Plate, PlateState, Reply, Shape, Vec3};
@@ -31,6 +31,8 @@ fn options() -> Options {
         warm_up_columns: 0,
         hidden_by: "nothing".into(),
         seed: 1,
+        time_scale: 0.0,
+        rate_kpts: "122".into(),
         threads: 2,
     }
 }
@@ -219,4 +221,23 @@ fn a_plate_file_is_read_or_refused_with_its_place() {
     assert!(!refused.to_string().contains('\n'));
     let both = Options { cell: Some("127.0.0.1:1".into()), ..options };
     assert!(refusal(&both).to_string().contains("both"));
+}
+
+#[test]
+fn a_paced_scan_takes_its_share_of_the_real_time() {
+    // The coarsest resolution: 7 s for the circle, 21 s for spin-up and settling.
+    let options = Options { time_scale: 0.01, step_deg: 0.28, margin_deg: 0.5, ..options() };
+    let due = capture::estimate_s(&Options { time_scale: 1.0, ..options.clone() }, None).unwrap();
+    assert!((21.0..24.0).contains(&due), "{due}");
+    let started = std::time::Instant::now();
+    let (lattice, end) = taken(&options, None, 1);
+    assert!(started.elapsed().as_secs_f64() > 0.21);
+    assert_eq!(end.columns as usize, lattice.n_columns());
+    // Cancelled while the mirror spins up: at once.
+    let slow = Options { time_scale: 10.0, ..options };
+    let shot = Shot::new(&slow, plate::fetch(&slow).unwrap(), None, 1).unwrap();
+    let mut keep = Keep { stop_after: Some(0), ..Keep::default() };
+    assert!(shot.take(&mut keep).is_err() && keep.columns == 0);
+    let impossible = Options { rate_kpts: "976".into(), ..slow };
+    assert!(crate::pace::device(&impossible).unwrap_err().to_string().contains("97 Hz"));
 }

@@ -15,6 +15,7 @@
 
 mod bounds;
 mod column;
+mod device;
 mod instrument;
 mod lattice;
 mod measure;
@@ -26,6 +27,7 @@ mod solid;
 mod surroundings;
 
 pub use column::{SimColumn, SimState, TruthCell};
+pub use device::{Device, DeviceError};
 pub use instrument::{Cyclic, Faces, Instrument};
 pub use lattice::SimLattice;
 pub use measure::INTENSITY_MAX;
