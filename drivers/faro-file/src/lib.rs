@@ -1,4 +1,4 @@
-//! Reads laser scans from files: structured E57, PTX, and XYZ with row and column.
+//! Reads laser scans from files: structured E57, PTX, XYZ with row and column, XYB.
 //!
 //! # What it does
 //! It recognises the format from the content, checks that the file is complete, decides from the geometry how rows
@@ -42,9 +42,11 @@ mod e57;
 mod error;
 mod open;
 mod ptx;
+mod regrid;
 mod source;
 mod text;
 mod watch;
+mod xyb;
 mod xyz;
 
 use std::path::PathBuf;
@@ -100,7 +102,7 @@ impl Scanner for FaroFile {
     const INFO: Info = Info::new(
         c"faro-file",
         c"FARO scan files",
-        c"Reads structured E57, PTX and XYZ scans, one file or the next in a watched folder; decides orientation, handedness and units from the geometry.",
+        c"Reads structured E57, PTX, XYZ and XYB scans, one file or the next in a watched folder; decides orientation, handedness and units from the geometry.",
         c"0.1.0",
     );
     type Options = Options;

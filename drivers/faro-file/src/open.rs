@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::ptx::Ptx;
 use crate::source::Source;
 use crate::text::{self, Lines};
+use crate::xyb::{self, Xyb};
 use crate::xyz::{self, Xyz};
 
 /// Bytes from which a format is told.
@@ -25,6 +26,7 @@ pub(crate) enum Kind {
     E57,
     Ptx,
     Xyz,
+    Xyb,
     /// Recognised and refused: what it is, what to do instead.
     Refused(String, &'static str),
 }
@@ -44,6 +46,7 @@ pub(crate) fn open(path: &Path, chosen: Option<usize>) -> Result<Box<dyn Source>
         Kind::E57 => Ok(Box::new(E57::open(file, chosen)?)),
         Kind::Ptx => Ok(Box::new(Ptx::open(file, chosen)?)),
         Kind::Xyz => Ok(Box::new(Xyz::open(file)?)),
+        Kind::Xyb => Ok(Box::new(Xyb::open(file)?)),
         Kind::Refused(format, instead) => Err(Error::Refused { format, instead }),
     }
 }
@@ -98,6 +101,9 @@ pub(crate) fn kind(head: &[u8], extension: &str) -> Result<Kind> {
     }
     if head.starts_with(b"ASTM-E57") {
         return Ok(Kind::E57);
+    }
+    if head.starts_with(xyb::SIGNATURE) {
+        return Ok(Kind::Xyb);
     }
     if let Some((_, format)) = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature)) {
         let instead = if format.contains("archive") { "unpack it first" } else { STRUCTURED };

@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::open;
 use crate::ptx::Ptx;
 use crate::source::{Source, deliver};
+use crate::xyb::Xyb;
 use crate::xyz::Xyz;
 
 /// Reads bytes by what they look like; `Ok` with the points delivered.
@@ -21,6 +22,7 @@ fn read(bytes: &[u8]) -> Result<u64, Error> {
         open::Kind::E57 => Box::new(E57::open(file, None)?),
         open::Kind::Ptx => Box::new(Ptx::open(file, None)?),
         open::Kind::Xyz => Box::new(Xyz::open(file)?),
+        open::Kind::Xyb => Box::new(Xyb::open(file)?),
         open::Kind::Refused(format, instead) => return Err(Error::Refused { format, instead }),
     };
     let mut collected = Collected::default();
@@ -34,6 +36,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("e57 spherical", e57(E57Style { spherical: true, gaps: Gaps::LeftOut, ..PLAIN }, 1)),
         ("ptx", ptx(PTX, COLUMNS)),
         ("xyz", xyz("", " 12", false, "\n")),
+        ("xyb", xyb((ROWS, COLUMNS), true, false, 0.0)),
+        ("xyb of hits", xyb((0, 0), false, false, 0.0)),
     ]
 }
 
@@ -46,9 +50,13 @@ fn a_file_cut_anywhere_is_refused() {
         for length in (0..file.len()).step_by(97) {
             let cut = &file[..length];
             let read = read(cut);
-            // Text cut at a line end cannot be told from a smaller scan where nothing announces the number.
-            let whole_lines = name == "xyz" && cut.ends_with(b"\n");
-            assert!(read.is_err() || whole_lines, "{name} cut at {length} gave {read:?}");
+            // Cut behind a whole point a file cannot be told from a smaller scan where nothing announces the number.
+            let whole_points = match name {
+                "xyz" => cut.ends_with(b"\n"),
+                "xyb" | "xyb of hits" => true,
+                _ => false,
+            };
+            assert!(read.is_err() || whole_points, "{name} cut at {length} gave {read:?}");
         }
     }
 }
@@ -69,7 +77,7 @@ proptest! {
     /// Bytes replaced anywhere, with the checksums of an E57 mended so that the damage reaches the parser.
     #[test]
     fn no_damage_brings_the_reader_down(
-        which in 0_usize..4,
+        which in 0_usize..6,
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
     ) {
         let (name, mut file) = files().swap_remove(which);
@@ -87,8 +95,8 @@ proptest! {
 
     /// Anything at all.
     #[test]
-    fn no_bytes_bring_the_reader_down(mut bytes in prop::collection::vec(any::<u8>(), 0..3000), head in 0..4) {
-        let head: &[u8] = [b"ASTM-E57".as_slice(), b"5\n4\n0 0 0\n", b"1 2 3 4 5\n", b""][head as usize];
+    fn no_bytes_bring_the_reader_down(mut bytes in prop::collection::vec(any::<u8>(), 0..3000), head in 0..5) {
+        let head: &[u8] = [b"ASTM-E57".as_slice(), b"5\n4\n0 0 0\n", b"1 2 3 4 5\n", crate::xyb::SIGNATURE, b""][head as usize];
         bytes.splice(0..0, head.iter().copied());
         let _ = read(&bytes);
     }

@@ -163,6 +163,31 @@ fn every_xyz_gives_the_same_cells() {
 }
 
 #[test]
+fn every_xyb_gives_the_same_cells() {
+    for along_rows in [false, true] {
+        for sizes in [(ROWS, COLUMNS), (COLUMNS, ROWS)] {
+            for missing_as in [0.0, f64::NAN] {
+                check(&xyb(sizes, true, along_rows, missing_as), "scan.xyb", EXACT);
+            }
+        }
+    }
+    for sizes in [(ROWS, COLUMNS), (COLUMNS, ROWS), (0, 0)] {
+        let lattice = check(&xyb(sizes, false, false, 0.0), "scan.xyb", EXACT);
+        assert!(notes(&lattice).contains("placed by the order of their angles"), "{}", notes(&lattice));
+    }
+    check_refused(&xyb((0, 0), false, true, 0.0), "scan.xyb", "do not follow each other along columns");
+}
+
+#[test]
+fn a_cut_xyb_says_so() {
+    let whole = xyb((ROWS, COLUMNS), true, false, 0.0);
+    check_refused(&whole[..whole.len() - 3], "scan.xyb", "19965 bytes of points, a multiple of 26 needed");
+    check_refused(&whole[..60], "scan.xyb", "no end of the header in 60 bytes");
+    let nameless = String::from_utf8_lossy(&whole[..80]).replace("Rows", "Raws").into_bytes();
+    check_refused(&[&nameless[..], &[0; 30]].concat(), "scan.xyb", "does not say");
+}
+
+#[test]
 fn a_cut_text_file_is_incomplete() {
     let whole = ptx(PTX, COLUMNS);
     let text = String::from_utf8(whole.clone()).unwrap();

@@ -215,3 +215,19 @@ pub(super) fn xyz(head: &str, tail: &str, swapped: bool, end: &str) -> Vec<u8> {
     }
     text.into_bytes()
 }
+
+/// The lattice as an XYB file: `sizes` in the header, all cells or hits alone, along columns or along rows.
+pub(super) fn xyb(sizes: (u32, u32), all: bool, along_rows: bool, missing_as: f64) -> Vec<u8> {
+    let (rows, columns) = sizes;
+    let head =
+        format!("# SCENE XYZ binary format v1.0\nScanPosition 1.0 2.0 3.0 \nRows {rows}\nCols {columns}\n");
+    let mut file = [head.as_bytes(), &[0; 4]].concat();
+    let cells = (0..ROWS * COLUMNS)
+        .map(|i| if along_rows { (i / COLUMNS, i % COLUMNS) } else { (i % ROWS, i / ROWS) });
+    for (row, column) in cells.filter(|(row, column)| all || !missing(*row, *column)) {
+        let xyz = if missing(row, column) { [missing_as; 3] } else { point(row, column) };
+        xyz.iter().for_each(|c| file.extend(c.to_le_bytes()));
+        file.extend((intensity(row, column) as u16).to_le_bytes());
+    }
+    file
+}

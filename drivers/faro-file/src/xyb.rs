@@ -1,0 +1,199 @@
+//! XYB (SCENE binary, version 1.0): a text header, four zero bytes, then x, y, z as f64 and the reflectance as u16.
+//!
+//! There is no count and no checksum; only the length tells a whole record from a cut one. `Rows` and `Cols` are
+//! named either way round. When the records are as many as the cells they are all of them, and the geometry says
+//! along which of the two they run; else they are hits alone and get their rows and columns back from the order in
+//! which they were measured, where that proves possible.
+
+use std::io::{BufReader, Read, Seek, SeekFrom};
+
+use platen_scan::orient::{Expected, RawCell, Survey};
+use platen_scan::{Direction, State};
+
+use crate::error::{Error, Result};
+use crate::regrid::{self, Placer, Steps};
+use crate::source::{About, Source, Visit};
+
+const FORMAT: &str = "XYB";
+/// First line, without its version.
+pub(crate) const SIGNATURE: &[u8] = b"# SCENE XYZ binary";
+/// The header ends within so many bytes.
+const MAX_HEADER: u64 = 512;
+const RECORD: usize = 26;
+/// Full scale of the scanner's reflectance.
+const REFLECTANCE: (f64, f64) = (0.0, 2047.0);
+const BUFFER: usize = RECORD << 13;
+
+/// One scan of an XYB file.
+#[derive(Debug)]
+pub(crate) struct Xyb<R> {
+    file: R,
+    offset: u64,
+    order: Order,
+    about: About,
+}
+
+/// How records become cells.
+#[derive(Debug, Clone)]
+enum Order {
+    /// Every cell is stored, so many in a line.
+    Lines(u32),
+    /// Hits alone.
+    Hits(Steps),
+}
+
+/// What the header says.
+struct Header {
+    length: u64,
+    rows: u32,
+    columns: u32,
+}
+
+impl<R: Read + Seek> Xyb<R> {
+    /// Reads the header, checks the length and finds out how records become cells.
+    pub(crate) fn open(mut file: R) -> Result<Self> {
+        let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
+        let header = header(&mut file)?;
+        let bytes = length - header.length;
+        if bytes == 0 || !bytes.is_multiple_of(RECORD as u64) {
+            let what = format!("{bytes} bytes of points, a multiple of {RECORD} needed");
+            return Err(Error::Incomplete { format: FORMAT, what });
+        }
+        let cells = bytes / RECORD as u64;
+        let about = About { cells, intensity: Some(REFLECTANCE), ..About::default() };
+        let lines = Order::Lines(header.rows);
+        let mut xyb = Self { file, offset: header.length, order: lines, about };
+        if u64::from(header.rows) * u64::from(header.columns) == cells {
+            xyb.choose_lines(header.rows, header.columns)?;
+        } else {
+            xyb.order = Order::Hits(xyb.steps()?);
+            let note = "the file holds hits without row and column: placed by the order of their angles";
+            xyb.about.notes.push(note.to_owned());
+        }
+        Ok(xyb)
+    }
+
+    /// Whether the records run along what the header calls rows or along what it calls columns.
+    fn choose_lines(&mut self, rows: u32, columns: u32) -> Result<()> {
+        let mut first_error = None;
+        for in_a_line in [rows, columns] {
+            self.order = Order::Lines(in_a_line);
+            let mut survey = Survey::default();
+            self.cells(&mut |cell| Ok(survey.add(cell)?))?;
+            match survey.decide(&Expected::default()) {
+                Ok(_) => return Ok(()),
+                Err(error) => first_error.get_or_insert(error),
+            };
+        }
+        first_error.map_or(Ok(()), |error| Err(error.into()))
+    }
+
+    fn steps(&mut self) -> Result<Steps> {
+        let mut reader = self.records()?;
+        let mut hits = Vec::new();
+        while let Some((xyz, _)) = next(&mut reader)?
+            && hits.len() < regrid::SAMPLE
+        {
+            if is_hit(xyz) {
+                hits.push(Direction::of(xyz));
+            }
+        }
+        Ok(Steps::estimate(&hits)?)
+    }
+
+    fn records(&mut self) -> Result<BufReader<&mut R>> {
+        self.file.seek(SeekFrom::Start(self.offset)).map_err(Error::io("going to the points"))?;
+        Ok(BufReader::with_capacity(BUFFER, &mut self.file))
+    }
+}
+
+impl<R: Read + Seek> Source for Xyb<R> {
+    fn about(&self) -> &About {
+        &self.about
+    }
+
+    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
+        let order = self.order.clone();
+        let mut reader = self.records()?;
+        match order {
+            Order::Lines(in_a_line) => {
+                let (mut row, mut column) = (0, 0);
+                while let Some((xyz, intensity)) = next(&mut reader)? {
+                    visit(&RawCell { row, column, xyz, intensity, state: State::Valid })?;
+                    row += 1;
+                    if row == in_a_line {
+                        (row, column) = (0, column + 1);
+                    }
+                }
+                Ok(())
+            }
+            Order::Hits(steps) => {
+                let mut placer = Placer::new(steps);
+                let mut give = |placed: Vec<regrid::Placed<([f64; 3], f64)>>| {
+                    placed.into_iter().try_for_each(|place| {
+                        let (row, column, (xyz, intensity)) = (place.row, place.column, place.record);
+                        visit(&RawCell { row, column, xyz, intensity, state: State::Valid })
+                    })
+                };
+                while let Some((xyz, intensity)) = next(&mut reader)? {
+                    if is_hit(xyz) {
+                        give(placer.push(Direction::of(xyz), (xyz, intensity))?)?;
+                    }
+                }
+                give(placer.finish()?)
+            }
+        }
+    }
+}
+
+fn is_hit(xyz: [f64; 3]) -> bool {
+    xyz.iter().all(|c| c.is_finite()) && xyz != [0.0; 3]
+}
+
+/// A reason of the placing is one to refuse the file.
+impl From<String> for Error {
+    fn from(why: String) -> Self {
+        Self::Refused {
+            format: format!("XYB file of hits alone ({why})"),
+            instead: "export it again with all cells, or as structured E57",
+        }
+    }
+}
+
+/// The next record, `None` behind the last.
+fn next<R: Read>(reader: &mut R) -> Result<Option<([f64; 3], f64)>> {
+    let mut record = [0; RECORD];
+    let mut filled = 0;
+    while filled < RECORD {
+        match reader.read(&mut record[filled..]).map_err(Error::io("reading points"))? {
+            0 if filled == 0 => return Ok(None),
+            0 => return Err(Error::Incomplete { format: FORMAT, what: "a record is cut".to_owned() }),
+            n => filled += n,
+        }
+    }
+    let number = |at: usize| {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&record[at..at + 8]);
+        f64::from_le_bytes(bytes)
+    };
+    let reflectance = u16::from_le_bytes([record[24], record[25]]);
+    Ok(Some(([number(0), number(8), number(16)], f64::from(reflectance))))
+}
+
+fn header<R: Read + Seek>(file: &mut R) -> Result<Header> {
+    file.rewind().map_err(Error::io("going back to the start"))?;
+    let mut head = Vec::new();
+    file.by_ref().take(MAX_HEADER).read_to_end(&mut head).map_err(Error::io("reading the header"))?;
+    let end = head.windows(4).position(|four| four == [0; 4]);
+    let Some(end) = end else {
+        let what = format!("no end of the header in {} bytes", head.len());
+        return Err(Error::Incomplete { format: FORMAT, what });
+    };
+    let text = String::from_utf8_lossy(&head[..end]);
+    let size = |name: &str| {
+        let line = text.lines().find_map(|line| line.strip_prefix(name));
+        line.and_then(|number| number.trim().parse().ok())
+            .ok_or_else(|| Error::Unsound { format: FORMAT, what: format!("its header does not say {name}") })
+    };
+    Ok(Header { length: end as u64 + 4, rows: size("Rows")?, columns: size("Cols")? })
+}
