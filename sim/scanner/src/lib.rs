@@ -16,6 +16,7 @@
 mod bounds;
 mod column;
 mod device;
+mod files;
 mod instrument;
 mod lattice;
 mod measure;
@@ -28,6 +29,7 @@ mod surroundings;
 
 pub use column::{SimColumn, SimState, TruthCell};
 pub use device::{Device, DeviceError};
+pub use files::{E57Encoding, FileError, FileFormat, FileOrder, SimScan};
 pub use instrument::{Cyclic, Faces, Instrument};
 pub use lattice::SimLattice;
 pub use measure::INTENSITY_MAX;

@@ -1,0 +1,14 @@
+//! XYZ with row and column first; cells without echo are left out.
+
+use super::{FileOrder, SimScan};
+use std::io::{Result, Write};
+
+/// `row column x y z reflectance`, metres, reflectance 0..=2047.
+pub(super) fn write(scan: &SimScan, out: &mut impl Write, order: FileOrder) -> Result<()> {
+    for cell in scan.cells(order) {
+        if let Some([x, y, z]) = cell.point() {
+            writeln!(out, "{} {} {x:.6} {y:.6} {z:.6} {}", cell.row, cell.column, cell.intensity)?;
+        }
+    }
+    Ok(())
+}
