@@ -22,9 +22,9 @@ use platen_shape::sparse::Spd;
 
 /// The membrane of one mesh.
 pub(crate) struct Membrane<'a> {
-    triangles: &'a [[u32; 3]],
+    pub(crate) triangles: &'a [[u32; 3]],
     /// Metric of each triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
-    metrics: Vec<[f64; 3]>,
+    pub(crate) metrics: Vec<[f64; 3]>,
     poisson: f64,
 }
 
@@ -43,11 +43,11 @@ pub(crate) struct Strained {
 }
 
 /// The state of one triangle at given material places.
-struct State {
+pub(crate) struct State {
     /// Area on the flat plate.
-    area: f64,
+    pub(crate) area: f64,
     /// Gradients of the three hat functions.
-    hats: [[f64; 2]; 3],
+    pub(crate) hats: [[f64; 2]; 3],
     stretch: Sym,
     stress: Sym,
     /// Energy density.
@@ -93,7 +93,7 @@ impl<'a> Membrane<'a> {
     pub(crate) fn add_hessian(&self, x: &[[f64; 2]], spd: &mut Spd<2>) {
         for (t, metric) in self.triangles.iter().zip(&self.metrics) {
             let Some(state) = self.state(t, metric, x) else { continue };
-            let forms = Forms::of(&state, self.poisson, true);
+            let forms = Forms::of(&state, self.poisson).positive();
             for (a, b) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
                 spd.add(t[a], t[b], forms.block(state.hats[a], state.hats[b], state.area));
             }
@@ -112,7 +112,7 @@ impl<'a> Membrane<'a> {
         self.triangles.iter().zip(&self.metrics).map(of_triangle).collect()
     }
 
-    fn state(&self, t: &[u32; 3], &[g11, g12, g22]: &Sym, x: &[[f64; 2]]) -> Option<State> {
+    pub(crate) fn state(&self, t: &[u32; 3], &[g11, g12, g22]: &Sym, x: &[[f64; 2]]) -> Option<State> {
         let corners = t.map(|v| x[v as usize]);
         let area = signed_area(corners);
         if area.is_nan() || area <= 0.0 {
@@ -139,7 +139,7 @@ impl State {
     }
 
     /// psi I - C S; C and S commute, so it is symmetric.
-    fn eshelby(&self) -> Sym {
+    pub(crate) fn eshelby(&self) -> Sym {
         let ([c11, c22, c12], [s11, s22, s12]) = (self.stretch, self.stress);
         [
             self.density - (c11 * s11 + c12 * s12),
@@ -160,7 +160,7 @@ pub(crate) fn stress([e11, e22, e12]: Sym, poisson: f64) -> Sym {
 }
 
 /// The second derivative of a triangle's energy per area as two quadratic forms in H, in the frame of C.
-struct Forms {
+pub(crate) struct Forms {
     /// Cosine and sine of the angle from u to the frame's first axis.
     turn: [f64; 2],
     /// In (H11, H22).
@@ -170,7 +170,7 @@ struct Forms {
 }
 
 impl Forms {
-    fn of(state: &State, poisson: f64, positive: bool) -> Self {
+    pub(crate) fn of(state: &State, poisson: f64) -> Self {
         let [c11, c22, c12] = state.stretch;
         let (mean, half) = (0.5 * (c11 + c22), 0.5 * (c11 - c22));
         let radius = (half * half + c12 * c12).sqrt();
@@ -185,12 +185,16 @@ impl Forms {
         let stretches =
             [p1 + young * c1 * c1, p2 + young * c2 * c2, psi - p1 - p2 + young * poisson * c1 * c2];
         let shears = [c1 * s2 + shear * c1 * c1, c2 * s1 + shear * c2 * c2, p1 + p2 - psi + shear * c1 * c2];
-        let keep = |form| if positive { positive_part(form) } else { form };
-        Self { turn: [cos, sin], stretches: keep(stretches), shears: keep(shears) }
+        Self { turn: [cos, sin], stretches, shears }
+    }
+
+    /// The nearest positive semidefinite forms.
+    pub(crate) fn positive(self) -> Self {
+        Self { stretches: positive_part(self.stretches), shears: positive_part(self.shears), ..self }
     }
 
     /// The 2 x 2 block of two vertices with the given hat gradients.
-    fn block(&self, a: [f64; 2], b: [f64; 2], area: f64) -> [[f64; 2]; 2] {
+    pub(crate) fn block(&self, a: [f64; 2], b: [f64; 2], area: f64) -> [[f64; 2]; 2] {
         let [cos, sin] = self.turn;
         let turned = |g: [f64; 2]| [cos * g[0] + sin * g[1], cos * g[1] - sin * g[0]];
         let (a, b) = (turned(a), turned(b));
@@ -207,7 +211,7 @@ impl Forms {
 }
 
 /// The nearest positive semidefinite form.
-fn positive_part([a, d, b]: Sym) -> Sym {
+pub(crate) fn positive_part([a, d, b]: Sym) -> Sym {
     let (mean, radius) = (0.5 * (a + d), (0.5 * (a - d)).hypot(b));
     let [high, low] = [mean + radius, mean - radius];
     if low >= 0.0 {
@@ -219,96 +223,4 @@ fn positive_part([a, d, b]: Sym) -> Sym {
     // high times the projector on its eigenvector, (form - low I) / (high - low).
     let share = high / (high - low);
     [share * (a - low), share * (d - low), share * b]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use platen_shape::flatten::closed_form::{ClosedForm, Random};
-
-    /// A small plate, its material places shaken by `strain`.
-    fn shaken(strain: f64, seed: u64) -> (DiskMesh, Vec<[f64; 2]>) {
-        let surface = |[u, v]: [f64; 2]| [u + 0.1 * v, v, 0.2 * u * v + 0.1 * u * u];
-        let plate = ClosedForm::new(surface, [1.0, 0.8], [4, 3], 0.2, seed);
-        let mut random = Random(seed);
-        let x = plate.uv.iter().map(|p| p.map(|x| x + strain * 0.25 * (random.unit() - 0.5))).collect();
-        (plate.mesh().unwrap(), x)
-    }
-
-    #[test]
-    fn the_gradient_is_the_energys_difference() {
-        for seed in 0..20 {
-            let (mesh, x) = shaken(0.3, seed);
-            let membrane = Membrane::new(&mesh, 0.3);
-            let mut gradient = vec![[0.0; 2]; x.len()];
-            membrane.add_gradient(&x, &mut gradient);
-            for (v, c) in (0..x.len()).flat_map(|v| [(v, 0), (v, 1)]) {
-                let at = |step: f64| {
-                    let mut x = x.clone();
-                    x[v][c] += step;
-                    membrane.energy(&x)
-                };
-                let h = 1e-4;
-                let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
-                assert!((gradient[v][c] - difference).abs() < 1e-9 * (1.0 + difference.abs()), "{v} {c}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_hessian_is_the_gradients_difference() {
-        for seed in 0..20 {
-            let (mesh, x) = shaken(0.3, seed);
-            let membrane = Membrane::new(&mesh, 0.3);
-            let (t, metric) = (membrane.triangles[0], membrane.metrics[0]);
-            let state = membrane.state(&t, &metric, &x).unwrap();
-            let forms = Forms::of(&state, 0.3, false);
-            let gradient = |x: &[[f64; 2]]| {
-                let state = membrane.state(&t, &metric, x).unwrap();
-                let m = state.eshelby();
-                state
-                    .hats
-                    .map(|g| [m[0] * g[0] + m[2] * g[1], m[2] * g[0] + m[1] * g[1]].map(|f| f * state.area))
-            };
-            for (b, c) in (0..3).flat_map(|b| [(b, 0), (b, 1)]) {
-                let at = |step: f64| {
-                    let mut x = x.clone();
-                    x[t[b] as usize][c] += step;
-                    gradient(&x)
-                };
-                let h = 1e-4;
-                let [p, m, p2, m2] = [at(h), at(-h), at(2.0 * h), at(-2.0 * h)];
-                for (a, r) in (0..3).flat_map(|a| [(a, 0), (a, 1)]) {
-                    let difference = (8.0 * (p[a][r] - m[a][r]) - (p2[a][r] - m2[a][r])) / (12.0 * h);
-                    let block = forms.block(state.hats[a], state.hats[b], state.area);
-                    assert!(
-                        (block[r][c] - difference).abs() < 1e-7 * (1.0 + difference.abs()),
-                        "{seed} {a}{r} {b}{c}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_positive_part_keeps_what_is_positive() {
-        assert_eq!(positive_part([2.0, 1.0, 0.5]), [2.0, 1.0, 0.5]);
-        assert_eq!(positive_part([-2.0, -1.0, 0.5]), [0.0; 3]);
-        // Eigenvalues 3 and -1 along the diagonals.
-        let [a, d, b] = positive_part([1.0, 1.0, 2.0]);
-        assert!((a - 1.5).abs() + (d - 1.5).abs() + (b - 1.5).abs() < 1e-12);
-    }
-
-    #[test]
-    fn an_evenly_stretched_plate_has_its_closed_form_energy() {
-        let plate = ClosedForm::new(|[u, v]| [1.01 * u, 0.0, 0.98 * v], [2.0, 1.0], [6, 4], 0.3, 1);
-        let mesh = plate.mesh().unwrap();
-        let membrane = Membrane::new(&mesh, 0.3);
-        let (e1, e2) = (0.5 * (1.01_f64.powi(2) - 1.0), 0.5 * (0.98_f64.powi(2) - 1.0));
-        let density = (e1 * e1 + e2 * e2 + 2.0 * 0.3 * e1 * e2) / (2.0 * (1.0 - 0.09));
-        assert!((membrane.energy(&plate.uv) - 2.0 * density).abs() < 1e-15);
-        for Strained { strain: [a, b, c], .. } in membrane.strains(&plate.uv) {
-            assert!((a - e1).abs() < 1e-12 && (b - e2).abs() < 1e-12 && c.abs() < 1e-12);
-        }
-    }
 }

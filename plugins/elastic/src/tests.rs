@@ -1,4 +1,5 @@
 mod least_energy;
+mod membrane;
 
 use crate::chart::elastic;
 use least_energy::sphere_of_least_energy;
