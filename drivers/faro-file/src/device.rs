@@ -23,8 +23,8 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// Reads one file.
-    pub(crate) fn file(&self, path: &Path, out: &mut dyn Receiver) -> Result<()> {
-        let mut source = open::open(path, self.cloud)?;
+    pub(crate) fn file(&self, path: &Path, out: &mut dyn Receiver, alive: &dyn Fn() -> bool) -> Result<()> {
+        let mut source = open::open(path, self.cloud, alive)?;
         deliver(source.as_mut(), &self.known, None, out)?;
         Ok(())
     }
@@ -70,9 +70,10 @@ impl Folder {
         pattern: glob::Pattern,
         out: &mut dyn Receiver,
         pause: &mut dyn FnMut(String) -> Result<()>,
+        alive: &dyn Fn() -> bool,
     ) -> platen_sdk::Result<()> {
         let watch = Watch::new(pattern, self.stable_polls, self.before.take());
-        let outcome = self.wait(watch, reading, out, pause);
+        let outcome = self.wait(watch, reading, out, pause, alive);
         self.before = list(&self.path).ok();
         self.measured = Some(outcome?);
         Ok(())
@@ -85,12 +86,13 @@ impl Folder {
         reading: &Reading,
         out: &mut dyn Receiver,
         pause: &mut dyn FnMut(String) -> Result<()>,
+        alive: &dyn Fn() -> bool,
     ) -> platen_sdk::Result<u32> {
         loop {
             let due = watch.poll(list(&self.path));
             let mut sound = Vec::new();
             for name in due {
-                match open::open(&self.path.join(&name), reading.cloud) {
+                match open::open(&self.path.join(&name), reading.cloud, alive) {
                     Ok(source) => sound.push((name, source)),
                     Err(error) => watch.refuse(&name, error.to_string()),
                 }

@@ -46,6 +46,7 @@ mod regrid;
 mod source;
 mod text;
 mod watch;
+mod window;
 mod xyb;
 mod xyz;
 
@@ -149,15 +150,20 @@ impl Scanner for FaroFile {
     }
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
+        let alive = || job.check().is_ok();
         let mut host = ToHost { job, out };
         match &mut self.place {
-            Place::File(path) => self.reading.file(path, &mut host).map_err(|error| error.at(path)),
+            Place::File(path) => {
+                let read = self.reading.file(path, &mut host, &alive);
+                // A cancelled job ends reading with an error of its own.
+                read.map_err(|error| job.check().err().unwrap_or_else(|| error.at(path)))
+            }
             Place::Folder(folder) => {
                 let pattern = folder.pattern(job.stroke(), job.id());
                 let pattern = pattern.map_err(|e| config(&format!("pattern: {e}"), "see its description"))?;
                 let poll = self.poll;
                 let mut pause = |why| device::pause(job, poll, why);
-                folder.follow(&self.reading, pattern, &mut host, &mut pause)
+                folder.follow(&self.reading, pattern, &mut host, &mut pause, &alive)
             }
         }
     }

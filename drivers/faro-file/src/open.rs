@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::ptx::Ptx;
 use crate::source::Source;
 use crate::text::{self, Lines};
+use crate::window::Window;
 use crate::xyb::{self, Xyb};
 use crate::xyz::{self, Xyz};
 
@@ -31,14 +32,20 @@ pub(crate) enum Kind {
     Refused(String, &'static str),
 }
 
-/// Opens the scan in the file at `path`; `chosen` counts from 1 where a file holds several.
-pub(crate) fn open(path: &Path, chosen: Option<usize>) -> Result<Box<dyn Source>> {
+/// Opens the scan in the file at `path`; `chosen` counts from 1 where a file holds several. Reading ends with an
+/// error when `alive` says no.
+pub(crate) fn open<'a>(
+    path: &Path,
+    chosen: Option<usize>,
+    alive: &'a dyn Fn() -> bool,
+) -> Result<Box<dyn Source + 'a>> {
     let data = std::fs::metadata(path).map_err(Error::io("looking for the scan"))?;
     if data.is_dir() {
         let (format, instead) = folder(path);
         return Err(Error::Refused { format, instead });
     }
-    let mut file = File::open(path).map_err(Error::io("opening the scan"))?;
+    let file = File::open(path).map_err(Error::io("opening the scan"))?;
+    let mut file = Window::new(file, alive);
     let mut head = Vec::new();
     file.by_ref().take(HEAD).read_to_end(&mut head).map_err(Error::io("reading the scan"))?;
     file.rewind().map_err(Error::io("going back to the start"))?;

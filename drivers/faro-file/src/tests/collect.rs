@@ -47,7 +47,7 @@ impl Receiver for Collected {
 /// Reads a file to the end.
 pub(super) fn read(path: &Path, chosen: Option<usize>) -> std::result::Result<Lattice, Error> {
     let mut collected = Collected::default();
-    Reading { cloud: chosen, known: Expected::default() }.file(path, &mut collected)?;
+    Reading { cloud: chosen, known: Expected::default() }.file(path, &mut collected, &|| true)?;
     let (lattice, end) = (collected.lattice.unwrap(), collected.end.unwrap());
     assert_eq!((collected.columns, lattice.n_columns()), (end.columns, end.columns as usize));
     assert_eq!(lattice.n_valid() as u64, end.points);
