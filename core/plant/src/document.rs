@@ -59,7 +59,7 @@ impl Document {
         let (table, errors) = DeTable::parse_recoverable(&source.text);
         let mut root = Node::from_table(&table);
         let syntax = Syntax::sort_out(&source, &root, &errors);
-        root.break_values(&syntax.broken);
+        root.break_values(&|value| syntax.breaks(&source, value));
         let faults = RefCell::new(syntax.faults.clone());
         Self { source: Arc::new(source), path: String::new(), root, syntax, faults }
     }
@@ -72,19 +72,14 @@ impl Document {
         let file = path.display().to_string();
         let bytes =
             std::fs::read(path).map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
-        match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self::parse(file, text)),
-            Err(error) => {
-                let valid = error.utf8_error().valid_up_to();
-                let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
-                let document = Self::parse(file, text);
-                document.faults.borrow_mut().clear();
-                let place = Place { key: String::new(), offset: valid };
-                let message = "this byte is not UTF-8; save the file as UTF-8".to_owned();
-                let fault = document.source.fault(&place, message);
-                Err(Error::Faulty(Faults::one(fault)))
-            }
-        }
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let offset = error.utf8_error().valid_up_to();
+            let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+            let source = Source { file: file.clone(), text };
+            let message = "this byte is not UTF-8; save the file as UTF-8".to_owned();
+            Faults::one(source.fault(&Place { key: String::new(), offset }, message))
+        })?;
+        Ok(Self::parse(file, text))
     }
 
     /// A part of a file that was read before, to be read on its own.
@@ -105,10 +100,10 @@ impl Document {
         Reported(())
     }
 
-    /// Records that a key is missing, unless broken syntax may have swallowed it.
-    pub(crate) fn missing(&self, place: &Place) -> Reported {
+    /// Records that something is not there, unless broken syntax may have swallowed it.
+    pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
         if self.syntax.broken.is_empty() {
-            return self.fault(place, "missing");
+            return self.fault(place, message);
         }
         Reported(())
     }

@@ -60,7 +60,7 @@ impl<'d, T> Field<'d, T> {
     /// [`Reported`] when it is missing or was refused.
     pub fn required(self) -> Result<T, Reported> {
         let Self { document, place, state } = self;
-        state?.ok_or_else(|| document.missing(&place))
+        state?.ok_or_else(|| document.absent(&place, "missing"))
     }
 
     /// The value if it is there.

@@ -82,20 +82,16 @@ impl Node {
         }
     }
 
-    /// Marks every value that overlaps one of `ranges` as broken, whole, with all that it holds.
-    pub(crate) fn break_values(&mut self, ranges: &[Range<usize>]) {
+    /// Marks every value below this one for which `is_broken` holds, whole, with all that it holds.
+    pub(crate) fn break_values(&mut self, is_broken: &impl Fn(&Self) -> bool) {
+        let visit = |value: &mut Self| match is_broken(value) {
+            true => value.kind = Kind::Broken,
+            false => value.break_values(is_broken),
+        };
         match &mut self.kind {
-            Kind::Table(entries) => entries.iter_mut().for_each(|entry| entry.value.break_if(ranges)),
-            Kind::Array(values) => values.iter_mut().for_each(|value| value.break_if(ranges)),
+            Kind::Table(entries) => entries.iter_mut().for_each(|entry| visit(&mut entry.value)),
+            Kind::Array(values) => values.iter_mut().for_each(visit),
             _ => {}
-        }
-    }
-
-    fn break_if(&mut self, ranges: &[Range<usize>]) {
-        if ranges.iter().any(|range| self.span.start < range.end && range.start < self.span.end) {
-            self.kind = Kind::Broken;
-        } else {
-            self.break_values(ranges);
         }
     }
 

@@ -38,6 +38,14 @@ impl Syntax {
         self.broken.iter().any(|range| range.start <= offset && offset <= range.end)
     }
 
+    /// Whether broken text takes part in a value. The parser lets the header after a broken one begin at the broken one:
+    /// of a header only its end counts.
+    pub(crate) fn breaks(&self, source: &Source, value: &Node) -> bool {
+        let Range { start, end } = value.span;
+        let start = if under_header(source, value) { end.saturating_sub(1) } else { start };
+        self.broken.iter().any(|range| start < range.end && range.start < end)
+    }
+
     fn add(
         &mut self,
         source: &Source,

@@ -129,31 +129,29 @@ impl PlateFile {
         let target = root.table("target").optional();
         let target = target.and_then(|table| table.map(|table| Target::read(table, rectangle)).transpose());
         let markers = read_all(&mut root, "marker", |table, names| Marker::read(table, names, rectangle));
-        let mut lines = Vec::new();
-        let reference_lines = read_all(&mut root, "reference_line", |table, names| {
-            let named = ReferenceLine::read(table, names, rectangle);
-            lines.push(named.clone());
-            named.line
+        let lines = read_all(&mut root, "reference_line", |table, names| {
+            ReferenceLine::read(table, names, rectangle)
         });
-        let templates = read_all(&mut root, "template", |table, names| Template::read(table, names, &lines));
+        let known = lines.as_deref().map_err(|reported| *reported);
+        let templates = read_all(&mut root, "template", |table, names| Template::read(table, names, known));
         let stations = read_all(&mut root, "station", |table, names| Station::read(table, names, rectangle));
         root.finish();
         Ok(Self {
             plate: plate?,
             target: target?,
-            markers: markers?,
-            reference_lines: reference_lines?,
-            templates: templates?,
-            stations: stations?,
+            markers: markers?.into_iter().collect::<Result<_, _>>()?,
+            reference_lines: lines?.into_iter().map(|line| line.line).collect::<Result<_, _>>()?,
+            templates: templates?.into_iter().collect::<Result<_, _>>()?,
+            stations: stations?.into_iter().collect::<Result<_, _>>()?,
         })
     }
 }
 
-/// Reads every element of an array of tables before it gives up on any; `read` also gets the names taken so far.
+/// Reads every element of an array of tables; `read` also gets the names taken so far.
 fn read_all<'d, T>(
     root: &mut Table<'d>,
     key: &str,
-    mut read: impl FnMut(Table<'d>, &mut Names) -> Result<T, Reported>,
+    mut read: impl FnMut(Table<'d>, &mut Names) -> T,
 ) -> Result<Vec<T>, Reported> {
     let mut names = Names::default();
     let mut all = Vec::new();
@@ -161,7 +159,7 @@ fn read_all<'d, T>(
         names.number += 1;
         all.push(read(table, &mut names));
     }
-    all.into_iter().collect()
+    Ok(all)
 }
 
 impl Plate {

@@ -86,7 +86,7 @@ impl Template {
     pub(super) fn read(
         mut table: Table<'_>,
         names: &mut Names,
-        lines: &[NamedLine],
+        lines: Result<&[NamedLine], Reported>,
     ) -> Result<Self, Reported> {
         let name = name(&mut table, names);
         let presets: Vec<(&str, Preset)> = PRESETS.iter().map(|preset| (preset.name, *preset)).collect();
@@ -141,12 +141,13 @@ fn name(table: &mut Table<'_>, names: &mut Names) -> Result<String, Reported> {
     names.claim(table, name.value, name.place)
 }
 
-/// The line called `name`; a line that is faulty itself is not reported again.
+/// The line called `name`; lines that are faulty themselves are not reported again.
 fn on_line<'a>(
     document: &Document,
     name: &Located<String>,
-    lines: &'a [NamedLine],
+    lines: Result<&'a [NamedLine], Reported>,
 ) -> Result<&'a ReferenceLine, Reported> {
+    let lines = lines?;
     let called = |line: &&NamedLine| line.name.as_ref().is_ok_and(|known| *known == name.value);
     if let Some(NamedLine { line, .. }) = lines.iter().find(called) {
         return line.as_ref().map_err(|reported| *reported);
@@ -160,7 +161,7 @@ fn on_line<'a>(
         _ if known.is_empty() => "; this file has none".to_owned(),
         _ => format!("; the file has {}", known.join(", ")),
     };
-    Err(document.fault(&name.place, format!("no reference line is called {:?}{advice}", name.value)))
+    Err(document.absent(&name.place, format!("no reference line is called {:?}{advice}", name.value)))
 }
 
 /// `centre_mm`: a number along the line, or "worst".
