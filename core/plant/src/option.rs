@@ -211,7 +211,7 @@ impl OptionDecl {
         must(!self.doc.trim().is_empty(), "a sentence of documentation is missing");
         must(self.unit.as_deref().is_none_or(|unit| Unit::find(unit).is_some()), "the unit is unknown");
         must(
-            self.kind != OptionType::Duration || self.unit().measures() == "time",
+            self.kind != OptionType::Duration || self.declared_unit().measures() == "time",
             "the unit must be one of time",
         );
         must(self.min.zip(self.max).is_none_or(|(min, max)| min <= max), "min is above max");
@@ -249,7 +249,7 @@ impl OptionDecl {
             OptionType::Duration => table
                 .node(name)
                 .try_map(|node| self.float(node))
-                .map(|value| Value::Duration(self.unit().to(value, Unit::SECOND))),
+                .map(|value| Value::Duration(self.declared_unit().to(value, Unit::SECOND))),
             OptionType::String if self.secret => {
                 table.node(name).try_map(|node| secret(node, folder)).map(Value::String)
             }
@@ -271,9 +271,11 @@ impl OptionDecl {
     fn int(&self, node: &Node) -> Result<i64, String> {
         let value = match &node.kind {
             Kind::Integer(value) => *value,
-            Kind::String(text) if self.unit.is_some() => whole(self.unit().read(text)?).ok_or_else(|| {
-                format!("found {text:?}, expected a whole number of {}", self.unit().symbol())
-            })?,
+            Kind::String(text) if self.unit.is_some() => {
+                whole(self.declared_unit().read(text)?).ok_or_else(|| {
+                    format!("found {text:?}, expected a whole number of {}", self.declared_unit().symbol())
+                })?
+            }
             _ => return Err(format!("found {}, expected a whole number", node.describe())),
         };
         self.in_range(value as f64, node).map(|()| value)
@@ -283,7 +285,7 @@ impl OptionDecl {
         let measured = self.unit.is_some() || self.kind == OptionType::Duration;
         let value = match (&node.kind, number(node)) {
             (_, Some(value)) => value,
-            (Kind::String(text), _) if measured => self.unit().read(text)?,
+            (Kind::String(text), _) if measured => self.declared_unit().read(text)?,
             _ => return Err(format!("found {}, expected a number", node.describe())),
         };
         self.in_range(value, node).map(|()| value)
@@ -302,7 +304,7 @@ impl OptionDecl {
     }
 
     /// The declared unit; seconds for a duration without one.
-    fn unit(&self) -> Unit {
+    fn declared_unit(&self) -> Unit {
         let default = if self.kind == OptionType::Duration { Unit::SECOND } else { Unit::ONE };
         self.unit.as_deref().and_then(Unit::find).unwrap_or(default)
     }
@@ -315,7 +317,11 @@ impl OptionDecl {
             (None, Some(max)) => format!("at most {max}"),
             (None, None) => return String::new(),
         };
-        if self.unit() == Unit::ONE { range } else { format!("{range} {}", self.unit().symbol()) }
+        if self.declared_unit() == Unit::ONE {
+            range
+        } else {
+            format!("{range} {}", self.declared_unit().symbol())
+        }
     }
 }
 
@@ -332,8 +338,8 @@ impl fmt::Display for OptionDecl {
             OptionType::Duration => "duration",
             OptionType::Floats => "list of numbers",
         })?;
-        if self.unit() != Unit::ONE {
-            write!(f, " in {}", self.unit().symbol())?;
+        if self.declared_unit() != Unit::ONE {
+            write!(f, " in {}", self.declared_unit().symbol())?;
         }
         if !self.choices.is_empty() {
             write!(f, ": {}", self.choices.join(", "))?;

@@ -62,6 +62,22 @@ fn directions_become_radians_and_a_template_lies_in_the_middle_unless_said() {
 }
 
 #[test]
+fn a_preset_that_was_changed_says_so() {
+    let source = |changes: &str| {
+        let text = format!(
+            "[plate]\nid = 'A'\nwidth_mm = 4000\nheight_mm = 4000\nthickness_mm = 35\n[[reference_line]]\nname = 'R'\n\
+             from_mm = [0, 0]\nto_mm = [4000, 0]\n[[template]]\nline = 'R'\npreset = 'spherical-petal'\n{changes}"
+        );
+        PlateFile::parse("f", &text).unwrap().templates.remove(0).source.unwrap()
+    };
+    let rule = source("");
+    assert!(rule.starts_with("spherical tank petals, 2 m board"), "{rule}");
+    assert_eq!(source("limit_mm = 3.0"), rule);
+    assert_eq!(source("limit_mm = 4.5"), format!("{rule}; changed here to 2000 mm board, 4.5 mm gap"));
+    assert_eq!(source("limit_mm = 4.5\nsource = 'works drawing 12'"), "works drawing 12");
+}
+
+#[test]
 fn every_plant_file_loads() {
     let files = toml_files(&config());
     let plants =

@@ -93,16 +93,7 @@ impl Template {
         let preset = table.choice("preset", &presets).located().optional();
         let line =
             table.name("line").located().required().and_then(|name| on_line(table.document(), &name, lines));
-        let chord = table.number("chord_mm").above(0.0).located();
-        let limit = table.number("limit_mm").above(0.0);
-        let (chord, limit) = match &preset {
-            Ok(None) => (chord.required(), limit.required()),
-            Ok(Some(Located { value: preset, place })) => {
-                let place = place.clone();
-                (chord.or(Located { value: preset.chord_mm, place }), limit.or(preset.limit_mm))
-            }
-            Err(reported) => (Err(*reported), limit.optional().and(Err(*reported))),
-        };
+        let (chord, limit) = board(&mut table, &preset);
         let centre = centre(&mut table);
         let seat = table
             .choice("seat", &[("gravity", Seat::Gravity), ("balanced", Seat::Balanced), ("held", Seat::Held)])
@@ -111,26 +102,49 @@ impl Template {
         let document = table.document();
         table.finish();
 
-        let (line, chord) = (line?, chord?);
+        let (line, chord, limit) = (line?, chord?, limit?);
         fits(document, line, &chord)?;
         let centre = match centre? {
-            Some(Located { value: Centre::Worst, .. }) => Centre::Worst,
-            Some(Located { value: Centre::At(at), place }) => {
-                let at = Located { value: at, place };
-                stays_on(document, line, chord.value, &at)?;
-                Centre::At(at.value)
-            }
+            Some(centre) => stays_on(document, line, chord.value, centre)?,
             None => Centre::At(line.length() / 2.0),
         };
+        let preset = preset?.map(|preset| preset.value.source_for(chord.value, limit));
         Ok(Self {
             name: name?,
             line: line.name.clone(),
             chord: metres(chord.value),
             centre,
-            limit: metres(limit?),
+            limit: metres(limit),
             seat: seat?,
-            source: source?.or(preset?.map(|preset| preset.value.source.to_owned())),
+            source: source?.or(preset),
         })
+    }
+}
+
+impl Preset {
+    /// The source of a board of these measures: a rule that was changed is no longer the rule.
+    fn source_for(&self, chord_mm: f64, limit_mm: f64) -> String {
+        if (chord_mm, limit_mm) == (self.chord_mm, self.limit_mm) {
+            return self.source.to_owned();
+        }
+        format!("{}; changed here to {chord_mm} mm board, {limit_mm} mm gap", self.source)
+    }
+}
+
+/// Length and limit of the board, millimetres, from the file or from its preset.
+fn board(
+    table: &mut Table<'_>,
+    preset: &Result<Option<Located<Preset>>, Reported>,
+) -> (Result<Located<f64>, Reported>, Result<f64, Reported>) {
+    let chord = table.number("chord_mm").above(0.0).located();
+    let limit = table.number("limit_mm").above(0.0);
+    match preset {
+        Ok(None) => (chord.required(), limit.required()),
+        Ok(Some(Located { value: preset, place })) => {
+            let default = Located { value: preset.chord_mm, place: place.clone() };
+            (chord.or(default), limit.or(preset.limit_mm))
+        }
+        Err(reported) => (chord.optional().and(Err(*reported)), limit.optional().and(Err(*reported))),
     }
 }
 
@@ -185,17 +199,18 @@ fn fits(document: &Document, line: &ReferenceLine, chord: &Located<f64>) -> Resu
     Err(document.fault(&chord.place, message))
 }
 
-/// Both ends of the board lie on its line.
+/// The middle of a board whose both ends lie on its line.
 fn stays_on(
     document: &Document,
     line: &ReferenceLine,
     chord_mm: f64,
-    centre: &Located<f64>,
-) -> Result<(), Reported> {
-    let (at, length) = (millimetres(centre.value), millimetres(line.length()));
+    centre: Located<Centre>,
+) -> Result<Centre, Reported> {
+    let Centre::At(at) = centre.value else { return Ok(centre.value) };
+    let (at, length) = (millimetres(at), millimetres(line.length()));
     let (first, last) = (chord_mm / 2.0, length - chord_mm / 2.0);
     if (first..=last).contains(&at) {
-        return Ok(());
+        return Ok(centre.value);
     }
     let message = format!(
         "found {at}, where the board of {chord_mm} mm hangs over an end of {:?}, {length} mm long; allowed {first} to {last}",
