@@ -102,12 +102,13 @@ impl Template {
         let document = table.document();
         table.finish();
 
-        let (line, chord, limit) = (line?, chord?, limit?);
+        let (line, chord) = (line?, chord?);
         fits(document, line, &chord)?;
         let centre = match centre? {
             Some(centre) => stays_on(document, line, chord.value, centre)?,
             None => Centre::At(line.length() / 2.0),
         };
+        let limit = limit?;
         let preset = preset?.map(|preset| preset.value.source_for(chord.value, limit));
         Ok(Self {
             name: name?,
