@@ -5,18 +5,16 @@ use crate::error::Error;
 use crate::pace::Pace;
 use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::{Job, Result, ScanSink};
-use platen_sim_plate::{Plate, PlateState, Vec3};
+use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
-    Cyclic, INTENSITY_MAX, Instrument, Scene, SimColumn, SimLattice, SimState, Surroundings, scan,
+    Cyclic, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState, Surroundings, scan,
 };
+use std::f64::consts::FRAC_PI_2;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Period of the cyclic range error, metres.
 const CYCLIC_PERIOD: f64 = 1.2;
-
-/// Elevations that a scanner cannot reach: its own feet.
-const LOWEST_DEG: f64 = -62.5;
 
 /// Seeds of consecutive scans lie this far apart, so that no two runs with neighbouring seeds share a scan.
 const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -170,49 +168,14 @@ fn lattice(
     window: Option<&Window>,
 ) -> std::result::Result<SimLattice, Error> {
     let step = options.step_deg.to_radians();
-    let lowest = LOWEST_DEG.to_radians();
-    // Directions are multiples of the step, as an encoder's are.
-    let snap = |angle: f64| (angle / step).floor() * step;
-    let all = match window {
-        Some(w) => {
-            let (low, high) = (w.elevation_min.max(lowest), w.elevation_max.min(std::f64::consts::FRAC_PI_2));
-            if high <= low {
-                return Err(Error::Options("the window lies below what the scanner reaches".into()));
-            }
-            SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step)
-        }
-        None => SimLattice::around(&interesting(plate), options.margin_deg.to_radians(), step),
+    let Some(w) = window else {
+        return Ok(SimLattice::of_plate(plate, options.margin_deg.to_radians(), step));
     };
-    let top = snap(all.elevation_start);
-    let rows = (((top - lowest) / step) as u32 + 1).min(all.n_rows);
-    Ok(SimLattice {
-        azimuth_start: snap(all.azimuth_start),
-        elevation_start: top,
-        n_rows: rows.max(2),
-        ..all
-    })
-}
-
-/// Points on the plate's outline; on an empty press, those where a plate would lie.
-fn interesting(plate: Option<&Plate>) -> Vec<Vec3> {
-    match plate {
-        Some(plate) => {
-            let (width, height) = (plate.width(), plate.height());
-            let at = |i: usize| i as f64 / 8.0;
-            let ring = |share: f64| {
-                [
-                    (share * width, 0.0),
-                    (share * width, height),
-                    (0.0, share * height),
-                    (width, share * height),
-                ]
-            };
-            (0..=8).flat_map(|i| ring(at(i))).map(|(u, v)| plate.top(u, v)).collect()
-        }
-        None => {
-            [(4.0, -1.5), (4.0, 1.5), (8.0, -1.5), (8.0, 1.5)].map(|(x, y)| Vec3::new(x, y, -3.6)).to_vec()
-        }
+    let (low, high) = (w.elevation_min.max(LOWEST_DEG.to_radians()), w.elevation_max.min(FRAC_PI_2));
+    if high <= low {
+        return Err(Error::Options("the window lies below what the scanner reaches".into()));
     }
+    Ok(SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step).on_encoder())
 }
 
 fn surroundings(options: &Options) -> Surroundings {

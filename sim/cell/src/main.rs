@@ -1,13 +1,22 @@
-//! Program `platen-sim`: a simulated press, for hosts to be tried out and tested on over real sockets.
+//! Program `platen-sim`: a simulated press, a simulated scanner, or both on one plate, for hosts to be tried out and
+//! tested on over real sockets and real files.
 //!
-//! `platen-sim press` serves Modbus and the plate's shape on loopback and prints one line when both ports answer:
-//! `{"modbus":"127.0.0.1:5020","plate":"127.0.0.1:5021"}`. It ends on SIGTERM, on Ctrl-C, when told to over its
-//! second port and, with `--with-parent`, when its standard input closes.
+//! - `platen-sim press` serves Modbus and the plate's shape on loopback.
+//! - `platen-sim scanner PLATE.toml --out scan.e57` scans a described plate into a file, with the truth beside it.
+//! - `platen-sim cell --drop FOLDER` is a press whose scanner drops a file into a folder at each accepted stroke.
 //!
-//! Results go to stdout, the log to stderr (`PLATEN_LOG`); exit codes: 0 done, 1 failed, 2 bad usage or file.
+//! Press and cell print one line when both ports answer: `{"modbus":"127.0.0.1:5020","plate":"127.0.0.1:5021"}`.
+//! They end on SIGTERM, on Ctrl-C, when told to over the second port and, with `--with-parent`, when their standard
+//! input closes. Results go to stdout, the log to stderr (`PLATEN_LOG`); exit codes: 0 done, 1 failed, 2 bad usage or
+//! file.
 
+mod cell;
+mod document;
 mod error;
+mod line;
 mod press;
+mod scanner;
+mod truth;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -25,6 +34,10 @@ struct Cli {
 enum Verb {
     /// A press on Modbus that bends a simulated plate at each stroke
     Press(press::Command),
+    /// Scans a simulated plate into a file
+    Scanner(scanner::Command),
+    /// A press whose scanner drops a file into a folder at each stroke
+    Cell(cell::Command),
 }
 
 #[tokio::main]
@@ -33,6 +46,8 @@ async fn main() -> ExitCode {
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let ended = match Cli::parse().verb {
         Verb::Press(command) => press::run(&command).await,
+        Verb::Scanner(command) => scanner::run(&command),
+        Verb::Cell(command) => cell::run(command).await,
     };
     match ended {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,11 +1,12 @@
 //! Verb `press`.
 
+use crate::document;
 use crate::error::Error;
 use clap::Args;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tokio::signal::unix::{SignalKind, signal};
 
 /// What the command line says of the press; options overrule the file.
@@ -33,7 +34,7 @@ pub(crate) struct Command {
 impl Command {
     /// The file with the options on top.
     fn config(&self) -> Result<Config, Error> {
-        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), read)?;
+        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), document::read)?;
         if let Some(port) = self.modbus_port {
             config.link = LinkConfig::Tcp { port };
         }
@@ -48,19 +49,21 @@ impl Command {
     }
 }
 
-fn read(path: &Path) -> Result<Config, Error> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.into(), source })?;
-    toml::from_str(&text).map_err(|error| {
-        let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or(""));
-        let line = before.matches('\n').count() + 1;
-        Error::Config { path: path.into(), line, message: error.message().to_owned() }
-    })
-}
-
 /// Runs the press until it is told to end.
 pub(crate) async fn run(command: &Command) -> Result<(), Error> {
-    let mut press = SimPress::start(command.config()?).await?;
+    let press = start(command).await?;
+    until_told(press, command).await
+}
+
+/// Starts the press and says where it serves.
+pub(crate) async fn start(command: &Command) -> Result<SimPress, Error> {
+    let press = SimPress::start(command.config()?).await?;
     announce(&press)?;
+    Ok(press)
+}
+
+/// Lets the press run until it is told to end.
+pub(crate) async fn until_told(mut press: SimPress, command: &Command) -> Result<(), Error> {
     let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {
         ended = press.ended() => ended?,

@@ -87,3 +87,29 @@ fn a_file_describes_the_press() {
     drop(child.stdin.take());
     assert!(child.wait().unwrap().success());
 }
+
+#[test]
+fn a_scan_lies_beside_its_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let text = "[blank]\nwidth_mm = 3000.0\nheight_mm = 2000.0\nthickness_mm = 30.0\nmarkers_mm = [[1000.0, 500.0]]\n\
+                [shape]\nshape = \"cylinder\"\nradius_mm = 8000.0\naxis_deg = 90.0\n";
+    std::fs::write(at("plate.toml"), text).unwrap();
+    let (plate, out, truth) = (at("plate.toml"), at("scan.e57"), at("truth.json"));
+    let scan = ["scanner", &plate, "--out", &out, "--truth", &truth, "--step-deg", "0.4"];
+    assert_eq!(refused(&scan), (Some(0), String::new()));
+    let truth: serde_json::Value = serde_json::from_slice(&std::fs::read(&truth).unwrap()).unwrap();
+    let [x, y, z] = [0, 1, 2].map(|k| truth["markers"][0]["position_m"][k].as_f64().unwrap());
+    assert!((x - 5.5).abs() < 0.02 && (y + 0.5).abs() < 0.02 && (z + 3.57).abs() < 0.03, "{x} {y} {z}");
+    assert!((truth["grid"]["kappa_u_per_m"][200].as_f64().unwrap() - 0.125).abs() < 1e-9);
+    let mut reader = e57::E57Reader::from_file(&out).unwrap();
+    let cloud = reader.pointclouds().remove(0);
+    assert_eq!(Some(cloud.records), truth["counts"]["cells"].as_u64());
+    assert!(reader.pointcloud_simple(&cloud).unwrap().all(|point| point.is_ok()));
+
+    let (code, log) = refused(&["scanner", &plate, "--out", &at("scan.las")]);
+    assert!(code == Some(2) && log.contains(".e57"), "{log}");
+    std::fs::write(&plate, text.replace("8000.0", "0.0")).unwrap();
+    let (code, log) = refused(&scan);
+    assert!(code == Some(2) && log.contains("plate.toml: plate.radius_mm"), "{log}");
+}

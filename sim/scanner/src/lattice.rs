@@ -1,6 +1,9 @@
 //! The directions in which a scanner looks.
 
-use platen_sim_plate::Vec3;
+use platen_sim_plate::{Plate, Side, Vec3};
+
+/// Lowest elevation that a scanner reaches, degrees: below are its own feet.
+pub const LOWEST_DEG: f64 = -62.5;
 
 /// A regular lattice of directions, radians: columns by growing azimuth (counter-clockwise from +x), rows from the top down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +61,26 @@ impl SimLattice {
         Self::covering(start, width, elevation[0] - margin, elevation[1] + margin, step)
     }
 
+    /// The lattice that covers a plate and `margin` radians round it, or the place of a plate in an empty press.
+    pub fn of_plate(plate: Option<&Plate>, margin: f64, step: f64) -> Self {
+        Self::around(&outline(plate), margin, step).on_encoder()
+    }
+
+    /// The same lattice on directions that are multiples of the step, as an encoder's are, without the rows that lie
+    /// below what a scanner reaches.
+    #[must_use]
+    pub fn on_encoder(&self) -> Self {
+        let down_to = |angle: f64, step: f64| (angle / step).floor() * step;
+        let elevation_start = down_to(self.elevation_start, self.elevation_step);
+        let rows = ((elevation_start - LOWEST_DEG.to_radians()) / self.elevation_step) as u32 + 1;
+        Self {
+            azimuth_start: down_to(self.azimuth_start, self.azimuth_step),
+            elevation_start,
+            n_rows: self.n_rows.min(rows).max(2),
+            ..*self
+        }
+    }
+
     /// Nominal azimuth of a column, not wrapped.
     pub fn azimuth(&self, column: u32) -> f64 {
         self.azimuth_start + self.azimuth_step * f64::from(column)
@@ -72,6 +95,18 @@ impl SimLattice {
     pub fn n_cells(&self) -> usize {
         self.n_columns as usize * self.n_rows as usize
     }
+}
+
+/// Points on a plate's outline; for an empty press, those where a plate would lie.
+fn outline(plate: Option<&Plate>) -> Vec<Vec3> {
+    let Some(plate) = plate else {
+        return [(4.0, -1.5), (4.0, 1.5), (8.0, -1.5), (8.0, 1.5)]
+            .map(|(x, y)| Vec3::new(x, y, -3.6))
+            .to_vec();
+    };
+    let at = |side: Side, i: u32| plate.side_uv(side, f64::from(i) / 8.0);
+    let points = Side::ALL.into_iter().flat_map(|side| (0..=8).map(move |i| at(side, i)));
+    points.map(|[u, v]| plate.top(u, v)).collect()
 }
 
 /// Unit vector of a direction.

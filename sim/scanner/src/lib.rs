@@ -31,7 +31,7 @@ pub use column::{SimColumn, SimState, TruthCell};
 pub use device::{Device, DeviceError};
 pub use files::{E57Encoding, FileError, FileFormat, FileOrder, SimScan};
 pub use instrument::{Cyclic, Faces, Instrument};
-pub use lattice::SimLattice;
+pub use lattice::{LOWEST_DEG, SimLattice};
 pub use measure::INTENSITY_MAX;
 pub use ray::{Hit, Label, Ray};
 pub use scan::{scan, scan_all};

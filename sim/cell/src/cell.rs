@@ -1,0 +1,100 @@
+//! Verb `cell`: a press whose scanner drops a file into a folder at each stroke, the way an export script of a real
+//! scanner does.
+//!
+//! The scanner starts when the host has accepted a stroke and the plate lies still; the file is named
+//! `SESSION-STROKE-ATTEMPT.e57` and appears whole. It knows the press only by its second port.
+
+use crate::error::Error;
+use crate::line::{Line, Wanted};
+use crate::press;
+use crate::scanner::Device;
+use clap::Args;
+use platen_sim_scanner::FileFormat;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How often the scanner looks at the press.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Press and scanner.
+#[derive(Debug, Args)]
+pub(crate) struct Command {
+    #[command(flatten)]
+    press: press::Command,
+    /// Folder for scans
+    #[arg(long, value_name = "FOLDER")]
+    drop: PathBuf,
+    /// Format of the scans: e57, ptx, xyz or xyb
+    #[arg(long, default_value = "e57")]
+    format: String,
+    #[command(flatten)]
+    device: Device,
+}
+
+/// Runs press and scanner until the press is told to end.
+pub(crate) async fn run(command: Command) -> Result<(), Error> {
+    let example = PathBuf::from(format!("scan.{}", command.format));
+    if FileFormat::of(&example).is_none() {
+        return Err(Error::Format { path: example });
+    }
+    std::fs::create_dir_all(&command.drop)?;
+    let press = press::start(&command.press).await?;
+    let ending = Arc::new(AtomicBool::new(false));
+    let scanner = Scanner {
+        address: press.control().to_string(),
+        drop: command.drop,
+        format: command.format,
+        device: command.device,
+        ending: Arc::clone(&ending),
+    };
+    let mut scans = tokio::task::spawn_blocking(move || scanner.run());
+    let ended = tokio::select! {
+        ended = press::until_told(press, &command.press) => {
+            ending.store(true, Ordering::Relaxed);
+            // Without the press the scanner loses its line; that is no failure any more.
+            let _ = scans.await;
+            ended
+        }
+        failed = &mut scans => failed.map_err(std::io::Error::other)?,
+    };
+    ended
+}
+
+struct Scanner {
+    address: String,
+    drop: PathBuf,
+    format: String,
+    device: Device,
+    ending: Arc<AtomicBool>,
+}
+
+impl Scanner {
+    fn run(&self) -> Result<(), Error> {
+        let mut line = Line::open(&self.address)?;
+        let mut last: Option<Wanted> = None;
+        let mut number = 0;
+        while !self.ending.load(Ordering::Relaxed) {
+            match line.wanted()? {
+                Some(wanted) if last != Some(wanted) => {
+                    number += 1;
+                    self.scan(&mut line, wanted, number)?;
+                    last = Some(wanted);
+                }
+                _ => std::thread::sleep(LOOK),
+            }
+        }
+        Ok(())
+    }
+
+    fn scan(&self, line: &mut Line, wanted: Wanted, number: u64) -> Result<(), Error> {
+        let state = line.plate()?;
+        let Wanted { session, stroke, attempt } = wanted;
+        let path = self.drop.join(format!("{session:05}-{stroke:05}-{attempt}.{}", self.format));
+        let shot = self.device.shot(state.as_ref(), number).map_err(platen_sim_press::Error::from)?;
+        shot.write(&path)?;
+        tracing::info!(path = %path.display(), "scan dropped");
+        Ok(())
+    }
+}
