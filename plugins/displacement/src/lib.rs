@@ -1,1 +1,177 @@
-//! Comparison: displacement between strokes.
+//! Comparison `displacement`: how every place of the plate moved since the stroke before.
+//!
+//! After a stroke the plate has moved as a whole and has no part that is sure to be still, so a displacement means
+//! nothing without its alignment, which is therefore named in every sentence. The rigid motion that the alignment
+//! takes away is reported.
+//!
+//! | `alignment` | the plate before is moved so that |
+//! |---|---|
+//! | `unchanged` | the largest part that kept its shape lies where it lay: many local fits vote, the best is refined by iterated reweighting (Tukey) |
+//! | `corners` | the four corners fit best |
+//! | `none` | nothing: for a plate on fixed supports under a fixed scanner |
+//!
+//! A place is *unchanged* when its displacement along the normal is below the level of detection,
+//! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2): s1 and s2 from the splines' covariances, s_corr from the
+//! plant's null pairs, s_align from the alignment. Places above it that hang together over less than `min_patch`
+//! count as unchanged too: by chance 5 % of a plate that kept its shape lies above the LoD.
+//!
+//! ```toml
+//! [[comparison]]
+//! plugin = "displacement"
+//! [comparison.options]
+//! against = "before"
+//! alignment = "unchanged"
+//! ```
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `against` | `before`, the stroke before, or `baseline`, the blank |
+//! | `alignment` | see above |
+//! | `min_patch` | smallest patch of change, square metres |
+//!
+//! Fields: `displacement` (3 components, scanner frame) and `displacement_normal` (towards the scanner), metres.
+
+mod align;
+mod detect;
+mod grid;
+
+use platen_sdk::{Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, Report, Result};
+use platen_shape::Surface;
+use platen_shape::task::{Figure, Findings};
+
+use align::{Alignment, Motion};
+use grid::{NODES, Nodes};
+
+platen_sdk::options! {
+    /// Options of `displacement`.
+    pub struct Options {
+        /// Which earlier scan to compare with.
+        against: String = "before", choices ["before", "baseline"];
+        /// How the plate's own movement is taken away.
+        alignment: String = "unchanged", choices ["unchanged", "corners", "none"];
+        /// Smallest connected area that counts as changed, square metres.
+        min_patch: f64 = 0.02, unit "m2", min 0.0, max 10.0;
+    }
+}
+
+struct Displacement(Options);
+
+/// Scans of one plate agree on its size, which comes from the plate file.
+const SAME_SIZE: f64 = 1e-6;
+
+impl Comparison for Displacement {
+    const INFO: Info = Info::new(
+        c"displacement",
+        c"Displacement",
+        c"How every place of the plate moved since the stroke before, its own movement as a whole taken away.",
+        c"1.0.0",
+    );
+    type Options = Options;
+
+    fn new(options: Options) -> Result<Self> {
+        Ok(Self(options))
+    }
+
+    fn compare(&mut self, job: &Job<'_>, inputs: &Inputs) -> Result<Report> {
+        let earlier = if self.0.against == "before" { &inputs.before } else { &inputs.baseline };
+        let Some(earlier) = earlier else {
+            let says = format!("no {} scan: displacement is not known", self.0.against);
+            return Ok(Report {
+                findings: Findings { says: vec![says], ..Findings::default() },
+                fields: Vec::new(),
+            });
+        };
+        same_plate(&inputs.now, earlier)?;
+        let nodes = Nodes::new(&inputs.now, earlier);
+        let motion = match self.0.alignment.as_str() {
+            "corners" => align::corners(&nodes),
+            "none" => Motion::none(),
+            _ => align::unchanged(job, &nodes)?,
+        };
+        let alignment = Alignment { motion, name: &self.0.alignment };
+        let changes =
+            detect::changes(&nodes, &alignment.motion, inputs.task.sigma_correlated, self.0.min_patch);
+        Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &self.0.against))
+    }
+}
+
+fn same_plate(now: &Surface, earlier: &Surface) -> Result<()> {
+    let differs = |a: f64, b: f64| (a - b).abs() > SAME_SIZE;
+    if differs(now.width(), earlier.width()) || differs(now.height(), earlier.height()) {
+        let mm = |s: &Surface| format!("{:.0} x {:.0} mm", s.width() * 1000.0, s.height() * 1000.0);
+        let message =
+            format!("the plate measures {}, the one before {}: not the same plate", mm(now), mm(earlier));
+        return Err(Error::new(ErrorKind::BadData, message).hint("give a scan of the same plate"));
+    }
+    Ok(())
+}
+
+fn report(
+    nodes: &Nodes,
+    alignment: &Alignment<'_>,
+    changes: &detect::Changes,
+    supports_changed: bool,
+    against: &str,
+) -> Report {
+    let largest = (0..nodes.len())
+        .filter(|&i| changes.state[i] != NodeState::Unseen)
+        .max_by(|&a, &b| changes.normal[a].abs().total_cmp(&changes.normal[b].abs()));
+    let changed = changes.state.iter().filter(|s| **s == NodeState::Seen).count();
+    let seen = changes.state.iter().filter(|s| **s != NodeState::Unseen).count();
+    let share = changed as f64 / seen.max(1) as f64;
+
+    let mut says = Vec::new();
+    let how = format!("against the {against} scan, aligned by {}", alignment.name);
+    match largest.filter(|_| changed > 0) {
+        Some(i) => says.push(format!(
+            "changed over {:.0} % of the plate, most {:+.1} mm at u {:.0}, v {:.0} mm ({how})",
+            share * 100.0,
+            changes.normal[i] * 1000.0,
+            nodes.uv[i][0] * 1000.0,
+            nodes.uv[i][1] * 1000.0,
+        )),
+        None => says.push(format!("nothing changed above {:.2} mm ({how})", changes.median_lod * 1000.0)),
+    }
+    if supports_changed {
+        says.push(
+            "the plate rests on other supports than before: part of the change may be its own weight".into(),
+        );
+    }
+
+    let figure = |name: &str, value: f64, unit: &str| Figure {
+        name: name.into(),
+        value,
+        unit: unit.into(),
+        uncertainty: None,
+        at: None,
+    };
+    let mut figures = vec![
+        figure("displacement.changed_share", share, "1"),
+        figure("displacement.lod", changes.median_lod, "m"),
+        figure("displacement.plate_rotation", alignment.motion.angle(), "rad"),
+        figure("displacement.plate_translation", alignment.motion.translation_at(nodes.centre()).norm(), "m"),
+    ];
+    if let Some(i) = largest {
+        figures.push(Figure {
+            uncertainty: Some(changes.lod[i]),
+            at: Some(nodes.uv[i]),
+            ..figure("displacement.max", changes.normal[i], "m")
+        });
+    }
+
+    let field = |name: &str, components: usize, values: Vec<f64>| Field {
+        name: name.into(),
+        unit: "m".into(),
+        n_u: NODES,
+        n_v: NODES,
+        components,
+        values,
+        state: changes.state.clone(),
+    };
+    let vectors = changes.vectors.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
+    let fields =
+        vec![field("displacement", 3, vectors), field("displacement_normal", 1, changes.normal.clone())];
+    Report { findings: Findings { verdict: None, says, figures, templates: Vec::new() }, fields }
+}
+
+platen_sdk::export!(comparison Displacement);

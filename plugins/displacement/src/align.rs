@@ -1,0 +1,186 @@
+//! The rigid motion of the plate as a whole.
+
+use nalgebra::{Matrix6, Rotation3, Vector6};
+use platen_sdk::{Job, Result};
+use platen_shape::Vec3;
+
+use crate::grid::{NODES, Nodes};
+
+/// Standard deviation of a material point within the surface, metres: what scans of good plates show. The normal
+/// direction is known ten times better and decides the alignment; this keeps it from sliding.
+const TANGENT_SIGMA: f64 = 0.3e-3;
+
+/// Errors that the fits do not know of (lattice, range bias) as a floor of the normal direction's sigma, metres.
+const NORMAL_FLOOR: f64 = 0.05e-3;
+
+/// Tukey's constant: 95 % efficient on normal errors (Huber, Ronchetti, Robust Statistics, 2nd ed., 4.8).
+const TUKEY: f64 = 4.685;
+
+/// Local fits along each side that vote for the part that kept its shape.
+const VOTERS: usize = 6;
+
+/// `p -> rotation * (p - pivot) + pivot + translation`, with the covariance of its six parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    rotation: Rotation3<f64>,
+    translation: Vec3,
+    pivot: Vec3,
+    covariance: Matrix6<f64>,
+}
+
+/// A motion and how it was found.
+#[derive(Debug)]
+pub(crate) struct Alignment<'a> {
+    pub(crate) motion: Motion,
+    pub(crate) name: &'a str,
+}
+
+impl Motion {
+    pub(crate) fn none() -> Self {
+        Self {
+            rotation: Rotation3::identity(),
+            translation: Vec3::zeros(),
+            pivot: Vec3::zeros(),
+            covariance: Matrix6::zeros(),
+        }
+    }
+
+    pub(crate) fn apply(&self, p: &Vec3) -> Vec3 {
+        self.rotation * (p - self.pivot) + self.pivot + self.translation
+    }
+
+    pub(crate) fn angle(&self) -> f64 {
+        self.rotation.angle()
+    }
+
+    /// How far the motion takes a point.
+    pub(crate) fn translation_at(&self, p: Vec3) -> Vec3 {
+        self.apply(&p) - p
+    }
+
+    /// Standard deviation of the moved point along `normal`.
+    pub(crate) fn sigma(&self, p: &Vec3, normal: &Vec3) -> f64 {
+        let row = jacobian_row(&(p - self.pivot), normal);
+        (row.transpose() * self.covariance * row)[0].max(0.0).sqrt()
+    }
+}
+
+/// Derivative of `direction . motion(p)` by the small rotation and the translation.
+fn jacobian_row(arm: &Vec3, direction: &Vec3) -> Vector6<f64> {
+    let turn = arm.cross(direction);
+    Vector6::new(turn.x, turn.y, turn.z, direction.x, direction.y, direction.z)
+}
+
+/// The four corners fit best.
+pub(crate) fn corners(nodes: &Nodes) -> Motion {
+    let last = NODES - 1;
+    let corners = [0, last, NODES * last, NODES * last + last];
+    let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
+    for _ in 0..8 {
+        step(nodes, &mut motion, corners.into_iter().map(|i| (i, 1.0)), 1.0);
+    }
+    motion
+}
+
+/// The largest part that kept its shape lies where it lay.
+pub(crate) fn unchanged(job: &Job<'_>, nodes: &Nodes) -> Result<Motion> {
+    let start = whole(nodes);
+    let mut best = (f64::NEG_INFINITY, start.clone());
+    for row in 0..VOTERS {
+        for column in 0..VOTERS {
+            job.check()?;
+            let motion = local(nodes, &start, row, column);
+            let votes = votes(nodes, &motion);
+            if votes > best.0 {
+                best = (votes, motion);
+            }
+        }
+    }
+    let mut motion = best.1;
+    for _ in 0..20 {
+        let weights = weights(nodes, &motion);
+        step(nodes, &mut motion, weights.into_iter().enumerate(), inflation(nodes));
+    }
+    Ok(motion)
+}
+
+/// All seen places together.
+fn whole(nodes: &Nodes) -> Motion {
+    let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
+    for _ in 0..6 {
+        step(nodes, &mut motion, (0..nodes.len()).step_by(7).map(|i| (i, 1.0)), 1.0);
+    }
+    motion
+}
+
+/// One cell of the voters' grid and a margin round it.
+fn local(nodes: &Nodes, start: &Motion, row: usize, column: usize) -> Motion {
+    let range = |k: usize| {
+        let cell = (NODES - 1) as f64 / VOTERS as f64;
+        let (from, to) = ((k as f64 - 0.25) * cell, (k as f64 + 1.25) * cell);
+        from.max(0.0) as usize..=to.min((NODES - 1) as f64) as usize
+    };
+    let mut motion = start.clone();
+    for _ in 0..3 {
+        let places =
+            range(row).step_by(2).flat_map(|v| range(column).step_by(2).map(move |u| (v * NODES + u, 1.0)));
+        step(nodes, &mut motion, places, 1.0);
+    }
+    motion
+}
+
+fn scaled_residual(nodes: &Nodes, motion: &Motion, i: usize) -> f64 {
+    let off = (nodes.now[i] - motion.apply(&nodes.before[i])).dot(&nodes.normal[i]);
+    off / nodes.sigma[i].hypot(NORMAL_FLOOR)
+}
+
+fn votes(nodes: &Nodes, motion: &Motion) -> f64 {
+    let near = |i: &usize| nodes.seen[*i] && scaled_residual(nodes, motion, *i).abs() < TUKEY;
+    (0..nodes.len()).step_by(3).filter(near).count() as f64
+}
+
+/// Tukey's weights.
+fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
+    let weight = |i: usize| {
+        let r = scaled_residual(nodes, motion, i) / TUKEY;
+        if r.abs() < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 }
+    };
+    (0..nodes.len()).map(weight).collect()
+}
+
+/// Neighbouring nodes share their error: a spline over `n` nodes has fewer independent ones. One in 25 is
+/// independent, as the result's own grid.
+fn inflation(nodes: &Nodes) -> f64 {
+    if nodes.len() > 1000 { 25.0 } else { 1.0 }
+}
+
+/// One Gauss-Newton step of the weighted fit over the places given; `inflation` widens the covariance.
+fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize, f64)>, inflation: f64) {
+    let mut normal_matrix = Matrix6::zeros();
+    let mut gradient = Vector6::zeros();
+    for (i, weight) in places.filter(|(i, weight)| nodes.seen[*i] && *weight > 0.0) {
+        let moved = motion.apply(&nodes.before[i]);
+        let off = nodes.now[i] - moved;
+        let arm = moved - motion.pivot - motion.translation;
+        let n = nodes.normal[i];
+        let tangent = n.cross(&least_axis(&n)).normalize();
+        let sigma_n = nodes.sigma[i].hypot(NORMAL_FLOOR);
+        for (direction, sigma) in [(n, sigma_n), (tangent, TANGENT_SIGMA), (n.cross(&tangent), TANGENT_SIGMA)]
+        {
+            let row = jacobian_row(&arm, &direction);
+            let w = weight / (sigma * sigma);
+            normal_matrix += row * row.transpose() * w;
+            gradient += row * (off.dot(&direction) * w);
+        }
+    }
+    let Some(cholesky) = normal_matrix.cholesky() else { return };
+    let delta = cholesky.solve(&gradient);
+    motion.rotation = Rotation3::new(Vec3::new(delta[0], delta[1], delta[2])) * motion.rotation;
+    motion.translation += Vec3::new(delta[3], delta[4], delta[5]);
+    motion.covariance = cholesky.inverse() * inflation;
+}
+
+fn least_axis(n: &Vec3) -> Vec3 {
+    let axis = n.iamin();
+    Vec3::from_fn(|k, _| f64::from(k == axis))
+}
