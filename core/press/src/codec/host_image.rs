@@ -131,14 +131,14 @@ impl HostImage {
         }
         let Some(offset) = field.place.offset() else { return };
         for index in 0..field.count {
-            let number = match (self.count(output, heartbeat), &self.result) {
-                (Some(count), _) => Some(f64::from(count)),
-                (None, Some(result)) => {
-                    figure(&result.measurement.figures, output, field, usize::from(index))
-                }
-                (None, None) => None,
+            let figure = || {
+                let figures = &self.result.as_ref()?.measurement.figures;
+                figure(figures, output, field, usize::from(index))
             };
-            let (bits, _) = words::number_bits(field, number);
+            let bits = match self.count(output, heartbeat) {
+                Some(count) => words::count_bits(field, count),
+                None => words::number_bits(field, figure()).0,
+            };
             let registers = words::registers(field.kind, field.order, bits);
             put_words(block, offset + index * field.kind.registers(), &registers);
         }
@@ -288,6 +288,12 @@ mod tests {
             }
         }
         assert_eq!(words[52], crc);
+    }
+
+    #[test]
+    fn the_last_stroke_number_is_no_invalid_value() {
+        let words = HostImage { ack_stroke_id: 65_535, ..image() }.encode(&RegisterMap::pph1(), 65_535);
+        assert_eq!((words[1], words[3]), (65_535, 65_535));
     }
 
     #[test]

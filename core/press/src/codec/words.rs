@@ -91,6 +91,12 @@ pub(super) fn number_bits(field: &Field, number: Option<f64>) -> (u32, bool) {
     (bits, held != raw)
 }
 
+/// The bits of a count of the handshake: every value is one, none means "no value".
+pub(super) fn count_bits(field: &Field, count: u32) -> u32 {
+    let (low, high) = field.kind.range().unwrap_or((0.0, 0.0));
+    raw_bits(field.kind, f64::from(count).clamp(low, high))
+}
+
 /// The number, in the inside unit, that the bits of a field mean. `None` when they mean "no value", are no number, or
 /// lie outside the field's limits.
 pub(super) fn number(field: &Field, bits: u32) -> Option<f64> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use platen_plant::press::Press;
 use tokio::time::{Instant, sleep_until};
 
-use super::journal::{Done, JournalThread};
+use super::journal::{Done, Recorder};
 use super::{Answer, Metrics, Order, PressSide, Status};
 use crate::handshake::{Effect, Event, Handshake, LinkState, Transition, Work};
 use crate::reconcile::Reconciler;
@@ -30,7 +30,7 @@ pub(super) struct Runner<L> {
     pub(super) registers: Reconciler,
     pub(super) client: Client<L>,
     pub(super) metrics: Metrics,
-    pub(super) journal: JournalThread,
+    pub(super) journal: Recorder,
     pub(super) side: PressSide,
     pub(super) clock: Clock,
     pub(super) faults: Faults,
@@ -330,7 +330,9 @@ impl<L: Link> Runner<L> {
         match effect {
             Effect::Journal(record) => {
                 if let Err(record) = self.journal.record(record) {
-                    tracing::error!(stroke = %record.key(), "the journal's thread is gone");
+                    let (key, stage) = (record.key(), record.stage());
+                    let error = Some("the journal panicked".into());
+                    self.journaled(Done { key, stage, error });
                 }
             }
             Effect::StartScan { key, run_id, data } => self.order(Order::StartScan { key, run_id, data }),

@@ -1,7 +1,7 @@
-//! The journal on a thread of its own: a slow disk must not stop the heartbeat.
+//! The journal beside the loop: a slow disk must not stop the heartbeat.
 
-use tokio::sync::{mpsc, oneshot};
-use tokio::task::JoinHandle;
+use tokio::sync::mpsc;
+use tokio::task::{JoinHandle, spawn_blocking};
 
 use crate::{Journal, Recalled, Record, Stage, StrokeKey};
 
@@ -13,40 +13,45 @@ pub(super) struct Done {
     pub(super) error: Option<String>,
 }
 
-/// The way to the journal's thread: records are written in the order in which they are sent.
+/// The way to the journal: records are written in the order in which they are sent.
 #[derive(Debug)]
-pub(super) struct JournalThread {
+pub(super) struct Recorder {
     records: mpsc::UnboundedSender<Record>,
     pub(super) done: mpsc::UnboundedReceiver<Done>,
-    thread: JoinHandle<()>,
+    task: JoinHandle<()>,
 }
 
-/// Reads the journal and starts its thread. The error is `None` when the thread ended by itself.
-pub(super) async fn start<J: Journal>(mut journal: J) -> Result<(JournalThread, Recalled), Option<J::Error>> {
-    let (records, mut queue) = mpsc::unbounded_channel::<Record>();
+/// Reads the journal and gets ready to write it. The error is `None` when the journal panicked.
+pub(super) async fn start<J: Journal>(mut journal: J) -> Result<(Recorder, Recalled), Option<J::Error>> {
+    let read = spawn_blocking(move || (journal.recall(), journal)).await;
+    let (recalled, journal) = read.map_err(|_| None)?;
+    let (records, queue) = mpsc::unbounded_channel();
     let (tell, done) = mpsc::unbounded_channel();
-    let (tell_recalled, recalled) = oneshot::channel();
-    let thread = tokio::task::spawn_blocking(move || {
-        let read = journal.recall();
-        let failed = read.is_err();
-        if tell_recalled.send(read).is_err() || failed {
-            return;
-        }
-        while let Some(record) = queue.blocking_recv() {
-            let error = journal.record(&record).err().map(|error| error.to_string());
-            // Nobody may be left to hear it when the host ends.
-            let _ = tell.send(Done { key: record.key(), stage: record.stage(), error });
-        }
-    });
-    match recalled.await {
-        Ok(Ok(recalled)) => Ok((JournalThread { records, done, thread }, recalled)),
-        Ok(Err(error)) => Err(Some(error)),
-        Err(_) => Err(None),
+    let task = tokio::spawn(write(journal, queue, tell));
+    Ok((Recorder { records, done, task }, recalled.map_err(Some)?))
+}
+
+async fn write<J: Journal>(
+    mut journal: J,
+    mut queue: mpsc::UnboundedReceiver<Record>,
+    tell: mpsc::UnboundedSender<Done>,
+) {
+    while let Some(record) = queue.recv().await {
+        let (key, stage) = (record.key(), record.stage());
+        let written = spawn_blocking(move || (journal.record(&record), journal)).await;
+        let Ok((result, back)) = written else { return };
+        journal = back;
+        let error = result.err().map(|error| error.to_string());
+        // Nobody may be left to hear it when the host ends.
+        let _ = tell.send(Done { key, stage, error });
     }
 }
 
-impl JournalThread {
+impl Recorder {
     /// Asks for a record; [`done`](Self::done) tells when it would survive a power cut.
+    ///
+    /// # Errors
+    /// The record, when the journal has panicked.
     pub(super) fn record(&self, record: Record) -> Result<(), Record> {
         self.records.send(record).map_err(|refused| refused.0)
     }
@@ -54,8 +59,8 @@ impl JournalThread {
     /// Waits until everything asked for is written.
     pub(super) async fn finish(self) {
         drop(self.records);
-        if self.thread.await.is_err() {
-            tracing::error!("the journal's thread panicked");
+        if self.task.await.is_err() {
+            tracing::error!("the journal panicked");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Runs the handshake: ties link, registers, journal and host together.
 //!
 //! One task polls the press, feeds the pure handshake and carries out its effects. The host takes part through two
-//! channels: it receives [`Order`]s and sends [`Answer`]s, in its own time. The journal has a thread of its own.
+//! channels: it receives [`Order`]s and sends [`Answer`]s, in its own time. The journal is written beside the loop.
 
 mod cycle;
 mod journal;
@@ -136,7 +136,7 @@ pub enum RunError<E: std::error::Error + 'static> {
         /// Why.
         source: E,
     },
-    /// The journal's thread ended before the journal was read.
+    /// The journal panicked while it was read.
     #[error("press {press}: the journal gave up while being read")]
     JournalGone {
         /// Name of the press.

@@ -1,0 +1,336 @@
+//! The host against a press in memory, in virtual time: bad habits of presses, bad links, restarts.
+
+#![allow(clippy::unwrap_used, reason = "a bench that cannot go on shall fail its test")]
+
+mod bench;
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bench::memory::{Chaos, MemoryLink};
+use bench::plc::{Habits, P};
+use bench::{Memory, Plc, SharedPlc};
+use platen_plant::press::{Link, Mode, Press};
+use platen_press::{Acked, Answer, Code, HostSide, RunError, StrokeKey, channels, run_press};
+use tokio::task::JoinHandle;
+
+const MS: fn(u64) -> Duration = Duration::from_millis;
+
+/// A press, a journal and a host that can be killed and started again.
+struct Cell {
+    plc: SharedPlc,
+    journal: Memory,
+    chaos: Chaos,
+    seed: u64,
+    mode: Mode,
+    scans: Arc<Mutex<Vec<StrokeKey>>>,
+    alarms: Arc<Mutex<Vec<Code>>>,
+}
+
+struct Host {
+    run: JoinHandle<Result<(), RunError<bench::Full>>>,
+    scanner: JoinHandle<()>,
+    answers: tokio::sync::mpsc::UnboundedSender<Answer>,
+    status: tokio::sync::watch::Receiver<platen_press::Status>,
+    reachable: Arc<std::sync::atomic::AtomicBool>,
+}
+
+impl Cell {
+    fn new(first_stroke: u16) -> Self {
+        let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, first_stroke)));
+        tokio::spawn(bench::run_plc(plc.clone()));
+        let journal = Memory::new(7);
+        let (scans, alarms) = (Arc::default(), Arc::default());
+        Self { plc, journal, chaos: Chaos::default(), seed: 1, mode: Mode::Measure, scans, alarms }
+    }
+
+    fn habits(first_stroke: u16, habits: Habits) -> Self {
+        let cell = Self::new(first_stroke);
+        cell.plc().habits = habits;
+        cell
+    }
+
+    fn plc(&self) -> std::sync::MutexGuard<'_, Plc> {
+        self.plc.lock().unwrap()
+    }
+
+    fn start(&self) -> Host {
+        self.start_on(&self.journal, 3)
+    }
+
+    fn start_on(&self, journal: &Memory, press_id: u16) -> Host {
+        let mut press = Press::pph1("Press 3", press_id, Link::tcp("memory", 502, 1));
+        press.mode = self.mode;
+        let link = MemoryLink::new(self.plc.clone(), self.chaos, self.seed);
+        let reachable = Arc::clone(&link.reachable);
+        let (HostSide { orders, answers, status }, side) = channels();
+        let (scans, alarms) = (Arc::clone(&self.scans), Arc::clone(&self.alarms));
+        let scanner = tokio::spawn(bench::host(orders, answers.clone(), MS(40), MS(10), scans, alarms));
+        let run = tokio::spawn(run_press(press, link, journal.clone(), side));
+        Host { run, scanner, answers, status, reachable }
+    }
+
+    /// Lets the press do `strokes` more and waits until it is done with them.
+    async fn strokes(&self, strokes: usize) {
+        self.plc().to_do = strokes;
+        bench::until(Duration::from_secs(600 * strokes as u64), "strokes", || self.plc().idle()).await;
+    }
+
+    /// What must always hold, as the press saw it; returns the numbers of results and scans.
+    fn check(&self) -> (usize, usize) {
+        let plc = self.plc();
+        assert_eq!(plc.outside, 0, "writes outside the allowed registers");
+        for result in &plc.results {
+            let measured = result.status & 1 << 12 == 0;
+            assert!(
+                !measured || result.dev_max == result.stroke % 30_000,
+                "another stroke's figure: {result:?}"
+            );
+            assert!(measured || result.dev_max == 0x8000, "a figure without a measurement: {result:?}");
+        }
+        let mut scans = self.scans.lock().unwrap().clone();
+        let n_scans = scans.len();
+        scans.sort();
+        scans.dedup();
+        assert_eq!(scans.len(), n_scans, "a stroke was scanned twice");
+        (plc.results.len(), n_scans)
+    }
+
+    fn alarmed(&self, code: Code) -> usize {
+        self.alarms.lock().unwrap().iter().filter(|&&alarm| alarm == code).count()
+    }
+}
+
+impl Host {
+    async fn stop(self) {
+        self.answers.send(Answer::Stop).unwrap();
+        self.run.await.unwrap().unwrap();
+    }
+
+    /// A power cut: nothing is written any more.
+    async fn kill(self) {
+        self.run.abort();
+        self.scanner.abort();
+        let _ = self.run.await;
+    }
+}
+
+async fn habit(first_stroke: u16, habits: Habits, strokes: usize) -> Cell {
+    let cell = Cell::habits(first_stroke, habits);
+    let host = cell.start();
+    cell.strokes(strokes).await;
+    host.stop().await;
+    assert_eq!(cell.check(), (strokes, strokes));
+    cell
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_bouncing_trigger_is_one_stroke() {
+    habit(0, Habits { bounce: true, ..Habits::default() }, 40).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_trigger_that_stays_is_one_stroke() {
+    habit(0, Habits { keeps_trigger: true, ..Habits::default() }, 40).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_that_never_acknowledges_still_gets_every_result() {
+    let cell = habit(0, Habits { no_ack: true, ..Habits::default() }, 40).await;
+    let acked = cell.journal.acked();
+    assert_eq!(acked.len(), 39);
+    assert!(acked.iter().all(|(_, how)| *how == Acked::NextStroke));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_counter_that_jumps_by_two_is_one_missed_stroke() {
+    let cell = habit(0, Habits { jump_at: Some(20), ..Habits::default() }, 40).await;
+    assert_eq!(cell.alarmed(Code::MissedStroke), 1);
+    assert_eq!(cell.plc().regs[109], 1, "missed_count");
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_counter_wraps_to_one() {
+    let cell = habit(65_525, Habits::default(), 30).await;
+    assert_eq!(cell.alarmed(Code::MissedStroke), 0);
+    assert_eq!(cell.plc().results.last().unwrap().stroke, 20);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_counter_set_back_with_a_new_session_is_no_missed_stroke() {
+    let cell = habit(500, Habits { back_at: Some(15), ..Habits::default() }, 40).await;
+    assert_eq!(cell.alarmed(Code::MissedStroke) + cell.alarmed(Code::CounterBack), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_torn_block_is_read_again() {
+    habit(0, Habits { torn_cycles: 12, ..Habits::default() }, 20).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_that_moves_during_the_scan_gets_not_measured() {
+    let cell = habit(0, Habits { unclear_after_ms: Some(20), ..Habits::default() }, 3).await;
+    let errors: Vec<_> = cell.plc().results.iter().map(|result| result.error).collect();
+    assert_eq!(errors, [Code::NotClear.number(); 3]);
+}
+
+/// 10,000 strokes with 1 % late answers, 0.5 % resets and 0.5 % lost answers to requests that were carried out.
+#[tokio::test(start_paused = true)]
+async fn ten_thousand_strokes_on_a_bad_link() {
+    let seed = 0x5EED;
+    let mut cell = Cell::new(60_000);
+    cell.chaos = Chaos { late: 10, reset: 5, lost: 5 };
+    cell.seed = seed;
+    let host = cell.start();
+    cell.strokes(10_000).await;
+    let status = host.status.borrow().clone();
+    host.stop().await;
+    assert_eq!(cell.check(), (10_000, 10_000), "seed {seed}");
+    assert_eq!(cell.plc().gave_up, [], "seed {seed}");
+    assert_eq!(cell.alarmed(Code::MissedStroke), 0, "seed {seed}");
+    assert!(status.counts.poisoned > 1000, "the link was bad: {:?}", status.counts);
+}
+
+/// The host is killed again and again, in all states; each stroke is delivered or reported as not measured.
+#[tokio::test(start_paused = true)]
+async fn a_host_that_is_killed_loses_no_stroke() {
+    for seed in 1..=40u64 {
+        let cell = Cell::new(0);
+        cell.plc().to_do = 20;
+        let mut kills = 0;
+        while !cell.plc().idle() {
+            let host = cell.start();
+            let life = 37 + (seed * 7919 + kills * 104_729) % 160;
+            tokio::time::sleep(MS(life)).await;
+            kills += 1;
+            host.kill().await;
+            assert!(kills < 2000, "seed {seed}: the strokes never end");
+        }
+        let (results, scans) = cell.check();
+        assert_eq!(results, 20, "seed {seed}: a stroke was lost, {kills} kills");
+        let interrupted = cell.plc().results.iter().filter(|result| result.status & 1 << 12 != 0).count();
+        assert!(
+            scans + interrupted >= 20,
+            "seed {seed}: {scans} scans, {interrupted} reported as interrupted"
+        );
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_that_restarts_is_not_written_to_before_it_is_known() {
+    let cell = Cell::new(0);
+    let host = cell.start();
+    cell.strokes(5).await;
+    let writes = {
+        let mut plc = cell.plc();
+        plc.restart(0xB002);
+        plc.regs[P] = 0;
+        plc.writes
+    };
+    tokio::time::sleep(MS(3000)).await;
+    assert!(cell.plc().writes <= writes + 1, "at most the write that was under way");
+    assert_eq!(cell.alarmed(Code::MapVersion), 1);
+    cell.plc().regs[P] = 1;
+    cell.strokes(5).await;
+    host.stop().await;
+    assert_eq!(cell.check(), (10, 10));
+    assert_eq!(cell.alarmed(Code::MissedStroke), 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_link_cut_in_the_middle_of_a_scan_delivers_once() {
+    let cell = Cell::new(0);
+    let host = cell.start();
+    cell.strokes(3).await;
+    cell.plc().to_do = 1;
+    bench::until(MS(2000), "the fourth scan", || cell.scans.lock().unwrap().len() == 4).await;
+    host.reachable.store(false, Ordering::SeqCst);
+    tokio::time::sleep(MS(1500)).await;
+    assert_eq!(cell.plc().results.len(), 3);
+    host.reachable.store(true, Ordering::SeqCst);
+    bench::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
+    host.stop().await;
+    assert_eq!(cell.check(), (4, 4));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_host_stands_back_and_the_first_goes_on() {
+    let cell = Cell::new(0);
+    let first = cell.start();
+    cell.strokes(2).await;
+    let second = cell.start_on(&Memory::new(8), 3);
+    tokio::time::sleep(MS(3000)).await;
+    assert_eq!(second.status.borrow().link_error, Some(Code::SecondHost));
+    assert_eq!(second.status.borrow().counts.writes, 0);
+    cell.strokes(5).await;
+    assert_eq!(first.status.borrow().link_error, None);
+    second.stop().await;
+    first.stop().await;
+    assert_eq!(cell.check(), (7, 7));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_dead_hosts_registers_are_taken_over() {
+    let cell = Cell::new(0);
+    let first = cell.start();
+    cell.strokes(2).await;
+    first.kill().await;
+    let second = cell.start_on(&Memory::new(8), 3);
+    cell.strokes(2).await;
+    second.stop().await;
+    assert_eq!(cell.check().0, 4);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_wrong_press_is_never_written_to() {
+    let cell = Cell::new(0);
+    let host = cell.start_on(&cell.journal, 4);
+    tokio::time::sleep(MS(10_000)).await;
+    assert_eq!(host.status.borrow().link_error, Some(Code::PressId));
+    assert_eq!(cell.alarmed(Code::PressId), 1, "one alarm per cause");
+    host.stop().await;
+    assert_eq!(cell.plc().writes, 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn listening_and_dry_runs_never_write() {
+    for mode in [Mode::Off, Mode::Listen, Mode::DryRun] {
+        let mut cell = Cell::new(0);
+        cell.mode = mode;
+        let host = cell.start();
+        tokio::time::sleep(MS(25_000)).await;
+        let counts = host.status.borrow().counts.clone();
+        assert!(mode == Mode::Off || counts.requests > 1000, "{mode:?}: {counts:?}");
+        host.stop().await;
+        assert_eq!(cell.plc().writes, 0, "{mode:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_full_disk_stops_no_result_and_is_told() {
+    let cell = Cell::new(0);
+    let host = cell.start();
+    cell.strokes(2).await;
+    *cell.journal.full.lock().unwrap() = true;
+    cell.strokes(3).await;
+    assert_eq!(cell.alarmed(Code::StorageFailed), 1);
+    let status = cell.plc().results.last().unwrap().status;
+    assert_ne!(status & 1 << 10, 0, "storage_degraded");
+    *cell.journal.full.lock().unwrap() = false;
+    cell.strokes(2).await;
+    assert_eq!(cell.plc().results.last().unwrap().status & 1 << 10, 0);
+    host.stop().await;
+    assert_eq!(cell.check(), (7, 7));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_registers_are_safe_after_a_stop_in_the_middle_of_a_scan() {
+    let cell = Cell::new(0);
+    let host = cell.start();
+    cell.plc().to_do = 1;
+    bench::until(MS(2000), "a scan", || cell.scans.lock().unwrap().len() == 1).await;
+    host.stop().await;
+    let plc = cell.plc();
+    assert_eq!((plc.regs[102], plc.regs[106]), (0, 0), "status and error_code");
+}
