@@ -187,7 +187,7 @@ async fn ten_thousand_strokes_on_a_bad_link() {
     let status = host.status.borrow().clone();
     host.stop().await;
     assert_eq!(cell.check(), (10_000, 10_000), "seed {seed}");
-    assert_eq!(cell.plc().gave_up, [], "seed {seed}");
+    assert!(cell.plc().gave_up.is_empty(), "seed {seed}");
     assert_eq!(cell.alarmed(Code::MissedStroke), 0, "seed {seed}");
     assert!(status.counts.poisoned > 1000, "the link was bad: {:?}", status.counts);
 }
