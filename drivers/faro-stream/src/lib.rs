@@ -1,0 +1,133 @@
+//! Scans through a bridge: a small server beside the scanner's own software that speaks the scan bridge protocol.
+//!
+//! # What it does
+//! It asks the bridge for one scan under a name of its own, so that a lost answer never leads to a second scan, and
+//! delivers columns as they arrive. A broken connection is made again and the scan goes on where it stopped; columns that
+//! came damaged are asked for again. The scan counts only when every column is there and the digest over all of
+//! them agrees: late, repeated, shuffled or damaged frames cannot make a torn lattice. Rows and columns are brought into the
+//! order of the host whichever way the scanner turns.
+//!
+//! The protocol is in `PROTOCOL.md` beside this crate; it is enough to write a bridge from.
+//!
+//! # Example
+//! ```toml
+//! [scanner]
+//! plugin = "faro-stream"
+//! [scanner.options]
+//! address = "192.168.43.20:7040"
+//! divisor = 4
+//! rate_kpts = 244
+//! ```
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `address` | host and port of the bridge |
+//! | `client` | name of this host at the bridge; one per press |
+//! | `divisor` | resolution 1/divisor |
+//! | `rate_kpts` | thousands of points per second |
+//! | `compression` | n: n^2 samples become one |
+//! | `serial` | serial number of the scanner that must answer |
+
+mod column;
+mod device;
+mod error;
+mod message;
+mod session;
+mod wire;
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use platen_scan::Window;
+use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
+
+use message::Settings;
+use session::Request;
+
+options! {
+    /// Options of the stream driver; the module head is their manual.
+    pub struct Options {
+        /// Host and port of the bridge.
+        address: String;
+        /// Name of this host at the bridge: one per press, the same over restarts.
+        client: String = "platen";
+        /// Resolution, as the divisor of the finest.
+        divisor: i64 = 4, min 1, max 32;
+        /// Thousands of points per second.
+        rate_kpts: i64 = 244, min 1, max 10000;
+        /// Averaging: n^2 samples become one.
+        compression: i64 = 1, min 1, max 8;
+        /// Serial number of the scanner that must answer.
+        serial: Option<String>;
+    }
+}
+
+/// The driver.
+#[derive(Debug)]
+pub struct FaroStream {
+    options: Options,
+    /// Tells the jobs of this run from those of the runs before.
+    run: u64,
+}
+
+impl Scanner for FaroStream {
+    const INFO: Info = Info::new(
+        c"faro-stream",
+        c"Scan bridge",
+        c"Scans through a bridge beside the scanner's own software; resumes after broken connections.",
+        c"0.1.0",
+    )
+    .hardware();
+    type Options = Options;
+
+    fn new(options: Options) -> Result<Self> {
+        let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as u64);
+        Ok(Self { options, run })
+    }
+
+    fn open(&mut self) -> Result<()> {
+        self.ask(None).map(drop)
+    }
+
+    fn estimate_s(&mut self, window: Option<&Window>) -> Option<f64> {
+        self.ask(window).ok().flatten()
+    }
+
+    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
+        job.check()?;
+        self.ask(None).map(drop)
+    }
+
+    fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
+        let request = self.request(job.id(), out.window());
+        device::scan(&self.options.address, request, job, out)
+            .map_err(|error| error.at(&self.options.address))
+    }
+}
+
+impl FaroStream {
+    fn request(&self, job: u64, window: Option<&Window>) -> Request {
+        let whole = |number: i64| u32::try_from(number).unwrap_or(1);
+        Request {
+            client: self.options.client.clone(),
+            job: format!("{}-{:x}-{job}", self.options.client, self.run),
+            settings: Settings {
+                divisor: whole(self.options.divisor),
+                rate_kpts: whole(self.options.rate_kpts),
+                compression: whole(self.options.compression),
+                window: window.map(Into::into),
+            },
+            serial: self.options.serial.clone(),
+        }
+    }
+
+    fn ask(&self, window: Option<&Window>) -> Result<Option<f64>> {
+        let request = self.request(0, window);
+        let answer = device::ask(&self.options.address, &request, &request.settings);
+        answer.map_err(|error| error.at(&self.options.address))
+    }
+}
+
+platen_sdk::export!(scanner FaroStream);
+
+#[cfg(test)]
+mod tests;

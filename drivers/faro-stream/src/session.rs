@@ -1,0 +1,285 @@
+//! One scan, told as what comes in and what goes out; pure, without a socket or a clock.
+//!
+//! ```text
+//! connected -> Hello; Capabilities -> Start, or Resume when the scan is known; ScanBegin; Columns;
+//! ScanEnd -> done, or Resume for the columns that are missing
+//! ```
+//! A broken connection loses nothing: the next one goes on. Columns are delivered once, whatever comes twice, late,
+//! out of order or damaged; the end is delivered when every column is there and the digest agrees.
+
+use std::collections::VecDeque;
+
+use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, State};
+
+use crate::column::Layout;
+use crate::error::{Error, Result};
+use crate::message::{self, Settings};
+use crate::wire::{Frame, VERSION, kind};
+
+/// Requests for the same columns that may bring none before the bridge is given up.
+const FRUITLESS: u32 = 3;
+
+/// What the session wants done.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Action {
+    /// Send a frame: type, scan, payload.
+    Send(u16, u32, Vec<u8>),
+    /// Tell the host how far the scanner is.
+    Progress(f64, String),
+    /// Deliver the header.
+    Begin(Box<ScanHeader>),
+    /// Deliver a column.
+    Column(Box<Column>),
+    /// Deliver the end; the session is over.
+    End(ScanEnd),
+}
+
+/// Who asks for what.
+#[derive(Debug, Clone)]
+pub(crate) struct Request {
+    pub(crate) client: String,
+    pub(crate) job: String,
+    pub(crate) settings: Settings,
+    /// Serial number that must answer.
+    pub(crate) serial: Option<String>,
+}
+
+/// What came of the scan so far.
+#[derive(Debug)]
+struct Scan {
+    number: u32,
+    layout: Layout,
+    /// Payload checksum of every column that came, by its number at the bridge.
+    columns: Vec<Option<u32>>,
+    points: u64,
+    /// Columns that were missing at the end before.
+    missed: usize,
+    fruitless: u32,
+}
+
+/// One scan.
+#[derive(Debug)]
+pub(crate) struct Session {
+    request: Request,
+    greeted: bool,
+    scanner: String,
+    scan: Option<Scan>,
+    actions: VecDeque<Action>,
+}
+
+impl Session {
+    /// Nothing sent yet.
+    pub(crate) fn new(request: Request) -> Self {
+        Self { request, greeted: false, scanner: String::new(), scan: None, actions: VecDeque::new() }
+    }
+
+    /// The next thing to do.
+    pub(crate) fn action(&mut self) -> Option<Action> {
+        self.actions.pop_front()
+    }
+
+    /// A connection stands: the first, or another one.
+    pub(crate) fn connected(&mut self) {
+        self.greeted = false;
+        // What the connection before was to carry means nothing on this one.
+        self.actions.retain(|action| !matches!(action, Action::Send(..)));
+        let hello =
+            message::Hello { versions: [VERSION; 2], client: &self.request.client, role: "controller" };
+        self.actions.push_back(Action::Send(kind::HELLO, 0, json(&hello)));
+    }
+
+    /// The frame that ends the scan at the bridge.
+    pub(crate) fn abort(&self) -> Action {
+        let number = self.scan.as_ref().map_or(0, |scan| scan.number);
+        Action::Send(kind::ABORT, number, json(&message::Abort { job: &self.request.job }))
+    }
+
+    /// Takes a frame.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] and [`Error::Busy`] when another connection may help, else what ends the scan.
+    pub(crate) fn frame(&mut self, frame: &Frame) -> Result<()> {
+        if frame.kind == kind::COLUMN {
+            return self.column(frame);
+        }
+        if !frame.sound() {
+            return Err(Error::Broken(format!(
+                "the checksum of a frame of type {:#06x} is wrong",
+                frame.kind
+            )));
+        }
+        match frame.kind {
+            kind::CAPABILITIES => self.capabilities(&parse(frame)?),
+            kind::STATUS => {
+                self.status(parse(frame)?);
+                Ok(())
+            }
+            kind::ERROR => Err(refused(parse(frame)?)),
+            kind::SCAN_BEGIN => self.scan_begin(frame.scan, parse(frame)?),
+            kind::SCAN_END => self.scan_end(frame.scan, &parse(frame)?),
+            other if other & kind::MUST_UNDERSTAND == 0 => Ok(()),
+            other => {
+                Err(Error::Bridge(format!("it sends frames of type {other:#06x}, unknown to version 1.0")))
+            }
+        }
+    }
+
+    fn capabilities(&mut self, found: &message::Capabilities) -> Result<()> {
+        check_scanner(found, self.request.serial.as_deref())?;
+        if std::mem::replace(&mut self.greeted, true) {
+            return Err(Error::Bridge("it says its capabilities twice".to_owned()));
+        }
+        self.scanner = format!("{} {}", found.model, found.serial).trim().to_owned();
+        let next = match &self.scan {
+            Some(scan) => self.resume(scan),
+            None => {
+                let start = message::Start { job: &self.request.job, settings: &self.request.settings };
+                Action::Send(kind::START, 0, json(&start))
+            }
+        };
+        self.actions.push_back(next);
+        Ok(())
+    }
+
+    fn resume(&self, scan: &Scan) -> Action {
+        let resume = message::Resume { job: &self.request.job, missing: scan.missing() };
+        Action::Send(kind::RESUME, scan.number, json(&resume))
+    }
+
+    fn status(&mut self, status: message::Status) {
+        let worst = status.exceptions.into_iter().filter(|e| e.level <= 3).min_by_key(|e| e.level);
+        let text = worst.map_or(status.state.clone(), |e| format!("{}: {}", status.state, e.text));
+        self.actions.push_back(Action::Progress(status.progress.clamp(0.0, 1.0), text));
+    }
+
+    fn scan_begin(&mut self, number: u32, begin: message::ScanBegin) -> Result<()> {
+        if begin.job != self.request.job {
+            return Ok(()); // The late beginning of another scan.
+        }
+        let layout = Layout::new(begin)?;
+        match &self.scan {
+            None => {
+                self.actions.push_back(Action::Begin(Box::new(layout.header(&self.scanner))));
+                let columns = vec![None; layout.begin().columns as usize];
+                self.scan =
+                    Some(Scan { number, layout, columns, points: 0, missed: usize::MAX, fruitless: 0 });
+                Ok(())
+            }
+            Some(scan) if scan.number == number && scan.layout == layout => Ok(()),
+            Some(scan) => {
+                let before = scan.number;
+                Err(Error::Bridge(format!("it began scan {number} for the job of scan {before}")))
+            }
+        }
+    }
+
+    fn column(&mut self, frame: &Frame) -> Result<()> {
+        let Some(scan) = self.scan.as_mut().filter(|scan| scan.number == frame.scan) else {
+            return Ok(()); // A late frame of another scan.
+        };
+        if !frame.sound() {
+            return Ok(()); // Missing, and asked for at the end.
+        }
+        let (number, column) = scan.layout.column(&frame.payload)?;
+        match &mut scan.columns[number as usize] {
+            Some(before) if *before == frame.crc => Ok(()),
+            Some(_) => Err(Error::Bridge(format!("column {number} came twice with different content"))),
+            slot => {
+                *slot = Some(frame.crc);
+                scan.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
+                self.actions.push_back(Action::Column(Box::new(column)));
+                Ok(())
+            }
+        }
+    }
+
+    fn scan_end(&mut self, number: u32, end: &message::ScanEnd) -> Result<()> {
+        let Some(scan) = self.scan.as_mut().filter(|scan| scan.number == number) else { return Ok(()) };
+        if end.outcome != "complete" {
+            let (outcome, reason) = (end.outcome.clone(), end.reason.clone());
+            return Err(Error::Ended { outcome, reason });
+        }
+        let missing = scan.columns.iter().filter(|column| column.is_none()).count();
+        if missing == 0 {
+            let end = scan.close(end)?;
+            self.actions.push_back(Action::End(end));
+            return Ok(());
+        }
+        scan.fruitless = if missing < scan.missed { 0 } else { scan.fruitless + 1 };
+        scan.missed = missing;
+        if scan.fruitless == FRUITLESS {
+            return Err(Error::Bridge(format!("{missing} columns do not come, asked for {FRUITLESS} times")));
+        }
+        let again = self.scan.as_ref().map(|scan| self.resume(scan));
+        self.actions.extend(again);
+        Ok(())
+    }
+}
+
+impl Scan {
+    /// Runs of columns that did not come sound.
+    fn missing(&self) -> Vec<(u32, u32)> {
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        for (number, _) in (0..).zip(&self.columns).filter(|(_, column)| column.is_none()) {
+            match runs.last_mut() {
+                Some((_, last)) if *last + 1 == number => *last = number,
+                _ => runs.push((number, number)),
+            }
+        }
+        runs
+    }
+
+    /// The end, when the bridge sent what it says it sent.
+    fn close(&self, end: &message::ScanEnd) -> Result<ScanEnd> {
+        let add = |digest, crc: &u32| crc32c::crc32c_append(digest, &crc.to_le_bytes());
+        let digest = self.columns.iter().flatten().fold(0, add);
+        let columns = self.layout.begin().columns;
+        if (end.columns, end.points, end.digest) != (columns, self.points, digest) {
+            let what = format!(
+                "it sent {columns} columns, {} points, digest {digest:#010x}, and says {} columns, {} points, digest {:#010x}",
+                self.points, end.columns, end.points, end.digest
+            );
+            return Err(Error::Bridge(what));
+        }
+        Ok(ScanEnd {
+            columns,
+            points: self.points,
+            warm_up_columns: end.warm_up_columns,
+            outcome: Outcome::Complete,
+        })
+    }
+}
+
+/// The scanner that answers must be the one of the plant file.
+pub(crate) fn check_scanner(found: &message::Capabilities, serial: Option<&str>) -> Result<()> {
+    if found.version.0 != VERSION.0 {
+        return Err(Error::Version { bridge: found.version });
+    }
+    match serial {
+        Some(expected) if expected != found.serial => {
+            Err(Error::WrongScanner { found: found.serial.clone(), expected: expected.to_owned() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// An Error frame as an error.
+pub(crate) fn refused(refusal: message::Refusal) -> Error {
+    match (refusal.code.as_str(), refusal.retry_ms) {
+        ("busy", retry) => Error::Busy { text: refusal.text, retry_ms: retry.unwrap_or(1000) },
+        (_, Some(retry_ms)) => Error::Busy { text: format!("{}: {}", refusal.code, refusal.text), retry_ms },
+        _ => Error::Refused { code: refusal.code, text: refusal.text },
+    }
+}
+
+/// The message in a frame.
+pub(crate) fn parse<T: serde::de::DeserializeOwned>(frame: &Frame) -> Result<T> {
+    serde_json::from_slice(&frame.payload).map_err(|error| {
+        Error::Bridge(format!("a frame of type {:#06x} is not as agreed: {error}", frame.kind))
+    })
+}
+
+/// The bytes of a message. Its types hold nothing that JSON cannot.
+pub(crate) fn json(message: &impl serde::Serialize) -> Vec<u8> {
+    serde_json::to_vec(message).unwrap_or_default()
+}
