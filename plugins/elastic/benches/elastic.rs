@@ -21,13 +21,13 @@ fn main() {
 const SIZE: [f64; 2] = [4.0, 4.0];
 
 /// Rolled to R 12 m with 0.05 mm of noise.
-#[divan::bench(args = [32, 71, 101, 224, 316])]
+#[divan::bench(args = [32, 71, 101, 224, 316], sample_count = 15)]
 fn rolled(bencher: Bencher<'_, '_>, side: u32) {
     run(bencher, ClosedForm::new(cylinder(12.0, 0.3), SIZE, [side - 1; 2], 0.3, 1).with_noise(5e-5, 1));
 }
 
 /// A sphere of R 15 m.
-#[divan::bench(args = [32, 71, 101, 224, 316])]
+#[divan::bench(args = [32, 71, 101, 224, 316], sample_count = 15)]
 fn sphere(bencher: Bencher<'_, '_>, side: u32) {
     run(bencher, ClosedForm::new(sphere_of_fibres(15.0, SIZE), SIZE, [side - 1; 2], 0.3, 1));
 }

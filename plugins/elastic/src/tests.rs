@@ -1,3 +1,4 @@
+mod hold;
 mod least_energy;
 mod membrane;
 

@@ -10,7 +10,7 @@ fn main() {
     divan::main();
 }
 
-#[divan::bench(args = [32, 71, 101, 224, 316])]
+#[divan::bench(args = [32, 71, 101, 224, 316], sample_count = 15)]
 fn vertices_a_side(bencher: Bencher<'_, '_>, side: u32) {
     let plate = ClosedForm::new(cylinder(12.0, 0.3), [4.0, 4.0], [side - 1; 2], 0.3, 1);
     let Ok(mesh) = plate.mesh() else { return };
