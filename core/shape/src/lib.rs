@@ -7,8 +7,10 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+pub mod evaluate;
 pub mod extract;
 pub mod flatten;
+pub mod measure;
 pub mod mesh;
 pub mod outline;
 mod patch;
@@ -16,10 +18,9 @@ mod plate;
 pub mod sparse;
 pub mod surface;
 pub mod task;
-#[cfg(test)]
-mod testing;
 
 pub use flatten::{Chart, Flatten, FlattenError};
+pub use measure::{MeasureError, Measurement, measure};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, Outline, OutlineError};
 pub use patch::{Beyond, Crossing, Patch, Sample};

@@ -1,6 +1,12 @@
-//! The triangle mesh of the plate's mid-surface, on which a flattening works.
+//! From samples and outline to the triangle mesh of the plate's mid-surface, on which a flattening works.
 
 mod disk;
+mod edges;
+mod face;
+pub(crate) mod foot;
 mod topology;
+mod triangulate;
 
 pub use disk::{DiskMesh, DiskParts, MeshError};
+pub use face::{Face, axes};
+pub(crate) use face::{biweight, sigma_across};

@@ -19,6 +19,7 @@ pub use fit::{Fit, Fitted, Undetermined};
 pub use mask::Mask;
 pub use net::{Jet, Net};
 pub use parts::{SurfaceError, SurfaceParts};
+pub(crate) use smoothing::Penalty;
 
 use crate::Vec3;
 use axis::Stencil;

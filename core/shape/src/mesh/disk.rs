@@ -4,6 +4,7 @@ use std::ops::Deref;
 
 use super::topology::check_topology;
 use crate::Vec3;
+use crate::surface::Undetermined;
 
 /// What a [`DiskMesh`] is made of: plain data, unchecked.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,6 +48,9 @@ pub enum MeshError {
         /// The first fault found.
         what: String,
     },
+    /// Too few samples lie on the plate.
+    #[error(transparent)]
+    Undetermined(#[from] Undetermined),
     /// The triangles do not form a disk.
     #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
     NotADisk {

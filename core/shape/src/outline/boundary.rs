@@ -246,10 +246,10 @@ mod tests {
 
     #[test]
     fn the_loop_runs_around_dropouts_and_along_the_rim() {
-        let mut seed = crate::testing::Noise::new(7);
+        let mut seed = crate::flatten::closed_form::Random(7);
         let cells = (0..40).flat_map(|c| (0..30).map(move |r| (c, r)));
         let patch =
-            patch(cells.filter(|&(c, r)| seed.uniform() > 0.1 || c == 0 || r == 0 || c == 39 || r == 29));
+            patch(cells.filter(|&(c, r)| seed.unit() > 0.1 || c == 0 || r == 0 || c == 39 || r == 29));
         let grid = Grid::of(&patch);
         assert_eq!(grid.longest_loop(1000.0).len(), 2 * (39 + 29));
     }

@@ -23,6 +23,8 @@ pub struct Fitted<const D: usize> {
     pub(crate) precision: BandFactor,
     /// Weighted sum of squared residuals over the points and components.
     pub residual_square: f64,
+    /// Sum of the weights.
+    pub weight: f64,
     /// Points with a positive weight.
     pub n_points: usize,
 }
@@ -68,7 +70,8 @@ impl<const D: usize> Fit<D> {
         precision.solve(&mut control);
         let residual_square = residual_square(self.moments.square, &data, &rhs, &control);
         let net = Net { u: self.u, v: self.v, control };
-        Ok(Fitted { net, precision, residual_square, n_points: self.moments.n_points })
+        let (weight, n_points) = (self.moments.weight, self.moments.n_points);
+        Ok(Fitted { net, precision, residual_square, weight, n_points })
     }
 }
 
@@ -91,14 +94,14 @@ fn residual_square<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Noise;
+    use crate::flatten::closed_form::Random;
 
     /// Scattered points of f with noise sigma, fitted on n x m spans.
     fn fit(n_points: usize, spans: [usize; 2], sigma: f64, f: impl Fn(f64, f64) -> f64) -> Fitted<1> {
-        let mut noise = Noise::new(7);
+        let mut noise = Random(7);
         let mut fit = Fit::new(Axis::new(0.0, 3.0, spans[0]), Axis::new(0.0, 2.0, spans[1]));
         for _ in 0..n_points {
-            let (u, v) = (3.0 * noise.uniform(), 2.0 * noise.uniform());
+            let (u, v) = (3.0 * noise.unit(), 2.0 * noise.unit());
             fit.add(u, v, [f(u, v) + sigma * noise.normal()], sigma.max(1e-6).powi(-2));
         }
         fit.solve([1.0]).expect("determined")
@@ -146,10 +149,10 @@ mod tests {
         let f = |u: f64, v: f64| 0.05 * (2.0 * u).sin() + 0.1 * v * v;
         let (mut square, mut stated) = (0.0, 0.0);
         for seed in 0..40 {
-            let mut noise = Noise::new(1000 + seed);
+            let mut noise = Random(1000 + seed);
             let mut fit = Fit::new(Axis::new(0.0, 3.0, 20), Axis::new(0.0, 2.0, 14));
             for _ in 0..3000 {
-                let (u, v) = (3.0 * noise.uniform(), 2.0 * noise.uniform());
+                let (u, v) = (3.0 * noise.unit(), 2.0 * noise.unit());
                 fit.add(u, v, [f(u, v) + 1e-3 * noise.normal()], 1e6);
             }
             let fitted = fit.solve([1.0]).expect("determined");

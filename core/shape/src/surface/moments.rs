@@ -46,6 +46,8 @@ pub(crate) struct Moments<const D: usize> {
     cells: Vec<Cell<D>>,
     /// Sum of w y^2 over points and components.
     pub(crate) square: f64,
+    /// Sum of the weights.
+    pub(crate) weight: f64,
     /// Points with a positive weight.
     pub(crate) n_points: usize,
 }
@@ -53,7 +55,7 @@ pub(crate) struct Moments<const D: usize> {
 impl<const D: usize> Moments<D> {
     pub(crate) fn new(u: Axis, v: Axis) -> Self {
         let empty = Cell { gram: [[0.0; 7]; 7], rhs: [[[0.0; D]; 4]; 4], n_points: 0 };
-        Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, n_points: 0 }
+        Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, weight: 0.0, n_points: 0 }
     }
 
     /// Adds the point `y` at (u, v) with weight `w`; weight 0 adds nothing.
@@ -80,6 +82,7 @@ impl<const D: usize> Moments<D> {
             }
         }
         self.square += w * y.iter().map(|x| x * x).sum::<f64>();
+        self.weight += w;
         self.n_points += 1;
     }
 

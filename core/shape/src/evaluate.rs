@@ -1,0 +1,136 @@
+//! What is read off the fitted surface: markers, reference lines and the grid, each with its uncertainty.
+//!
+//! (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
+
+use crate::surface::{Curvature, Surface};
+use crate::{Chart, DiskMesh, Vec3};
+
+/// Distance of the points of a reference line, metres.
+pub const LINE_STEP: f64 = 0.05;
+/// Places of the grid along u and along v.
+pub const GRID: [usize; 2] = [21, 21];
+
+/// How well material points are located within the surface.
+///
+/// A point's u follows from the edges u = 0 and u = W, each with its own standard deviation, and from the flattening's
+/// own uncertainty; likewise v.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Location {
+    width: f64,
+    height: f64,
+    edge_sigma: [f64; 4],
+    /// Cells of the rectangle with the flattening's largest standard deviations of u and v among their vertices.
+    cells: Vec<[f64; 2]>,
+}
+
+/// A material point on the scanned face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Along u, metres.
+    pub u: f64,
+    /// Along v, metres.
+    pub v: f64,
+    /// Position on the scanned face, metres, scanner frame.
+    pub position: Vec3,
+    /// Standard deviations along u, along v and along the normal, metres.
+    pub sigma: [f64; 3],
+    /// False where no sample was near and the surface was bridged.
+    pub seen: bool,
+}
+
+/// A node of the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// The material point.
+    pub place: Place,
+    /// Curvature of the mid-surface.
+    pub curvature: Curvature,
+    /// Standard deviations of the curvatures along u and v and of the twist, 1/m.
+    pub sigma_curvature: [f64; 3],
+}
+
+/// Places on a regular grid over the rectangle, edges included; v outer, u inner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Nodes along u.
+    pub n_u: usize,
+    /// Nodes along v.
+    pub n_v: usize,
+    /// The nodes.
+    pub nodes: Vec<Node>,
+}
+
+impl Place {
+    /// Standard deviation of the position, all directions together, metres.
+    #[must_use]
+    pub fn sigma_all(&self) -> f64 {
+        self.sigma.iter().map(|s| s * s).sum::<f64>().sqrt()
+    }
+}
+
+/// Cells of [`Location`] along each side.
+const CELLS: usize = 16;
+
+impl Location {
+    /// From the mesh's edges and the chart's own figures.
+    #[must_use]
+    pub fn new(mesh: &DiskMesh, chart: &Chart) -> Self {
+        let mut cells = vec![[0.0_f64; 2]; CELLS * CELLS];
+        for ([u, v], sigma) in chart.uv.iter().zip(chart.sigma.iter().flatten()) {
+            let cell = &mut cells[cell(*u, mesh.width) + CELLS * cell(*v, mesh.height)];
+            *cell = [cell[0].max(sigma[0]), cell[1].max(sigma[1])];
+        }
+        Self { width: mesh.width, height: mesh.height, edge_sigma: mesh.edge_sigma, cells }
+    }
+
+    /// Standard deviations of u and of v at a place, metres.
+    #[must_use]
+    pub fn sigma(&self, u: f64, v: f64) -> [f64; 2] {
+        let (x, y) = ((u / self.width).clamp(0.0, 1.0), (v / self.height).clamp(0.0, 1.0));
+        let [bottom, right, top, left] = self.edge_sigma;
+        let flattening = self.cells[cell(u, self.width) + CELLS * cell(v, self.height)];
+        let total = |from: f64, to: f64, f: f64, own: f64| {
+            (((1.0 - f) * from).powi(2) + (f * to).powi(2) + own * own).sqrt()
+        };
+        [total(left, right, x, flattening[0]), total(bottom, top, y, flattening[1])]
+    }
+}
+
+fn cell(x: f64, length: f64) -> usize {
+    ((x / length * CELLS as f64).max(0.0) as usize).min(CELLS - 1)
+}
+
+/// The material point (u, v) on the scanned face.
+#[must_use]
+pub fn place(surface: &Surface, location: &Location, u: f64, v: f64) -> Place {
+    let [su, sv] = location.sigma(u, v);
+    let sigma = [su, sv, surface.sigma_point(u, v)];
+    Place { u, v, position: surface.face(u, v), sigma, seen: surface.mask().seen(u, v) }
+}
+
+/// Points of a straight line of the rectangle, every [`LINE_STEP`] from `from`, and its end.
+#[must_use]
+pub fn reference_line(surface: &Surface, location: &Location, from: [f64; 2], to: [f64; 2]) -> Vec<Place> {
+    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    let steps = (length / LINE_STEP - 1e-9).ceil().max(0.0) as usize;
+    (0..=steps)
+        .map(|k| if k == steps { 1.0 } else { k as f64 * LINE_STEP / length })
+        .map(|f| place(surface, location, from[0] + f * (to[0] - from[0]), from[1] + f * (to[1] - from[1])))
+        .collect()
+}
+
+/// The grid of `n_u` x `n_v` places over the whole rectangle, at least 2 x 2.
+#[must_use]
+pub fn grid(surface: &Surface, location: &Location, n_u: usize, n_v: usize) -> Grid {
+    let (n_u, n_v) = (n_u.max(2), n_v.max(2));
+    let at = |k: usize, n: usize, length: f64| length * k as f64 / (n - 1) as f64;
+    let nodes = (0..n_u * n_v)
+        .map(|k| (at(k % n_u, n_u, surface.width()), at(k / n_u, n_v, surface.height())))
+        .map(|(u, v)| Node {
+            place: place(surface, location, u, v),
+            curvature: surface.curvature(u, v),
+            sigma_curvature: surface.sigma_curvature(u, v),
+        })
+        .collect();
+    Grid { n_u, n_v, nodes }
+}

@@ -1,0 +1,119 @@
+//! From the plate's samples and outline to its surface S(u, v): one stroke, in the order of the data.
+//!
+//! ```text
+//! Patch, Outline -> Face (smooth face and mid-surface) -> DiskMesh -> Chart (the flattening) -> Surface
+//! ```
+
+#[cfg(test)]
+mod scene;
+mod settle;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use crate::evaluate::Location;
+use crate::mesh::{Face, MeshError};
+use crate::surface::{Surface, Undetermined};
+use crate::{Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
+
+/// Vertices of the mesh: as many as the paper's.
+pub const N_VERTICES: usize = 10_000;
+
+/// One measured plate.
+#[derive(Debug, Clone)]
+pub struct Measurement {
+    /// The mid-surface over the original rectangle.
+    pub surface: Surface,
+    /// The mesh that was flattened.
+    pub mesh: DiskMesh,
+    /// Its flattening.
+    pub chart: Chart,
+    /// How well material points are located.
+    pub location: Location,
+    /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, metres, scanner frame.
+    pub corners: [Vec3; 4],
+    /// How good the scan was.
+    pub quality: Quality,
+    /// How long each stage took.
+    pub timings: Timings,
+}
+
+/// How good the scan was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Samples on the plate.
+    pub n_samples: usize,
+    /// Samples that count: not thrown out as outliers.
+    pub n_used: usize,
+    /// Share of the plate that was seen.
+    pub coverage: f64,
+    /// Standard deviation of the range as observed about the smooth face, metres.
+    pub noise: f64,
+    /// Root mean square distance of the samples from S, metres, weighted as in the fit.
+    pub rms: f64,
+    /// Mean distance of neighbouring samples on the plate, metres.
+    pub lattice_step: f64,
+}
+
+/// Time spent in each stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Timings {
+    /// Smooth face, mid-surface and mesh.
+    pub mesh: Duration,
+    /// Flattening.
+    pub flatten: Duration,
+    /// S(u, v) with its covariance.
+    pub surface: Duration,
+}
+
+/// Why there is no measurement.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeasureError {
+    /// No mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// No chart.
+    #[error(transparent)]
+    Flatten(#[from] FlattenError),
+    /// No surface.
+    #[error(transparent)]
+    Surface(#[from] Undetermined),
+}
+
+/// Measures the plate. `clock` tells the time since some fixed moment; it is read between the stages.
+///
+/// # Errors
+/// [`MeasureError`]: too few samples, a mesh that is no disk, or the flattening's own refusal.
+pub fn measure(
+    patch: &Patch,
+    outline: &Outline,
+    spec: &PlateSpec,
+    flatten: &mut dyn Flatten,
+    clock: &mut dyn FnMut() -> Duration,
+) -> Result<Measurement, MeasureError> {
+    let start = clock();
+    let face = Face::fit(patch, outline, spec)?;
+    let (mesh, places) = face.mesh(outline, spec, N_VERTICES)?;
+    let meshed = clock();
+    let chart = flatten.flatten(&mesh)?;
+    chart.check(&mesh)?;
+    let flattened = clock();
+    let settled = settle::settle(patch, &face, &places, &chart, spec)?;
+    let fitted = clock();
+    let surface = settled.surface;
+    let corners = [[0.0, 0.0], [spec.width, 0.0], [spec.width, spec.height], [0.0, spec.height]];
+    Ok(Measurement {
+        corners: corners.map(|[u, v]| surface.face(u, v)),
+        location: Location::new(&mesh, &chart),
+        surface,
+        mesh,
+        chart,
+        quality: settled.quality,
+        timings: Timings {
+            mesh: meshed.saturating_sub(start),
+            flatten: flattened.saturating_sub(meshed),
+            surface: fitted.saturating_sub(flattened),
+        },
+    })
+}

@@ -1,0 +1,128 @@
+//! S(u, v) from all samples, once the mesh is flattened.
+//!
+//! A spline through the vertices' (u, v) carries the chart from the vertices to every place (a, b) of the face. Each
+//! sample then has its (u, v), its own mid-surface point (half the thickness below it along the face's normal) and its
+//! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
+
+use super::Quality;
+use crate::mesh::foot::walk;
+use crate::mesh::{Face, axes, biweight, sigma_across};
+use crate::surface::{Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
+use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
+
+/// Cells of the mask, metres.
+const MASK_CELL: f64 = 0.025;
+/// Rows up to this far apart are neighbours: a single dropout is no hole.
+const NEIGHBOUR_ROWS: u32 = 2;
+
+/// The surface and how good its samples were.
+pub(super) struct Settled {
+    pub(super) surface: Surface,
+    pub(super) quality: Quality,
+}
+
+/// Fits S to all samples of `patch`; `places` are the vertices' coordinates (a, b) on the face.
+pub(super) fn settle(
+    patch: &Patch,
+    face: &Face,
+    places: &[[f64; 2]],
+    chart: &Chart,
+    spec: &PlateSpec,
+) -> Result<Settled, Undetermined> {
+    let [u, v] = axes(spec.width, spec.height);
+    let carried = carry(face, places, chart)?;
+    // Around its middle the plate's coordinates are small, and so are the rounding errors of their squares.
+    let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
+    let mut fit = Fit::<3>::new(u, v);
+    let mut seen = Seen::new(spec);
+    let mut variance = 0.0;
+    walk(&face.face, patch.samples.iter(), |sample, foot| {
+        let [u, v] = carried.point(foot.at[0], foot.at[1]);
+        let sigma = face.noise_scale * sigma_across(sample, &foot.normal);
+        let weight = biweight(foot.height / sigma) / (sigma * sigma);
+        let mid = sample.point - foot.normal * (0.5 * spec.thickness) - middle;
+        fit.add(u, v, mid.into(), weight);
+        seen.add(sample, [u, v]);
+        variance += f64::from(sample.sigma).powi(2);
+    });
+    let fitted = fit.solve(direction(&face.mid).into())?;
+    let n = patch.samples.len();
+    let quality = Quality {
+        n_samples: n,
+        n_used: fitted.n_points,
+        coverage: seen.mask.coverage(),
+        noise: face.noise_scale * (variance / n.max(1) as f64).sqrt(),
+        rms: (fitted.residual_square / fitted.weight).sqrt(),
+        lattice_step: (spec.width * spec.height * seen.mask.coverage() / n.max(1) as f64).sqrt(),
+    };
+    let surface = Surface::new(moved(fitted, middle), spec.thickness, seen.mask);
+    Ok(Settled { surface, quality })
+}
+
+/// The chart as a spline over (a, b): least squares on the vertices, with a penalty that acts below three spans only.
+fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<2>, Undetermined> {
+    let (a, b) = (face.mid.u, face.mid.v);
+    let mut fit = Fit::<2>::new(a, b);
+    for ([x, y], uv) in places.iter().zip(&chart.uv) {
+        fit.add(*x, *y, *uv, 1.0);
+    }
+    let density = places.len() as f64 / (a.end() * b.end());
+    let weight = |step: f64| density * (3.0 * step / std::f64::consts::TAU).powi(6);
+    Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net)
+}
+
+/// Mean normal of the plate: at right angles to both diagonals.
+fn direction(mid: &Net<3>) -> Vec3 {
+    let corner = |a: f64, b: f64| Vec3::from(mid.point(a, b));
+    let (w, h) = (mid.u.end(), mid.v.end());
+    (corner(w, h) - corner(0.0, 0.0)).cross(&(corner(0.0, h) - corner(w, 0.0))).normalize()
+}
+
+fn moved(mut fitted: Fitted<3>, by: Vec3) -> Fitted<3> {
+    fitted.net.control.iter_mut().for_each(|c| *c = (Vec3::from(*c) + by).into());
+    fitted
+}
+
+/// Marks what lies at and between neighbouring samples: at grazing sight they are further apart than cells.
+struct Seen {
+    mask: Mask,
+    column: u32,
+    /// Rows and places of the last column and of this one.
+    before: Vec<(u32, [f64; 2])>,
+    current: Vec<(u32, [f64; 2])>,
+    /// Where in the last column the search for a sample's neighbour stands.
+    cursor: usize,
+}
+
+impl Seen {
+    fn new(spec: &PlateSpec) -> Self {
+        let mask = Mask::unseen(spec.width, spec.height, MASK_CELL);
+        Self { mask, column: 0, before: Vec::new(), current: Vec::new(), cursor: 0 }
+    }
+
+    fn add(&mut self, sample: &Sample, at: [f64; 2]) {
+        if sample.column != self.column {
+            std::mem::swap(&mut self.before, &mut self.current);
+            if sample.column != self.column + 1 {
+                self.before.clear();
+            }
+            self.current.clear();
+            (self.column, self.cursor) = (sample.column, 0);
+        }
+        self.mask.mark(at[0], at[1]);
+        if let Some((row, above)) = self.current.last()
+            && sample.row - row <= NEIGHBOUR_ROWS
+        {
+            self.mask.mark_between(*above, at);
+        }
+        while self.before.get(self.cursor).is_some_and(|(row, _)| *row < sample.row) {
+            self.cursor += 1;
+        }
+        if let Some((row, beside)) = self.before.get(self.cursor)
+            && row - sample.row < NEIGHBOUR_ROWS
+        {
+            self.mask.mark_between(*beside, at);
+        }
+        self.current.push((sample.row, at));
+    }
+}

@@ -1,0 +1,86 @@
+//! The surface spanned by the four edge curves: the first picture of the plate's face, and its coordinates.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::surface::{Axis, Net};
+use crate::{EdgeCurve, Outline, Vec3};
+
+/// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
+/// surface. Detail across the surface (narrow bends) is added later, from the samples inside.
+const SPAN: f64 = 0.25;
+/// Wavelength, metres, below which an edge is taken for noise.
+const SMOOTH_BELOW: f64 = 0.4;
+/// A bridged point of an edge counts this much: enough to guide the curve, not to bend it against seen points.
+const BRIDGED: f64 = 0.01;
+/// The corners are fixed by this weight.
+const CORNER: f64 = 1e6;
+
+/// A smooth curve over [0, 1].
+struct Edge {
+    axis: Axis,
+    control: DMatrix<f64>,
+}
+
+impl Edge {
+    /// Penalised least squares on the points of the curve, through both of its ends.
+    fn fit(curve: &EdgeCurve) -> Self {
+        let n = curve.points.len();
+        let length: f64 = curve.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let axis = Axis::new(0.0, 1.0, ((length / SPAN).ceil() as usize).clamp(3, 64));
+        let n_coefficients = axis.n_coefficients();
+        let mut normal = DMatrix::zeros(n_coefficients, n_coefficients);
+        let mut rhs = DMatrix::zeros(n_coefficients, 3);
+        for (j, point) in curve.points.iter().enumerate() {
+            let end = j == 0 || j == n - 1;
+            let seen = curve.seen.get(j).copied().unwrap_or(false);
+            let weight = if end {
+                CORNER
+            } else if seen {
+                1.0
+            } else {
+                BRIDGED
+            };
+            let (first, values) = axis.values(j as f64 / (n - 1) as f64);
+            for (a, x) in values.iter().enumerate() {
+                for (b, y) in values.iter().enumerate() {
+                    normal[(first + a, first + b)] += weight * x * y;
+                }
+                (0..3).for_each(|d| rhs[(first + a, d)] += weight * x * point[d]);
+            }
+        }
+        // Where the penalty's weight at a wavelength equals that of the points: n / (2 pi / wavelength)^6.
+        let penalty = n as f64 * (SMOOTH_BELOW / length / std::f64::consts::TAU).powi(6);
+        for (i, row) in axis.roughness().iter().enumerate() {
+            for (k, value) in row.iter().enumerate().filter(|(k, _)| i + k < n_coefficients) {
+                normal[(i, i + k)] += penalty * value;
+                if k > 0 {
+                    normal[(i + k, i)] += penalty * value;
+                }
+            }
+        }
+        let control = normal.cholesky().map_or_else(|| DMatrix::zeros(n_coefficients, 3), |c| c.solve(&rhs));
+        Self { axis, control }
+    }
+
+    fn point(&self, s: f64) -> Vec3 {
+        let (first, values) = self.axis.values(s);
+        let weights = DVector::from_row_slice(&values);
+        (self.control.rows(first, 4).transpose() * weights).fixed_rows::<3>(0).into_owned()
+    }
+}
+
+/// The Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum reproduces every
+/// surface of second order, however it is bent or turned. With an inset the outline lies that far inside of the
+/// rectangle, and the patch goes on beyond it.
+pub(crate) fn coons(outline: &Outline, width: f64, height: f64, inset: f64, axes: [Axis; 2]) -> Net<3> {
+    let edges = [0, 1, 2, 3].map(|k| Edge::fit(&outline.edges[k]));
+    let corner = |k: usize| outline.corners[k].point;
+    Net::approximate(axes[0], axes[1], |a, b| {
+        let (x, y) = ((a - inset) / (width - 2.0 * inset), (b - inset) / (height - 2.0 * inset));
+        let along_v = edges[0].point(x) * (1.0 - y) + edges[2].point(1.0 - x) * y;
+        let along_u = edges[3].point(1.0 - y) * (1.0 - x) + edges[1].point(y) * x;
+        let twice =
+            (corner(0) * (1.0 - x) + corner(1) * x) * (1.0 - y) + (corner(3) * (1.0 - x) + corner(2) * x) * y;
+        (along_v + along_u - twice).into()
+    })
+}

@@ -1,0 +1,128 @@
+//! The scanned face and the mid-surface as smooth surfaces over one pair of coordinates.
+//!
+//! The edges span a Coons patch over the rectangle; its coordinates (a, b) are nearly those of the plate and never
+//! fold, however strongly the plate is bent or from where it is seen, where a plane of projection would. Each
+//! sample has a foot on the patch and a height over it. A penalised spline through the heights is the smooth face: one
+//! noisy sample moves nothing, holes are bridged, and the edges' own noise across the surface drops out. Half
+//! the thickness below it, along its normal, lies the mid-surface, right up to its edges: cuts are square to it.
+
+use super::MeshError;
+use super::edges::coons;
+use super::foot::walk;
+use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
+use crate::{Outline, Patch, PlateSpec, Sample, Vec3};
+
+/// Length of a span of every surface fitted here, metres: the narrowest bend of a press is a few times as wide.
+const SPAN: f64 = 0.06;
+/// Samples used for the smooth face, at least, where there are as many: every n-th of every n-th column.
+const ENOUGH: usize = 30_000;
+/// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
+const CUT_OFF: f64 = 5.0;
+/// The cosine of the incidence never counts below this one: beyond 87 degrees a sample tells nothing.
+const LEAST_COSINE: f64 = 0.05;
+
+/// The smooth scanned face and mid-surface over (a, b) in `[0, W] x [0, H]`.
+#[derive(Debug, Clone)]
+pub struct Face {
+    /// The scanned face, metres, scanner frame.
+    pub face: Net<3>,
+    /// The mid-surface at the same (a, b): half the thickness below the face along its normal.
+    pub mid: Net<3>,
+    /// Feet (a, b) of the samples that were used, in lattice order.
+    pub(crate) places: Vec<[f64; 2]>,
+    /// Observed over stated standard deviation of the samples.
+    pub(crate) noise_scale: f64,
+}
+
+/// Axes over the rectangle with spans as long as the surfaces here have.
+#[must_use]
+pub fn axes(width: f64, height: f64) -> [Axis; 2] {
+    [width, height].map(|length| Axis::new(0.0, length, ((length / SPAN).round() as usize).clamp(8, 128)))
+}
+
+impl Face {
+    /// Fits the face to the samples.
+    ///
+    /// # Errors
+    /// [`MeshError::Undetermined`] when too few samples lie on the plate.
+    pub fn fit(patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Result<Self, MeshError> {
+        let axes = axes(spec.width, spec.height);
+        let base = coons(outline, spec.width, spec.height, spec.face_inset, axes);
+        let heights = Heights::over(&base, patch);
+        let (fitted, noise_scale) = heights.smooth(axes)?;
+        let face = Net::approximate(axes[0], axes[1], |a, b| {
+            let [p, along_a, along_b] = base.frame(a, b).map(Vec3::from);
+            (p + along_a.cross(&along_b).normalize() * fitted.net.point(a, b)[0]).into()
+        });
+        let mid = Net::approximate(axes[0], axes[1], |a, b| {
+            let [p, along_a, along_b] = face.frame(a, b).map(Vec3::from);
+            (p - along_a.cross(&along_b).normalize() * (0.5 * spec.thickness)).into()
+        });
+        Ok(Self { face, mid, places: heights.places, noise_scale })
+    }
+}
+
+/// Standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
+pub(crate) fn sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
+    let cosine = sample.point.normalize().dot(normal).abs();
+    f64::from(sample.sigma) * cosine.max(LEAST_COSINE)
+}
+
+/// Tukey's biweight of a residual, in standard deviations.
+pub(crate) fn biweight(residual: f64) -> f64 {
+    let x = residual / CUT_OFF;
+    (1.0 - x * x).max(0.0).powi(2)
+}
+
+/// Standard deviation of normally spread residuals with outliers, from the median of their sizes.
+fn robust_scale(mut sizes: Vec<f64>) -> f64 {
+    /// The median of |x| of the standard normal distribution.
+    const MEDIAN: f64 = 0.674_489_750_196_081_7;
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN).max(1e-6)
+}
+
+/// Heights of samples over a surface.
+struct Heights {
+    places: Vec<[f64; 2]>,
+    heights: Vec<f64>,
+    sigmas: Vec<f64>,
+}
+
+impl Heights {
+    fn over(base: &Net<3>, patch: &Patch) -> Self {
+        let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
+        let thinned = patch.samples.iter().filter(|s| s.column % every == 0 && s.row % every == 0);
+        let mut out = Self { places: Vec::new(), heights: Vec::new(), sigmas: Vec::new() };
+        walk(base, thinned, |sample, foot| {
+            out.places.push(foot.at);
+            out.heights.push(foot.height);
+            out.sigmas.push(sigma_across(sample, &foot.normal));
+        });
+        out
+    }
+
+    /// The spline through the heights, and how much larger than stated their noise is.
+    fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
+        let fit = |weight: &dyn Fn(usize) -> f64| {
+            let mut fit = Fit::new(axes[0], axes[1]);
+            for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
+                fit.add(*a, *b, [*height], weight(i));
+            }
+            fit.solve([1.0])
+        };
+        let first = fit(&|i| self.sigmas[i].powi(-2))?;
+        let residuals: Vec<f64> = (0..self.places.len())
+            .map(|i| {
+                (self.heights[i] - first.net.point(self.places[i][0], self.places[i][1])[0]) / self.sigmas[i]
+            })
+            .collect();
+        let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
+        let robust = fit(&|i| biweight(residuals[i] / scale) / (scale * self.sigmas[i]).powi(2))?;
+        Ok((robust, scale))
+    }
+}
