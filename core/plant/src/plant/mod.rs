@@ -14,6 +14,7 @@ pub use plugin_use::PluginUse;
 use std::path::{Path, PathBuf};
 
 use crate::document::{Document, Reported};
+use crate::press::Press;
 use crate::{Error, Faults, Table};
 
 /// Used where the plant file names no flattening.
@@ -28,6 +29,8 @@ pub struct PlantFile {
     pub name: String,
     /// From which every random choice is drawn, so that a measurement can be repeated to the last bit.
     pub seed: u64,
+    /// The press and how it is reached; needed to run, not to measure a file.
+    pub press: Option<Press>,
     /// Where scans come from; needed to run, not to measure a file.
     pub scanner: Option<PluginUse>,
     /// How the scanner stands to the press and the plate.
@@ -48,6 +51,7 @@ impl Default for PlantFile {
         Self {
             name: "no plant file".to_owned(),
             seed: 1,
+            press: None,
             scanner: None,
             frame: Frame::default(),
             plates: PathBuf::from("plates"),
@@ -117,6 +121,7 @@ impl PlantFile {
         let scanner = root.table("scanner").optional();
         let scanner = scanner.and_then(|table| table.map(PluginUse::read).transpose());
         let press = root.table("press").optional();
+        let press = press.and_then(|table| table.map(Press::read).transpose());
         let frame = root.section("frame").and_then(Frame::read);
         let plates = root.section("plates").and_then(|mut table| {
             let plates = table.name("folder").map(PathBuf::from).or(default.plates);
@@ -134,10 +139,10 @@ impl PlantFile {
         root.finish();
 
         let (name, seed) = plant?;
-        press?;
         Ok(Self {
             name,
             seed,
+            press: press?,
             scanner: scanner?,
             frame: frame?,
             plates: folder.join(plates?),

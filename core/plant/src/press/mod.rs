@@ -6,6 +6,7 @@ mod link;
 mod map;
 mod names;
 mod pph1;
+mod read;
 
 pub use allow::{Refused, WriteAllow};
 pub use field::{Dimension, Field, Kind, Place, Unit, WordOrder};

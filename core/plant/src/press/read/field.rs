@@ -1,0 +1,354 @@
+//! Reads the fields of `[press.map.in]` and `[press.map.out]`.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::document::Reported;
+use crate::node::Kind as NodeKind;
+use crate::press::{
+    AddressBase, Block, Counter, Dimension, Field, Input, Kind, Measure, Output, Place, Unit, WordOrder,
+};
+use crate::{Place as FilePlace, Table as Cursor};
+
+/// What fields are called and what they measure.
+pub(super) trait Name: Copy + Ord + 'static {
+    const INPUT: bool;
+    fn name(self) -> &'static str;
+    fn dimension(self) -> Dimension;
+}
+
+impl Name for Input {
+    const INPUT: bool = true;
+    fn name(self) -> &'static str {
+        self.name()
+    }
+    fn dimension(self) -> Dimension {
+        self.dimension()
+    }
+}
+
+impl Name for Output {
+    const INPUT: bool = false;
+    fn name(self) -> &'static str {
+        self.name()
+    }
+    fn dimension(self) -> Dimension {
+        self.dimension()
+    }
+}
+
+/// The fields of one direction, and where the file speaks of them.
+pub(super) struct Given<N> {
+    pub(super) fields: BTreeMap<N, Field>,
+    pub(super) places: BTreeMap<N, FilePlace>,
+}
+
+/// What fields have in common, and what they say about more than themselves.
+pub(super) struct FieldReader {
+    pub(super) order: WordOrder,
+    pub(super) address_base: AddressBase,
+    pub(super) block: Block,
+    pub(super) counter: Counter,
+    pub(super) heartbeat_in: Option<Duration>,
+}
+
+impl FieldReader {
+    /// Every field of a direction: the profile's, unless the file says otherwise.
+    pub(super) fn fields<N: Name>(
+        &mut self,
+        mut table: Cursor<'_>,
+        built_in: BTreeMap<N, Field>,
+        all: &[N],
+    ) -> Result<Given<N>, Reported> {
+        let mut given = Given { fields: built_in, places: BTreeMap::new() };
+        for field in given.fields.values_mut() {
+            field.order = self.order;
+        }
+        let mut failed = None;
+        for &name in all {
+            match self.one(&mut table, name, given.fields.get(&name)) {
+                Ok(None) => {}
+                Ok(Some((field, place))) => {
+                    given.places.insert(name, place);
+                    match field {
+                        Some(field) => given.fields.insert(name, field),
+                        None => given.fields.remove(&name),
+                    };
+                }
+                Err(reported) => failed = Some(reported),
+            }
+        }
+        table.finish();
+        failed.map_or(Ok(given), Err)
+    }
+
+    /// What the file says about one field: nothing, that it does not exist, or where and what it is.
+    fn one<N: Name>(
+        &mut self,
+        table: &mut Cursor<'_>,
+        name: N,
+        built_in: Option<&Field>,
+    ) -> Result<Option<(Option<Field>, FilePlace)>, Reported> {
+        if !table.has(name.name()) {
+            // Asked for, so that it counts as a known key.
+            return table.node(name.name()).optional().map(|_| None);
+        }
+        let node = table.node(name.name()).located().required()?;
+        if let NodeKind::String(text) = &node.value.kind {
+            if text == "none" {
+                return Ok(Some((None, node.place)));
+            }
+            let message =
+                format!("found {text:?}, expected a table like {{ at = 4, type = \"u16\" }} or \"none\"");
+            return Err(table.document().fault(&node.place, message));
+        }
+        let place = node.place;
+        let field = self.table(table.table(name.name()).required()?, name, built_in, &place)?;
+        Ok(Some((Some(field), place)))
+    }
+
+    fn table<N: Name>(
+        &mut self,
+        mut table: Cursor<'_>,
+        name: N,
+        built_in: Option<&Field>,
+        place: &FilePlace,
+    ) -> Result<Field, Reported> {
+        let document = table.document();
+        let dimension = name.dimension();
+        let default = built_in.cloned().unwrap_or_else(|| Field {
+            order: self.order,
+            ..Field::register(0, if dimension == Dimension::Switch { Kind::Bool } else { Kind::U16 })
+        });
+        let at = self.place(&mut table, name, built_in.map(|field| field.place));
+        let kind = read_kind(&mut table, dimension, default.kind);
+        let orders = WordOrder::ALL.map(|order| (order.name(), order));
+        let order = table.choice("order", &orders).or(self.order);
+        let kind = kind.and_then(|kind| {
+            kind.ok_or_else(|| document.fault(place, "a text needs its length in registers"))
+        });
+        let same = kind.is_ok_and(|kind| kind == default.kind);
+        let scale = table.number("scale").check(|scale| match *scale == 0.0 {
+            true => Err("found 0, nothing can be told from 0 times a number".to_owned()),
+            false => Ok(()),
+        });
+        let scale = scale.or(if same { default.scale } else { 1.0 });
+        let unit = read_unit(&mut table, dimension, default.unit);
+        let invalid = read_invalid(&mut table).map(|given| given.or(default.invalid.filter(|_| same)));
+        let (min, max) = (table.number("min").optional(), table.number("max").optional());
+        let actives = [("high", false), ("low", true)];
+        let active_low = if dimension == Dimension::Switch {
+            table.choice("active", &actives).or(default.active_low)
+        } else {
+            Ok(false)
+        };
+        let own = if N::INPUT {
+            self.input_keys(&mut table, name.name(), &default)
+        } else {
+            output_keys(&mut table, name.name(), dimension, &default)
+        };
+        table.finish();
+        let own = own?;
+        let field = Field {
+            place: at?,
+            kind: kind?,
+            count: own.count,
+            order: order?,
+            scale: scale?,
+            unit: unit?,
+            invalid: invalid?,
+            expect: own.expect,
+            min: min?,
+            max: max?,
+            active_low: active_low?,
+            debounce_reads: own.debounce_reads,
+            from: own.from,
+        };
+        check_field(&field, dimension).map_err(|message| document.fault(place, message))?;
+        Ok(field)
+    }
+
+    /// `at = 3`, `at = "2.1"`, `at = "@1234"`, `at = "@1234.5"`, or `const = 1`.
+    fn place<N: Name>(
+        &self,
+        table: &mut Cursor<'_>,
+        name: N,
+        built_in: Option<Place>,
+    ) -> Result<Place, Reported> {
+        let constant = if N::INPUT { table.number("const").optional() } else { Ok(None) };
+        let at = table.node("at").try_map(|node| match &node.kind {
+            NodeKind::Integer(offset) => self.offset(*offset).map(Place::Register),
+            NodeKind::String(text) => self.parse_place(text),
+            _ => Err(format!("found {}, expected 3, \"2.1\", \"@1234\" or \"@1234.5\"", node.describe())),
+        });
+        let at = at.try_map(|at| match (name.dimension(), at) {
+            (Dimension::Switch, _) | (_, Place::Register(_) | Place::Constant(_)) => Ok(at),
+            (_, Place::Bit(..)) => Err("a bit holds a switch only; this field needs a register".to_owned()),
+        });
+        if let Some(number) = constant? {
+            return Ok(Place::Constant(number));
+        }
+        match built_in {
+            Some(place) => at.or(place),
+            None => at.required(),
+        }
+    }
+
+    fn parse_place(&self, text: &str) -> Result<Place, String> {
+        let wrong = || format!("found {text:?}, expected 3, \"2.1\", \"@1234\" or \"@1234.5\"");
+        let (absolute, rest) = text.strip_prefix('@').map_or((false, text), |rest| (true, rest));
+        let (register, bit) =
+            rest.split_once('.').map_or((rest, None), |(register, bit)| (register, Some(bit)));
+        let register: i64 = register.trim().parse().map_err(|_| wrong())?;
+        let register = if absolute { self.offset_of(register)? } else { self.offset(register)? };
+        match bit.map(str::parse::<u8>) {
+            None => Ok(Place::Register(register)),
+            Some(Ok(bit @ 0..=15)) => Ok(Place::Bit(register, bit)),
+            Some(Ok(bit)) => Err(format!("found bit {bit}, a register has bits 0 to 15")),
+            Some(Err(_)) => Err(wrong()),
+        }
+    }
+
+    fn offset(&self, offset: i64) -> Result<u16, String> {
+        let last = self.block.count - 1;
+        let inside = u16::try_from(offset).ok().filter(|&offset| offset <= last);
+        inside.ok_or_else(|| format!("found register {offset} of its block, which has 0 to {last}"))
+    }
+
+    fn offset_of(&self, address: i64) -> Result<u16, String> {
+        let first = i64::from(self.address_base.first(self.block.table)) + i64::from(self.block.start);
+        let last = first + i64::from(self.block.count) - 1;
+        let inside = (first..=last).contains(&address);
+        if inside {
+            Ok((address - first) as u16)
+        } else {
+            Err(format!("found @{address}, its block is @{first} to @{last}"))
+        }
+    }
+
+    /// The keys that only fields of the press have; some say something about the press as a whole.
+    fn input_keys(&mut self, table: &mut Cursor<'_>, name: &str, default: &Field) -> Result<Own, Reported> {
+        let expect = table.integer("expect").optional();
+        let debounce = if name == Input::Trigger.name() {
+            table
+                .integer("debounce_reads")
+                .in_range(1..=100)
+                .map(|reads| reads as u8)
+                .or(default.debounce_reads)
+        } else {
+            Ok(default.debounce_reads)
+        };
+        if name == Input::StrokeId.name() {
+            let wrap = table.integer("wrap").in_range(2..=65_535).map(|wrap| wrap as u16).or(u16::MAX);
+            let zero = table.choice("zero", &[("none", 1), ("stroke", 0)]).or(1);
+            self.counter = Counter { wrap: wrap?, first: zero? };
+        }
+        if name == Input::Heartbeat.name() {
+            self.heartbeat_in = super::ms(table, "timeout_ms", 100)?;
+        }
+        Ok(Own {
+            expect: expect?.or(default.expect),
+            debounce_reads: debounce?,
+            count: default.count,
+            from: None,
+        })
+    }
+}
+
+/// Keys that only one direction has.
+struct Own {
+    expect: Option<i64>,
+    debounce_reads: u8,
+    count: u16,
+    from: Option<Measure>,
+}
+
+fn output_keys(
+    table: &mut Cursor<'_>,
+    name: &str,
+    dimension: Dimension,
+    default: &Field,
+) -> Result<Own, Reported> {
+    let count = if name == Output::Station.name() {
+        table.integer("count").in_range(1..=100).map(|count| count as u16).or(default.count)
+    } else {
+        Ok(default.count)
+    };
+    let measured = Output::from_name(name).is_some_and(|output| output.measure().is_some());
+    let from = if measured {
+        let sources: Vec<_> = Measure::ALL.iter().map(|measure| (measure.name(), *measure)).collect();
+        let from = table.choice("from", &sources).check(|measure| match measure.dimension() == dimension {
+            true => Ok(()),
+            false => Err(format!("{measure} is of another kind than this field")),
+        });
+        from.optional()
+    } else {
+        Ok(None)
+    };
+    Ok(Own { expect: None, debounce_reads: 1, count: count?, from: from?.or(default.from) })
+}
+
+/// The type; `None` for a text without a length.
+fn read_kind(table: &mut Cursor<'_>, dimension: Dimension, default: Kind) -> Result<Option<Kind>, Reported> {
+    if dimension == Dimension::Text {
+        let kind = table.choice("type", &[("ascii", ())]).optional();
+        let registers = table.integer("length").in_range(1..=60).map(|registers| registers as u16).optional();
+        kind?;
+        let kept = if let Kind::Ascii { registers } = default { Some(registers) } else { None };
+        return Ok(registers?.or(kept).map(|registers| Kind::Ascii { registers }));
+    }
+    let numbers = [Kind::U16, Kind::I16, Kind::U32, Kind::I32, Kind::F32].map(|kind| (kind.name(), kind));
+    let bits = [(Kind::Bool.name(), Kind::Bool), (Kind::U16.name(), Kind::U16)];
+    let kinds = if dimension == Dimension::Switch { &bits[..] } else { &numbers[..] };
+    table.choice("type", kinds).or(default).map(Some)
+}
+
+fn read_unit(table: &mut Cursor<'_>, dimension: Dimension, default: Unit) -> Result<Unit, Reported> {
+    if matches!(dimension, Dimension::Switch | Dimension::Text) {
+        return Ok(Unit::One);
+    }
+    let units: Vec<_> =
+        Unit::ALL.iter().filter(|unit| unit.measures(dimension)).map(|unit| (unit.name(), *unit)).collect();
+    table.choice("unit", &units).or(default)
+}
+
+/// `invalid = "0x8000"` or `invalid = 32768`.
+fn read_invalid(table: &mut Cursor<'_>) -> Result<Option<u32>, Reported> {
+    let field = table.node("invalid").try_map(|node| {
+        let value = match &node.kind {
+            NodeKind::Integer(value) => u32::try_from(*value).ok(),
+            NodeKind::String(text) => {
+                text.strip_prefix("0x").and_then(|hex| u32::from_str_radix(hex, 16).ok())
+            }
+            _ => None,
+        };
+        value.ok_or_else(|| format!("found {}, expected the raw bits like \"0x8000\"", node.describe()))
+    });
+    field.optional()
+}
+
+/// What can be wrong within one field.
+fn check_field(field: &Field, dimension: Dimension) -> Result<(), String> {
+    if !field.unit.measures(dimension) && !matches!(dimension, Dimension::Switch | Dimension::Text) {
+        let units: Vec<_> =
+            Unit::ALL.iter().filter(|unit| unit.measures(dimension)).map(|unit| unit.name()).collect();
+        return Err(format!("needs its unit; allowed {}", units.join(", ")));
+    }
+    let Some((low, high)) = field.kind.range() else { return Ok(()) };
+    if let (Some(min), Some(max)) = (field.min, field.max)
+        && min > max
+    {
+        return Err(format!("min {min} is above max {max}"));
+    }
+    for (key, limit) in [("min", field.min), ("max", field.max)] {
+        let raw = limit.map(|limit| limit / field.scale);
+        if let Some(raw) = raw.filter(|raw| !(low..=high).contains(raw)) {
+            let kind = field.kind.name();
+            return Err(format!("{key} is {raw:.0} raw, which a {kind} ({low:.0} to {high:.0}) cannot hold"));
+        }
+    }
+    if let Some(invalid) = field.invalid.filter(|&invalid| field.kind.registers() == 1 && invalid > 0xFFFF) {
+        return Err(format!("invalid is {invalid:#x}, which one register cannot hold"));
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! Reads `[press]`: every key checked on its own here, their conflicts in [`check`].
+
+mod check;
+mod field;
+mod link;
+mod map;
+
+use std::time::Duration;
+
+use super::{
+    Mode, NoAck, OnInterrupted, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts, WriteAllow,
+};
+use crate::document::Reported;
+use crate::{Located, Table};
+use map::{Located as LocatedMap, read_map};
+
+/// One day: no time limit of a press is longer.
+const DAY_MS: i64 = 86_400_000;
+
+impl Press {
+    /// Reads the table `[press]`.
+    pub(crate) fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+        let document = table.document();
+        let name = table.name("name").required();
+        let press_id = table.integer("press_id").in_range(0..=65_535).map(|id| id as u16).required();
+        let role = table.choice("role", &[("client", Role::Client), ("server", Role::Server)]).located();
+        let role = role.optional();
+        let mode = table.choice("mode", &Mode::ALL).or(Mode::default());
+        let profiles = [Profile::Pph1, Profile::Word, Profile::Bits].map(|profile| (profile.name(), profile));
+        let profile = table.choice("profile", &profiles).or(Profile::default());
+        let link = table.table("link").required().and_then(link::read);
+        let map = match profile {
+            Ok(profile) => table.section("map").and_then(|table| read_map(table, profile)),
+            Err(reported) => table.table("map").optional().and(Err(reported)),
+        };
+        let write = match &map {
+            Ok(map) => table.section("write").and_then(|table| read_write(table, map)),
+            Err(reported) => table.table("write").optional().and(Err(*reported)),
+        };
+        let timeouts = table.section("timeouts").and_then(read_timeouts);
+        let policy = table.section("policy").and_then(read_policy);
+        table.finish();
+
+        let (map, write) = (map?, write?);
+        check::map(document, &map, &write)?;
+        let role = role?;
+        let (link, transport_place) = link?;
+        if let Some(Located { value: Role::Server, place }) = &role
+            && link.is_serial()
+        {
+            let message = "the host serves Modbus TCP only, but link.type is not tcp";
+            let at = transport_place.as_ref().unwrap_or(place);
+            return Err(document.fault(at, message));
+        }
+        let mut timeouts = timeouts?;
+        timeouts.heartbeat_in = map.heartbeat_in.unwrap_or(timeouts.heartbeat_in);
+        Ok(Self {
+            name: name?,
+            press_id: press_id?,
+            role: role.map_or(Role::default(), |role| role.value),
+            mode: mode?,
+            link,
+            write,
+            map: map.map,
+            timeouts,
+            policy: policy?,
+        })
+    }
+}
+
+/// A key in milliseconds.
+fn ms(table: &mut Table<'_>, key: &str, least: i64) -> Result<Option<Duration>, Reported> {
+    let field = table.integer(key).in_range(least..=DAY_MS);
+    field.map(|ms| Duration::from_millis(ms.unsigned_abs())).optional()
+}
+
+fn read_timeouts(mut table: Table<'_>) -> Result<Timeouts, Reported> {
+    let default = Timeouts::default();
+    let scan = ms(&mut table, "scan_ms", 1);
+    let evaluate = ms(&mut table, "evaluate_ms", 1);
+    let ack = ms(&mut table, "ack_ms", 1);
+    let clear = ms(&mut table, "clear_ms", 1);
+    let heartbeat = ms(&mut table, "heartbeat_ms", 10);
+    table.finish();
+    Ok(Timeouts {
+        scan: scan?,
+        evaluate: evaluate?.unwrap_or(default.evaluate),
+        ack: ack?.unwrap_or(default.ack),
+        clear: clear?.unwrap_or(default.clear),
+        heartbeat: heartbeat?.unwrap_or(default.heartbeat),
+        heartbeat_in: default.heartbeat_in,
+    })
+}
+
+fn read_policy(mut table: Table<'_>) -> Result<Policy, Reported> {
+    let missed = [("warn", OnMissed::Warn), ("error", OnMissed::Error), ("block", OnMissed::Block)];
+    let on_missed_stroke = table.choice("on_missed_stroke", &missed).or(OnMissed::default());
+    let interrupted = [("report", OnInterrupted::Report), ("rescan", OnInterrupted::Rescan)];
+    let on_interrupted = table.choice("on_interrupted", &interrupted).or(OnInterrupted::default());
+    let full = [("degrade", OnStorageFull::Degrade), ("stop", OnStorageFull::Stop)];
+    let on_storage_full = table.choice("on_storage_full", &full).or(OnStorageFull::default());
+    let no_ack = [("next-stroke", NoAck::NextStroke), ("hold", NoAck::Hold)];
+    let no_ack = table.choice("no_ack", &no_ack).or(NoAck::default());
+    table.finish();
+    Ok(Policy {
+        on_missed_stroke: on_missed_stroke?,
+        on_interrupted: on_interrupted?,
+        on_storage_full: on_storage_full?,
+        no_ack: no_ack?,
+    })
+}
+
+/// `[press.write]`; addresses as the map counts them.
+fn read_write(mut table: Table<'_>, map: &LocatedMap) -> Result<WriteAllow, Reported> {
+    let document = table.document();
+    let allow = table.strings("allow").optional();
+    let rate = table.integer("max_writes_per_s").in_range(1..=10_000).optional();
+    table.finish();
+    let mut write = match allow? {
+        None => WriteAllow::block(&map.map.write),
+        Some(texts) => {
+            let ranges = texts.iter().map(|text| {
+                let range = map.range(&text.value);
+                range.map_err(|message| document.fault(&text.place, message))
+            });
+            WriteAllow::new(ranges.collect::<Result<Vec<_>, _>>()?)
+        }
+    };
+    if let Some(rate) = rate? {
+        write.max_writes_per_s = rate.unsigned_abs() as u32;
+    }
+    Ok(write)
+}
