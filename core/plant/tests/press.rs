@@ -153,6 +153,15 @@ result_stroke_id = "none"
 [press.write]
 allow = ["100..=159"]
 "#,
-        &["p.toml:7:1: press.map: `gap_line` at holding register 159 is fine"],
+        &[
+            "p.toml:7:8: press.map: `attempt_echo` at holding register 161 is not in press.write.allow (100..=159)",
+            "p.toml:7:8: press.map: `sense` at holding register 160 is not in press.write.allow (100..=159)",
+            "p.toml:9:15: press.map.in.press_force: holding register 20 is `thickness` already (p.toml:8:13); move one",
+            "p.toml:10:11: press.map.in.part_id: `part_id` needs holding register 32, but its block ends with holding register 31",
+            "p.toml:11:9: press.map.in.abort: holding register 2 bit 1 is `trigger` already (built-in); move one",
+            "p.toml:13:11: press.map.out.dev_min: holding register 110 is `dev_max` already (built-in); move one",
+            "p.toml:14:9: press.map.out.owner: `owner` needs holding register 164, but its block ends with holding register 163",
+            "p.toml:15:20: press.map.out.result_stroke_id: the profile pph-1 cannot do without `result_stroke_id`",
+        ],
     );
 }
