@@ -7,9 +7,10 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::{Job, Result, ScanSink};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
-    Cyclic, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState, Surroundings, scan,
+    Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
+    Surroundings, scan,
 };
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -84,7 +85,7 @@ impl Shot {
             scene: Scene::new(plate, &surroundings(options)),
             lattice,
             pace: Pace::new(options, width(&lattice))?,
-            instrument: instrument(options, number),
+            instrument: instrument(options, &lattice, number),
             threads: threads(options),
             note,
         })
@@ -130,6 +131,11 @@ impl Shot {
         out.check(done)
     }
 
+    fn seam(&self) -> Option<u32> {
+        let seam = self.instrument.faces?.seam_column;
+        (seam < self.lattice.n_columns).then_some(seam)
+    }
+
     fn header(&self) -> ScanHeader {
         ScanHeader {
             n_rows: self.lattice.n_rows,
@@ -138,7 +144,7 @@ impl Shot {
             azimuth_step: self.lattice.azimuth_step,
             elevation_start: self.lattice.elevation_start,
             elevation_step: self.lattice.elevation_step,
-            seam_column: None,
+            seam_column: self.seam(),
             intensity_range: (0, INTENSITY_MAX),
             simulated: true,
             instrument: "platen simulated scanner".to_owned(),
@@ -185,7 +191,7 @@ fn surroundings(options: &Options) -> Surroundings {
     Surroundings { floor: all.floor - height, person_in_front: hides("person"), chain: hides("chain"), ..all }
 }
 
-fn instrument(options: &Options, number: u64) -> Instrument {
+fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrument {
     let cyclic = Cyclic { amplitude: options.cyclic_mm * 1e-3, period: CYCLIC_PERIOD, phase: 0.0 };
     Instrument {
         range_sigma: options.noise_mm * 1e-3,
@@ -194,10 +200,18 @@ fn instrument(options: &Options, number: u64) -> Instrument {
         angular_sigma: options.angular_noise_urad * 1e-6,
         dropout: options.dropout,
         cyclic: (options.cyclic_mm > 0.0).then_some(cyclic),
+        faces: options.back_face_from_deg.map(|azimuth_deg| faces(options, lattice, azimuth_deg)),
         warm_up_columns: u32::try_from(options.warm_up_columns).unwrap_or(0),
         seed: options.seed.unsigned_abs().wrapping_add(number.wrapping_mul(SEED_STRIDE)),
         ..Instrument::default()
     }
+}
+
+/// Two faces, the back one from an azimuth on. A seam outside the window leaves one face.
+fn faces(options: &Options, lattice: &SimLattice, azimuth_deg: f64) -> Faces {
+    let ahead = (azimuth_deg.to_radians() - lattice.azimuth_start).rem_euclid(TAU);
+    let seam_column = (ahead / lattice.azimuth_step).ceil() as u32;
+    Faces { seam_column, collimation: options.collimation_urad * 1e-6, trunnion: 0.0, moved: [0.0; 3] }
 }
 
 fn threads(options: &Options) -> usize {

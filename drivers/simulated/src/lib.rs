@@ -28,6 +28,7 @@
 //! | `step_deg`, `margin_deg` | angle between cells; what is scanned round the plate |
 //! | `noise_mm`, `tail_dof` | standard deviation of a range at 10 m; degrees of freedom of heavy tails |
 //! | `footprint_mrad`, `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
+//! | `back_face_from_deg`, `collimation_urad` | where the back face begins, and what the faces disagree by |
 //! | `warm_up_columns` | columns before the laser is warm |
 //! | `hidden_by` | what stands before the plate |
 //! | `seed` | of all random numbers |
@@ -85,6 +86,10 @@ options! {
         cyclic_mm: f64 = 0.0, unit "mm", min 0.0, max 20.0;
         /// Standard deviation of the reported angles.
         angular_noise_urad: f64 = 0.0, unit "urad", min 0.0, max 1000.0;
+        /// Azimuth from which on columns are measured on the back face; without it the scan has one face.
+        back_face_from_deg: Option<f64>, unit "deg", min -180.0, max 180.0;
+        /// Angle of the beam against the mirror's plane; its sign changes between the faces.
+        collimation_urad: f64 = 0.0, unit "urad", min -1000.0, max 1000.0;
         /// Columns before the laser is warm.
         warm_up_columns: i64 = 10, min 0, max 1000;
         /// What stands between scanner and plate.

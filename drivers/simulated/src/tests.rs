@@ -28,6 +28,8 @@ fn options() -> Options {
         dropout: 0.006,
         cyclic_mm: 0.0,
         angular_noise_urad: 0.0,
+        back_face_from_deg: None,
+        collimation_urad: 0.0,
         warm_up_columns: 0,
         hidden_by: "nothing".into(),
         seed: 1,
@@ -240,4 +242,17 @@ fn a_paced_scan_takes_its_share_of_the_real_time() {
     assert!(shot.take(&mut keep).is_err() && keep.columns == 0);
     let impossible = Options { rate_kpts: "976".into(), ..slow };
     assert!(crate::pace::device(&impossible).unwrap_err().to_string().contains("97 Hz"));
+}
+
+#[test]
+fn the_seam_of_two_faces_is_reported_where_it_lies() {
+    let options = Options { back_face_from_deg: Some(0.0), collimation_urad: 50.0, ..options() };
+    let (lattice, _) = taken(&options, None, 1);
+    let seam = lattice.header().seam_column.unwrap() as usize;
+    let azimuth = lattice.header().azimuth_start + lattice.header().azimuth_step * seam as f64;
+    assert!((-1e-12..lattice.header().azimuth_step).contains(&azimuth), "{azimuth}");
+    let face = |column| lattice.face(column).unwrap();
+    assert!(face(seam - 1) == platen_scan::Face::Front && face(seam) == platen_scan::Face::Back);
+    let elsewhere = Options { back_face_from_deg: Some(170.0), ..options };
+    assert_eq!(taken(&elsewhere, None, 1).0.header().seam_column, None);
 }

@@ -64,12 +64,9 @@ impl View<'_> {
         let rays: Vec<Ray> = (0..self.lattice.n_rows)
             .map(|row| {
                 let elevation = self.lattice.elevation(row);
-                let (mut d_az, mut d_el) = self.systematic(column, elevation);
-                if sigma > 0.0 {
-                    d_az += sigma * normal();
-                    d_el += sigma * normal();
-                }
-                Ray { origin: self.origin(column), direction: unit(azimuth + d_az, elevation + d_el) }
+                let (across, up) = (sigma * normal(), sigma * normal());
+                let azimuth = azimuth + self.azimuth_error(column, elevation) + across;
+                Ray { origin: self.origin(column), direction: unit(azimuth, elevation + up) }
             })
             .collect();
         let hits = rays.iter().map(|ray| self.cast(ray)).collect();
@@ -88,12 +85,11 @@ impl View<'_> {
         }
     }
 
-    /// Errors of azimuth and elevation that change sign between the faces.
-    fn systematic(&self, column: u32, elevation: f64) -> (f64, f64) {
-        let Some(faces) = self.instrument.faces else { return (0.0, 0.0) };
-        let sign = if self.is_back(column) { -1.0 } else { 1.0 };
-        let azimuth = faces.collimation / elevation.cos() + faces.trunnion * elevation.tan();
-        (sign * azimuth, 0.0)
+    /// Error of the azimuth that changes sign between the faces.
+    fn azimuth_error(&self, column: u32, elevation: f64) -> f64 {
+        let Some(faces) = self.instrument.faces else { return 0.0 };
+        let error = faces.collimation / elevation.cos() + faces.trunnion * elevation.tan();
+        if self.is_back(column) { -error } else { error }
     }
 
     /// Measures a column, whose neighbours tell where edges are.
