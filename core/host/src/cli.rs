@@ -1,14 +1,23 @@
 //! The command line: one module for each verb. Results go to stdout, the log to stderr.
 
+mod check;
+mod demo;
+mod history;
+mod inspect;
+mod measure;
 mod output;
 mod plugins;
+mod run;
+mod status;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::files::FilesError;
 use crate::plugin::{Catalogue, PluginError};
+use crate::rig::RigError;
 
 /// Measures plates on a press, stroke by stroke.
 #[derive(Debug, Parser)]
@@ -45,6 +54,20 @@ impl Common {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// A simulated press and scanner on loopback: strokes until the plate is bent
+    Demo(demo::Command),
+    /// Serve a press: scan, measure and answer after each stroke
+    Run(run::Command),
+    /// Measure a plate in one scan file
+    Measure(measure::Command),
+    /// What is in a scan file, and how it was oriented
+    Inspect(inspect::Command),
+    /// Check plant and plate files, all faults at once
+    Check(check::Command),
+    /// How a running host stands
+    Status(status::Command),
+    /// What is on record
+    History(history::Command),
     /// What plugins are installed, and their options
     Plugins(plugins::Command),
 }
@@ -62,6 +85,27 @@ pub(crate) enum CliError {
 
 impl From<PluginError> for CliError {
     fn from(error: PluginError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<platen_plant::Error> for CliError {
+    fn from(error: platen_plant::Error) -> Self {
+        Self::Usage(error.to_string())
+    }
+}
+
+impl From<RigError> for CliError {
+    fn from(error: RigError) -> Self {
+        match error {
+            RigError::Plugin(error) => error.into(),
+            wrong => Self::Usage(wrong.to_string()),
+        }
+    }
+}
+
+impl From<FilesError> for CliError {
+    fn from(error: FilesError) -> Self {
         Self::Failed(error.to_string())
     }
 }
@@ -85,6 +129,13 @@ pub fn main() -> ExitCode {
     };
     start_log();
     let result = match &cli.verb {
+        Verb::Demo(command) => demo::run(&cli.common, command),
+        Verb::Run(command) => run::run(&cli.common, command),
+        Verb::Inspect(command) => inspect::run(&cli.common, command),
+        Verb::Check(command) => check::run(&cli.common, command),
+        Verb::Status(command) => status::run(&cli.common, command),
+        Verb::History(command) => history::run(&cli.common, command),
+        Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
     };
     match result {

@@ -1,4 +1,11 @@
 //! The host: loads plugins, measures plates, runs strokes, answers on the command line.
 
 pub mod cli;
+pub mod files;
+pub mod picture;
 pub mod plugin;
+pub mod progress;
+pub mod record;
+pub mod rig;
+pub mod run;
+pub mod stroke;

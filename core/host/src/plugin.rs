@@ -13,6 +13,7 @@ mod instance;
 mod job;
 mod library;
 mod scanner;
+mod surface;
 mod values;
 
 pub use catalogue::{Catalogue, Listed};
@@ -21,6 +22,7 @@ pub use descriptor::{Descriptor, Kind};
 pub use error::PluginError;
 pub use flattening::Flattening;
 pub use instance::{Emitted, Instance, RunningJob};
-pub use job::JobSpec;
+pub use job::{CancelToken, JobSpec};
 pub use library::Library;
 pub use scanner::{ScanEvent, Scanner};
+pub use surface::{surface_bytes, surface_from_bytes};

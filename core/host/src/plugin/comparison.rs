@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use platen_abi::payload::{self, Header, Layout, Malformed};
+use platen_abi::payload::{self, Header, Malformed};
 use platen_plant::OptionValue;
 use platen_shape::surface::Surface;
 use platen_shape::task::{Findings, Task};
 
 use super::instance::InputFrame;
 use super::job::HostBuffer;
-use super::{Instance, JobSpec, Kind, Library, PluginError};
+use super::{Instance, JobSpec, Kind, Library, PluginError, surface};
 
 /// Largest field believed: 4 million numbers.
 const MAX_FIELD: usize = 1 << 22;
@@ -129,32 +129,7 @@ fn task_frame(task: &Task) -> Result<InputFrame, serde_json::Error> {
 }
 
 fn surface_frame(surface: &Surface, role: &'static std::ffi::CStr) -> InputFrame {
-    let parts = surface.to_parts();
-    let seen: Vec<u8> = parts.seen.iter().map(|seen| u8::from(*seen)).collect();
-    let mut layout = Layout::of::<payload::Surface>();
-    let head = payload::Surface {
-        struct_size: size_of::<payload::Surface>() as u32,
-        mask_u: parts.mask_cells[0] as u32,
-        mask_v: parts.mask_cells[1] as u32,
-        reserved: 0,
-        thickness: parts.thickness,
-        knots_u: layout.add::<f64>(parts.knots_u.len()),
-        knots_v: layout.add::<f64>(parts.knots_v.len()),
-        control: layout.add::<[f64; 3]>(parts.control.len()),
-        precision_factor: layout.add::<f64>(parts.precision_factor.len()),
-        covariance: layout.add::<[f64; 49]>(parts.covariance.len()),
-        seen: layout.add::<u8>(seen.len()),
-    };
-    let mut buffer = HostBuffer::new(layout.bytes());
-    let bytes = buffer.bytes_mut();
-    payload::put_header(bytes, &head);
-    payload::put(bytes, head.knots_u, &parts.knots_u);
-    payload::put(bytes, head.knots_v, &parts.knots_v);
-    payload::put(bytes, head.control, &parts.control);
-    payload::put(bytes, head.precision_factor, &parts.precision_factor);
-    payload::put(bytes, head.covariance, &parts.covariance);
-    payload::put(bytes, head.seen, &seen);
-    InputFrame { format: payload::Surface::FORMAT, role: Some(role), buffer }
+    InputFrame { format: payload::Surface::FORMAT, role: Some(role), buffer: surface::buffer(surface) }
 }
 
 /// `None` when the field does not fit its grid or holds numbers that are none.

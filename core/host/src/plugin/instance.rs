@@ -12,12 +12,15 @@ use platen_abi::payload;
 use platen_plant::OptionValue;
 use platen_scan::Window;
 
-use super::job::{self, EmittedFrame, HostBuffer, JobSpec, Listed};
+use super::job::{self, CancelToken, EmittedFrame, HostBuffer, JobSpec, Listed};
 use super::values::Values;
 use super::{Kind, Library, PluginError, host_table};
 
 /// Time that a plugin has to return once it was cancelled.
 const GRACE: Duration = Duration::from_millis(500);
+
+/// How often a waiting job looks whether it was cancelled.
+const CANCEL_POLL: Duration = Duration::from_millis(20);
 
 /// Frames under way between a plugin and its consumer: enough to keep both busy, few enough to bound memory.
 const FRAMES_UNDER_WAY: usize = 64;
@@ -142,7 +145,7 @@ impl Instance {
     pub fn arm(&self, spec: JobSpec) -> Result<(), PluginError> {
         let (reports, _receiver) = sync_channel(1);
         let listed = job::begin(Instant::now() + spec.limit, reports);
-        let raw = raw_job(&listed, spec);
+        let raw = raw_job(&listed, &spec);
         self.ask(spec.limit + GRACE, |reply| Command::Arm(raw, reply))?
     }
 
@@ -151,12 +154,20 @@ impl Instance {
         let (reports, inbox) = sync_channel(FRAMES_UNDER_WAY);
         let started = Instant::now();
         let listed = job::begin(started + spec.limit, reports.clone());
-        let raw = raw_job(&listed, spec);
+        let raw = raw_job(&listed, &spec);
         if let Some(commands) = &self.commands {
             // A thread that ended shows as a disconnected inbox.
             let _ = commands.send(Command::Run(raw, inputs, reports));
         }
-        RunningJob { instance: self, listed, inbox, started, cancelled_at: None, result: None }
+        RunningJob {
+            instance: self,
+            listed,
+            inbox,
+            started,
+            token: spec.cancel,
+            cancelled_at: None,
+            result: None,
+        }
     }
 }
 
@@ -201,6 +212,7 @@ pub struct RunningJob<'a> {
     listed: Listed,
     inbox: Receiver<Report>,
     started: Instant,
+    token: CancelToken,
     cancelled_at: Option<Instant>,
     result: Option<Result<(), PluginError>>,
 }
@@ -209,13 +221,18 @@ impl RunningJob<'_> {
     /// The next frame; `None` at the end of the job.
     pub fn next_frame(&mut self) -> Option<Emitted> {
         while self.result.is_none() {
+            if self.token.is_cancelled() && self.cancelled_at.is_none() {
+                self.cancel();
+            }
             let until = self.cancelled_at.map_or(self.listed.0.deadline, |at| at + GRACE);
-            match self.inbox.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            let left = until.saturating_duration_since(Instant::now());
+            match self.inbox.recv_timeout(left.min(CANCEL_POLL)) {
                 Ok(Report::Frame(EmittedFrame { format, flags, buffer })) if self.cancelled_at.is_none() => {
                     return Some(Emitted { format, flags, buffer });
                 }
                 Ok(Report::Frame(_)) => {}
                 Ok(Report::Done(result)) => self.result = Some(self.judge(result)),
+                Err(RecvTimeoutError::Timeout) if left > CANCEL_POLL => {}
                 Err(RecvTimeoutError::Timeout) if self.cancelled_at.is_none() => self.cancel(),
                 Err(RecvTimeoutError::Timeout) => self.result = Some(Err(self.instance.hangs(self.started))),
                 Err(RecvTimeoutError::Disconnected) => self.result = Some(Err(self.instance.died())),
@@ -269,7 +286,7 @@ impl Drop for RunningJob<'_> {
     }
 }
 
-fn raw_job(listed: &Listed, spec: JobSpec) -> abi::Job {
+fn raw_job(listed: &Listed, spec: &JobSpec) -> abi::Job {
     let since_trigger = spec.trigger.elapsed();
     let utc = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(since_trigger);
     abi::Job {

@@ -9,8 +9,24 @@ use std::time::{Duration, Instant};
 
 use super::instance::Report;
 
+/// Cancels a job from another thread.
+#[derive(Debug, Clone, Default)]
+pub struct CancelToken(Arc<AtomicBool>);
+
+impl CancelToken {
+    /// Cancels the job that was started with this token.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// True once cancelled.
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// What a job belongs to and how long it may take.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct JobSpec {
     /// Stroke, 0 when none.
     pub stroke: u64,
@@ -18,12 +34,14 @@ pub struct JobSpec {
     pub trigger: Instant,
     /// Time allowed from now.
     pub limit: Duration,
+    /// Cancels it.
+    pub cancel: CancelToken,
 }
 
 impl JobSpec {
     /// Work that belongs to no stroke.
     pub fn untriggered(limit: Duration) -> Self {
-        Self { stroke: 0, trigger: Instant::now(), limit }
+        Self { stroke: 0, trigger: Instant::now(), limit, cancel: CancelToken::default() }
     }
 }
 

@@ -1,0 +1,183 @@
+//! `platen demo`: a simulated press bends a plate, the host measures it, all over real sockets and libraries.
+
+mod cell;
+mod files;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use platen_plant::PlantFile;
+use tokio::sync::{mpsc, watch};
+
+use super::run::{runtime, stop_signal, verdict_words};
+use super::{CliError, Common, output};
+use crate::progress;
+use crate::run::{self, StrokeReport, Watcher};
+use cell::{Cell, Taken};
+
+/// A demo that takes longer than this is stuck.
+const LIMIT: Duration = Duration::from_secs(300);
+
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  platen demo\n\n\
+                        Nothing is faked but steel and light: platen-sim bends and serves Modbus, the simulated scanner casts rays,\n\
+                        the host measures with the plugin libraries beside the program and writes back.")]
+pub(super) struct Command {
+    /// Folder for the results; an earlier demo there is replaced
+    #[arg(long, value_name = "DIR", default_value = "platen-demo")]
+    out: PathBuf,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let start = Instant::now();
+    files::prepare(&command.out)?;
+    let mut cell = Cell::start(&files::press_file(&command.out)?)?;
+    let plant_file = files::plant_file(&command.out, &cell)?;
+    let plant = PlantFile::load(&plant_file)?;
+    let Some(press) = plant.press.clone() else {
+        return Err(CliError::Failed("the demo's plant file has no [press]".into()));
+    };
+    if !common.json {
+        output::line(&format!("simulated press on {}, plate on {}", cell.modbus, cell.plate))?;
+    }
+    let mut reports = Vec::new();
+    let (ended, registers) = runtime()?.block_on(async {
+        let (sender, mut strokes) = mpsc::unbounded_channel();
+        let (stop, stopped) = watch::channel(false);
+        let mut interrupted = stop_signal()?;
+        let catalogue = common.catalogue();
+        let host = run::run(&plant, press, &catalogue, stopped, Some(Watcher { strokes: sender }));
+        tokio::pin!(host);
+        let limit = tokio::time::sleep(LIMIT);
+        tokio::pin!(limit);
+        let mut look = tokio::time::interval(Duration::from_millis(100));
+        loop {
+            tokio::select! {
+                ended = &mut host => return Ok::<_, CliError>((ended, None)),
+                Some(report) = strokes.recv() => {
+                    progress(&report);
+                    reports.push(report);
+                }
+                _ = look.tick() => if cell.is_done()? { break },
+                _ = interrupted.changed() => break,
+                () = &mut limit => return Err(CliError::Failed(format!("the demo has not ended after {} s", LIMIT.as_secs()))),
+            }
+        }
+        let registers = cell.registers()?;
+        stop.send_replace(true);
+        Ok((host.await, Some(registers)))
+    })?;
+    ended?;
+    progress::done();
+    let taken = cell.taken()?;
+    let after_stop = cell.registers()?;
+    summary(common, command, &reports, &taken, registers, after_stop, start.elapsed())
+}
+
+fn progress(report: &StrokeReport) {
+    let what = if report.baseline { "baseline".to_owned() } else { format!("stroke {}", report.key.stroke) };
+    let text = match &report.result {
+        Ok(record) => verdict_words(record.verdict).to_owned(),
+        Err(why) => why.clone(),
+    };
+    progress::phase(&format!("{what}: {text}; the press bends"));
+}
+
+/// Largest gap under a template, millimetres, and its uncertainty.
+fn gap_mm(report: &StrokeReport) -> Option<(f64, f64)> {
+    let record = report.result.as_ref().ok()?;
+    let templates = record.reference_lines.iter().flat_map(|line| &line.templates);
+    templates.map(|t| (t.max_gap_mm, t.uncertainty_mm)).max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn summary(
+    common: &Common,
+    command: &Command,
+    reports: &[StrokeReport],
+    taken: &[Taken],
+    registers: Option<Vec<u16>>,
+    after_stop: Vec<u16>,
+    elapsed: Duration,
+) -> Result<ExitCode, CliError> {
+    let mut rows = vec![
+        [
+            "stroke",
+            "trigger to busy ms",
+            "scan ms",
+            "evaluation ms",
+            "stroke to result ms",
+            "gap before mm",
+            "gap after mm",
+            "verdict",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    let mut documents = Vec::new();
+    let mut before = None;
+    for report in reports {
+        let seen = taken.iter().find(|t| t.is(report.key.stroke, report.key.session, report.key.attempt));
+        let gap = gap_mm(report);
+        let number = |value: Option<f64>| value.map(|v| format!("{v:.0}")).unwrap_or_default();
+        let length =
+            |gap: Option<(f64, f64)>| gap.map(|(g, u)| format!("{g:.2} +- {u:.2}")).unwrap_or_default();
+        let record = report.result.as_ref().ok();
+        let scan_ms = record.map(|r| r.timings_ms.acquire + r.timings_ms.extract);
+        let evaluation_ms = record.map(|r| r.timings_ms.total - r.timings_ms.extract);
+        let verdict = record.map_or("not measured", |r| verdict_words(r.verdict));
+        rows.push(vec![
+            if report.baseline { "blank".to_owned() } else { report.key.stroke.to_string() },
+            number(seen.map(|t| t.accepted_ms)),
+            number(scan_ms),
+            number(evaluation_ms),
+            number(seen.map(|t| t.result_ms)),
+            length(before),
+            length(gap),
+            verdict.to_owned(),
+        ]);
+        documents.push(serde_json::json!({
+            "stroke": report.key.stroke, "baseline": report.baseline, "verdict": verdict,
+            "trigger_to_busy_ms": seen.map(|t| t.accepted_ms), "scan_ms": scan_ms, "evaluation_ms": evaluation_ms,
+            "stroke_to_result_ms": seen.map(|t| t.result_ms),
+            "gap_before_mm": before.map(|(g, _)| g), "gap_after_mm": gap.map(|(g, _)| g), "folder": report.folder,
+        }));
+        before = gap.or(before);
+    }
+    let passed = reports
+        .last()
+        .and_then(|r| r.result.as_ref().ok())
+        .is_some_and(|r| r.verdict == platen_shape::task::Verdict::Pass);
+    // The commit word and its tail agree, and name the last stroke: result_seq, result_seq_tail, result_stroke_id.
+    let correct = registers
+        .as_deref()
+        .zip(reports.last())
+        .is_some_and(|(h, last)| h.get(8) == h.get(53) && h.get(4) == Some(&last.key.stroke));
+    let safe = after_stop.get(2) == Some(&0);
+    if common.json {
+        output::json(&serde_json::json!({
+            "strokes": documents, "bent": passed, "registers_correct": correct, "registers_safe": safe,
+            "elapsed_s": elapsed.as_secs_f64(), "folder": command.out,
+        }))?;
+    } else {
+        output::table(&rows)?;
+        let plate = if passed { "the plate has its shape" } else { "the plate has not its shape" };
+        let words = if correct {
+            "the press holds the last stroke's result"
+        } else {
+            "the press holds a wrong result"
+        };
+        let after = if safe { "safe after the stop" } else { "not safe after the stop" };
+        output::line(&format!(
+            "{plate}; {words}; its registers are {after}; {:.1} s",
+            elapsed.as_secs_f64()
+        ))?;
+        output::line(&format!(
+            "files: {} (one folder a stroke: result.json, reference_lines.csv, maps as SVG; history.sqlite)",
+            command.out.join("results").display()
+        ))?;
+        output::line(&format!("next: platen history list {}", command.out.join("plant.toml").display()))?;
+    }
+    Ok(ExitCode::from(u8::from(!(passed && correct && safe))))
+}

@@ -1,0 +1,44 @@
+//! The demo's files: what a plant engineer would write for this cell.
+
+use std::path::{Path, PathBuf};
+
+use super::cell::Cell;
+use crate::cli::CliError;
+
+/// Tells a folder of an earlier demo from one that holds something else.
+const MARK: &str = ".platen-demo";
+
+/// Makes an empty folder; only an earlier demo is removed.
+pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
+    if out.exists() {
+        if !out.join(MARK).is_file() {
+            let text = format!("{}: exists and is no earlier demo; give another --out", out.display());
+            return Err(CliError::Usage(text));
+        }
+        std::fs::remove_dir_all(out)?;
+    }
+    std::fs::create_dir_all(out.join("plates"))?;
+    std::fs::write(out.join(MARK), "made by `platen demo`, which may replace this folder\n")?;
+    std::fs::write(out.join("plates/plate-009.toml"), PLATE)?;
+    Ok(())
+}
+
+/// What the simulated press is told.
+pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
+    let path = out.join("press.toml");
+    std::fs::write(&path, PRESS)?;
+    Ok(path)
+}
+
+/// The plant file for the ports that the system gave.
+pub(super) fn plant_file(out: &Path, cell: &Cell) -> Result<PathBuf, CliError> {
+    let path = out.join("plant.toml");
+    let text =
+        PLANT.replace("PORT", &cell.modbus.port().to_string()).replace("CELL", &cell.plate.to_string());
+    std::fs::write(&path, text)?;
+    Ok(path)
+}
+
+const PLATE: &str = include_str!("plate.toml");
+const PRESS: &str = include_str!("press.toml");
+const PLANT: &str = include_str!("plant.toml");

@@ -1,0 +1,131 @@
+//! `platen history`: what is on record.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
+use platen_plant::PlantFile;
+
+use super::{CliError, Common, output};
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \
+                        platen history show config/plant-north.toml 1042")]
+pub(super) struct Command {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// One line for each stroke, oldest first
+    List {
+        /// Plant file
+        plant: PathBuf,
+        /// Strokes of this plate only, by its number in the history
+        #[arg(long)]
+        plate: Option<u32>,
+        /// So many of the newest
+        #[arg(long, default_value_t = 50)]
+        newest: u32,
+    },
+    /// Everything on record about one stroke
+    Show {
+        /// Plant file
+        plant: PathBuf,
+        /// Run id, as in the list and in the press's registers
+        run_id: u32,
+    },
+}
+
+impl From<HistoryError> for CliError {
+    fn from(error: HistoryError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    match &command.verb {
+        Verb::List { plant, plate, newest } => {
+            let archive = Archive::open(&PlantFile::load(plant)?.output.history)?;
+            let filter = Filter { plate: *plate, newest: Some(*newest), ..Filter::default() };
+            let strokes = archive.strokes(&filter)?;
+            if common.json { output::json(&strokes)? } else { list(&strokes)? }
+        }
+        Verb::Show { plant, run_id } => {
+            let archive = Archive::open(&PlantFile::load(plant)?.output.history)?;
+            let stroke = archive.stroke(*run_id)?;
+            if common.json { output::json(&stroke)? } else { show(&stroke)? }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn verdict(stroke: &Stroke) -> String {
+    match (stroke.verdict, &stroke.reason) {
+        (Some(verdict), Some(reason)) => format!("{} ({reason})", verdict.as_str()),
+        (Some(verdict), None) => verdict.as_str().to_owned(),
+        (None, _) => format!("{:?}", stroke.stage()).to_lowercase(),
+    }
+}
+
+fn mm(stroke: &Stroke, figure: &str) -> String {
+    stroke.figures.get(figure).map(|metres| format!("{:.1}", metres * 1000.0)).unwrap_or_default()
+}
+
+fn list(strokes: &[Stroke]) -> Result<(), CliError> {
+    let head = [
+        "run",
+        "accepted",
+        "plate",
+        "session",
+        "stroke",
+        "attempt",
+        "verdict",
+        "gap mm",
+        "+- mm",
+        "acknowledged",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for stroke in strokes {
+        rows.push(vec![
+            stroke.run_id.to_string(),
+            stroke.accepted.strftime("%F %T").to_string(),
+            stroke.plate.to_string(),
+            stroke.key.session.to_string(),
+            if stroke.baseline {
+                format!("{} baseline", stroke.key.stroke)
+            } else {
+                stroke.key.stroke.to_string()
+            },
+            stroke.key.attempt.to_string(),
+            verdict(stroke),
+            mm(stroke, "gap.max"),
+            mm(stroke, "gap.uncertainty"),
+            stroke.ack.clone().unwrap_or_default(),
+        ]);
+    }
+    output::table(&rows)
+}
+
+fn show(stroke: &Stroke) -> Result<(), CliError> {
+    output::line(&format!("run {}: {}: {}", stroke.run_id, stroke.key, verdict(stroke)))?;
+    let time = |at: Option<jiff::Timestamp>| at.map_or_else(|| "-".to_owned(), |at| at.to_string());
+    output::line(&format!(
+        "accepted {}, scanned {}, judged {}, acknowledged {}",
+        stroke.accepted,
+        time(stroke.scanned),
+        time(stroke.finished),
+        time(stroke.acked)
+    ))?;
+    for (name, value) in &stroke.figures {
+        output::line(&format!("  {name} = {value}"))?;
+    }
+    for (what, path) in [("result", &stroke.document), ("scan", &stroke.scan)] {
+        if let Some(path) = path {
+            output::line(&format!("{what}: {}", path.display()))?;
+        }
+    }
+    Ok(())
+}

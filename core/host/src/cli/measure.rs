@@ -1,0 +1,184 @@
+//! `platen measure`: one scan file to a measured plate.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use platen_plant::{OptionValue, PlantFile, PlateFile, PluginUse, Value};
+use platen_shape::task::Verdict;
+
+use super::{CliError, Common, output};
+use crate::plugin::{Catalogue, JobSpec, Scanner, Surfaces};
+use crate::record::{Context, ResultRecord};
+use crate::rig::{self, Rig};
+use crate::stroke::{self, Measured, Scanned};
+use crate::{files, progress};
+
+/// A file of the finest full dome takes minutes to read.
+const READ_LIMIT: Duration = Duration::from_secs(600);
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
+                        platen measure after.e57 --before before.e57 --plate plate.toml --plant plant.toml --out results/a17\n  \
+                        platen measure scan.ptx --plate plate.toml --json | jq .markers\n\n\
+                        The exit code is 0 when the plate was measured, whatever the verdict.")]
+pub(super) struct Command {
+    /// Scan file: structured E57, PTX, XYZ with row and column, XYB
+    scan: PathBuf,
+    /// Plate file: size, target, markers, lines, templates
+    #[arg(long, value_name = "PLATE.toml")]
+    plate: PathBuf,
+    /// Plant file: frame, flattening, comparisons; without it, defaults
+    #[arg(long, value_name = "PLANT.toml")]
+    plant: Option<PathBuf>,
+    /// Scan of the same plate at the stroke before
+    #[arg(long, value_name = "SCAN")]
+    before: Option<PathBuf>,
+    /// Scan of the same plate before the first stroke
+    #[arg(long, value_name = "SCAN")]
+    baseline: Option<PathBuf>,
+    /// Flattening plugin to use instead of the plant file's
+    #[arg(long, value_name = "NAME")]
+    flattening: Option<String>,
+    /// Rough direction of growing u in the scanner frame, instead of the plant file's
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    u_axis: Option<Vec<f64>>,
+    /// New folder for result.json, reference_lines.csv and pictures
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    if let Some(out) = command.out.as_ref().filter(|out| out.exists()) {
+        return Err(CliError::Usage(files::FilesError::Exists(out.clone()).to_string()));
+    }
+    let catalogue = common.catalogue();
+    let plate = PlateFile::load(&command.plate)?;
+    let mut plant = command.plant.as_deref().map_or_else(|| Ok(PlantFile::default()), PlantFile::load)?;
+    if let Some(name) = &command.flattening {
+        plant.flattening = PluginUse::by_default(name);
+    }
+    if let Some([x, y, z]) = command.u_axis.as_deref() {
+        plant.frame.u_axis = Some([*x, *y, *z]);
+    }
+    let mut rig = Rig::of(&plant, &catalogue)?;
+    let mut measure = |scan: &Path| measure_file(&catalogue, &mut rig, scan, &plate);
+    let before = command.before.as_deref().map(&mut measure).transpose()?;
+    let baseline = command.baseline.as_deref().map(&mut measure).transpose()?;
+    let (scanned, now) = measure(&command.scan)?;
+
+    progress::phase("comparing");
+    let surface =
+        |earlier: &Option<(Scanned, Measured)>| earlier.as_ref().map(|(_, m)| m.measurement.surface.clone());
+    let (before, baseline) = (surface(&before), surface(&baseline));
+    let surfaces =
+        Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
+    let start = Instant::now();
+    let reports = stroke::compare(&rig, &rig::task(&plate, false), surfaces);
+    let compare = start.elapsed();
+    let verdict = stroke::verdict(&reports);
+    let context = Context { plate: &plate, stroke: None, verdict, reports: &reports, compare };
+    let record = ResultRecord::new(&scanned, &now, context);
+    progress::done();
+
+    let sound: Vec<_> = reports.iter().flatten().collect();
+    let written = command.out.as_ref().map(|out| files::write(out, &record, &sound)).transpose()?;
+    if common.json {
+        output::json(&record)?;
+    } else {
+        print(&record)?;
+        for file in written.iter().flatten() {
+            output::line(&format!("wrote {}", file.display()))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Measures one scan file with the file driver.
+fn measure_file(
+    catalogue: &Catalogue,
+    rig: &mut Rig,
+    scan: &Path,
+    plate: &PlateFile,
+) -> Result<(Scanned, Measured), CliError> {
+    let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
+    let scanner = open_file(catalogue, scan)?;
+    progress::phase(&format!("measuring {}", scan.display()));
+    let spec = rig.spec(plate);
+    let job = JobSpec::untriggered(READ_LIMIT);
+    let scanned = stroke::scan(&scanner, job, None, &spec).map_err(|e| failed(&e))?;
+    let measured = stroke::measure_scanned(rig, &scanned, &spec).map_err(|e| failed(&e))?;
+    Ok((scanned, measured))
+}
+
+/// The file driver, set to one file.
+pub(super) fn open_file(catalogue: &Catalogue, scan: &Path) -> Result<Scanner, CliError> {
+    let (library, mut values) = rig::load(catalogue, &PluginUse::by_default("faro-file"))?;
+    let file = std::path::absolute(scan)?;
+    values.push(OptionValue { name: "file".into(), value: Value::Path(file), given: true });
+    let scanner = Scanner::create(&library, &values)?;
+    scanner.instance().open(READ_LIMIT).map_err(|e| CliError::Failed(format!("{}: {e}", scan.display())))?;
+    Ok(scanner)
+}
+
+fn print(record: &ResultRecord) -> Result<(), CliError> {
+    let verdict = match record.verdict {
+        Verdict::Pass => "pass",
+        Verdict::Fail => "fail",
+        Verdict::CannotTell => "cannot tell",
+        Verdict::NotMeasured => "not measured",
+    };
+    output::line(&format!("plate {}: {verdict}", record.plate))?;
+    for sentence in &record.says {
+        output::line(&format!("  {sentence}"))?;
+    }
+    let quality = &record.quality;
+    output::line(&format!(
+        "scan: {} x {} cells, {} on the plate, {:.0} % of it seen, step {:.1} mm, noise {:.2} mm, surface rms {:.2} mm",
+        record.scan.rows,
+        record.scan.columns,
+        record.scan.plate_points,
+        quality.coverage * 100.0,
+        quality.lattice_step_mm,
+        quality.noise_mm,
+        record.surface.rms_mm,
+    ))?;
+    for note in &record.scan.notes {
+        output::line(&format!("  {note}"))?;
+    }
+    let mut rows = vec![["place", "u mm", "v mm", "x m", "y m", "z m", "+- mm"].map(str::to_owned).to_vec()];
+    let (w, h) = record.extent_mm();
+    for (corner, (u, v)) in record.corners_m.iter().zip([(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]) {
+        rows.push(row("corner", u, v, corner, None));
+    }
+    for marker in &record.markers {
+        rows.push(row(
+            &marker.name,
+            marker.u_mm,
+            marker.v_mm,
+            &marker.position_m,
+            Some(marker.uncertainty_mm),
+        ));
+    }
+    output::table(&rows)?;
+    let t = &record.timings_ms;
+    output::line(&format!(
+        "ms: acquire {:.0}, extract {:.0}, outline {:.0}, mesh {:.0}, flatten {:.0}, surface {:.0}, compare {:.0}; \
+         after the last column {:.0}",
+        t.acquire, t.extract, t.outline, t.mesh, t.flatten, t.surface, t.compare, t.total
+    ))
+}
+
+fn row(name: &str, u: f64, v: f64, [x, y, z]: &[f64; 3], uncertainty: Option<f64>) -> Vec<String> {
+    let uncertainty = uncertainty.map(|mm| format!("{mm:.2}")).unwrap_or_default();
+    vec![
+        name.to_owned(),
+        format!("{u:.0}"),
+        format!("{v:.0}"),
+        format!("{x:.4}"),
+        format!("{y:.4}"),
+        format!("{z:.4}"),
+        uncertainty,
+    ]
+}

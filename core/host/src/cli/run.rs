@@ -1,0 +1,116 @@
+//! `platen run`: the host.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use platen_plant::PlantFile;
+use platen_shape::task::Verdict;
+use tokio::sync::{mpsc, watch};
+
+use super::{CliError, Common, output};
+use crate::run::{self, HostError, StrokeReport, Watcher};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  platen check config/plant-north.toml && platen run config/plant-north.toml\n  \
+                        PLATEN_LOG=info platen run config/plant-north.toml\n\n\
+                        SIGTERM and Ctrl-C make the press's registers safe and end the host with exit code 0."
+)]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let plant = PlantFile::load(&command.plant)?;
+    let Some(press) = plant.press.clone() else {
+        return Err(CliError::Usage(format!(
+            "{}: has no [press]; add the one to serve",
+            command.plant.display()
+        )));
+    };
+    let json = common.json;
+    runtime()?.block_on(async {
+        let (reports, mut strokes) = mpsc::unbounded_channel();
+        let printer = tokio::spawn(async move {
+            while let Some(report) = strokes.recv().await {
+                // Whoever read the output has gone; the press goes on.
+                let _ = print(&report, json);
+            }
+        });
+        let watcher = Watcher { strokes: reports };
+        let ended = run::run(&plant, press, &common.catalogue(), stop_signal()?, Some(watcher)).await;
+        // The printer ends with the last sender.
+        let _ = printer.await;
+        ended.map_err(CliError::from)
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The runtime of the press side: polling needs little, but must not wait for a scan.
+pub(super) fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
+    Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
+}
+
+/// Turns true on SIGTERM and Ctrl-C.
+pub(super) fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (stop, stopped) = watch::channel(false);
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::spawn(async move {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+        stop.send_replace(true);
+        // Keeps the channel open until the host has ended.
+        stop.closed().await;
+    });
+    Ok(stopped)
+}
+
+impl From<HostError> for CliError {
+    fn from(error: HostError) -> Self {
+        match error {
+            HostError::Rig(error) => error.into(),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+/// One line for each stroke.
+fn print(report: &StrokeReport, json: bool) -> Result<(), CliError> {
+    if json {
+        let (verdict, why) = match &report.result {
+            Ok(record) => (record.verdict, None),
+            Err(why) => (Verdict::NotMeasured, Some(why)),
+        };
+        return output::line(
+            &serde_json::json!({
+                "press": report.key.press, "session": report.key.session, "stroke": report.key.stroke,
+                "attempt": report.key.attempt, "baseline": report.baseline, "verdict": verdict, "reason": why,
+                "folder": report.folder, "elapsed_ms": report.elapsed.as_secs_f64() * 1000.0,
+            })
+            .to_string(),
+        );
+    }
+    let text = match &report.result {
+        Ok(record) => {
+            format!("{}: {}", verdict_words(record.verdict), record.says.first().map_or("", |s| s.as_str()))
+        }
+        Err(why) => format!("not measured: {why}"),
+    };
+    let what = if report.baseline { "baseline" } else { "stroke" };
+    output::line(&format!("{what} {} {text} ({:.1} s)", report.key.stroke, report.elapsed.as_secs_f64()))
+}
+
+pub(super) fn verdict_words(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "pass",
+        Verdict::Fail => "fail",
+        Verdict::CannotTell => "cannot tell",
+        Verdict::NotMeasured => "not measured",
+    }
+}

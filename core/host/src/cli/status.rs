@@ -1,0 +1,59 @@
+//! `platen status`: how a running host stands.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use platen_plant::PlantFile;
+
+use super::{CliError, Common, output};
+use crate::run::StatusRecord;
+
+/// A host that has not written for so long is not running, or hangs.
+const STALE_S: f64 = 5.0;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  platen status config/plant-north.toml\n\n\
+                        The exit code is 0 when the host runs, 1 when it does not.")]
+pub(super) struct Command {
+    /// Plant file of the host
+    plant: PathBuf,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let plant = PlantFile::load(&command.plant)?;
+    let folder = &plant.output.folder;
+    let status = StatusRecord::load(folder).map_err(|e| {
+        CliError::Failed(format!("no host has run with this plant file ({}: {e})", folder.display()))
+    })?;
+    let age_s = jiff::Timestamp::now().duration_since(status.at).as_secs_f64();
+    let running = age_s < STALE_S;
+    if common.json {
+        output::json(&serde_json::json!({ "running": running, "age_s": age_s, "status": status }))?;
+    } else {
+        let alive = if running { "running" } else { "not running" };
+        output::line(&format!(
+            "{}: host {alive} (pid {}, said so {age_s:.0} s ago), {}",
+            status.press, status.pid, status.state
+        ))?;
+        for (what, text) in
+            [("link", &status.link_error), ("error", &status.error), ("warning", &status.warning)]
+        {
+            if let Some(text) = text {
+                output::line(&format!("{what}: {text}"))?;
+            }
+        }
+        output::line(&format!(
+            "strokes {}, measured {}, not measured {}, missed {}",
+            status.strokes, status.measured, status.not_measured, status.missed
+        ))?;
+        for (what, [median, worst]) in
+            [("trigger to busy", status.trigger_to_busy_ms), ("stroke to result", status.stroke_to_result_ms)]
+        {
+            if let (Some(median), Some(worst)) = (median, worst) {
+                output::line(&format!("{what}: median {median:.0} ms, 99 % within {worst:.0} ms"))?;
+            }
+        }
+    }
+    Ok(ExitCode::from(u8::from(!running)))
+}

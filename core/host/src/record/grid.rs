@@ -1,0 +1,76 @@
+//! The grid of the record: curvature of S and the comparisons' fields at 21 x 21 places.
+
+use serde::Serialize;
+
+use platen_shape::evaluate::{self, GRID};
+use platen_shape::measure::Measurement;
+
+use super::mm;
+use crate::plugin::{Field, NodeState, Report};
+
+/// Places on an even grid over the plate; null where nothing is known.
+#[derive(Debug, Clone, Serialize)]
+pub struct GridRecord {
+    /// Places along u.
+    pub nu: usize,
+    /// Places along v.
+    pub nv: usize,
+    /// Curvature along u of the mid-surface.
+    pub kappa_u_per_m: Vec<Option<f64>>,
+    /// Curvature along v.
+    pub kappa_v_per_m: Vec<Option<f64>>,
+    /// Twist.
+    pub kappa_uv_per_m: Vec<Option<f64>>,
+    /// On the scanned face, scanner frame.
+    pub position_m: Vec<[f64; 3]>,
+    /// Displacement against the stroke before, when there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement_mm: Option<Vec<Option<[f64; 3]>>>,
+    /// Measured minus target along the target's normal, when there is a target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation_mm: Option<Vec<Option<f64>>>,
+    /// Whether the displacement is below the level of detection.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unchanged: Option<Vec<Option<bool>>>,
+}
+
+impl GridRecord {
+    pub(super) fn new(measurement: &Measurement, reports: &[&Report]) -> Self {
+        let [nu, nv] = GRID;
+        let grid = evaluate::grid(&measurement.surface, &measurement.location, nu, nv);
+        let curvature = |kappa: fn(&platen_shape::surface::Curvature) -> f64| {
+            grid.nodes.iter().map(|n| n.place.seen.then(|| kappa(&n.curvature))).collect()
+        };
+        let find =
+            |name: &str| reports.iter().flat_map(|report| &report.fields).find(|field| field.name == name);
+        let displacement = find("displacement").filter(|field| field.components == 3);
+        let deviation = find("deviation").filter(|field| field.components == 1);
+        Self {
+            nu,
+            nv,
+            kappa_u_per_m: curvature(|c| c.u),
+            kappa_v_per_m: curvature(|c| c.v),
+            kappa_uv_per_m: curvature(|c| c.uv),
+            position_m: grid.nodes.iter().map(|n| n.place.position.into()).collect(),
+            displacement_mm: displacement
+                .map(|field| nodes(field, |values, _| [mm(values[0]), mm(values[1]), mm(values[2])])),
+            deviation_mm: deviation.map(|field| nodes(field, |values, _| mm(values[0]))),
+            unchanged: displacement.map(|field| nodes(field, |_, state| state == NodeState::Unchanged)),
+        }
+    }
+}
+
+/// The field at the places of the grid: its own nearest nodes, which are the same where it divides evenly.
+fn nodes<T>(field: &Field, value: impl Fn(&[f64], NodeState) -> T) -> Vec<Option<T>> {
+    let nearest = |k: usize, n: usize, along: usize| (k * (along - 1) + (n - 1) / 2) / (n - 1);
+    let at = |i_u: usize, i_v: usize| {
+        let node =
+            nearest(i_v, GRID[1], field.nodes[1]) * field.nodes[0] + nearest(i_u, GRID[0], field.nodes[0]);
+        let values = &field.values[node * field.components..(node + 1) * field.components];
+        (field.state[node] != NodeState::Unseen).then(|| value(values, field.state[node]))
+    };
+    (0..GRID[1])
+        .flat_map(|i_v| (0..GRID[0]).map(move |i_u| (i_u, i_v)))
+        .map(|(i_u, i_v)| at(i_u, i_v))
+        .collect()
+}

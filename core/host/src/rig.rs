@@ -1,0 +1,171 @@
+//! What a plant measures with: its plugins, loaded and configured, and where it stands.
+
+use std::time::Duration;
+
+use platen_plant::plate::{self, PlateFile};
+use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, check_options};
+use platen_shape::task::{self, Task};
+use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
+
+use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
+
+/// Time that a flattening or a comparison may take; the press waits at most 10 s for both.
+const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
+
+/// The plugins of a plant, ready to measure.
+#[derive(Debug)]
+pub struct Rig {
+    /// Turns the mesh into (u, v).
+    pub flattening: Flattening,
+    /// What is compared, in this order.
+    pub comparisons: Vec<Comparison>,
+    /// Rough direction of growing u, scanner frame.
+    pub u_axis: Option<Vec3>,
+    /// Where the plate can be, scanner frame.
+    pub region: Option<RegionOfInterest>,
+}
+
+/// Why a plant cannot measure.
+#[derive(Debug, thiserror::Error)]
+pub enum RigError {
+    /// The plant or plate file is wrong.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// Options of a plugin are wrong.
+    #[error("{0}")]
+    Options(#[from] Faults),
+    /// A plugin cannot be used.
+    #[error(transparent)]
+    Plugin(#[from] PluginError),
+}
+
+/// The library that a plant file names, with its options checked.
+///
+/// # Errors
+/// The library cannot be used, or every fault of its options.
+pub fn load(catalogue: &Catalogue, wanted: &PluginUse) -> Result<(Library, Vec<OptionValue>), RigError> {
+    let library = catalogue.load(&wanted.plugin)?;
+    let values = check_options(&wanted.plugin, &wanted.options, &library.descriptor().options)?;
+    Ok((library, values))
+}
+
+impl Rig {
+    /// Loads what the plant file names.
+    ///
+    /// # Errors
+    /// The first plugin that cannot be used.
+    pub fn of(plant: &PlantFile, catalogue: &Catalogue) -> Result<Self, RigError> {
+        let (library, values) = load(catalogue, &plant.flattening)?;
+        let flattening = Flattening::create(&library, &values, EVALUATION_LIMIT)?;
+        let comparison = |wanted| {
+            let (library, values) = load(catalogue, wanted)?;
+            Ok(Comparison::create(&library, &values, EVALUATION_LIMIT)?)
+        };
+        let comparisons = plant.comparisons.iter().map(comparison).collect::<Result<_, RigError>>()?;
+        Ok(Self {
+            flattening,
+            comparisons,
+            u_axis: plant.frame.u_axis.map(Vec3::from),
+            region: plant
+                .frame
+                .region_of_interest
+                .map(|r| RegionOfInterest { min: r.min.into(), max: r.max.into() }),
+        })
+    }
+
+    /// The plate as the geometry wants it.
+    pub fn spec(&self, plate: &PlateFile) -> PlateSpec {
+        PlateSpec {
+            width: plate.plate.width,
+            height: plate.plate.height,
+            thickness: plate.plate.thickness,
+            face_inset: plate.plate.face_inset,
+            u_axis: self.u_axis,
+            region: self.region,
+        }
+    }
+}
+
+/// The driver that a plant file names, or `faro-file` where it names none.
+///
+/// # Errors
+/// The library cannot be used, or every fault of its options.
+pub fn scanner(plant: &PlantFile, catalogue: &Catalogue) -> Result<Scanner, RigError> {
+    let file_driver = PluginUse::by_default("faro-file");
+    let (library, values) = load(catalogue, plant.scanner.as_ref().unwrap_or(&file_driver))?;
+    Ok(Scanner::create(&library, &values)?)
+}
+
+/// What is asked of the comparisons for this plate.
+pub fn task(plate: &PlateFile, supports_changed: bool) -> Task {
+    Task {
+        plate: plate.plate.id.clone(),
+        width: plate.plate.width,
+        height: plate.plate.height,
+        thickness: plate.plate.thickness,
+        target: plate.target.map(|target| target_of(&target)),
+        reference_lines: plate
+            .reference_lines
+            .iter()
+            .map(|line| task::ReferenceLine { name: line.name.clone(), from: line.from, to: line.to })
+            .collect(),
+        templates: plate.templates.iter().map(template).collect(),
+        stations: plate
+            .stations
+            .iter()
+            .map(|s| task::Station { name: s.name.clone(), at: s.at, quantity: quantity(s.quantity) })
+            .collect(),
+        sigma_correlated: 0.0,
+        sigma_true: None,
+        supports_changed,
+    }
+}
+
+fn target_of(target: &plate::Target) -> task::Target {
+    use plate::TargetShape as From;
+    use task::TargetShape as To;
+    task::Target {
+        shape: match target.shape {
+            From::Flat => To::Flat,
+            From::Cylinder { radius, axis } => To::Cylinder { radius, axis },
+            From::Cone { axis, radius_start, radius_end } => To::Cone { axis, radius_start, radius_end },
+            From::Sphere { radius } => To::Sphere { radius },
+            From::Torus { axis, radius, cross_radius } => To::Torus { axis, radius, cross_radius },
+        },
+        radius_of: match target.radius_of {
+            plate::RadiusOf::Inside => task::RadiusOf::Inside,
+            plate::RadiusOf::Outside => task::RadiusOf::Outside,
+            plate::RadiusOf::Mid => task::RadiusOf::Mid,
+        },
+        scanned_face: match target.scanned_face {
+            plate::Facing::Inside => task::Facing::Inside,
+            plate::Facing::Outside => task::Facing::Outside,
+        },
+    }
+}
+
+fn template(template: &plate::Template) -> task::Template {
+    task::Template {
+        name: template.name.clone(),
+        line: template.line.clone(),
+        chord: template.chord,
+        centre: match template.centre {
+            plate::Centre::At(at) => task::Centre::At(at),
+            plate::Centre::Worst => task::Centre::Worst,
+        },
+        limit: template.limit,
+        seat: match template.seat {
+            plate::Seat::Gravity => task::Seat::Gravity,
+            plate::Seat::Balanced => task::Seat::Balanced,
+            plate::Seat::Held => task::Seat::Held,
+        },
+    }
+}
+
+fn quantity(quantity: plate::Quantity) -> task::Quantity {
+    match quantity {
+        plate::Quantity::Deviation => task::Quantity::Deviation,
+        plate::Quantity::Gap => task::Quantity::Gap,
+        plate::Quantity::CurvatureDeficit => task::Quantity::CurvatureDeficit,
+    }
+}

@@ -1,0 +1,155 @@
+//! `platen run`: the press triggers, the plate is measured, the result goes back.
+//!
+//! Three parties, each with one task: the press side (link, handshake, registers) of `platen-press`; the bench, a
+//! thread that scans and measures one stroke at a time; and this dispatcher between them. Strokes are remembered in
+//! the history before anything is promised to the press; the stroke before and the baseline are asked from there, so
+//! that a restart changes nothing.
+
+mod bench;
+mod figures;
+mod journal;
+mod status;
+mod surface_file;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use jiff::Timestamp;
+use platen_history::{Error as HistoryError, History};
+use platen_plant::PlantFile;
+use platen_plant::press::Press;
+use platen_press::{Language, ModbusLink, Order, RunError, StrokeKey, channels, run_press};
+use tokio::sync::watch;
+
+pub use bench::StrokeReport;
+pub use status::StatusRecord;
+
+use crate::plugin::{CancelToken, Catalogue};
+use crate::rig::{Rig, RigError};
+use bench::{Bench, Task};
+
+/// Why a host cannot run.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// A plugin or a file is wrong.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The history cannot be used.
+    #[error("{0}")]
+    History(#[from] HistoryError),
+    /// The press side could not start.
+    #[error(transparent)]
+    Press(#[from] RunError<HistoryError>),
+    /// The system has no thread for the bench.
+    #[error("no thread for measuring: {0}")]
+    Thread(std::io::Error),
+    /// The bench ended on its own.
+    #[error("measuring has ended: {0}; restart platen")]
+    Bench(String),
+}
+
+/// What a running host tells those who watch it.
+#[derive(Debug)]
+pub struct Watcher {
+    /// One for each stroke that was measured or could not be.
+    pub strokes: tokio::sync::mpsc::UnboundedSender<StrokeReport>,
+}
+
+/// Runs until `stop` turns true; the press's registers are then safe.
+///
+/// # Errors
+/// [`HostError`]; nothing was written to the press when the start fails.
+pub async fn run(
+    plant: &PlantFile,
+    press: Press,
+    catalogue: &Catalogue,
+    mut stop: watch::Receiver<bool>,
+    watcher: Option<Watcher>,
+) -> Result<(), HostError> {
+    let history = History::open(&plant.output.history, press.press_id, Timestamp::now())?;
+    let history = Arc::new(Mutex::new(history));
+    let rig = Rig::of(plant, catalogue)?;
+    let (mut host, side) = channels();
+    let (tasks, inbox) = std::sync::mpsc::channel();
+    let bench =
+        Bench::new(plant, catalogue, rig, &press, Arc::clone(&history), host.answers.clone(), watcher);
+    let bench = std::thread::Builder::new().name("bench".into()).spawn(move || bench.serve(&inbox));
+    let bench = bench.map_err(HostError::Thread)?;
+
+    let link = ModbusLink::new(&press.link);
+    let status = tokio::spawn(status::keep(
+        plant.output.folder.join("status.json"),
+        press.clone(),
+        host.status.clone(),
+    ));
+    let mut press_side = tokio::spawn(run_press(press, link, journal::Adapter(Arc::clone(&history)), side));
+    let mut scanning: Option<(StrokeKey, CancelToken)> = None;
+    let mut hung = None;
+    let ended = loop {
+        tokio::select! {
+            ended = &mut press_side => break ended,
+            changed = stop.changed() => {
+                if changed.is_err() || *stop.borrow() {
+                    // The press side answers by making the registers safe; then it ends.
+                    let _ = host.answers.send(platen_press::Answer::Stop);
+                }
+                if changed.is_err() {
+                    break press_side.await;
+                }
+            }
+            Some(order) = host.orders.recv() => {
+                if bench.is_finished() && hung.is_none() {
+                    hung = Some(HostError::Bench("a plugin hangs or the bench failed".into()));
+                    let _ = host.answers.send(platen_press::Answer::Stop);
+                }
+                dispatch(order, &tasks, &mut scanning, &history);
+            }
+        }
+    };
+    drop(tasks);
+    if let Some((_, token)) = scanning {
+        token.cancel();
+    }
+    status.abort();
+    match ended {
+        Ok(result) => result?,
+        Err(panic) => return Err(HostError::Bench(panic.to_string())),
+    }
+    hung.map_or(Ok(()), Err)
+}
+
+/// Hands an order on; what the bench must hear while it works goes beside its queue.
+fn dispatch(
+    order: Order,
+    tasks: &std::sync::mpsc::Sender<Task>,
+    scanning: &mut Option<(StrokeKey, CancelToken)>,
+    history: &Arc<Mutex<History>>,
+) {
+    match order {
+        Order::StartScan { key, run_id, data } => {
+            let token = CancelToken::default();
+            *scanning = Some((key, token.clone()));
+            // A bench that ended is noticed by the dispatcher.
+            let _ = tasks.send(Task::Scan { key, run_id, data, token });
+        }
+        Order::Evaluate(key) => drop(tasks.send(Task::Evaluate(key))),
+        Order::Cancel(key) => {
+            if let Some((_, token)) = scanning.take_if(|(running, _)| *running == key) {
+                token.cancel();
+            }
+        }
+        Order::PartEnd => {
+            let ended = history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
+            if let Err(error) = ended {
+                tracing::error!("end of part: {error}");
+            }
+        }
+        Order::Alarm { code, stroke, detail } => {
+            let alarm = code.alarm();
+            let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
+            let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
+            let text = alarm.text(Language::En);
+            tracing::warn!(code = code.number(), "{stroke}{text}{detail}; {}", alarm.remedy(Language::En));
+        }
+        Order::Seen(image) => tracing::debug!(?image, "the press says"),
+    }
+}

@@ -1,0 +1,312 @@
+//! The bench: scans and measures one stroke at a time, on a thread of its own.
+
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use platen_history::History;
+use platen_plant::press::{Measure, Press};
+use platen_plant::{PlantFile, PlateFile};
+use platen_press::{Answer, Code, Measurement, StrokeData, StrokeKey};
+use platen_shape::Surface;
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::{Watcher, figures, surface_file};
+use crate::files;
+use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
+use crate::record::{Context, ResultRecord};
+use crate::rig::{self, Rig};
+use crate::stroke::{self, NotMeasured, Scanned};
+
+/// Longest scan of a driver that gives no estimate: a full dome takes minutes.
+const SCAN_LIMIT: Duration = Duration::from_secs(900);
+/// Time for a scanner to connect.
+const OPEN_LIMIT: Duration = Duration::from_secs(60);
+/// Time between two tries to reach a scanner.
+const RETRY: Duration = Duration::from_secs(2);
+
+/// What the bench is asked.
+#[derive(Debug)]
+pub(super) enum Task {
+    /// Scan this stroke.
+    Scan { key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken },
+    /// Judge the stroke that was scanned last.
+    Evaluate(StrokeKey),
+}
+
+/// One stroke as it ended, for those who watch.
+#[derive(Debug, Clone)]
+pub struct StrokeReport {
+    /// The stroke.
+    pub key: StrokeKey,
+    /// A scan of the blank.
+    pub baseline: bool,
+    /// Its result document, or why there is none.
+    pub result: Result<Box<ResultRecord>, String>,
+    /// Folder of its files.
+    pub folder: Option<PathBuf>,
+    /// From the order to the verdict.
+    pub elapsed: Duration,
+}
+
+/// A stroke between its scan and its result.
+#[derive(Debug)]
+struct InHand {
+    key: StrokeKey,
+    run_id: u32,
+    data: Box<StrokeData>,
+    plate: PlateFile,
+    scanned: Scanned,
+    started: Instant,
+    scanned_at: jiff::Timestamp,
+}
+
+/// Scans and measures.
+#[derive(Debug)]
+pub(super) struct Bench {
+    plant: PlantFile,
+    catalogue: Catalogue,
+    rig: Rig,
+    scanner: Option<Scanner>,
+    scan_limit: Option<Duration>,
+    history: Arc<Mutex<History>>,
+    answers: UnboundedSender<Answer>,
+    watcher: Option<Watcher>,
+    in_hand: Option<InHand>,
+}
+
+impl Bench {
+    pub(super) fn new(
+        plant: &PlantFile,
+        catalogue: &Catalogue,
+        rig: Rig,
+        press: &Press,
+        history: Arc<Mutex<History>>,
+        answers: UnboundedSender<Answer>,
+        watcher: Option<Watcher>,
+    ) -> Self {
+        Self {
+            plant: plant.clone(),
+            catalogue: catalogue.clone(),
+            rig,
+            scanner: None,
+            scan_limit: press.timeouts.scan,
+            history,
+            answers,
+            watcher,
+            in_hand: None,
+        }
+    }
+
+    /// Works until the dispatcher lets go, or a plugin hangs.
+    pub(super) fn serve(mut self, tasks: &Receiver<Task>) {
+        loop {
+            if self.scanner.is_none() {
+                self.connect();
+            }
+            let task = match (&self.scanner, tasks.recv_timeout(RETRY)) {
+                (_, Ok(task)) => task,
+                (_, Err(std::sync::mpsc::RecvTimeoutError::Timeout)) => continue,
+                (_, Err(std::sync::mpsc::RecvTimeoutError::Disconnected)) => return,
+            };
+            let hung = match task {
+                Task::Scan { key, run_id, data, token } => self.scan(key, run_id, data, token),
+                Task::Evaluate(key) => self.evaluate(key),
+            };
+            if hung {
+                return;
+            }
+        }
+    }
+
+    fn say(&self, answer: Answer) {
+        // A press side that ended needs no answer.
+        let _ = self.answers.send(answer);
+    }
+
+    fn connect(&mut self) {
+        let scanner =
+            rig::scanner(&self.plant, &self.catalogue).map_err(|e| e.to_string()).and_then(|scanner| {
+                scanner.instance().open(OPEN_LIMIT).map_err(|e| e.to_string())?;
+                let estimate = scanner.estimate(None, OPEN_LIMIT).map_err(|e| e.to_string())?;
+                Ok((scanner, estimate))
+            });
+        match scanner {
+            Ok((scanner, estimate)) => {
+                tracing::info!(?estimate, "scanner ready");
+                self.scanner = Some(scanner);
+                self.say(Answer::Scanner { ready: Ok(()), estimate });
+            }
+            Err(why) => {
+                tracing::error!("scanner: {why}");
+                self.say(Answer::Scanner { ready: Err(Code::ScannerNotReady), estimate: None });
+            }
+        }
+    }
+
+    /// True when a plugin hangs.
+    fn scan(&mut self, key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken) -> bool {
+        let started = Instant::now();
+        self.in_hand = None;
+        let scanned = self.plate(&data).and_then(|plate| {
+            let spec = self.rig.spec(&plate);
+            let scanner =
+                self.scanner.as_ref().ok_or((Code::ScannerNotReady, "not connected".to_owned(), false))?;
+            let limit = self.scan_limit.unwrap_or(SCAN_LIMIT);
+            let job = JobSpec { stroke: u64::from(key.stroke), trigger: started, limit, cancel: token };
+            let scanned = stroke::scan(scanner, job, None, &spec).map_err(|e| refusal(&e))?;
+            Ok((plate, scanned))
+        });
+        match scanned {
+            Ok((plate, scanned)) => {
+                let scanned_at = jiff::Timestamp::now();
+                self.in_hand = Some(InHand { key, run_id, data, plate, scanned, started, scanned_at });
+                self.say(Answer::Acquired(key));
+                false
+            }
+            Err((code, why, hung)) => {
+                if matches!(code, Code::ScanFailed | Code::ScannerNotReady) {
+                    self.scanner = None;
+                }
+                self.fail(key, data.baseline, code, why, started);
+                hung
+            }
+        }
+    }
+
+    fn fail(&self, key: StrokeKey, baseline: bool, code: Code, why: String, started: Instant) {
+        tracing::error!(%key, code = code.number(), "not measured: {why}");
+        self.say(Answer::Failed(key, code));
+        self.report(StrokeReport {
+            key,
+            baseline,
+            result: Err(why),
+            folder: None,
+            elapsed: started.elapsed(),
+        });
+    }
+
+    fn report(&self, report: StrokeReport) {
+        if let Some(watcher) = &self.watcher {
+            // A watcher that went away needs no report.
+            let _ = watcher.strokes.send(report);
+        }
+    }
+
+    /// The plate file of the stroke's recipe.
+    fn plate(&self, data: &StrokeData) -> Result<PlateFile, (Code, String, bool)> {
+        let unknown = |why: String| (Code::RecipeUnknown, why, false);
+        let recipe = data.recipe_id.ok_or_else(|| unknown("the press names no recipe".into()))?;
+        PlateFile::load(&self.plant.plate_path(recipe)).map_err(|e| unknown(format!("recipe {recipe}: {e}")))
+    }
+
+    /// True when a plugin hangs.
+    fn evaluate(&mut self, key: StrokeKey) -> bool {
+        let Some(stroke) = self.in_hand.take().filter(|stroke| stroke.key == key) else {
+            self.fail(key, false, Code::Interrupted, "its scan is gone".into(), Instant::now());
+            return false;
+        };
+        let start = Instant::now();
+        let (baseline, started) = (stroke.data.baseline, stroke.started);
+        match self.measure(&stroke, start) {
+            Ok((measurement, record, folder)) => {
+                self.say(Answer::Result(key, Box::new(measurement)));
+                let elapsed = started.elapsed();
+                self.report(StrokeReport { key, baseline, result: Ok(Box::new(record)), folder, elapsed });
+                false
+            }
+            Err(error) => {
+                let (code, why, hung) = refusal(&error);
+                self.fail(key, baseline, code, why, started);
+                hung
+            }
+        }
+    }
+
+    /// From the plate's face to the result and its files.
+    fn measure(
+        &mut self,
+        stroke: &InHand,
+        start: Instant,
+    ) -> Result<(Measurement, ResultRecord, Option<PathBuf>), NotMeasured> {
+        let spec = self.rig.spec(&stroke.plate);
+        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec)?;
+        let (before, baseline) = self.earlier(stroke.run_id);
+        let surfaces = Surfaces {
+            now: &measured.measurement.surface,
+            before: before.as_ref(),
+            baseline: baseline.as_ref(),
+        };
+        let comparing = Instant::now();
+        let reports = stroke::compare(&self.rig, &rig::task(&stroke.plate, false), surfaces);
+        let compare = comparing.elapsed();
+        let verdict = stroke::verdict(&reports);
+        let number = Some(u64::from(stroke.key.stroke));
+        let context = Context { plate: &stroke.plate, stroke: number, verdict, reports: &reports, compare };
+        let record = ResultRecord::new(&stroke.scanned, &measured, context);
+        let folder = self.keep(stroke, &record, &reports, &measured.measurement.surface);
+        let times = [
+            (Measure::ScanTime, stroke.scanned.acquire + stroke.scanned.extract),
+            (Measure::EvaluateTime, start.elapsed()),
+            (Measure::StrokeToResultTime, stroke.started.elapsed()),
+        ];
+        let measurement = figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
+        Ok((measurement, record, folder))
+    }
+
+    fn history(&self) -> MutexGuard<'_, History> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Surfaces of the stroke before and of the blank, where they are on record.
+    fn earlier(&self, run_id: u32) -> (Option<Surface>, Option<Surface>) {
+        let history = self.history();
+        let load = |found: Result<Option<platen_history::Stroke>, platen_history::Error>| match found {
+            Ok(stroke) => {
+                stroke.and_then(|s| s.document).and_then(|document| surface_file::beside(&document))
+            }
+            Err(error) => {
+                tracing::warn!("{error}; this stroke is compared with none");
+                None
+            }
+        };
+        (load(history.archive().before(run_id)), load(history.archive().baseline(run_id)))
+    }
+
+    /// Writes the files and notes where they lie. A full disk costs the record, not the result.
+    fn keep(
+        &mut self,
+        stroke: &InHand,
+        record: &ResultRecord,
+        reports: &[Result<crate::plugin::Report, PluginError>],
+        surface: &Surface,
+    ) -> Option<PathBuf> {
+        let folder = self.plant.output.folder.join(format!("run-{:06}", stroke.run_id));
+        let sound: Vec<_> = reports.iter().flatten().collect();
+        let written = files::write(&folder, record, &sound).map_err(|e| e.to_string()).and_then(|_| {
+            surface_file::write(&folder, surface).map_err(|e| format!("{}: {e}", folder.display()))?;
+            let document = folder.join("result.json");
+            self.history().attach_document(stroke.run_id, &document).map_err(|e| e.to_string())
+        });
+        match written {
+            Ok(()) => Some(folder),
+            Err(why) => {
+                tracing::error!(key = %stroke.key, "the record is lost: {why}");
+                None
+            }
+        }
+    }
+}
+
+/// Code for the press, sentence for people, and whether a plugin hangs.
+fn refusal(error: &NotMeasured) -> (Code, String, bool) {
+    let hung = matches!(error, NotMeasured::Scanner(PluginError::Hangs { .. }));
+    let code = match error {
+        NotMeasured::Scanner(PluginError::Stopped { .. }) => Code::ScanTimeout,
+        NotMeasured::Scanner(_) | NotMeasured::Column(_) | NotMeasured::NoHeader => Code::ScanFailed,
+        NotMeasured::Plate(_) => Code::PlateNotFound,
+        NotMeasured::Outline(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
+    };
+    (code, error.to_string(), hung)
+}

@@ -1,0 +1,60 @@
+//! From the comparisons' findings to the figures in the press's registers.
+
+use platen_plant::PlateFile;
+use platen_plant::press::Measure;
+use platen_press::{Figures, Measurement, Timestamp, Verdict};
+use platen_shape::task;
+
+use crate::plugin::{PluginError, Report};
+use crate::stroke::{self, Measured};
+
+/// What goes to the press. Figures that no comparison gave stay out and show as invalid.
+pub(super) fn measurement(
+    measured: &Measured,
+    reports: &[Result<Report, PluginError>],
+    plate: &PlateFile,
+    times: [(Measure, std::time::Duration); 3],
+    scanned_at: jiff::Timestamp,
+) -> Measurement {
+    let mut figures = Figures::default();
+    let mut put = |measure: Measure, value: f64| {
+        if value.is_finite() {
+            figures.values.insert(measure, value);
+        }
+    };
+    let found = || reports.iter().flatten().flat_map(|report| &report.findings.figures);
+    for figure in found() {
+        if let Some(measure) = Measure::from_name(&figure.name) {
+            put(measure, figure.value);
+        }
+    }
+    put(Measure::Coverage, measured.measurement.quality.coverage);
+    for (measure, time) in times {
+        put(measure, time.as_secs_f64());
+    }
+    let station = |station: &platen_plant::plate::Station| {
+        let name = format!("station.{}", station.name);
+        found()
+            .find(|figure| figure.name == name)
+            .map(|figure| figure.value)
+            .filter(|value| value.is_finite())
+    };
+    figures.stations = plate.stations.iter().map(station).collect();
+    Measurement {
+        verdict: match stroke::verdict(reports) {
+            task::Verdict::Pass => Verdict::Pass,
+            task::Verdict::Fail => Verdict::Fail,
+            task::Verdict::CannotTell => Verdict::CannotTell,
+            task::Verdict::NotMeasured => Verdict::NotMeasured(platen_press::Code::EvaluationFailed),
+        },
+        figures,
+        scanned_at: timestamp(scanned_at),
+        warning: None,
+    }
+}
+
+fn timestamp(at: jiff::Timestamp) -> Option<Timestamp> {
+    let unix_s = u32::try_from(at.as_second()).ok()?;
+    let ms = u16::try_from(at.subsec_millisecond()).ok()?;
+    Some(Timestamp { unix_s, ms })
+}

@@ -1,0 +1,134 @@
+//! One stroke, as the data travels: scanner, plate, outline, surface, comparisons, verdict.
+//!
+//! ```text
+//! columns -> Patch -> Outline -> Measurement (mid-surface, mesh, chart, S) -> Reports -> Verdict
+//! ```
+//! Each arrow is one function here, with one type on each side. Nothing travels back.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use platen_scan::{ColumnError, ScanHeader, Window};
+use platen_shape::extract::{Extractor, Refusal};
+use platen_shape::measure::{MeasureError, Measurement, measure};
+use platen_shape::outline::{Outline, OutlineError, outline};
+use platen_shape::task::{Task, Verdict};
+use platen_shape::{Patch, PlateSpec};
+
+use crate::plugin::{JobSpec, PluginError, Report, ScanEvent, Scanner, Surfaces};
+use crate::rig::Rig;
+
+/// Why a stroke was not measured, by who must act.
+#[derive(Debug, thiserror::Error)]
+pub enum NotMeasured {
+    /// The scanner gave no scan.
+    #[error("scanner {0}")]
+    Scanner(#[from] PluginError),
+    /// The scanner's driver sent what is no lattice.
+    #[error("scan: {0}; report this to the driver's author")]
+    Column(#[from] ColumnError),
+    /// The driver sent columns before it said what they are.
+    #[error("scan: columns without a header; report this to the driver's author")]
+    NoHeader,
+    /// The plate was not found in the scan.
+    #[error("scan: {0}")]
+    Plate(#[from] Refusal),
+    /// The plate's outline was not found.
+    #[error("plate: {0}")]
+    Outline(#[from] OutlineError),
+    /// The plate could not be flattened or fitted.
+    #[error("plate: {0}")]
+    Shape(#[from] MeasureError),
+}
+
+/// The plate as scanned.
+#[derive(Debug)]
+pub struct Scanned {
+    /// What the driver said of the scan.
+    pub header: ScanHeader,
+    /// Valid cells of the whole scan.
+    pub n_valid: u64,
+    /// The plate's scanned face.
+    pub patch: Patch,
+    /// From the start to the last column.
+    pub acquire: Duration,
+    /// From the last column to the patch.
+    pub extract: Duration,
+}
+
+/// Scans; the plate is extracted while columns arrive.
+///
+/// # Errors
+/// No scan, or no plate in it.
+pub fn scan(
+    scanner: &Scanner,
+    job: JobSpec,
+    window: Option<&Window>,
+    spec: &PlateSpec,
+) -> Result<Scanned, NotMeasured> {
+    let start = Instant::now();
+    let mut extractor: Option<(ScanHeader, Extractor)> = None;
+    let mut wrong: Option<NotMeasured> = None;
+    let mut take = |event| match (event, &mut extractor) {
+        (ScanEvent::Begin(header), _) => {
+            extractor = Some((header.clone(), Extractor::new(&header, spec)));
+            Ok(())
+        }
+        (ScanEvent::Column(column), Some((_, extractor))) => Ok(extractor.push(&column)?),
+        (ScanEvent::Column(_), None) => Err(NotMeasured::NoHeader),
+    };
+    let end = scanner.scan(job, window, &mut |event| match take(event) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(error) => {
+            wrong = Some(error);
+            ControlFlow::Break(())
+        }
+    });
+    if let Some(error) = wrong {
+        return Err(error);
+    }
+    let end = end?;
+    let (header, mut extractor) = extractor.ok_or(NotMeasured::NoHeader)?;
+    let acquired = Instant::now();
+    extractor.leave_out_warm_up(end.warm_up_columns);
+    let patch = extractor.finish()?;
+    Ok(Scanned { header, n_valid: end.points, patch, acquire: acquired - start, extract: acquired.elapsed() })
+}
+
+/// The plate's shape, from its scanned face.
+#[derive(Debug)]
+pub struct Measured {
+    /// Corners and edges.
+    pub outline: Outline,
+    /// Mid-surface, mesh, chart, S(u, v).
+    pub measurement: Measurement,
+    /// From patch to outline.
+    pub outline_time: Duration,
+}
+
+/// From the plate's face to its shape.
+///
+/// # Errors
+/// Why the plate was not measured.
+pub fn measure_scanned(rig: &mut Rig, scanned: &Scanned, spec: &PlateSpec) -> Result<Measured, NotMeasured> {
+    let start = Instant::now();
+    let outline = outline(&scanned.patch, spec)?;
+    let outline_time = start.elapsed();
+    let measurement = measure(&scanned.patch, &outline, spec, &mut rig.flattening, &mut || start.elapsed())?;
+    Ok(Measured { outline, measurement, outline_time })
+}
+
+/// What the comparisons found, in the plant's order. One that fails says so in its place and judges nothing.
+pub fn compare(rig: &Rig, task: &Task, surfaces: Surfaces<'_>) -> Vec<Result<Report, PluginError>> {
+    rig.comparisons.iter().map(|comparison| comparison.compare(task, surfaces)).collect()
+}
+
+/// The plate's verdict: the worst of those given. Nothing is good by default: a comparison that failed, or none that
+/// judges, leaves `cannot_tell`.
+pub fn verdict(reports: &[Result<Report, PluginError>]) -> Verdict {
+    let given = reports.iter().filter_map(|report| match report {
+        Ok(report) => report.findings.verdict,
+        Err(_) => Some(Verdict::CannotTell),
+    });
+    given.max().unwrap_or(Verdict::CannotTell)
+}
