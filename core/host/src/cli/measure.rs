@@ -42,8 +42,8 @@ pub(super) struct Command {
     #[arg(long, value_name = "NAME")]
     flattening: Option<String>,
     /// Rough direction of growing u in the scanner frame, instead of the plant file's
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
-    u_axis: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
+    u_axis: Option<[f64; 3]>,
     /// New folder for result.json, reference_lines.csv and pictures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -59,9 +59,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     if let Some(name) = &command.flattening {
         plant.flattening = PluginUse::by_default(name);
     }
-    if let Some([x, y, z]) = command.u_axis.as_deref() {
-        plant.frame.u_axis = Some([*x, *y, *z]);
-    }
+    plant.frame.u_axis = command.u_axis.or(plant.frame.u_axis);
     let mut rig = Rig::of(&plant, &catalogue)?;
     let mut measure = |scan: &Path| measure_file(&catalogue, &mut rig, scan, &plate);
     let before = command.before.as_deref().map(&mut measure).transpose()?;
@@ -93,6 +91,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let direction: [f64; 3] = numbers.try_into().map_err(|_| "give three numbers, e.g. 0.84,0.54,0".to_owned())?;
+    let sound = direction.iter().all(|c| c.is_finite()) && direction.iter().any(|c| *c != 0.0);
+    sound.then_some(direction).ok_or_else(|| "give a direction that is not 0,0,0".to_owned())
 }
 
 /// Measures one scan file with the file driver.
