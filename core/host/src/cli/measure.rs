@@ -95,7 +95,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 
 fn direction(text: &str) -> Result<[f64; 3], String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    let direction: [f64; 3] = numbers.try_into().map_err(|_| "give three numbers, e.g. 0.84,0.54,0".to_owned())?;
+    let direction: [f64; 3] =
+        numbers.try_into().map_err(|_| "give three numbers, e.g. 0.84,0.54,0".to_owned())?;
     let sound = direction.iter().all(|c| c.is_finite()) && direction.iter().any(|c| *c != 0.0);
     sound.then_some(direction).ok_or_else(|| "give a direction that is not 0,0,0".to_owned())
 }
