@@ -30,10 +30,28 @@ impl Job {
 }
 
 impl Handshake {
-    /// Follows the state, but for a stroke whose acceptance is not on the disk yet: it is not promised.
+    /// Follows the state. A stroke whose acceptance is not on the disk yet is not promised: until then the registers
+    /// keep what they say about the stroke before.
     pub(super) fn refresh_image(&mut self) {
-        if self.work != Work::Accepted || self.journaled() {
-            self.image = self.present_image();
+        let present = self.present_image();
+        let promised = self.work != Work::Accepted || self.journaled();
+        let before = std::mem::take(&mut self.image);
+        self.image = if promised { present } else { self.unpromised(present, before) };
+    }
+
+    fn unpromised(&self, present: HostImage, before: HostImage) -> HostImage {
+        let stopped = matches!(self.link, LinkState::Stopped { .. });
+        HostImage {
+            ready: self.link == LinkState::Online && !self.blocked(),
+            busy: false,
+            valid: before.valid && !stopped,
+            scan_done: before.scan_done && !stopped,
+            ack_stroke_id: before.ack_stroke_id,
+            session: before.session,
+            attempt: before.attempt,
+            result_seq: before.result_seq,
+            result: before.result,
+            ..present
         }
     }
 

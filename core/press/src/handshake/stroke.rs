@@ -105,10 +105,14 @@ impl Handshake {
         Transition::T12
     }
 
-    /// Why the scan of the stroke in hand must not go on.
+    /// Why the scan of the stroke in hand must not go on, or not begin. A stroke whose acceptance is still on its way to
+    /// the disk is not given up: it would be echoed.
     pub(super) fn given_up(&self, now: Duration) -> Option<Code> {
         let job = self.job.as_ref()?;
         let scanning = self.work == Work::Scanning;
+        if !scanning && job.journaled.is_none() {
+            return None;
+        }
         let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
         let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
         let failed = match &job.outcome {

@@ -117,6 +117,7 @@ impl Handshake {
                     self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
                 }
                 self.close(key, Acked::Never);
+                self.job = None;
                 if stage == Stage::Accepted && waits {
                     return self.accept_rescan(now, Transition::T7);
                 }

@@ -1,0 +1,427 @@
+//! The handshake alone, under events in any order and virtual time.
+
+#![allow(clippy::panic, reason = "helpers of tests")]
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use platen_plant::press::{Input, Link, Measure, NoAck, OnInterrupted, OnMissed, OnStorageFull, Press};
+use platen_press::{
+    Code, Config, Effect, Event, Figures, Handshake, HostImage, LinkState, Measurement, PressImage, Recalled,
+    Record, StrokeKey, Transition, Verdict, Work, Wrong,
+};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::RngSeed;
+
+/// The handshake with the world round it: the journal, the scanner, and what they owe it.
+struct Bench {
+    machine: Handshake,
+    now: Duration,
+    records: VecDeque<Record>,
+    scanning: Option<StrokeKey>,
+    judging: Option<StrokeKey>,
+    accepted: BTreeMap<StrokeKey, bool>,
+    finished: BTreeSet<(StrokeKey, u16)>,
+    scanned: BTreeSet<StrokeKey>,
+    synchronised: bool,
+    session: u16,
+    degrade: bool,
+    taken: BTreeSet<Transition>,
+    recalled: Recalled,
+    alarms: Vec<Code>,
+}
+
+impl Bench {
+    fn new(config: Config) -> Self {
+        Self::after(config, Recalled::empty(7))
+    }
+
+    fn after(config: Config, recalled: Recalled) -> Self {
+        let degrade = config.policy.on_storage_full == OnStorageFull::Degrade;
+        Self {
+            machine: Handshake::new(config, recalled.clone()),
+            now: Duration::ZERO,
+            records: VecDeque::new(),
+            scanning: None,
+            judging: None,
+            accepted: BTreeMap::new(),
+            finished: BTreeSet::new(),
+            scanned: recalled.last.iter().map(|entry| entry.key).collect(),
+            synchronised: false,
+            session: 1,
+            degrade,
+            taken: BTreeSet::new(),
+            recalled,
+            alarms: Vec::new(),
+        }
+    }
+
+    /// Another process on the same journal. A scan whose record could not be written is forgotten, and told so before.
+    fn restarted(self, config: Config) -> Self {
+        let stored = |key: &StrokeKey| self.accepted.get(key) == Some(&true);
+        let scanned = self.scanned.iter().copied().filter(stored).collect();
+        Self { scanned, session: self.session, ..Self::after(config, self.recalled) }
+    }
+
+    fn step(&mut self, event: Event) {
+        let before = self.machine.image().clone();
+        let effects = self.machine.step(event, self.now);
+        for effect in effects {
+            self.take(effect);
+        }
+        self.check(&before);
+    }
+
+    fn take(&mut self, effect: Effect) {
+        match effect {
+            Effect::Journal(record) => self.records.push_back(record),
+            Effect::StartScan { key, .. } => {
+                let stored = self.accepted.get(&key) == Some(&true);
+                assert!(stored || self.degrade, "scan of {key} without a record");
+                assert!(self.scanned.insert(key), "{key} is scanned twice");
+                self.scanning = Some(key);
+            }
+            Effect::Evaluate(key) => self.judging = Some(key),
+            Effect::Cancel(_) => (self.scanning, self.judging) = (None, None),
+            Effect::Took(transition) => {
+                use Transition::*;
+                match transition {
+                    T2 | T3 | T4 | T21 | T22 | T23 => self.synchronised = false,
+                    T5 | T6 | T7 | T8 => self.synchronised = true,
+                    _ => {}
+                }
+                self.taken.insert(transition);
+            }
+            Effect::Alarm(code) => self.alarms.push(code),
+            Effect::PartEnd | Effect::Reconnect => {}
+        }
+    }
+
+    fn check(&self, before: &HostImage) {
+        let image = self.machine.image();
+        let link = self.machine.state().link;
+        assert!(!(image.busy && image.ready), "busy and ready");
+        assert!(!(image.busy && image.valid), "busy and valid");
+        assert!(!image.valid || image.result.is_some(), "valid without a result");
+        assert!(!image.ready || self.synchronised, "ready before the press is known");
+        let silent = matches!(link, LinkState::Boot | LinkState::Offline | LinkState::Sync);
+        assert!(!silent || !self.machine.may_write(), "a write before the press is known");
+        if let Some(result) = &image.result {
+            let known = self.finished.contains(&(result.key, result.seq));
+            let recalled =
+                self.recalled.last.as_ref().and_then(|last| last.publication.as_ref()) == Some(result);
+            let overdue = self.now >= Duration::from_secs(10);
+            assert!(known || recalled || overdue, "{} is published without a record", result.key);
+        }
+        if image.ack_stroke_id != before.ack_stroke_id && image.busy {
+            let promised = self.accepted.keys().any(|key| key.stroke == image.ack_stroke_id);
+            assert!(promised || self.now >= Duration::from_secs(10), "an echo before the record");
+        }
+        if matches!(link, LinkState::Stopped { .. }) {
+            assert!(
+                !image.ready && !image.busy && !image.valid && image.error.is_none(),
+                "not safe at the end"
+            );
+        }
+    }
+
+    /// The journal answers its oldest record.
+    fn journal(&mut self, ok: bool) {
+        let Some(record) = self.records.pop_front() else { return };
+        if ok {
+            self.recalled.replay(&record);
+        }
+        match &record {
+            Record::Accepted { key, .. } => drop(self.accepted.insert(*key, ok)),
+            Record::Finished(result) => drop(self.finished.insert((result.key, result.seq))),
+            Record::Scanned { .. } | Record::Acked { .. } => {}
+        }
+        self.step(Event::Journaled { key: record.key(), stage: record.stage(), ok });
+    }
+
+    fn acquire(&mut self) {
+        if let Some(key) = self.scanning.take() {
+            self.step(Event::Acquired(key));
+        }
+    }
+
+    fn judge(&mut self) {
+        if let Some(key) = self.judging.take() {
+            self.step(Event::Measured(key, Box::new(measurement())));
+        }
+    }
+
+    fn pass(&mut self, ms: u64) {
+        self.now += Duration::from_millis(ms);
+    }
+
+    /// One cycle of a press that does everything right and has no new stroke.
+    fn calm_cycle(&mut self, beat: u16) {
+        self.pass(100);
+        self.step(Event::Connected);
+        let ack = self.machine.image().valid;
+        let press = PressImage { heartbeat: Some(beat), ack, ..calm() };
+        self.step(Event::Press(Box::new(press)));
+        self.step(Event::Host { owner: Some(7), heartbeat: Some(beat), mine: true });
+        while !self.records.is_empty() {
+            self.journal(true);
+        }
+        self.acquire();
+        self.judge();
+        if self.machine.may_write() {
+            self.step(Event::Written);
+        }
+    }
+}
+
+fn measurement() -> Measurement {
+    Measurement {
+        verdict: Verdict::Pass,
+        figures: Figures { values: [(Measure::GapMax, 0.001)].into(), stations: Vec::new() },
+        scanned_at: None,
+        warning: None,
+    }
+}
+
+fn calm() -> PressImage {
+    PressImage {
+        heartbeat: Some(0),
+        enable: true,
+        clear_to_scan: true,
+        stroke_id: 1,
+        session_id: 1,
+        ..PressImage::default()
+    }
+}
+
+fn config() -> Config {
+    Config::new(&Press::pph1("P", 3, Link::tcp("x", 502, 1)))
+}
+
+/// One thing that happens.
+#[derive(Debug, Clone)]
+enum Act {
+    Press(Box<PressImage>),
+    /// The press restarts or another part comes: a number that was never used before.
+    Session,
+    Host {
+        owner: u16,
+        heartbeat: u16,
+        mine: bool,
+    },
+    Connected,
+    Disconnected,
+    Written,
+    Journal(bool),
+    Acquire,
+    Judge,
+    Failed(Code),
+    Stale(StrokeKey),
+    Scanner(bool),
+    Fault(Code),
+    Reset,
+    Pass(u64),
+}
+
+fn press() -> impl Strategy<Value = PressImage> {
+    let bit = |chance: f64| prop::bool::weighted(chance);
+    let bits = (bit(0.9), bit(0.5), bit(0.3), bit(0.05), bit(0.1), bit(0.9), bit(0.1), bit(0.15));
+    let ids = (0u16..6, 0u16..3, 0u16..4);
+    (bits, ids).prop_map(
+        |((enable, trigger, ack, abort, error_reset, clear_to_scan, part_end, rescan), ids)| {
+            let (stroke_id, attempt, beat) = ids;
+            PressImage {
+                heartbeat: Some(beat),
+                enable,
+                trigger,
+                ack,
+                abort,
+                error_reset,
+                clear_to_scan,
+                part_end,
+                rescan,
+                // Near the wrap, so that the counter goes over it both ways.
+                stroke_id: [0, 65_534, 65_535, 1, 2, 40][usize::from(stroke_id)],
+                session_id: 0,
+                attempt,
+                data: Default::default(),
+                wrong: None,
+            }
+        },
+    )
+}
+
+/// Now and then the registers of a press that is only starting.
+fn press_or_ruin() -> impl Strategy<Value = PressImage> {
+    (press(), prop::bool::weighted(0.03)).prop_map(|(image, ruin)| {
+        let wrong = ruin.then_some(Wrong { input: Input::MapVersion, found: 0, expected: 1 });
+        PressImage { wrong, ..image }
+    })
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    prop_oneof![
+        8 => press_or_ruin().prop_map(|image| Act::Press(Box::new(image))),
+        2 => Just(Act::Host { owner: 7, heartbeat: 1, mine: true }),
+        1 => (0u16..9, 0u16..3).prop_map(|(owner, heartbeat)| Act::Host { owner, heartbeat, mine: owner == 7 }),
+        2 => Just(Act::Connected),
+        1 => Just(Act::Disconnected),
+        1 => Just(Act::Session),
+        4 => Just(Act::Written),
+        4 => prop::bool::weighted(0.9).prop_map(Act::Journal),
+        3 => Just(Act::Acquire),
+        3 => Just(Act::Judge),
+        1 => Just(Act::Failed(Code::ScanFailed)),
+        1 => (0u16..3).prop_map(|stroke| Act::Stale(StrokeKey { press: 3, session: 1, stroke, attempt: 0 })),
+        1 => prop::bool::weighted(0.8).prop_map(Act::Scanner),
+        1 => prop_oneof![Just(Code::IllegalAddress), Just(Code::DeviceFailure)].prop_map(Act::Fault),
+        1 => Just(Act::Reset),
+        3 => prop_oneof![1u64..50, Just(600), Just(2100), Just(6000), Just(200_000)].prop_map(Act::Pass),
+    ]
+}
+
+fn configs() -> impl Strategy<Value = Config> {
+    let missed = prop_oneof![Just(OnMissed::Warn), Just(OnMissed::Error), Just(OnMissed::Block)];
+    let full = prop_oneof![Just(OnStorageFull::Degrade), Just(OnStorageFull::Stop)];
+    let ack = prop_oneof![Just(NoAck::NextStroke), Just(NoAck::Hold)];
+    (missed, full, ack, any::<bool>(), any::<bool>()).prop_map(|(missed, full, ack, counts, attempts)| {
+        let mut config = config();
+        config.policy.on_missed_stroke = missed;
+        config.policy.on_storage_full = full;
+        config.policy.no_ack = ack;
+        if !counts {
+            config.counter = None;
+            config.debounce_reads = 2;
+        }
+        config.counts_attempts = attempts;
+        config
+    })
+}
+
+fn perform(bench: &mut Bench, act: Act) {
+    match act {
+        Act::Press(image) => {
+            let session_id = bench.session;
+            bench.step(Event::Press(Box::new(PressImage { session_id, ..*image })));
+        }
+        Act::Session => bench.session += 1,
+        Act::Host { owner, heartbeat, mine } => {
+            bench.step(Event::Host { owner: Some(owner), heartbeat: Some(heartbeat), mine });
+        }
+        Act::Connected => bench.step(Event::Connected),
+        Act::Disconnected => bench.step(Event::Disconnected),
+        Act::Written if bench.machine.may_write() => bench.step(Event::Written),
+        Act::Written => {}
+        Act::Journal(ok) => bench.journal(ok),
+        Act::Acquire => bench.acquire(),
+        Act::Judge => bench.judge(),
+        Act::Failed(code) => {
+            if let Some(key) = bench.scanning.take().or(bench.judging.take()) {
+                bench.step(Event::Failed(key, code));
+            }
+        }
+        Act::Stale(key) => bench.step(Event::Measured(key, Box::new(measurement()))),
+        Act::Scanner(ok) => {
+            let ready = if ok { Ok(()) } else { Err(Code::ScannerNotReady) };
+            bench.step(Event::Scanner { ready, estimate: Some(Duration::from_secs(20)) });
+        }
+        Act::Fault(code) => bench.step(Event::Fault(code)),
+        Act::Reset => bench.step(Event::Reset),
+        Act::Pass(ms) => {
+            bench.pass(ms);
+            bench.step(Event::Tick);
+        }
+    }
+}
+
+/// From wherever it is, a press that behaves brings the handshake back to idle.
+fn comes_to_rest(bench: &mut Bench) {
+    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+    let mut beat = 100;
+    for _ in 0..3000 {
+        beat += 1;
+        if beat % 500 == 0 {
+            bench.step(Event::Reset);
+        }
+        bench.calm_cycle(beat);
+        let state = bench.machine.state();
+        if beat > 110 && state.link == LinkState::Online && state.work == Work::Idle {
+            return;
+        }
+    }
+    panic!("no way out of {:?}", bench.machine.state());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, rng_seed: RngSeed::Fixed(0x5EED), ..ProptestConfig::default() })]
+
+    /// No scan twice, none without a record, no result without a record, no write and no ready before the press is
+    /// known, and a way out of every state.
+    #[test]
+    fn any_order_of_events(config in configs(), acts in prop::collection::vec(act(), 0..120)) {
+        let mut bench = Bench::new(config);
+        bench.step(Event::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
+        bench.step(Event::Connected);
+        for act in acts {
+            perform(&mut bench, act);
+        }
+        comes_to_rest(&mut bench);
+        bench.step(Event::Stop);
+        assert!(matches!(bench.machine.state().link, LinkState::Stopped { told: true }));
+    }
+
+    /// The same with a restart in the middle: what the journal has is all that is left.
+    #[test]
+    fn any_order_of_events_with_a_restart(
+        config in configs(),
+        rescan in any::<bool>(),
+        before in prop::collection::vec(act(), 0..80),
+        after in prop::collection::vec(act(), 0..40),
+    ) {
+        let mut config = config;
+        config.policy.on_interrupted = if rescan { OnInterrupted::Rescan } else { OnInterrupted::Report };
+        let mut bench = Bench::new(config.clone());
+        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+        bench.step(Event::Connected);
+        for act in before {
+            perform(&mut bench, act);
+        }
+        let mut bench = bench.restarted(config);
+        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+        bench.step(Event::Connected);
+        for act in after {
+            perform(&mut bench, act);
+        }
+        comes_to_rest(&mut bench);
+    }
+}
+
+/// The properties above are worth something only if every transition is taken on the way.
+#[test]
+fn every_transition_is_taken() {
+    let mut runner = proptest::test_runner::TestRunner::deterministic();
+    let mut taken = BTreeSet::new();
+    for _ in 0..2000 {
+        let run = (configs(), prop::collection::vec(act(), 40..120), prop::collection::vec(act(), 0..40));
+        let (config, before, after) = run.new_tree(&mut runner).expect("no filter").current();
+        let mut bench = Bench::new(config.clone());
+        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+        bench.step(Event::Connected);
+        before.into_iter().for_each(|act| perform(&mut bench, act));
+        taken.append(&mut bench.taken);
+        let mut bench = bench.restarted(config);
+        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+        bench.step(Event::Connected);
+        after.into_iter().for_each(|act| perform(&mut bench, act));
+        bench.step(Event::Stop);
+        taken.append(&mut bench.taken);
+    }
+    use Transition::*;
+    let all = [
+        T1, T2, T3, T4, T5, T6, T7, T8, T9, T10, T11, T12, T13, T14, T15, T16, T17, T18, T19, T20, T21, T22,
+        T23, T24, T25, T26, T27,
+    ];
+    let never: Vec<_> = all.into_iter().filter(|transition| !taken.contains(transition)).collect();
+    assert!(never.is_empty(), "never taken: {never:?}");
+}
