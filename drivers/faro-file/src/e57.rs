@@ -32,8 +32,7 @@ impl<R: Read + Seek> E57<R> {
     /// Checks the file and finds the scan: `chosen` counts from 1 and may be left out when the file holds one.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length_note = check_length(&mut file)?;
-        E57Reader::validate_crc(&mut file).map_err(|e| Error::Damaged { format: FORMAT, what: chain(&e) })?;
-        file.rewind().map_err(Error::io("going back to the start"))?;
+        check_pages(&mut file)?;
         let reader = E57Reader::new(file).map_err(|e| unsound(chain(&e)))?;
         let cloud = choose(reader.pointclouds(), chosen)?;
         check_prototype(&cloud.prototype)?;
@@ -70,12 +69,15 @@ fn unsound(what: String) -> Error {
     Error::Unsound { format: FORMAT, what }
 }
 
-/// The crate's message with its causes, in one line.
+/// The crate's message with those of its causes that it does not repeat, in one line.
 fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(inner) = cause {
-        text = format!("{text}: {inner}");
+        let more = inner.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
         cause = inner.source();
     }
     text
@@ -112,6 +114,28 @@ fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
         return Err(unsound(format!("{length} bytes, only {declared} announced")));
     }
     Ok(None)
+}
+
+/// Checks the CRC-32C at the end of every page. The standard writes it with the highest byte first, unlike all
+/// other numbers of the file.
+fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
+    let mut page = [0; PAGE as usize];
+    let mut number = 0_u64;
+    loop {
+        match file.read_exact(&mut page) {
+            Ok(()) => number += 1,
+            Err(end) if end.kind() == std::io::ErrorKind::UnexpectedEof => break,
+            Err(error) => return Err(Error::Io { doing: "reading pages", source: error }),
+        }
+        let (content, checksum) = page.split_at(page.len() - 4);
+        if crc32c::crc32c(content).to_be_bytes() != checksum {
+            return Err(Error::Damaged {
+                format: FORMAT,
+                what: format!("the checksum of page {number} is wrong"),
+            });
+        }
+    }
+    file.rewind().map_err(Error::io("going back to the start"))
 }
 
 /// The one scan that holds points, or the one asked for.

@@ -8,7 +8,7 @@ use platen_sdk::ErrorKind;
 /// Result of reading a scan file.
 pub(crate) type Result<T> = std::result::Result<T, Error>;
 
-/// Why a file gives no lattice. The path is added where the error leaves the driver.
+/// Why a file gives no lattice. In a watched folder the path is added where the error leaves the driver.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
     /// The system would not read the file: the share, or who may read it.
@@ -109,10 +109,10 @@ impl Error {
         )
     }
 
-    /// The error as it crosses the boundary, with the file's name.
-    pub(crate) fn at(self, path: &std::path::Path) -> platen_sdk::Error {
-        let kind = match &self {
-            Self::Host(error) => return error.clone(),
+    /// Whose turn it is.
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Host(error) => error.kind(),
             Self::Io { source, .. } => match source.kind() {
                 io::ErrorKind::NotFound => ErrorKind::NotFound,
                 io::ErrorKind::PermissionDenied => ErrorKind::Denied,
@@ -123,8 +123,26 @@ impl Error {
             Self::Refused { .. } => ErrorKind::Unsupported,
             Self::Several { .. } | Self::NoSuchCloud { .. } | Self::Ambiguous { .. } => ErrorKind::Config,
             Self::Damaged { .. } | Self::Unsound { .. } | Self::Orient(_) => ErrorKind::BadData,
-        };
-        let error = platen_sdk::Error::new(kind, format!("{}: {self}", path.display()));
+        }
+    }
+
+    fn crossing(self, message: String) -> platen_sdk::Error {
+        if let Self::Host(error) = self {
+            return error;
+        }
+        let error = platen_sdk::Error::new(self.kind(), message);
         if self.may_pass() { error.retryable() } else { error }
+    }
+
+    /// The error as it crosses the boundary.
+    pub(crate) fn into_sdk(self) -> platen_sdk::Error {
+        let message = self.to_string();
+        self.crossing(message)
+    }
+
+    /// The error as it crosses the boundary, with the place where it arose.
+    pub(crate) fn at(self, path: &std::path::Path) -> platen_sdk::Error {
+        let message = format!("{}: {self}", path.display());
+        self.crossing(message)
     }
 }

@@ -155,8 +155,8 @@ impl Scanner for FaroFile {
         match &mut self.place {
             Place::File(path) => {
                 let read = self.reading.file(path, &mut host, &alive);
-                // A cancelled job ends reading with an error of its own.
-                read.map_err(|error| job.check().err().unwrap_or_else(|| error.at(path)))
+                // A cancelled job ends reading with an error of its own. The host knows the file's name.
+                read.map_err(|error| job.check().err().unwrap_or_else(|| error.into_sdk()))
             }
             Place::Folder(folder) => {
                 let pattern = folder.pattern(job.stroke(), job.id());

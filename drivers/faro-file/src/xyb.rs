@@ -38,8 +38,8 @@ pub(crate) struct Xyb<R> {
 enum Order {
     /// Every cell is stored, so many in a line.
     Lines(u32),
-    /// Hits alone.
-    Hits(Steps),
+    /// Hits alone, the lowest of which lies in this row of the steps.
+    Hits(Steps, u32),
 }
 
 /// What the header says.
@@ -66,7 +66,14 @@ impl<R: Read + Seek> Xyb<R> {
         if u64::from(header.rows) * u64::from(header.columns) == cells {
             xyb.choose_lines(header.rows, header.columns)?;
         } else {
-            xyb.order = Order::Hits(xyb.steps()?);
+            let steps = xyb.steps()?;
+            xyb.order = Order::Hits(steps.clone(), 0);
+            let mut lowest = u32::MAX;
+            xyb.cells(&mut |cell| {
+                lowest = lowest.min(cell.row);
+                Ok(())
+            })?;
+            xyb.order = Order::Hits(steps, lowest);
             let note = "the file holds hits without row and column: placed by the order of their angles";
             xyb.about.notes.push(note.to_owned());
         }
@@ -127,11 +134,12 @@ impl<R: Read + Seek> Source for Xyb<R> {
                 }
                 Ok(())
             }
-            Order::Hits(steps) => {
+            Order::Hits(steps, lowest) => {
                 let mut placer = Placer::new(steps);
                 let mut give = |placed: Vec<regrid::Placed<([f64; 3], f64)>>| {
                     placed.into_iter().try_for_each(|place| {
-                        let (row, column, (xyz, intensity)) = (place.row, place.column, place.record);
+                        let (row, column, (xyz, intensity)) =
+                            (place.row.saturating_sub(lowest), place.column, place.record);
                         visit(&RawCell { row, column, xyz, intensity, state: State::Valid })
                     })
                 };

@@ -113,6 +113,10 @@ impl Survey {
             cells,
         };
         plan.header.notes = plan.sentences(&down, &round, closed, &self);
+        let empty = columns[column_range].iter().filter(|line| line.valid == 0).count();
+        if empty > 0 {
+            plan.header.notes.push(format!("{empty} of {n_columns} columns hold no measurement"));
+        }
         plan.header.notes.extend(intensity_note);
         Ok(plan)
     }

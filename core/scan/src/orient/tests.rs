@@ -265,6 +265,17 @@ fn missing_cells_are_missing_however_they_are_written() {
 }
 
 #[test]
+fn columns_without_any_measurement_are_said() {
+    let mut cells = cells(PLAIN);
+    let half = cells.len() / 2;
+    cells[half..].iter_mut().for_each(|cell| cell.xyz = [0.0; 3]);
+    let plan = plan(&cells, &Expected::default()).unwrap();
+    assert_eq!(plan.header.n_columns, COLUMNS);
+    let notes = plan.header.notes.join("\n");
+    assert!(notes.contains("20 of 40 columns hold no measurement"), "{notes}");
+}
+
+#[test]
 fn a_second_pass_that_differs_is_noticed() {
     let cells = cells(PLAIN);
     let plan = plan(&cells, &Expected::default()).unwrap();
