@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
+use platen_scan::{Column, ScanEnd, ScanHeader};
 use platen_sdk::{Job, ScanSink};
 
 use crate::error::{Error, Result};
@@ -23,6 +24,54 @@ const CONNECT: Duration = Duration::from_secs(2);
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(5));
 /// Time before the deadline that is kept for saying why there is no scan.
 const LAST_WORDS: Duration = Duration::from_millis(100);
+
+/// Who wants the scan.
+pub(crate) trait Host {
+    /// An error when the job was cancelled.
+    fn check(&self) -> Result<()>;
+    /// Time until the deadline.
+    fn remaining(&self) -> Duration;
+    /// Says how far the work is.
+    fn progress(&self, fraction: f64, phase: &str);
+    /// Takes what the session delivers.
+    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
+    /// One column.
+    fn column(&mut self, column: &Column) -> Result<()>;
+    /// The end.
+    fn end(&mut self, end: &ScanEnd) -> Result<()>;
+}
+
+/// The host behind the plugin boundary.
+pub(crate) struct ToHost<'a, 'j, 's> {
+    pub(crate) job: &'a Job<'j>,
+    pub(crate) out: &'a mut ScanSink<'s>,
+}
+
+impl Host for ToHost<'_, '_, '_> {
+    fn check(&self) -> Result<()> {
+        Ok(self.job.check()?)
+    }
+
+    fn remaining(&self) -> Duration {
+        self.job.remaining()
+    }
+
+    fn progress(&self, fraction: f64, phase: &str) {
+        self.job.progress(fraction, phase);
+    }
+
+    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
+        Ok(self.out.begin(header)?)
+    }
+
+    fn column(&mut self, column: &Column) -> Result<()> {
+        Ok(self.out.column(column)?)
+    }
+
+    fn end(&mut self, end: &ScanEnd) -> Result<()> {
+        Ok(self.out.end(end)?)
+    }
+}
 
 /// A connection to a bridge.
 struct Link {
@@ -94,13 +143,13 @@ impl Link {
     }
 }
 
-/// Scans through the bridge at `address`; the sink gets the columns as they come.
-pub(crate) fn scan(address: &str, request: Request, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
+/// Scans through the bridge at `address`; the host gets the columns as they come.
+pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Result<()> {
     let mut session = Session::new(request);
     let mut wait = BACK_OFF.0;
     loop {
         let started = Instant::now();
-        let error = match connection(address, &mut session, job, out) {
+        let error = match connection(address, &mut session, host) {
             Ok(()) => return Ok(()),
             Err(error @ (Error::Broken(_) | Error::Busy { .. })) => error,
             Err(error) => return Err(error),
@@ -111,32 +160,32 @@ pub(crate) fn scan(address: &str, request: Request, job: &Job<'_>, out: &mut Sca
             Error::Busy { retry_ms, .. } => Duration::from_millis(*retry_ms).min(BACK_OFF.1),
             _ => wait,
         };
-        pause_for(pause, job, &error)?;
+        pause_for(pause, host, &error)?;
     }
 }
 
 /// One connection, until the scan is whole or the connection fails.
-fn connection(address: &str, session: &mut Session, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
+fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Result<()> {
     let mut link = Link::connect(address)?;
     session.connected();
     loop {
         while let Some(action) = session.action() {
             match action {
                 Action::Send(kind, scan, payload) => link.send(kind, scan, &payload)?,
-                Action::Progress(fraction, phase) => job.progress(fraction, &phase),
-                Action::Begin(header) => out.begin(&header)?,
-                Action::Column(column) => out.column(&column)?,
-                Action::End(end) => return Ok(out.end(&end)?),
+                Action::Progress(fraction, phase) => host.progress(fraction, &phase),
+                Action::Begin(header) => host.begin(&header)?,
+                Action::Column(column) => host.column(&column)?,
+                Action::End(end) => return host.end(&end),
             }
         }
-        if let Err(cancelled) = job.check() {
+        if let Err(cancelled) = host.check() {
             if let Action::Send(kind, scan, payload) = session.abort() {
                 // The job is over whether the bridge hears of it or not: its lease ends by itself.
                 let _ = link.send(kind, scan, &payload);
             }
-            return Err(cancelled.into());
+            return Err(cancelled);
         }
-        if job.remaining() < LAST_WORDS {
+        if host.remaining() < LAST_WORDS {
             return Err(Error::TooLate("the scan was still running".to_owned()));
         }
         if let Some(frame) = link.receive()? {
@@ -145,16 +194,16 @@ fn connection(address: &str, session: &mut Session, job: &Job<'_>, out: &mut Sca
     }
 }
 
-fn pause_for(pause: Duration, job: &Job<'_>, error: &Error) -> Result<()> {
+fn pause_for(pause: Duration, host: &impl Host, error: &Error) -> Result<()> {
     let started = Instant::now();
     while started.elapsed() < pause {
-        job.check()?;
-        if job.remaining() < LAST_WORDS {
+        host.check()?;
+        if host.remaining() < LAST_WORDS {
             return Err(Error::TooLate(error.to_string()));
         }
         std::thread::sleep(TICK);
     }
-    job.progress(0.0, &error.to_string());
+    host.progress(0.0, &error.to_string());
     Ok(())
 }
 

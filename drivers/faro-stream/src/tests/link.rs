@@ -1,13 +1,16 @@
 //! The socket: a bridge on a port of the system's choice.
 
 use std::io::{Read, Write};
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::bridge::request;
-use crate::device::ask;
-use crate::error::Error;
+use platen_scan::{Column, Lattice, ScanEnd, ScanHeader};
+
+use super::bridge::{BRIDGE, Got, check, request};
+use crate::device::{Host, ask, scan};
+use crate::error::{Error, Result};
 use crate::wire::{Decoder, encode, kind};
 
 /// A bridge that takes one connection and answers each frame as `answer` says; it hangs up on `None`.
@@ -56,4 +59,115 @@ fn a_bridge_that_refuses_or_hangs_up_is_told_apart() {
     assert!(matches!(ask(&silent, &request(), &request().settings), Err(Error::Broken(_))));
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     assert!(matches!(ask(&nobody, &request(), &request().settings), Err(Error::Broken(_))));
+}
+
+/// A host with a deadline, which may cancel after some columns.
+struct Taker {
+    until: Instant,
+    cancel_after: usize,
+    header: Option<ScanHeader>,
+    columns: Vec<Column>,
+    end: Option<ScanEnd>,
+}
+
+impl Taker {
+    fn new(limit: Duration) -> Self {
+        let until = Instant::now() + limit;
+        Self { until, cancel_after: usize::MAX, header: None, columns: Vec::new(), end: None }
+    }
+}
+
+impl Host for Taker {
+    fn check(&self) -> Result<()> {
+        if self.columns.len() < self.cancel_after {
+            return Ok(());
+        }
+        Err(platen_sdk::Error::new(platen_sdk::ErrorKind::Cancelled, "cancelled").into())
+    }
+    fn remaining(&self) -> Duration {
+        self.until.saturating_duration_since(Instant::now())
+    }
+    fn progress(&self, _: f64, _: &str) {}
+    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
+        assert!(self.header.replace(header.clone()).is_none());
+        Ok(())
+    }
+    fn column(&mut self, column: &Column) -> Result<()> {
+        self.columns.push(column.clone());
+        Ok(())
+    }
+    fn end(&mut self, end: &ScanEnd) -> Result<()> {
+        self.end = Some(*end);
+        Ok(())
+    }
+}
+
+/// Serves the scan; the first connections break after so many frames each, the rest hold.
+fn bridge(breaks: Vec<usize>) -> (String, std::sync::mpsc::Receiver<u16>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let (heard, asked) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for (connection, stream) in listener.incoming().enumerate() {
+            let left = breaks.get(connection).copied().unwrap_or(usize::MAX);
+            serve_scan(stream.unwrap(), left, &heard);
+        }
+    });
+    (address, asked)
+}
+
+/// One connection, until `left` frames were sent or the driver hangs up.
+fn serve_scan(mut stream: TcpStream, mut left: usize, heard: &std::sync::mpsc::Sender<u16>) {
+    let (mut decoder, mut sequence) = (Decoder::default(), 0);
+    let mut bytes = [0; 1000];
+    while let Ok(n @ 1..) = stream.read(&mut bytes) {
+        decoder.push(&bytes[..n]);
+        while let Some(asked) = decoder.next().unwrap() {
+            heard.send(asked.kind).unwrap();
+            let quiet = matches!(asked.kind, kind::HEARTBEAT | kind::ABORT);
+            let answers = if quiet { Vec::new() } else { BRIDGE.answer(asked.kind, &asked.payload) };
+            for frame in answers {
+                if left == 0
+                    || stream.write_all(&encode(frame.kind, frame.scan, sequence, &frame.payload)).is_err()
+                {
+                    return;
+                }
+                left -= 1;
+                sequence += 1;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scan_over_a_socket_goes_on_after_every_break() {
+    let (address, asked) = bridge(vec![0, 1, 4, 9]);
+    let mut taker = Taker::new(Duration::from_secs(60));
+    scan(&address, request(), &mut taker).unwrap();
+    let mut lattice = Lattice::new(taker.header.unwrap());
+    taker.columns.iter().for_each(|column| lattice.push(column).unwrap());
+    check(&BRIDGE, &Got { lattice, columns: taker.columns, end: taker.end.unwrap(), connections: 5 });
+    let asked: Vec<u16> = asked.try_iter().filter(|kind| *kind != kind::HEARTBEAT).collect();
+    assert_eq!(asked.iter().filter(|kind| **kind == kind::HELLO).count(), 5);
+    assert_eq!(asked.iter().filter(|kind| **kind == kind::START).count(), 2, "{asked:x?}");
+}
+
+#[test]
+fn a_cancelled_scan_is_aborted_at_the_bridge() {
+    let (address, asked) = bridge(Vec::new());
+    let mut taker = Taker { cancel_after: 3, ..Taker::new(Duration::from_secs(60)) };
+    let cancelled = scan(&address, request(), &mut taker).unwrap_err();
+    assert!(matches!(&cancelled, Error::Host(error) if error.kind() == platen_sdk::ErrorKind::Cancelled));
+    let heard = asked.iter().find(|kind| *kind == kind::ABORT);
+    assert_eq!(heard, Some(kind::ABORT));
+    assert!(taker.end.is_none());
+}
+
+#[test]
+fn nobody_there_ends_at_the_deadline_with_the_reason() {
+    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let mut taker = Taker::new(Duration::from_millis(400));
+    let late = scan(&nobody, request(), &mut taker).unwrap_err();
+    assert!(late.to_string().starts_with("no scan in time: the connection broke: "), "{late}");
+    assert!(taker.header.is_none());
 }
