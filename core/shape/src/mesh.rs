@@ -8,5 +8,5 @@ mod topology;
 mod triangulate;
 
 pub use disk::{DiskMesh, DiskParts, MeshError};
-pub use face::{Face, axes};
+pub use face::Face;
 pub(crate) use face::{biweight, sigma_across};

@@ -1,6 +1,8 @@
 //! Whole measurements of the sample plates with the paper's harmonic map, against their truth. Left out when the samples
 //! are absent.
 
+#![allow(clippy::unwrap_used, reason = "test code: helpers fail like tests")]
+
 mod support;
 
 use platen_shape::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
@@ -88,7 +90,9 @@ fn sample_plates_are_met() {
         let bend = rms(&bends(&m.surface, &sample.truth["curvature_grid_mid"]));
         println!("{name}: {corners:.2}, {mean:.2}/{worst:.2}, {inside:.3}/{edge:.3}, {bend:.1e}");
         println!("    edges {:?} {:?} {:?}", m.mesh.edge_length, m.quality, m.timings);
+        // The harmonic map's own error on a sphere; the surface itself is met there too.
         let off_by_the_map = if name.starts_with("p2") { 1.0 } else { 0.0 };
-        assert!(corners < 3.0 && mean < 1.0 + off_by_the_map && inside < 0.1 && edge < 0.2 && bend < 2e-2);
+        assert!(corners < 3.0 && mean < 1.0 + off_by_the_map);
+        assert!(inside < 0.03 && edge < 0.06 && bend < 5e-3);
     }
 }

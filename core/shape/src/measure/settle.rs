@@ -6,10 +6,12 @@
 
 use super::Quality;
 use crate::mesh::foot::walk;
-use crate::mesh::{Face, axes, biweight, sigma_across};
-use crate::surface::{Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
+use crate::mesh::{Face, biweight, sigma_across};
+use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
+/// Length of a span of S, metres: a fifth of the width of a narrow bend.
+const SPAN: f64 = 0.06;
 /// Cells of the mask, metres.
 const MASK_CELL: f64 = 0.025;
 /// Rows up to this far apart are neighbours: a single dropout is no hole.
@@ -29,11 +31,10 @@ pub(super) fn settle(
     chart: &Chart,
     spec: &PlateSpec,
 ) -> Result<Settled, Undetermined> {
-    let [u, v] = axes(spec.width, spec.height);
     let carried = carry(face, places, chart)?;
     // Around its middle the plate's coordinates are small, and so are the rounding errors of their squares.
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
-    let mut fit = Fit::<3>::new(u, v);
+    let mut fit = Fit::<3>::new(Axis::of_length(spec.width, SPAN), Axis::of_length(spec.height, SPAN));
     let mut seen = Seen::new(spec);
     let mut variance = 0.0;
     walk(&face.face, patch.samples.iter(), |sample, foot| {

@@ -68,7 +68,8 @@ fn holes_are_bridged_and_marked() {
     let scene = Scene { hidden: Some(hole), ..Scene::new(cylinder(7.0, 0.4), [3.0, 2.5]) };
     let measured = scene.measure();
     let e = Errors::of(&measured, &scene);
-    assert!(e.markers < 0.2 && e.inside < 0.02 && e.edge < 0.03, "{e:?}");
+    println!("hole: {e:?}");
+    assert!(e.markers < 0.2 && e.inside < 0.01 && e.edge < 0.02, "{e:?}");
     let mask = measured.surface.mask();
     assert!(!mask.seen(1.25, 1.0) && !mask.seen(1.05, 1.15) && mask.seen(0.9, 1.0) && mask.seen(1.25, 1.3));
     let hidden = 0.5 * 0.4 / (3.0 * 2.5);
@@ -76,8 +77,8 @@ fn holes_are_bridged_and_marked() {
     // In the hole the surface is interpolated, and says how uncertain it is.
     let (surface, placed) = (&measured.surface, scene.placed());
     let off = (surface.face(1.25, 1.0) - placed.face(1.25, 1.0)).norm();
-    assert!(off < 0.5e-3, "{off}");
-    assert!(surface.sigma_point(1.25, 1.0) > 2.0 * surface.sigma_point(2.2, 1.0));
+    assert!(off < 0.3e-3, "{off}");
+    assert!(surface.sigma_point(1.25, 1.0) > 1.2 * surface.sigma_point(2.2, 1.0));
 }
 
 #[test]
@@ -85,7 +86,7 @@ fn an_edge_behind_a_person_is_bridged() {
     let scene =
         Scene { hidden: Some([[1.2, -1.0], [1.7, 0.5]]), ..Scene::new(cylinder(7.0, 0.4), [3.0, 2.5]) };
     let e = errors("person", &scene);
-    assert!(e.markers < 0.4 && e.inside < 0.02 && e.edge < 0.06, "{e:?}");
+    assert!(e.markers < 0.4 && e.inside < 0.01 && e.edge < 0.03 && e.curvature < 3e-4, "{e:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::{EdgeCurve, Outline, Vec3};
 /// surface. Detail across the surface (narrow bends) is added later, from the samples inside.
 const SPAN: f64 = 0.25;
 /// Wavelength, metres, below which an edge is taken for noise.
-const SMOOTH_BELOW: f64 = 0.4;
+const SMOOTH_BELOW: f64 = 1.0;
 /// A bridged point of an edge counts this much: enough to guide the curve, not to bend it against seen points.
 const BRIDGED: f64 = 0.01;
 /// The corners are fixed by this weight.

@@ -12,8 +12,9 @@ use super::foot::walk;
 use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
 use crate::{Outline, Patch, PlateSpec, Sample, Vec3};
 
-/// Length of a span of every surface fitted here, metres: the narrowest bend of a press is a few times as wide.
-const SPAN: f64 = 0.06;
+/// Length of a span of the smooth face, metres. Bends of a press are three and more times as wide; finer detail is left
+/// to S, which is fitted to all samples.
+const SPAN: f64 = 0.1;
 /// Samples used for the smooth face, at least, where there are as many: every n-th of every n-th column.
 const ENOUGH: usize = 30_000;
 /// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
@@ -34,19 +35,13 @@ pub struct Face {
     pub(crate) noise_scale: f64,
 }
 
-/// Axes over the rectangle with spans as long as the surfaces here have.
-#[must_use]
-pub fn axes(width: f64, height: f64) -> [Axis; 2] {
-    [width, height].map(|length| Axis::new(0.0, length, ((length / SPAN).round() as usize).clamp(8, 128)))
-}
-
 impl Face {
     /// Fits the face to the samples.
     ///
     /// # Errors
     /// [`MeshError::Undetermined`] when too few samples lie on the plate.
     pub fn fit(patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Result<Self, MeshError> {
-        let axes = axes(spec.width, spec.height);
+        let axes = [spec.width, spec.height].map(|length| Axis::of_length(length, SPAN));
         let base = coons(outline, spec.width, spec.height, spec.face_inset, axes);
         let heights = Heights::over(&base, patch);
         let (fitted, noise_scale) = heights.smooth(axes)?;
@@ -108,21 +103,25 @@ impl Heights {
 
     /// The spline through the heights, and how much larger than stated their noise is.
     fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
-        let fit = |weight: &dyn Fn(usize) -> f64| {
+        let gather = |weight: &dyn Fn(usize) -> f64| {
             let mut fit = Fit::new(axes[0], axes[1]);
             for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
                 fit.add(*a, *b, [*height], weight(i));
             }
-            fit.solve([1.0])
+            fit
         };
-        let first = fit(&|i| self.sigmas[i].powi(-2))?;
+        let all = gather(&|i| self.sigmas[i].powi(-2));
+        let penalty = all.choose_penalty([1.0]);
+        let first = all.solve_with(penalty)?;
         let residuals: Vec<f64> = (0..self.places.len())
             .map(|i| {
                 (self.heights[i] - first.net.point(self.places[i][0], self.places[i][1])[0]) / self.sigmas[i]
             })
             .collect();
         let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
-        let robust = fit(&|i| biweight(residuals[i] / scale) / (scale * self.sigmas[i]).powi(2))?;
+        // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
+        let robust =
+            gather(&|i| biweight(residuals[i] / scale) / self.sigmas[i].powi(2)).solve_with(penalty)?;
         Ok((robust, scale))
     }
 }

@@ -1,9 +1,7 @@
 //! Foot points: the place on a surface that is nearest to a point in space.
 
-use nalgebra::{Matrix2, Vector2};
-
 use crate::Vec3;
-use crate::surface::Net;
+use crate::surface::{Axis, Net};
 
 /// The place of a point over a surface.
 #[derive(Debug, Clone, Copy)]
@@ -26,10 +24,37 @@ const MARGIN: f64 = 0.05;
 /// Places per axis of the coarse search for a first foot.
 const COARSE: usize = 24;
 
+/// A place of a surface with its tangents, ready for steps from it.
+#[derive(Clone, Copy)]
+struct Tangent {
+    at: [f64; 2],
+    point: Vec3,
+    along: [Vec3; 2],
+    /// Inverse of the metric (e, f; f, g): g, -f and e over its determinant.
+    inverse: [f64; 3],
+}
+
+impl Tangent {
+    fn of(net: &Net<3>, at: [f64; 2]) -> Self {
+        let [point, along_u, along_v] = net.frame(at[0], at[1]).map(Vec3::from);
+        let (e, f, g) = (along_u.norm_squared(), along_u.dot(&along_v), along_v.norm_squared());
+        let determinant = e * g - f * f;
+        let inverse = [g / determinant, -f / determinant, e / determinant];
+        Self { at, point, along: [along_u, along_v], inverse }
+    }
+
+    /// From here to the foot of `p` on the tangent plane; not finite where the surface is degenerate.
+    fn step(&self, p: &Vec3) -> [f64; 2] {
+        let d = p - self.point;
+        let (x, y) = (self.along[0].dot(&d), self.along[1].dot(&d));
+        [self.inverse[0] * x + self.inverse[1] * y, self.inverse[1] * x + self.inverse[2] * y]
+    }
+}
+
 /// Finds feet one after the other; each search starts at the one before.
 pub(crate) struct FootFinder<'a> {
     net: &'a Net<3>,
-    last: Option<[f64; 2]>,
+    last: Option<Tangent>,
 }
 
 impl<'a> FootFinder<'a> {
@@ -37,52 +62,34 @@ impl<'a> FootFinder<'a> {
         Self { net, last: None }
     }
 
-    /// The next search starts here.
-    pub(crate) fn start_at(&mut self, at: [f64; 2]) {
-        self.last = Some(at);
-    }
-
     /// The foot of `p`: Gauss-Newton, which converges at a rate of height times curvature. `None` beyond the margin.
     pub(crate) fn find(&mut self, p: &Vec3) -> Option<Foot> {
-        let near = self.last.and_then(|at| self.descend(p, at));
-        let foot = near.or_else(|| self.descend(p, self.coarse(p)))?;
-        self.last = Some(foot.at);
+        let near = self.last.and_then(|start| self.descend(p, start));
+        let (foot, tangent) = near.or_else(|| self.descend(p, Tangent::of(self.net, self.coarse(p))))?;
+        self.last = Some(tangent);
         Some(foot)
     }
 
-    fn descend(&self, p: &Vec3, start: [f64; 2]) -> Option<Foot> {
+    fn descend(&self, p: &Vec3, mut tangent: Tangent) -> Option<(Foot, Tangent)> {
         let (u, v) = (&self.net.u, &self.net.v);
-        let mut at = start;
+        let within = |x: f64, axis: &Axis| x.clamp(axis.start() - MARGIN, axis.end() + MARGIN);
         for _ in 0..MAX_STEPS {
-            let [q, along_u, along_v] = self.net.frame(at[0], at[1]).map(Vec3::from);
-            let d = p - q;
-            let metric = Matrix2::new(
-                along_u.norm_squared(),
-                along_u.dot(&along_v),
-                along_u.dot(&along_v),
-                along_v.norm_squared(),
-            );
-            let step = metric.try_inverse()? * Vector2::new(along_u.dot(&d), along_v.dot(&d));
-            let to = [at[0] + step.x, at[1] + step.y];
-            if step.norm() < SMALL_STEP {
-                let inside = to[0] > u.start() - MARGIN
-                    && to[0] < u.end() + MARGIN
-                    && to[1] > v.start() - MARGIN
-                    && to[1] < v.end() + MARGIN;
-                let normal = along_u.cross(&along_v).normalize();
-                return inside.then(|| Foot { at: to, normal, height: normal.dot(&d) });
+            let [du, dv] = tangent.step(p);
+            let to = [tangent.at[0] + du, tangent.at[1] + dv];
+            let inside = [within(to[0], u), within(to[1], v)];
+            if du * du + dv * dv < SMALL_STEP * SMALL_STEP {
+                let normal = tangent.along[0].cross(&tangent.along[1]).normalize();
+                let foot = Foot { at: to, normal, height: normal.dot(&(p - tangent.point)) };
+                return (to == inside).then_some((foot, tangent));
             }
-            at = [
-                to[0].clamp(u.start() - MARGIN, u.end() + MARGIN),
-                to[1].clamp(v.start() - MARGIN, v.end() + MARGIN),
-            ];
+            tangent = Tangent::of(self.net, inside);
         }
         None
     }
 
     /// The nearest of a coarse grid of places.
     fn coarse(&self, p: &Vec3) -> [f64; 2] {
-        let place = |axis: &crate::surface::Axis, k: usize| {
+        let place = |axis: &Axis, k: usize| {
             axis.start() + (axis.end() - axis.start()) * (k as f64 + 0.5) / COARSE as f64
         };
         let mut best = ([0.0; 2], f64::INFINITY);
@@ -105,15 +112,15 @@ pub(crate) fn walk<'s>(
     mut visit: impl FnMut(&'s crate::Sample, Foot),
 ) {
     let mut finder = FootFinder::new(net);
-    let mut column_start: Option<(u32, [f64; 2])> = None;
+    let mut column_start: Option<(u32, Tangent)> = None;
     for sample in samples {
         let new_column = column_start.is_none_or(|(column, _)| column != sample.column);
-        if let (true, Some((_, at))) = (new_column, column_start) {
-            finder.start_at(at);
+        if let (true, Some((_, start))) = (new_column, column_start) {
+            finder.last = Some(start);
         }
         if let Some(foot) = finder.find(&sample.point) {
-            if new_column {
-                column_start = Some((sample.column, foot.at));
+            if let (true, Some(start)) = (new_column, finder.last) {
+                column_start = Some((sample.column, start));
             }
             visit(sample, foot);
         }
@@ -123,7 +130,6 @@ pub(crate) fn walk<'s>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Axis;
 
     #[test]
     fn feet_on_a_cylinder_are_the_closed_form() {

@@ -35,6 +35,12 @@ impl Axis {
         Self { start, step: (end - start) / n_spans as f64, n_spans }
     }
 
+    /// From 0 to `length` in spans of about `span`: at least 8, at most 128.
+    #[must_use]
+    pub fn of_length(length: f64, span: f64) -> Self {
+        Self::new(0.0, length, ((length / span).round() as usize).clamp(8, 128))
+    }
+
     /// Number of spans.
     #[must_use]
     pub fn n_spans(&self) -> usize {

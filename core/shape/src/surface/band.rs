@@ -114,7 +114,8 @@ impl BandMatrix {
     }
 
     /// Product with a vector in the net's order.
-    pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
+    #[cfg(test)]
+    fn times(&self, x: &[f64]) -> Vec<f64> {
         let (layout, m) = (self.layout, self.layout.block());
         let mut sorted = vec![0.0; x.len()];
         (0..x.len()).for_each(|c| sorted[layout.index(c)] = x[c]);

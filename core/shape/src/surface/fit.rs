@@ -1,7 +1,7 @@
 //! Penalised weighted least squares of a tensor spline on scattered points.
 
 use super::axis::Axis;
-use super::band::{BandFactor, BandMatrix};
+use super::band::BandFactor;
 use super::moments::Moments;
 use super::net::Net;
 use super::smoothing::Penalty;
@@ -55,40 +55,26 @@ impl<const D: usize> Fit<D> {
     /// # Errors
     /// [`Undetermined`] when there are too few points, or all in one place.
     pub fn solve(&self, direction: [f64; D]) -> Result<Fitted<D>, Undetermined> {
-        self.solve_with(self.moments.grid_values(direction).choose_penalty())
+        self.solve_with(self.choose_penalty(direction))
+    }
+
+    /// The penalty that the data make most likely.
+    pub(crate) fn choose_penalty(&self, direction: [f64; D]) -> Penalty {
+        self.moments.grid_values(direction).choose_penalty()
     }
 
     /// Solves with the given penalty.
     pub(crate) fn solve_with(&self, penalty: Penalty) -> Result<Fitted<D>, Undetermined> {
-        let undetermined = Undetermined { n_points: self.moments.n_points };
-        let (data, rhs) = self.moments.normal_equations();
-        let mut matrix: BandMatrix = data.clone();
+        let n_points = self.moments.n_points;
+        let (mut matrix, mut control) = self.moments.normal_equations();
         matrix.add_kronecker(&self.u.roughness(), &self.v.gram(), penalty.u);
         matrix.add_kronecker(&self.u.gram(), &self.v.roughness(), penalty.v);
-        let precision = matrix.factor().map_err(|_| undetermined)?;
-        let mut control = rhs.clone();
+        let precision = matrix.factor().map_err(|_| Undetermined { n_points })?;
         precision.solve(&mut control);
-        let residual_square = residual_square(self.moments.square, &data, &rhs, &control);
         let net = Net { u: self.u, v: self.v, control };
-        let (weight, n_points) = (self.moments.weight, self.moments.n_points);
-        Ok(Fitted { net, precision, residual_square, weight, n_points })
+        let residual_square = self.moments.residual_square(&net);
+        Ok(Fitted { net, precision, residual_square, weight: self.moments.weight, n_points })
     }
-}
-
-/// y'y - 2 c'b + c'Nc over all components.
-fn residual_square<const D: usize>(
-    square: f64,
-    data: &BandMatrix,
-    rhs: &[[f64; D]],
-    control: &[[f64; D]],
-) -> f64 {
-    let mut sum = square;
-    for d in 0..D {
-        let c: Vec<f64> = control.iter().map(|row| row[d]).collect();
-        let image = data.times(&c);
-        sum += c.iter().zip(&image).zip(rhs).map(|((c, n), b)| c * (n - 2.0 * b[d])).sum::<f64>();
-    }
-    sum.max(0.0)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 use super::axis::{Axis, BASIS, multiply, pairs};
 use super::band::BandMatrix;
+use super::net::Net;
 use super::smoothing::{GAUSS, GridValues};
 use nalgebra::{Matrix4, Vector4};
 
@@ -107,6 +108,26 @@ impl<const D: usize> Moments<D> {
         (matrix, rhs)
     }
 
+    /// Weighted sum of squared distances of the points from `net`, over all components.
+    pub(crate) fn residual_square(&self, net: &Net<D>) -> f64 {
+        let mut sum = self.square;
+        for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points > 0) {
+            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
+            let polynomial = polynomial(net, i, k);
+            for d in 0..D {
+                for (a, q) in (0..4).flat_map(|q| (0..4).map(move |p| (p, q))) {
+                    // The polynomial's own image under the cell's moments, less twice the right-hand side.
+                    let mut image = -2.0 * cell.rhs[q][a][d];
+                    for (row, moments) in polynomial.iter().zip(&cell.gram[q..]) {
+                        image += row.iter().zip(&moments[a..]).map(|(c, m)| c[d] * m).sum::<f64>();
+                    }
+                    sum += polynomial[q][a][d] * image;
+                }
+            }
+        }
+        sum.max(0.0)
+    }
+
     /// Four values per cell of the component along `direction`: a bilinear function through each cell's points, read
     /// at the Gauss places, where the noise of the four is independent and even. Nothing where too few points, or
     /// badly spread ones, were seen.
@@ -138,6 +159,21 @@ impl<const D: usize> Moments<D> {
             }
         }
     }
+}
+
+/// The net's polynomial in a cell: `[q][p]` is the coefficient of s^p t^q.
+fn polynomial<const D: usize>(net: &Net<D>, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
+    let mut polynomial = [[[0.0; D]; 4]; 4];
+    for (b, bv) in BASIS.iter().enumerate() {
+        for (control, bu) in net.row(i, k + b).iter().zip(&BASIS) {
+            for (row, fv) in polynomial.iter_mut().zip(bv) {
+                for (slot, fu) in row.iter_mut().zip(bu) {
+                    slot.iter_mut().zip(control).for_each(|(x, c)| *x += fv * fu * c);
+                }
+            }
+        }
+    }
+    polynomial
 }
 
 fn powers(t: f64) -> [f64; 7] {

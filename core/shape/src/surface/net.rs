@@ -114,7 +114,7 @@ impl<const D: usize> Net<D> {
     }
 
     /// The four control values that row `k` gives to the span starting at coefficient `i`.
-    fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
+    pub(super) fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
         let start = k * self.u.n_coefficients() + i;
         &self.control[start..start + 4]
     }

@@ -41,6 +41,10 @@ const NULLITY: usize = 3;
 /// The search covers penalties whose largest eigenvalue is 10^x times that of the data, x in this range. Beyond the
 /// upper end rounding would bend the shapes that the penalty is to leave alone; beyond the lower the fit interpolates.
 const EXPONENTS: (f64, f64) = (-1.0, 10.0);
+/// Exponents of a spline that hardly does more than a quadratic.
+const STIFF: [f64; 2] = [9.0, 9.0];
+/// Rounds of filling gaps with the smoothed values; each takes up what the gaps' values still bend the spline.
+const ROUNDS: usize = 5;
 /// Width of the last step of the search, in decades. The criterion is flat: a tenth of a decade changes nothing.
 const LAST_STEP: f64 = 0.2;
 
@@ -48,16 +52,16 @@ impl GridValues {
     /// The most likely penalty.
     pub(crate) fn choose_penalty(&self) -> Penalty {
         let (along_u, along_v) = (Spectrum::new(&self.u), Spectrum::new(&self.v));
-        let (mut filled, missing) = self.filled();
+        let (mut filled, gaps) = self.filled();
         let mut criterion = Criterion::new(&along_u, &along_v, &filled);
-        let mut best = criterion.minimise();
-        if !missing.is_empty() {
-            // The first fill is crude: put the smoothed values there and choose again.
-            let smooth = criterion.smoothed(best);
-            missing.iter().for_each(|&cell| filled[cell] = smooth[cell]);
-            criterion = Criterion::new(&along_u, &along_v, &filled);
+        let mut best = STIFF;
+        if !gaps.is_empty() {
+            // A crude fill has kinks that would pass for shape: first a stiff spline goes through, then the chosen one.
+            criterion.refill(&mut filled, &gaps, best);
             best = criterion.minimise();
+            criterion.refill(&mut filled, &gaps, best);
         }
+        best = criterion.minimise();
         let [scale_u, scale_v] = criterion.scales(best);
         let noise = criterion.noise(best);
         Penalty { u: scale_u / (noise * 0.5 * self.v.step()), v: scale_v / (noise * 0.5 * self.u.step()) }
@@ -144,6 +148,15 @@ impl<'a> Criterion<'a> {
         let squares = coordinates.map(|z| z * z);
         let outside = (values.norm_squared() - squares.sum()).max(0.0);
         Self { u, v, coordinates, squares, outside, n_values: values.len() }
+    }
+
+    /// Puts the spline at exponents `x` into the gaps of the values, so that in the end they no longer pull at it.
+    fn refill(&mut self, values: &mut DMatrix<f64>, gaps: &[(usize, usize)], x: [f64; 2]) {
+        for _ in 0..ROUNDS {
+            let smooth = self.smoothed(x);
+            gaps.iter().for_each(|&cell| values[cell] = smooth[cell]);
+            *self = Self::new(self.u, self.v, values);
+        }
     }
 
     /// The penalty's factors at exponents `x`.
