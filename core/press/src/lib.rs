@@ -5,6 +5,7 @@ mod codec;
 mod handshake;
 mod journal;
 mod link;
+mod page;
 mod reconcile;
 mod runner;
 mod stroke;
@@ -17,6 +18,7 @@ pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, ROUND_TRIP_LIMITS_MS, Request, Response,
     TransportError, consequence,
 };
+pub use page::{map_csv, map_markdown, reference_program};
 pub use runner::{
     Answer, Durations, HostSide, Metrics, Order, PressSide, RunError, Status, channels, run_press,
 };
