@@ -17,6 +17,7 @@ mod patch;
 mod plate;
 pub mod sparse;
 pub mod surface;
+mod target;
 pub mod task;
 
 pub use flatten::{Chart, Flatten, FlattenError};
@@ -26,6 +27,7 @@ pub use outline::{Corner, EdgeCurve, Outline, OutlineError};
 pub use patch::{Beyond, Crossing, Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
 pub use surface::{Surface, SurfaceParts};
+pub use target::{TargetError, TargetSurface};
 
 /// A point or vector in space, metres, scanner frame unless said.
 pub type Vec3 = nalgebra::Vector3<f64>;

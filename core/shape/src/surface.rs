@@ -223,9 +223,17 @@ impl Derivatives {
         let along = l / e;
         let twist = (m - f * along) / area2.sqrt();
         let across = (k * e - 2.0 * f * m + f * f * along) / area2;
+        Curvature::from_form(along, across, twist)
+    }
+}
+
+impl Curvature {
+    /// From the second fundamental form in an orthonormal frame along u.
+    #[must_use]
+    pub fn from_form(along: f64, across: f64, twist: f64) -> Self {
         let mean = 0.5 * (along + across);
         let spread = (0.25 * (along - across).powi(2) + twist * twist).sqrt();
-        Curvature {
+        Self {
             u: along,
             v: across,
             uv: twist,
@@ -233,6 +241,12 @@ impl Derivatives {
             min: mean - spread,
             gaussian: along * across - twist * twist,
         }
+    }
+
+    /// Normal curvature along a unit direction.
+    #[must_use]
+    pub fn along(&self, [x, y]: [f64; 2]) -> f64 {
+        x * x * self.u + 2.0 * x * y * self.uv + y * y * self.v
     }
 }
 
