@@ -1,0 +1,149 @@
+//! The whole target laid on the plate: deviation everywhere.
+//!
+//! The target's face comes onto the plate's from the scanner's side, as a rigid surface. Its direction follows the plate's own
+//! (u, v), by the best rigid fit of all material points; then it is lowered and tilted until it is lowest in the middle
+//! of the plate without going through the plate anywhere. A plate not bent enough leaves its tilt open, as under a
+//! board: a target that rocks keeps the tilt of the best fit.
+
+use nalgebra::{Matrix3, Rotation3};
+use platen_sdk::{Error, ErrorKind, Result};
+use platen_shape::{Surface, TargetSurface, Vec3};
+
+use crate::programme;
+
+/// Nodes along each side: every fifth is a node of the result's grid.
+pub(crate) const NODES: usize = 101;
+
+/// The target at rest on the plate.
+#[derive(Debug)]
+pub(crate) struct Deviation {
+    /// Places, v outer, u inner.
+    pub(crate) uv: Vec<[f64; 2]>,
+    /// Measured minus target along the target's normal, metres, positive towards the scanner.
+    pub(crate) value: Vec<f64>,
+    /// The plate was seen there.
+    pub(crate) seen: Vec<bool>,
+    /// The target rocks on the plate.
+    pub(crate) rocks: bool,
+    contacts: Vec<usize>,
+    rest: Rest,
+}
+
+/// From the scanner's frame to the target's, and the target's own last movement.
+#[derive(Debug)]
+struct Rest {
+    rotation: Rotation3<f64>,
+    translation: Vec3,
+    /// Rise of the target, and its tilts about x and y.
+    movement: Vec3,
+}
+
+impl Deviation {
+    /// Lays the target on the plate.
+    ///
+    /// # Errors
+    /// When too little of the plate was seen to carry the target, or the job was cancelled.
+    pub(crate) fn new(now: &Surface, target: &TargetSurface, check: &dyn Fn() -> Result<()>) -> Result<Self> {
+        let at = |k: usize, length: f64| length * k as f64 / (NODES - 1) as f64;
+        let uv: Vec<[f64; 2]> =
+            (0..NODES * NODES).map(|i| [at(i % NODES, now.width()), at(i / NODES, now.height())]).collect();
+        let seen: Vec<bool> = uv.iter().map(|&[u, v]| now.mask().seen(u, v)).collect();
+        let (rotation, translation) = fit(now, target, &uv, &seen);
+        let mut rest = Rest { rotation, translation, movement: Vec3::zeros() };
+        check()?;
+
+        let fitted: Vec<f64> = uv.iter().map(|&at| rest.deviation(now, target, at)).collect();
+        let (mut rows, mut heights, mut index) = (Vec::new(), Vec::new(), Vec::new());
+        for i in (0..uv.len()).filter(|&i| seen[i]) {
+            rows.push(row(target, uv[i]));
+            heights.push(fitted[i]);
+            index.push(i);
+        }
+        check()?;
+        let reach = 1e3 * (now.width() + now.height());
+        let vertex = programme::minimum(&rows, &heights, reach).ok_or_else(|| {
+            Error::new(
+                ErrorKind::BadData,
+                "the target finds no seat: the plate was seen on one side of its middle only",
+            )
+            .hint("scan again with the whole plate in view")
+        })?;
+        let shorter = now.width().min(now.height());
+        let rocks = narrowest(vertex.held_by.map(|i| uv[index[i]])) < 0.25 * shorter;
+        let held_by;
+        (rest.movement, held_by) = if rocks {
+            let rise = |i: usize| heights[i] / rows[i].x;
+            let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
+            (Vec3::x() * rise(top), vec![top])
+        } else {
+            (vertex.q, vertex.held_by.to_vec())
+        };
+        let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&rest.movement)).collect();
+        let contacts = held_by.into_iter().map(|i| index[i]).collect();
+        Ok(Self { uv, value, seen, rocks, contacts, rest })
+    }
+
+    /// Measured minus target at one place.
+    pub(crate) fn at(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
+        self.rest.deviation(now, target, at) - row(target, at).dot(&self.rest.movement)
+    }
+
+    /// One sigma of the deviation at a place: the fit's noise there and where the target touches.
+    pub(crate) fn sigma(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
+        let here = row(target, at);
+        let rows: Vec<Vec3> = self.contacts.iter().map(|&i| row(target, self.uv[i])).collect();
+        let weights: Vec<f64> = match rows[..] {
+            [a, b, c] => Matrix3::from_columns(&[a, b, c])
+                .try_inverse()
+                .map_or(vec![0.0; 3], |inverse| (inverse * here).iter().copied().collect()),
+            _ => rows.iter().map(|r| here.x / r.x).collect(),
+        };
+        let contacts = self.contacts.iter().zip(weights).map(|(&i, weight)| (self.uv[i], -weight));
+        now.sigma_of_heights(&contacts.chain([(at, 1.0)]).collect::<Vec<_>>())
+    }
+}
+
+impl Rest {
+    fn deviation(&self, now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> f64 {
+        let here = self.rotation * now.face(u, v) + self.translation;
+        (here - target.face(u, v)).dot(&target.normal(u, v))
+    }
+}
+
+/// How the deviation at a place falls when the target rises and tilts.
+fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {
+    let (p, n) = (target.face(u, v), target.normal(u, v));
+    let turn = p.cross(&n);
+    Vec3::new(n.z, turn.x, turn.y)
+}
+
+/// The rigid motion that brings the seen material points closest to the target's (Kabsch, by the singular vectors of
+/// the covariance).
+fn fit(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]], seen: &[bool]) -> (Rotation3<f64>, Vec3) {
+    let pairs: Vec<(Vec3, Vec3)> = uv
+        .iter()
+        .zip(seen)
+        .filter(|(_, seen)| **seen)
+        .map(|(&[u, v], _)| (now.face(u, v), target.face(u, v)))
+        .collect();
+    let n = pairs.len().max(1) as f64;
+    let from = pairs.iter().map(|(p, _)| p).sum::<Vec3>() / n;
+    let to = pairs.iter().map(|(_, q)| q).sum::<Vec3>() / n;
+    let covariance: Matrix3<f64> = pairs.iter().map(|(p, q)| (q - to) * (p - from).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (Some(left), Some(right)) = (svd.u, svd.v_t) else {
+        return (Rotation3::identity(), to - from);
+    };
+    let handed = (left * right).determinant().signum();
+    let rotation = left * Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, handed)) * right;
+    let rotation = Rotation3::from_matrix_unchecked(rotation);
+    (rotation, to - rotation * from)
+}
+
+/// Smallest altitude of a triangle.
+fn narrowest([a, b, c]: [[f64; 2]; 3]) -> f64 {
+    let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let twice_area = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
+    let longest = side(a, b).max(side(b, c)).max(side(c, a));
+    if longest > 0.0 { twice_area / longest } else { 0.0 }
+}

@@ -1,0 +1,166 @@
+//! The named figures, in the words of the press's register map.
+
+use platen_shape::task::{Figure, Quantity, Task};
+use platen_shape::{Surface, TargetSurface};
+
+use crate::deviation::Deviation;
+use crate::judge::{EXPANDED, Judged};
+
+/// Nodes along each side for the mean curvature: the result's grid.
+const GRID: usize = 21;
+
+/// Deviation of the whole plate from the target laid on it.
+pub(crate) fn of_deviation(
+    deviation: &Deviation,
+    now: &Surface,
+    target: &TargetSurface,
+    tolerance: Option<f64>,
+) -> Vec<Figure> {
+    let seen: Vec<usize> = (0..deviation.uv.len()).filter(|&i| deviation.seen[i]).collect();
+    let value = |i: &usize| deviation.value[*i];
+    let extreme =
+        |sign: f64| seen.iter().copied().max_by(|a, b| (sign * value(a)).total_cmp(&(sign * value(b))));
+    let (Some(max), Some(min)) = (extreme(1.0), extreme(-1.0)) else { return Vec::new() };
+    let n = seen.len() as f64;
+    let rms = (seen.iter().map(|i| value(i).powi(2)).sum::<f64>() / n).sqrt();
+    let mut sizes: Vec<f64> = seen.iter().map(|i| value(i).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let p95 = sizes[(0.95 * (n - 1.0)).round() as usize];
+
+    let placed = |name: &str, i: usize| Figure {
+        uncertainty: Some(EXPANDED * deviation.sigma(now, target, deviation.uv[i])),
+        ..at(name, deviation.value[i], "m", deviation.uv[i])
+    };
+    let mut figures = vec![
+        placed("deviation.max", max),
+        placed("deviation.min", min),
+        plain("deviation.rms", rms, "m"),
+        plain("deviation.p95", p95, "m"),
+        plain("deviation.max_u", deviation.uv[max][0], "m"),
+        plain("deviation.max_v", deviation.uv[max][1], "m"),
+        plain("deviation.min_u", deviation.uv[min][0], "m"),
+        plain("deviation.min_v", deviation.uv[min][1], "m"),
+        plain("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
+    ];
+    if let Some(tolerance) = tolerance {
+        let within = sizes.partition_point(|size| *size <= tolerance) as f64 / n;
+        figures.extend([plain("tolerance", tolerance, "m"), plain("in_tolerance", within, "1")]);
+    }
+    figures
+}
+
+/// The board with the most gap per limit, and what each board says about the plate under it.
+pub(crate) fn of_templates(judged: &[Judged]) -> Vec<Figure> {
+    let share = |j: &Judged| j.finding.max_gap.abs() / j.finding.limit;
+    let Some(worst) =
+        (0..judged.len()).reduce(|a, b| if share(&judged[b]) > share(&judged[a]) { b } else { a })
+    else {
+        return Vec::new();
+    };
+    let finding = &judged[worst].finding;
+    let mut figures = vec![
+        Figure {
+            uncertainty: Some(finding.uncertainty),
+            ..at("gap.max", finding.max_gap, "m", finding.max_gap_at)
+        },
+        plain("gap.uncertainty", finding.uncertainty, "m"),
+        plain("gap.u", finding.max_gap_at[0], "m"),
+        plain("gap.v", finding.max_gap_at[1], "m"),
+        plain("gap.line", (worst + 1) as f64, "1"),
+        plain("sense", f64::from(finding.sense), "1"),
+    ];
+    for j in judged {
+        let named = |what: &str| format!("template.{}.{what}", j.finding.name);
+        figures.extend(j.radius.map(|radius| plain(&named("radius"), radius, "m")));
+        figures.push(plain(&named("sagitta"), j.sagitta, "m"));
+        figures.push(plain(&named("rocking"), j.rocking, "rad"));
+    }
+    figures
+}
+
+/// Mean curvature of the plate in the direction of bending against the target's, as a share: -0.1 is a tenth not bent
+/// enough. None for a flat target.
+pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figure> {
+    let (mut is, mut wanted) = (0.0, 0.0);
+    for i in 0..GRID * GRID {
+        let at = |k: usize, length: f64| length * k as f64 / (GRID - 1) as f64;
+        let (u, v) = (at(i % GRID, now.width()), at(i / GRID, now.height()));
+        if now.mask().seen(u, v) {
+            let [measured, goal] = bending(now, target, [u, v]);
+            is += measured;
+            wanted += goal;
+        }
+    }
+    // 1e-6 1/m in the mean: a radius of 1000 km.
+    let flat = wanted.abs() <= 1e-6 * (GRID * GRID) as f64;
+    (!flat).then(|| plain("curvature.deviation", is / wanted - 1.0, "1"))
+}
+
+/// Figures of the stations; none for a station that was not seen or has no board.
+pub(crate) fn of_stations(
+    task: &Task,
+    now: &Surface,
+    target: &TargetSurface,
+    deviation: &Deviation,
+    judged: &[Judged],
+) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    for station in &task.stations {
+        let [u, v] = station.at;
+        let figure = |value: f64, unit: &str, sigma: f64| Figure {
+            uncertainty: Some(EXPANDED * sigma),
+            ..at(&format!("station.{}", station.name), value, unit, station.at)
+        };
+        match station.quantity {
+            Quantity::Gap => figures.extend(
+                nearest_gap(station.at, judged)
+                    .map(|(gap, uncertainty)| figure(gap, "m", uncertainty / EXPANDED)),
+            ),
+            _ if !now.mask().seen(u, v) => {}
+            Quantity::Deviation => figures.push(figure(
+                deviation.at(now, target, station.at),
+                "m",
+                deviation.sigma(now, target, station.at),
+            )),
+            Quantity::CurvatureDeficit => {
+                let [measured, wanted] = bending(now, target, station.at);
+                let sigma = now.sigma_curvature(u, v);
+                let sigma = match target.bending(u, v) {
+                    Some([x, y]) => (x * x * sigma[0]).hypot(2.0 * x * y * sigma[2]).hypot(y * y * sigma[1]),
+                    None => 0.5 * sigma[0].hypot(sigma[1]),
+                };
+                figures.push(figure(wanted - measured, "1/m", sigma));
+            }
+        }
+    }
+    figures
+}
+
+/// Curvature of the plate and of the target in the target's direction of bending, positive the way the target bends;
+/// the mean of both directions where no direction is special.
+fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] {
+    let goal = target.curvature(u, v);
+    let direction = target.bending(u, v);
+    [now.curvature(u, v), goal].map(|k| {
+        let along = direction.map_or(0.5 * (k.u + k.v), |direction| k.along(direction));
+        along * target.side()
+    })
+}
+
+/// Gap at the place under any board that is nearest to `station`, with its board's uncertainty.
+fn nearest_gap(station: [f64; 2], judged: &[Judged]) -> Option<(f64, f64)> {
+    let distance = |at: &[f64; 2]| (at[0] - station[0]).hypot(at[1] - station[1]);
+    let places = judged.iter().flat_map(|j| {
+        j.places.iter().zip(&j.finding.gap).map(move |(at, gap)| (at, *gap, j.finding.uncertainty))
+    });
+    let nearest = places.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)))?;
+    Some((nearest.1, nearest.2))
+}
+
+pub(crate) fn plain(name: &str, value: f64, unit: &str) -> Figure {
+    Figure { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
+}
+
+pub(crate) fn at(name: &str, value: f64, unit: &str, place: [f64; 2]) -> Figure {
+    Figure { at: Some(place), ..plain(name, value, unit) }
+}

@@ -1,0 +1,40 @@
+//! Gaps of noisy scans against the truth.
+
+use super::*;
+
+/// Error and stated uncertainty of the gap for several scans of an under-bent plate.
+fn errors(sigma: f64, seeds: std::ops::Range<u64>) -> Vec<(f64, f64)> {
+    let plate = goal(cylinder(9.0), Facing::Inside);
+    let task = task(cylinder(8.0), Facing::Inside, Seat::Balanced);
+    let truth = finding(&plate_of(cylinder(9.0), Facing::Inside), &task).max_gap;
+    seeds
+        .map(|seed| {
+            // 6 mm steps on 3 x 2 m are 167,000 points; a tenth of them with a tenth of the variance.
+            let now =
+                surface(16_700, sigma * 0.1_f64.sqrt(), seed, |u, v| (plate.point(u, v), plate.normal(u, v)));
+            let found = finding(&now, &task);
+            (found.max_gap - truth, found.uncertainty)
+        })
+        .collect()
+}
+
+#[test]
+fn a_balanced_gap_is_right_to_a_tenth_of_a_millimetre() {
+    for (sigma, bound) in [(0.5e-3, 0.1e-3), (2e-3, 0.2e-3)] {
+        let errors = errors(sigma, 1..9);
+        let rms = (errors.iter().map(|(e, _)| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        println!("sigma {:.1} mm: rms error of the gap {:.3} mm", sigma * 1e3, rms * 1e3);
+        assert!(rms < bound, "sigma {sigma}: {errors:?}");
+    }
+}
+
+#[test]
+fn gaps_lie_within_their_stated_uncertainty() {
+    let errors = errors(1e-3, 100..140);
+    let within = errors.iter().filter(|(e, u)| e.abs() <= *u).count();
+    println!("{within} of {} within; stated {:.3} mm", errors.len(), errors[0].1 * 1e3);
+    // 38 expected; fewer than 34 of 40 has a chance of 1 in 100.
+    assert!(within >= 34, "{errors:?}");
+    let rms = (errors.iter().map(|(e, _)| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    assert!(errors[0].1 < 4.0 * rms, "stated {} for an rms error of {rms}", errors[0].1);
+}

@@ -1,0 +1,103 @@
+//! The whole target laid on the plate, stations, and what does not depend on where the plate lies.
+
+use platen_shape::task::{Quantity, Station};
+
+use super::*;
+
+#[test]
+fn the_target_lies_on_a_plate_of_its_own_shape() {
+    for shape in [cylinder(6.0), TargetShape::Sphere { radius: 8.0 }, TargetShape::Flat] {
+        let report = run(&plate_of(shape, Facing::Outside), &task(shape, Facing::Outside, Seat::Gravity))
+            .expect("sound");
+        let field = &report.fields[0];
+        assert_eq!((field.n_u, field.n_v, field.components), (NODES, NODES, 1));
+        assert!(field.values.iter().all(|d| *d < 1e-9 && *d > -3e-5), "{shape:?}");
+        assert_eq!(figure(&report, "in_tolerance"), 1.0);
+    }
+}
+
+#[test]
+fn a_sphere_on_a_flatter_one_touches_in_the_middle() {
+    let [plate, target] = [9.0, 8.0].map(|radius| TargetShape::Sphere { radius });
+    let report =
+        run(&plate_of(plate, Facing::Inside), &task(target, Facing::Inside, Seat::Gravity)).expect("sound");
+    assert_eq!(figure(&report, "deviation.rocks"), 1.0);
+    assert!(figure(&report, "deviation.max").abs() < 1e-9);
+    // The corner lies sqrt(3.25) / 2 m from the middle. Along the target's normal the spheres, which touch in the middle,
+    // are that far apart: distance to the target's centre, at the place of the plate's corner.
+    let [r, t] = [9.0 - THICKNESS / 2.0, 8.0 - THICKNESS / 2.0];
+    let half_diagonal = 0.5 * (WIDTH * WIDTH + HEIGHT * HEIGHT).sqrt();
+    let angle = half_diagonal / 9.0;
+    let corner = [r * angle.sin(), r * (1.0 - angle.cos())];
+    let away = t - corner[0].hypot(t - corner[1]);
+    assert!(
+        (figure(&report, "deviation.min") - away).abs() < 1e-4,
+        "{} {away}",
+        figure(&report, "deviation.min")
+    );
+    assert!((figure(&report, "curvature.deviation") - (8.0 / 9.0 - 1.0)).abs() < 1e-3);
+    let corner = [figure(&report, "deviation.min_u"), figure(&report, "deviation.min_v")];
+    assert!([0.0, WIDTH].contains(&corner[0]) && [0.0, HEIGHT].contains(&corner[1]), "{corner:?}");
+}
+
+#[test]
+fn a_sphere_on_a_rounder_one_lies_on_its_corners() {
+    let [plate, target] = [7.0, 8.0].map(|radius| TargetShape::Sphere { radius });
+    let report =
+        run(&plate_of(plate, Facing::Inside), &task(target, Facing::Inside, Seat::Gravity)).expect("sound");
+    assert_eq!(figure(&report, "deviation.rocks"), 0.0);
+    let at = [figure(&report, "deviation.min_u"), figure(&report, "deviation.min_v")];
+    assert!((at[0] - 1.5).abs() < 0.1 && (at[1] - 1.0).abs() < 0.1, "{at:?}");
+    let value = &report.fields[0].values;
+    let corners = [0, NODES - 1, NODES * (NODES - 1), NODES * NODES - 1].map(|i| value[i]);
+    assert!(corners.iter().filter(|d| d.abs() < 1e-9).count() >= 3, "{corners:?}");
+}
+
+#[test]
+fn stations_say_deviation_gap_and_missing_curvature() {
+    let mut task = task(cylinder(8.0), Facing::Outside, Seat::Gravity);
+    let station = |name: &str, at, quantity| Station { name: name.into(), at, quantity };
+    task.stations = vec![
+        station("D", [0.6, 0.4], Quantity::Deviation),
+        station("G", [1.5, 1.1], Quantity::Gap),
+        station("K", [1.0, 1.0], Quantity::CurvatureDeficit),
+    ];
+    let report = run(&plate_of(cylinder(9.0), Facing::Outside), &task).expect("sound");
+    let node = report.fields[0].values[20 * NODES + 20];
+    assert!((figure(&report, "station.D") - node).abs() < 1e-12);
+    assert!((figure(&report, "station.G") - report.findings.templates[0].max_gap).abs() < 1e-6);
+    // Positive: bend more.
+    let deficit = figure(&report, "station.K");
+    assert!((deficit - (1.0 / 8.0 - 1.0 / 9.0)).abs() < 3e-4, "{deficit}");
+}
+
+#[test]
+fn of_several_boards_the_one_with_the_most_gap_per_limit_is_the_figure() {
+    let mut task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
+    let first = task.templates[0].clone();
+    task.templates.push(Template { name: "T2".into(), chord: 1.5, limit: 0.0005, ..first });
+    let report = run(&plate_of(cylinder(9.0), Facing::Inside), &task).expect("sound");
+    assert_eq!(figure(&report, "gap.line"), 2.0);
+    assert_eq!(figure(&report, "gap.max"), report.findings.templates[1].max_gap);
+    assert_eq!(figure(&report, "tolerance"), 0.0005);
+    assert_eq!(figure(&report, "sense"), -1.0);
+    assert!(report.findings.says[0].starts_with("T2: under-bent"), "{:?}", report.findings.says);
+}
+
+#[test]
+fn the_search_finds_a_gap_that_no_template_covers() {
+    let now = plate_of(TargetShape::Cone { axis: 0.0, radius_start: 10.0, radius_end: 12.0 }, Facing::Inside);
+    let mut task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
+    task.target.as_mut().expect("there").shape = TargetShape::Cylinder { radius: 8.0, axis: 0.0 };
+    let inputs = Inputs { task, now, before: None, baseline: None };
+    let report = compare(&Options { tolerance_mm: None, search: true }, &inputs, &|| Ok(())).expect("sound");
+    // Across the straight lines, at the far end of the cone, where its radius is 12 m.
+    let worst = report.findings.figures.iter().find(|f| f.name == "gap.worst_along_v").expect("searched");
+    let gap = 0.5 * (1.0 / 8.0 - 1.0 / 12.0);
+    assert!((worst.value - gap).abs() < 1e-3 && worst.at.expect("a place")[0] == WIDTH, "{worst:?}");
+    assert!(
+        report.findings.says.iter().any(|s| s.starts_with("largest gap anywhere: 2")),
+        "{:?}",
+        report.findings.says
+    );
+}
