@@ -53,19 +53,20 @@ struct Remembered<'a> {
 }
 
 /// Most cells that are kept, 200 MB; a larger file is decoded twice.
-const REMEMBERED: usize = 1 << 22;
+const REMEMBERED: u64 = 1 << 22;
 
 impl Remembered<'_> {
     fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
         if self.complete {
             return self.cells.iter().try_for_each(visit);
         }
-        let (kept, mut fits) = (&mut self.cells, true);
+        // The announced number spares memory; the real one has the last word.
+        let mut fits = self.source.about().cells <= REMEMBERED;
+        let kept = &mut self.cells;
         self.source.cells(&mut |cell| {
-            if kept.len() < REMEMBERED {
+            fits &= (kept.len() as u64) < REMEMBERED;
+            if fits {
                 kept.push(*cell);
-            } else {
-                fits = false;
             }
             visit(cell)
         })?;
