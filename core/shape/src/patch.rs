@@ -37,12 +37,20 @@ pub struct Crossing {
     pub sample: u32,
     /// Step from it along the lattice: -1, 0 or 1 columns and rows, one of them 0.
     pub step: [i8; 2],
+    /// Cells from `inside` to `outside`; 0 where the place was found between two of them.
+    pub cells: u16,
     /// The end of the face lies between this point, metres, scanner frame, ...
     pub inside: Vec3,
     /// ... and this one. Both lie on the smoothed face and its continuation.
     pub outside: Vec3,
     /// Unit normal of the face towards the scanner.
     pub normal: Vec3,
+    /// The nearest and the farthest mixed pixel between them: their beams straddle the end of the face.
+    pub mixed: Option<[Vec3; 2]>,
+    /// True when every cell between them was measured: none but those is mixed.
+    pub complete: bool,
+    /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
+    pub excess: f32,
     /// What ends it.
     pub beyond: Beyond,
 }

@@ -13,7 +13,7 @@ fn corners_are_where_the_truth_has_them() {
         let off = |k: usize| (outline.corners[k].point - support::vec3(&sample.truth["corners_m"][k])).norm();
         let rms_mm = ((0..4).map(|k| off(k).powi(2)).sum::<f64>() / 4.0).sqrt() * 1000.0;
         println!("{}: corners {rms_mm:.2} mm rms", folder.display());
-        assert!(rms_mm < 3.0, "{rms_mm}");
+        assert!(rms_mm < 0.9, "{rms_mm}");
     }
 }
 

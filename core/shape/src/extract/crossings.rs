@@ -3,15 +3,19 @@
 use std::collections::BTreeMap;
 
 use super::local::LocalFace;
+use super::mixed::Pixel;
 use super::noise::Noise;
 use super::window::Window;
 use crate::patch::{Beyond, Crossing};
 
-/// How far along a row or a column the first sound cell beyond the face is looked for, cells. A row that runs along an
-/// edge meets many mixed pixels before it is off the plate.
-const FAR: usize = 48;
+/// How far along a row or a column the face may go on behind a gap, cells.
+const WIDEST_GAP: usize = 48;
 
-/// Continuing the local fit further than this would say nothing.
+/// How far beyond the face the local fit places cells. A row that runs along an edge meets many mixed pixels
+/// before it is off the plate; the first of them say enough.
+const FAR: usize = 12;
+
+/// How far beyond the face a range is compared with its continuation, cells.
 const FIT_FAR: usize = 3;
 
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
@@ -23,13 +27,13 @@ pub(super) fn find(
     window: &Window,
     noise: &Noise,
     face: &[bool],
-    mixed: &[bool],
+    pixels: &[Pixel],
     number: impl Fn(usize) -> u32,
 ) -> (Vec<Crossing>, f64) {
     let mut fits: BTreeMap<(usize, usize), Option<LocalFace>> = BTreeMap::new();
     let mut crossings = Vec::new();
     let mut cut = 0.0;
-    let scene = Scene { window, noise, face, mixed };
+    let scene = Scene { window, noise, face, pixels };
     for index in (0..face.len()).filter(|&i| face[i]) {
         for step in [(0, -1), (0, 1), (-1, 0), (1, 0)] {
             let Some(first) = scene.beside(index, step, 1) else { continue };
@@ -56,6 +60,8 @@ pub(super) fn find(
 enum End {
     /// The first sound cell, so many steps away.
     Sound(usize),
+    /// Mixed pixels only, the last so many steps away.
+    Mixed(usize),
     /// Nothing came back.
     Nothing,
 }
@@ -64,7 +70,7 @@ struct Scene<'a> {
     window: &'a Window,
     noise: &'a Noise,
     face: &'a [bool],
-    mixed: &'a [bool],
+    pixels: &'a [Pixel],
 }
 
 impl Scene<'_> {
@@ -75,18 +81,21 @@ impl Scene<'_> {
             .then_some(column * self.window.n_rows + row)
     }
 
-    /// `None` where the face goes on behind a gap of cells without return or of mixed ones.
+    /// `None` where the face goes on behind a gap of cells without return, of mixed ones or of such that are not told.
     fn end_of_face(&self, index: usize, step: (isize, isize)) -> Option<End> {
-        for far in 1..=FAR {
-            let Some(at) = self.beside(index, step, far) else { return Some(End::Nothing) };
+        let mut last_mixed = None;
+        for far in 1..=WIDEST_GAP {
+            let Some(at) = self.beside(index, step, far) else { break };
             if self.face[at] {
                 return None;
             }
-            if self.window.cells[at].valid && !self.mixed[at] {
-                return Some(End::Sound(far));
+            match self.pixels[at] {
+                Pixel::Sound if far <= FAR => return Some(End::Sound(far)),
+                Pixel::Mixed if far <= FAR => last_mixed = Some(far),
+                _ => {}
             }
         }
-        Some(End::Nothing)
+        Some(last_mixed.map_or(End::Nothing, End::Mixed))
     }
 
     /// The crossing, and whether the face goes on beyond the region of interest.
@@ -100,30 +109,41 @@ impl Scene<'_> {
     ) -> Option<(Crossing, bool)> {
         let (x, y) = self.window.place(index);
         let on_face = |t: f64| fit.at(self.window, x + t * step.0 as f64, y + t * step.1 as f64);
-        let mut cut = false;
-        let (beyond, from, to) = match end {
-            End::Nothing => (Beyond::Nothing, 0.0, 1.0),
-            End::Sound(far) => {
-                let first = self.beside(index, step, far)?;
-                let excess = self.excess(fit, first, far.min(FIT_FAR), index, step)?;
-                let sigma = f64::from(self.noise.at(index));
-                cut = !self.window.cells[first].inside && excess.abs() <= FRONT_BOUND * sigma;
-                if excess < -FRONT_BOUND * sigma {
-                    (Beyond::InFront, 0.0, far as f64)
-                } else if let Some((from, to)) = self.crease(fit, index, step, far) {
-                    (Beyond::SideFace, from, to)
-                } else {
-                    (Beyond::Behind, 0.0, far as f64)
-                }
+        let (far, measured) = match end {
+            End::Sound(far) | End::Mixed(far) => (far, self.beside(index, step, far)),
+            End::Nothing => (1, None),
+        };
+        let (mut beyond, mut from, mut to) = (Beyond::Nothing, 0.0, far as f64);
+        let (mut cut, mut excess) = (false, 0.0);
+        if let Some(first) = measured {
+            excess = self.excess(fit, first, far.min(FIT_FAR), index, step)?;
+            let bound = FRONT_BOUND * f64::from(self.noise.at(index));
+            cut = !self.window.cells[first].inside && excess.abs() <= bound;
+            beyond = if excess < -bound { Beyond::InFront } else { Beyond::Behind };
+            if let Some(crease) = self.crease(fit, index, step, far).filter(|_| beyond == Beyond::Behind) {
+                (from, to) = crease;
+                beyond = Beyond::SideFace;
             }
+        }
+        let between = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
+        let mixed = between.clone().filter(|(_, at)| self.pixels[*at] == Pixel::Mixed);
+        let mixed = match (mixed.clone().next(), mixed.clone().next_back()) {
+            (Some((near, _)), Some((far, _))) => {
+                Some([on_face(near as f64)?.point, on_face(far as f64)?.point])
+            }
+            _ => None,
         };
         let (inside, outside) = (on_face(from)?, on_face(to)?);
         let crossing = Crossing {
             sample,
             step: [step.0 as i8, step.1 as i8],
+            cells: if beyond == Beyond::SideFace { 0 } else { far as u16 },
             inside: inside.point,
             outside: outside.point,
             normal: inside.normal,
+            mixed,
+            complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Untold),
+            excess: excess as f32,
             beyond,
         };
         Some((crossing, cut))
@@ -153,7 +173,7 @@ impl Scene<'_> {
         let mut excess = [0.0; 3];
         for (k, value) in excess.iter_mut().enumerate() {
             let at = self.beside(index, step, k + 1)?;
-            if !self.window.cells[at].valid || self.mixed[at] || self.face[at] {
+            if self.pixels[at] != Pixel::Sound || self.face[at] {
                 return None;
             }
             *value = self.excess(fit, at, k + 1, index, step)?;

@@ -4,34 +4,50 @@ use super::noise::Noise;
 use super::window::Window;
 
 /// Bound of a second difference, in its standard deviations. A sound cell is lost with a probability of 6e-7 in one
-/// difference, and is only lost when none of the three explains it.
+/// difference, and is only lost when none of those that explain it holds.
 const BOUND: f32 = 5.0;
 
-/// Marks the valid cells that no surface explains: those for which, along the row or along the column, the range
-/// departs by more than the noise allows from the straight continuation of the cells on either side and from the
-/// middle between them. Where fewer than two neighbours are valid on each side nothing is said.
+/// What the neighbours of a cell say of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Pixel {
+    /// No return, or too few neighbours to tell.
+    #[default]
+    Untold,
+    /// Part of a surface along its row and along its column.
+    Sound,
+    /// Part of none.
+    Mixed,
+}
+
+/// Tells the mixed pixels: cells whose range, along the row or along the column, departs by more than the noise allows
+/// from the straight continuation of the two cells on either side and from the middle between its neighbours.
 ///
 /// Straight means in inverse range, so that no limit of the incidence enters.
-pub(super) fn mark(window: &Window, noise: &Noise) -> Vec<bool> {
+pub(super) fn tell(window: &Window, noise: &Noise) -> Vec<Pixel> {
     let n_rows = window.n_rows;
-    let mut mixed = vec![false; window.cells.len()];
+    let mut pixels = vec![Pixel::Untold; window.cells.len()];
     for column in 2..window.n_columns.saturating_sub(2) {
         for row in 2..n_rows.saturating_sub(2) {
             let index = column * n_rows + row;
             let here = window.inverse[index];
             if here > 0.0 {
                 let bound = BOUND * 6.0_f32.sqrt() * noise.at(index) * here * here;
-                mixed[index] = departs(&window.inverse, index, 1, bound)
-                    || departs(&window.inverse, index, n_rows, bound);
+                let down = along(&window.inverse, index, 1, bound);
+                let across = along(&window.inverse, index, n_rows, bound);
+                pixels[index] = match (down, across) {
+                    (Pixel::Mixed, _) | (_, Pixel::Mixed) => Pixel::Mixed,
+                    (Pixel::Sound, Pixel::Sound) => Pixel::Sound,
+                    _ => Pixel::Untold,
+                };
             }
         }
     }
-    mixed
+    pixels
 }
 
-/// True when at least one second difference through `index` can be formed along `stride` and none is in bound.
+/// The cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
 #[inline]
-fn departs(inverse: &[f32], index: usize, stride: usize, bound: f32) -> bool {
+fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
     let q = [
         inverse[index - 2 * stride],
         inverse[index - stride],
@@ -39,8 +55,14 @@ fn departs(inverse: &[f32], index: usize, stride: usize, bound: f32) -> bool {
         inverse[index + stride],
         inverse[index + 2 * stride],
     ];
-    let small = |a: f32, b: f32, c: f32| a > 0.0 && c > 0.0 && b > 0.0 && (a - 2.0 * b + c).abs() <= bound;
-    let known = |a: f32, b: f32, c: f32| a > 0.0 && b > 0.0 && c > 0.0;
-    let any = known(q[0], q[1], q[2]) || known(q[1], q[2], q[3]) || known(q[2], q[3], q[4]);
-    any && !(small(q[0], q[1], q[2]) || small(q[1], q[2], q[3]) || small(q[2], q[3], q[4]))
+    let known = q.map(|q| q > 0.0);
+    let small = |i: usize| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs() <= bound;
+    let (before, behind) = (known[0] && known[1], known[3] && known[4]);
+    if (before && small(0)) || (known[1] && known[3] && small(1)) || (behind && small(2)) {
+        Pixel::Sound
+    } else if before && behind {
+        Pixel::Mixed
+    } else {
+        Pixel::Untold
+    }
 }

@@ -266,7 +266,7 @@ impl Extractor {
     }
 
     fn patch(&self, surface: &Surface, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
-        let Surface { window, noise, mixed, .. } = surface;
+        let Surface { window, noise, pixels, .. } = surface;
         let mut face = vec![false; window.cells.len()];
         for region in regions {
             for (cell, core) in face.iter_mut().zip(trim::core(window, region)) {
@@ -286,7 +286,7 @@ impl Extractor {
                 intensity: window.cells[cell].intensity,
             });
         }
-        let (crossings, cut) = crossings::find(window, noise, &face, mixed, |cell| number[cell]);
+        let (crossings, cut) = crossings::find(window, noise, &face, pixels, |cell| number[cell]);
         if cut > CUT_TOLERANCE {
             return Err(Refusal::CutByRegion { cut_mm: cut * 1000.0 });
         }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::continuity::Continuity;
 use super::grow::{self, Face};
-use super::mixed;
+use super::mixed::{self, Pixel};
 use super::noise::Noise;
 use super::pieces::Piece;
 use super::smooth;
@@ -17,7 +17,7 @@ pub(super) struct Surface {
     pub(super) root: u32,
     pub(super) window: Window,
     pub(super) noise: Noise,
-    pub(super) mixed: Vec<bool>,
+    pub(super) pixels: Vec<Pixel>,
     normals: Vec<Vector3<f32>>,
     labels: Vec<u32>,
     faces: Vec<Face>,
@@ -26,12 +26,13 @@ pub(super) struct Surface {
 impl Surface {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
-        let mixed = mixed::mark(&window, &noise);
-        let usable: Vec<bool> = window.own.iter().zip(&mixed).map(|(own, mixed)| *own && !*mixed).collect();
+        let pixels = mixed::tell(&window, &noise);
+        let usable: Vec<bool> =
+            window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smooth::low_pass(&window, &usable, continuity);
         let normals = smooth::normals(&window, &smooth, &usable);
         let (labels, faces) = grow::faces(&window, &normals);
-        Self { root, window, noise, mixed, normals, labels, faces }
+        Self { root, window, noise, pixels, normals, labels, faces }
     }
 
     /// Faces of at least `least` square metres. `number` is the surface's own, for [`Piece::surface`].

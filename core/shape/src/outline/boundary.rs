@@ -273,8 +273,18 @@ mod tests {
                     continue;
                 };
                 let zero = Vec3::zeros();
-                let crossing =
-                    Crossing { sample: number, step, inside: zero, outside: zero, normal: zero, beyond };
+                let crossing = Crossing {
+                    sample: number,
+                    step,
+                    inside: zero,
+                    outside: zero,
+                    normal: zero,
+                    cells: 1,
+                    mixed: None,
+                    complete: true,
+                    excess: 0.0,
+                    beyond,
+                };
                 patch.crossings.push(crossing);
             }
         }

@@ -7,6 +7,7 @@
 //! of an edge or a corner's neighbourhood takes its crossings out (`rim`); the curve goes through what is left.
 
 mod boundary;
+mod bracket;
 mod corners;
 mod edge;
 mod error;
@@ -19,7 +20,7 @@ pub use error::OutlineError;
 use crate::patch::{Crossing, Patch};
 use crate::{PlateSpec, Vec3};
 use corners::Plane;
-use edge::Edge;
+use edge::{Edge, EdgeData};
 use rim::Rim;
 
 /// A corner of the scanned face.
@@ -82,16 +83,20 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let rim = Rim::of(patch, spec)?;
     let corners = corners::find(&rim.flat, rim.step, spec.width.min(spec.height))?;
     let near = corners.map(|corner| rim.lift(&corner));
-    let fit = |k: usize| {
+    let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * rim.step;
         let crossings: Vec<&Crossing> = rim
             .between(corners[k].at, corners[(k + 1) % 4].at)
             .filter(|c| (c.inside - from).norm() > margin && (c.inside - to).norm() > margin)
             .collect();
-        Edge::fit(&crossings, from, to, rim.step, patch.noise)
+        EdgeData::new(&crossings, [from, to], spec.thickness, rim.step, patch.noise)
     };
-    let mut edges = [fit(0)?, fit(1)?, fit(2)?, fit(3)?];
+    let data = [side(0)?, side(1)?, side(2)?, side(3)?];
+    let angle = (patch.azimuth_step * patch.elevation_step).sqrt();
+    let footprint = bracket::footprint(data.iter().flat_map(EdgeData::lines), angle);
+    let [a, b, c, d] = data.map(|data| Edge::fit(data, footprint, rim.step, patch.noise));
+    let mut edges = [a?, b?, c?, d?];
     let mut points = near;
     for k in 0..4 {
         let arriving = (k + 3) % 4;

@@ -137,6 +137,11 @@ impl Strip {
         station.point + station.tangent * off.dot(&station.flat_tangent) + station.inward * off.dot(&n)
     }
 
+    /// Unit vector within the face across the edge, into the plate.
+    pub(super) fn inward(&self, along: f64) -> Vec3 {
+        self.station(Vector2::new(along, 0.0)).inward
+    }
+
     /// Unit normal of the face towards the scanner.
     pub(super) fn normal(&self, along: f64) -> Vec3 {
         let station = self.station(Vector2::new(along, 0.0));

@@ -1,0 +1,298 @@
+//! What one row or column of the lattice says of the edge it crosses.
+//!
+//! A mixed beam sees both sides of the edge: the edge is within a footprint. One that is not has its centre on its own
+//! side, and most likely a footprint away: some beams are mixed so little that it does not show. Where the plate's side face is seen, it is the lower edge of the plate,
+//! of which the place beside the upper one is known from the thickness, that mixes the beams; and a beam on a side face
+//! of a few millimetres falls behind the face's continuation in proportion to its way from the edge.
+
+use super::strip::Strip;
+use crate::patch::{Beyond, Crossing};
+
+/// Softness of a bracket in parts of the lattice step: pointing of the beam, shape of the footprint.
+const SOFTNESS: f64 = 0.03;
+
+/// Part of the brackets that have nothing to do with the edge, and the likelihood that one of those allows it anyway.
+const STRAY_PART: f64 = 0.05;
+const STRAY_LIKELIHOOD: f64 = 0.1;
+
+/// Part of the beams which see both sides of an edge and are not told from sound ones.
+const HIDDEN_PART: f64 = 0.25;
+
+/// A beam less than this part of the seen side face outside of the edge is on it; tangent of the angle by which a cut
+/// may be out of square.
+const SIDE_SLACK: f64 = 1.1;
+const SIDE_SLOPE: f64 = 0.1;
+
+/// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
+const FOOTPRINT_SPREAD: f64 = 0.3;
+
+/// A crossing in the strip of its edge. Distances inwards, metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    pub(super) along: f64,
+    low: f64,
+    high: f64,
+    /// Lowest and highest mixed pixel.
+    mixed: Option<(f64, f64)>,
+    complete: bool,
+    beyond: Beyond,
+    /// Distance inwards on the face per radian of footprint.
+    per_radian: f64,
+    /// Distance inwards per lattice step.
+    per_step: f64,
+    /// How far outside of the edge the plate's lower edge is seen, on the face's continuation; 0 where it is hidden.
+    side: f64,
+    /// Distance inwards per range by which a beam falls behind the face's continuation on a square side face.
+    per_range: f64,
+    excess: f64,
+}
+
+impl Line {
+    pub(super) fn new(strip: &Strip, crossing: &Crossing, thickness: f64) -> Self {
+        let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
+        let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
+        let along = 0.5 * (inside.x + outside.x);
+        let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
+        // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
+        // inward part of that, over all e across the beam, is the length of this vector.
+        let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
+        let across = lever - beam * lever.dot(&beam);
+        // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
+        // height / (height + thickness) of its way.
+        let height = -normal.dot(&crossing.inside);
+        Self {
+            along,
+            low: inside.y.min(outside.y),
+            high: inside.y.max(outside.y),
+            mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
+            complete: crossing.complete,
+            beyond: crossing.beyond,
+            per_radian: crossing.inside.norm() * across.norm(),
+            per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
+            side: (inward.dot(&crossing.inside) * thickness / (height + thickness)).max(0.0),
+            per_range: inward.dot(&beam),
+            excess: f64::from(crossing.excess),
+        }
+    }
+
+    /// True when the plate ends here in front of something and every cell up to there was measured.
+    fn tells_footprint(&self) -> bool {
+        self.complete && self.beyond == Beyond::Behind && self.side == 0.0
+    }
+
+    /// What the line says, for beams that see `footprint` radians to each side.
+    pub(super) fn bracket(&self, footprint: f64, step: f64, noise: f64) -> Bracket {
+        let (along, soft) = (self.along, SOFTNESS * step);
+        let seen = footprint * self.per_radian;
+        if self.beyond == Beyond::SideFace {
+            // Given as two standard deviations about the crease.
+            let at = 0.5 * (self.low + self.high);
+            return Bracket {
+                along,
+                evidence: Evidence::At(at),
+                soft: soft.hypot(0.25 * (self.high - self.low)),
+            };
+        }
+        let on_side = self.excess * self.per_range;
+        let noise = noise * self.per_range.abs();
+        if self.side > 0.0
+            && self.beyond == Beyond::Behind
+            && self.mixed.is_none()
+            && on_side < SIDE_SLACK * self.side + 3.0 * noise
+        {
+            let soft = soft.hypot(noise).hypot(SIDE_SLOPE * on_side);
+            return Bracket { along, evidence: Evidence::At(self.low + on_side), soft };
+        }
+        let mut above = Bound { sure: self.low, likely: self.low };
+        let mut below = Bound { sure: self.high, likely: self.high };
+        if self.side == 0.0 {
+            below.likely -= seen;
+        }
+        if self.beyond == Beyond::Behind {
+            above.sure += self.side;
+            above.likely += self.side + seen;
+        }
+        if let Some((lowest, highest)) = self.mixed {
+            let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
+            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
+            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
+        }
+        Bracket { along, evidence: Evidence::Between(above, below), soft }
+    }
+}
+
+/// Half the angle over which a beam sees both sides of an edge, from the number of mixed pixels on all edges; 0 where
+/// too few lines tell. `step` is the angle between beams.
+pub(super) fn footprint<'a>(lines: impl Iterator<Item = &'a Line>, step: f64) -> f64 {
+    /// Lines that tell the number to a tenth.
+    const LEAST_LINES: usize = 100;
+    /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
+    const MOST_CELLS: f64 = 3.0;
+    let (mut n, mut mixed, mut expected) = (0, 0.0, 0.0);
+    for line in lines.filter(|l| l.tells_footprint() && l.per_radian * step < MOST_CELLS * l.per_step) {
+        n += 1;
+        mixed += line.mixed.map_or(0.0, |(low, high)| (high - low) / line.per_step + 1.0);
+        expected += 2.0 * (1.0 - HIDDEN_PART) * line.per_radian / line.per_step;
+    }
+    if n >= LEAST_LINES { mixed / expected } else { 0.0 }
+}
+
+/// The footprint at an edge that is known, near that of all edges: the one that best parts its mixed pixels from the
+/// sound ones.
+pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64, step: f64) -> f64 {
+    const TRIALS: i32 = 40;
+    let soft = SOFTNESS * step;
+    let telling: Vec<(&Line, f64)> =
+        lines.iter().filter(|l| l.tells_footprint()).map(|l| (l, edge(l.along))).collect();
+    let fits = |footprint: f64| {
+        let off = (footprint / all - 1.0) / FOOTPRINT_SPREAD;
+        let lines = telling.iter().map(|(line, edge)| {
+            let seen = footprint * line.per_radian;
+            let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / soft);
+            let sound = (1.0 - is_mixed(line.high)).ln() + (1.0 - is_mixed(line.low)).ln();
+            sound
+                + line.mixed.map_or(0.0, |(low, high)| {
+                    (is_mixed(low) + STRAY_PART).ln() + (is_mixed(high) + STRAY_PART).ln()
+                })
+        });
+        lines.sum::<f64>() - 0.5 * off * off
+    };
+    let trial = |k: i32| all * (1.0 + 0.02 * f64::from(k));
+    let best = (-TRIALS..=TRIALS).map(|k| (fits(trial(k)), k)).max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(all, |(_, k)| trial(k))
+}
+
+/// Where a line says the edge is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bracket {
+    pub(super) along: f64,
+    evidence: Evidence,
+    soft: f64,
+}
+
+/// Distance inwards, metres.
+#[derive(Debug, Clone, Copy)]
+enum Evidence {
+    At(f64),
+    /// Above the first, below the second.
+    Between(Bound, Bound),
+}
+
+/// A bound of the edge, metres: it holds surely at one place and likely at another, farther in.
+#[derive(Debug, Clone, Copy)]
+struct Bound {
+    sure: f64,
+    likely: f64,
+}
+
+impl Bound {
+    /// Logarithm of the likelihood of an edge by its distances inside of the two places, in units of softness, its
+    /// slope and the negative second derivative of its lower bound (expectation maximisation).
+    fn log_likelihood(sure: f64, likely: f64) -> (f64, f64, f64) {
+        let (a, b) = (log_normal_cdf(sure), log_normal_cdf(likely));
+        let (a_part, b_part) = (HIDDEN_PART * a.0.exp(), (1.0 - HIDDEN_PART) * b.0.exp());
+        let sum = (a_part + b_part).max(f64::MIN_POSITIVE);
+        let (a_part, b_part) = (a_part / sum, b_part / sum);
+        (sum.ln(), a_part * a.1 + b_part * b.1, a_part * a.2 + b_part * b.2)
+    }
+}
+
+impl Bracket {
+    /// (place, weight) of a pull to the middle with the variance of a uniform distribution.
+    pub(super) fn middle(&self, step: f64) -> (f64, f64) {
+        match self.evidence {
+            Evidence::At(at) => (at, 12.0 / (step * step)),
+            Evidence::Between(above, below) => {
+                (0.5 * (above.likely + below.likely), 12.0 / (below.likely - above.likely).max(step).powi(2))
+            }
+        }
+    }
+
+    /// One Newton step of the likelihood of an edge at `at`: the place to which the bracket pulls it, and with which
+    /// weight. The weight fades where the bracket more likely has nothing to do with the edge.
+    ///
+    /// `least_soft` widens the bracket, to reach it from far away.
+    pub(super) fn pull(&self, at: f64, least_soft: f64) -> (f64, f64) {
+        let soft = self.soft.max(least_soft);
+        let (log_likelihood, slope, bend) = match self.evidence {
+            Evidence::At(place) => {
+                let off = (place - at) / soft;
+                (-0.5 * off * off, off, 1.0)
+            }
+            Evidence::Between(above, below) => {
+                let a = Bound::log_likelihood((at - above.sure) / soft, (at - above.likely) / soft);
+                let b = Bound::log_likelihood((below.sure - at) / soft, (below.likely - at) / soft);
+                (a.0 + b.0, a.1 - b.1, a.2 + b.2)
+            }
+        };
+        let mine = (1.0 - STRAY_PART) * log_likelihood.exp();
+        let belongs = mine / (mine + STRAY_PART * STRAY_LIKELIHOOD);
+        // In the middle of a wide bracket nothing pulls: a small weight keeps the step finite.
+        let bend = bend.max(1e-3);
+        (at + soft * slope / bend, belongs * bend / (soft * soft))
+    }
+
+    /// True when an edge at `at` agrees with the bracket within `slack`.
+    pub(super) fn agrees(&self, at: f64, slack: f64) -> bool {
+        match self.evidence {
+            Evidence::At(place) => (place - at).abs() < slack,
+            Evidence::Between(above, below) => above.sure - slack < at && at < below.sure + slack,
+        }
+    }
+}
+
+/// Logarithm of the normal distribution function, its slope and its negative second derivative.
+fn log_normal_cdf(z: f64) -> (f64, f64, f64) {
+    let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    // Below, the density by the series of Mills' ratio; its error there is below 1 in 500.
+    const TAIL: f64 = -4.0;
+    let (log, slope) = if z < TAIL {
+        let slope = -z / (1.0 - 1.0 / (z * z) + 3.0 / z.powi(4));
+        (-0.5 * z * z - (slope * (2.0 * std::f64::consts::PI).sqrt()).ln(), slope)
+    } else {
+        let cdf = normal_cdf(z);
+        (cdf.ln(), density / cdf)
+    };
+    (log, slope, slope * (slope + z))
+}
+
+/// Abramowitz and Stegun 7.1.26, to 1.5e-7.
+fn normal_cdf(x: f64) -> f64 {
+    let z = x.abs() / std::f64::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.327_591_1 * z);
+    let series = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
+    let tail = t * series.iter().rev().fold(0.0, |sum, c| sum * t + c) * (-z * z).exp();
+    if x < 0.0 { 0.5 * tail } else { 1.0 - 0.5 * tail }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_logarithm_and_its_derivatives_agree() {
+        // ln of the distribution function at -5, 0 and 1.5, from tables.
+        for (z, log) in [(-5.0, -15.064_998), (0.0, -std::f64::consts::LN_2), (1.5, -0.069_143)] {
+            assert!((log_normal_cdf(z).0 - log).abs() < 3e-3, "{z}: {}", log_normal_cdf(z).0);
+        }
+        for z in [-6.0, -3.0, -0.7, 0.4, 2.0] {
+            let h = 1e-3;
+            let (below, above) = (log_normal_cdf(z - h), log_normal_cdf(z + h));
+            assert!(((above.0 - below.0) / (2.0 * h) - log_normal_cdf(z).1).abs() < 0.02);
+            assert!((-(above.1 - below.1) / (2.0 * h) - log_normal_cdf(z).2).abs() < 0.05);
+        }
+    }
+
+    #[test]
+    fn a_bracket_pulls_from_outside_and_rests_within() {
+        let bound = |at: f64| Bound { sure: at, likely: at };
+        let bracket =
+            Bracket { along: 0.0, evidence: Evidence::Between(bound(-0.003), bound(0.003)), soft: 3e-4 };
+        let (to, weight) = bracket.pull(0.004, 2e-3);
+        assert!(to < 0.004 && weight > 0.0);
+        let (to, weight) = bracket.pull(0.001, 0.0);
+        assert!((to - 0.001).abs() < 1e-6 && weight < 1e5);
+        // Half a metre off it has nothing to do with the edge.
+        assert!(bracket.pull(0.5, 0.0).1 < 1e-3);
+    }
+}
