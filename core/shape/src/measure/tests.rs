@@ -59,7 +59,7 @@ fn a_plate_bent_along_the_line_of_sight_is_met() {
 #[test]
 fn wild_samples_move_nothing() {
     let scene = Scene { wild: 0.02, ..Scene::new(cylinder(7.0, 0.4), [3.0, 2.5]) };
-    check("wild", &scene, [0.2, 0.012, 0.03, 3e-4]);
+    check("wild", &scene, [0.2, 0.006, 0.015, 1.5e-4]);
 }
 
 #[test]
