@@ -1,4 +1,5 @@
 //! `platen measure` on plates with known truth, made by an independent generator.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -81,11 +82,16 @@ fn plate_file(plate: &Path, file: &Path) -> String {
 fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json {
     let file = folder.join("plate.toml");
     let hint = plate_file(plate, &file);
+    let plant = folder.join("plant.toml");
+    std::fs::write(&plant, "[plant]\nname = \"samples\"\n[[comparison]]\nplugin = \"displacement\"\n")
+        .unwrap();
     let output = platen_tests::program("platen")
         .arg("measure")
         .arg(scan(plate, folder))
         .arg("--plate")
         .arg(&file)
+        .arg("--plant")
+        .arg(&plant)
         .args(["--u-axis", &hint, "--flattening", flattening, "--json"])
         .args(more)
         .output()

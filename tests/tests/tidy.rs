@@ -1,4 +1,5 @@
 //! What may know what: the dependency direction, read from `cargo metadata`.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;

@@ -52,7 +52,7 @@ impl Cell {
         let mut child = Command::new(&program)
             .arg("press")
             .arg(config)
-            .arg("--with-parent")
+            .args(["--modbus-port", "0", "--plate-port", "0", "--with-parent"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

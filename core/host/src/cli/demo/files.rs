@@ -1,4 +1,4 @@
-//! The demo's files: what a plant engineer would write for this cell.
+//! The demo's files: those of `config/`, with the ports that the system gave and an output folder of their own.
 
 use std::path::{Path, PathBuf};
 
@@ -7,6 +7,10 @@ use crate::cli::CliError;
 
 /// Tells a folder of an earlier demo from one that holds something else.
 const MARK: &str = ".platen-demo";
+
+const PRESS: &str = include_str!("../../../../../config/sim-press.toml");
+const PLANT: &str = include_str!("../../../../../config/sim-plant.toml");
+const PLATE: &str = include_str!("../../../../../config/plates/plate-009.toml");
 
 /// Makes an empty folder; only an earlier demo is removed.
 pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
@@ -33,12 +37,10 @@ pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
 /// The plant file for the ports that the system gave.
 pub(super) fn plant_file(out: &Path, cell: &Cell) -> Result<PathBuf, CliError> {
     let path = out.join("plant.toml");
-    let text =
-        PLANT.replace("PORT", &cell.modbus.port().to_string()).replace("CELL", &cell.plate.to_string());
+    let text = PLANT
+        .replace("port = 15020", &format!("port = {}", cell.modbus.port()))
+        .replace("127.0.0.1:15021", &cell.plate.to_string())
+        .replace("folder = \"../platen-results\"", "folder = \"results\"");
     std::fs::write(&path, text)?;
     Ok(path)
 }
-
-const PLATE: &str = include_str!("plate.toml");
-const PRESS: &str = include_str!("press.toml");
-const PLANT: &str = include_str!("plant.toml");
