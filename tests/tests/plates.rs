@@ -117,9 +117,8 @@ impl Spline<'_> {
 
     fn basis(knots: &[f64], i: usize, degree: usize, x: f64) -> f64 {
         if degree == 0 {
-            let last = knots.len() - 4;
-            let closed = i + 1 == last && x >= knots[last];
-            return f64::from((knots[i] <= x && x < knots[i + 1]) || closed);
+            // The knots go on evenly beyond both ends, so the last span needs no special case.
+            return f64::from(knots[i] <= x && x < knots[i + 1]);
         }
         let part = |a: usize, b: usize| if knots[b] > knots[a] { 1.0 / (knots[b] - knots[a]) } else { 0.0 };
         (x - knots[i]) * part(i, i + degree) * Self::basis(knots, i, degree - 1, x)
