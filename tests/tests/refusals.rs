@@ -34,7 +34,7 @@ fn bench() -> &'static Bench {
 
 const SIMULATED: &str = r#"
 strokes = 0
-shape = { kind = "cylinder", radius_mm = 9000.0, axis_deg = 90.0 }
+shape = { shape = "cylinder", radius_mm = 9000.0, axis_deg = 90.0 }
 [blank]
 width_mm = 3000.0
 height_mm = 2500.0
