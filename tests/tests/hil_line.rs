@@ -1,0 +1,176 @@
+//! Every fault of the line, one by one and mixed, on TCP, on RTU through TCP and on a serial line.
+//!
+//! After each run the press has all its results, each under its own stroke, each scanned once.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod rig;
+
+use std::time::Duration;
+
+use platen_plant::press::{Link, Press, Serial};
+use platen_press::{Code, LinkState};
+use platen_sim_press::config::LinkConfig;
+use platen_sim_press::faults::LineFaults;
+use platen_sim_press::{Command, Config, SimPress, Tally};
+use rig::{Host, LIMIT, Memory, assert_clean, done, quick, tcp};
+use tokio_serial::{SerialPort, SerialStream};
+
+const SCAN: Duration = Duration::from_millis(5);
+
+type Set = fn(&mut LineFaults);
+
+/// Enough to hit most strokes of a run, and little enough that lines come up again.
+const FAULTS: [(&str, Set); 14] = [
+    ("late", |it| it.late = 0.02),
+    ("reset before", |it| it.reset = 0.03),
+    ("reset after", |it| it.reset_after = 0.03),
+    ("no answer", |it| it.no_answer = 0.02),
+    ("wrong transaction", |it| it.wrong_transaction = 0.03),
+    ("wrong unit", |it| it.wrong_unit = 0.03),
+    ("wrong function", |it| it.wrong_function = 0.03),
+    ("short", |it| it.short = 0.03),
+    ("long", |it| it.long = 0.03),
+    ("busy", |it| it.exception = 0.05),
+    ("noise", |it| it.noise = 0.03),
+    ("bit flip", |it| it.bit_flip = 0.03),
+    ("half", |it| it.half = 0.02),
+    ("twice", |it| it.twice = 0.03),
+];
+
+fn assert_all(what: &str, tally: &Tally, strokes: usize) {
+    println!("{what}: {:?}, {} connections, {} writes", tally.line_faults, tally.connections, tally.writes);
+    assert_clean(tally);
+    assert_eq!((tally.taken.len(), tally.missed_reported), (strokes, 0), "{what}");
+    assert_eq!(tally.plates_served, strokes as u64, "{what}: scans");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_fault_on_tcp() {
+    for (name, set) in FAULTS {
+        let mut line_faults = LineFaults::default();
+        set(&mut line_faults);
+        let (_press, host, tally) = rig::run(Config { strokes: 8, line_faults, ..quick() }, SCAN).await;
+        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &tally, 8);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_fault_on_rtu_through_tcp() {
+    for (name, set) in FAULTS {
+        let mut line_faults = LineFaults::default();
+        set(&mut line_faults);
+        let link = LinkConfig::RtuOverTcp { port: 0 };
+        let press = SimPress::start(Config { strokes: 4, link, line_faults, ..quick() }).await.unwrap();
+        let address = press.modbus().unwrap();
+        let plant =
+            Press::pph1("Press 3", 3, Link::rtu_over_tcp(address.ip().to_string(), address.port(), 1));
+        let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+        let tally = done(&press, &host).await;
+        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &tally, 4);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn late_answers_and_resets_on_many_strokes() {
+    let line_faults = LineFaults { late: 0.01, reset: 0.005, reset_after: 0.005, ..LineFaults::default() };
+    let (_press, host, tally) = rig::run(Config { strokes: 15, line_faults, ..quick() }, SCAN).await;
+    assert_all("mixed", &tally, 15);
+    assert!(tally.connections > 2, "{} connections", tally.connections);
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn strokes_on_a_serial_line_with_late_answers_and_noise() {
+    for (name, line_faults) in [
+        ("clean", LineFaults::default()),
+        ("late", LineFaults { late: 0.02, ..LineFaults::default() }),
+        ("noise", LineFaults { noise: 0.03, bit_flip: 0.03, half: 0.01, ..LineFaults::default() }),
+    ] {
+        let bridge = Bridge::new();
+        let link = LinkConfig::Rtu { device: bridge.names[0].clone().into(), baud: 115_200 };
+        let press = SimPress::start(Config { strokes: 5, link, line_faults, ..quick() }).await.unwrap();
+        let plant = Press::pph1("Press 3", 3, Link::rtu(Serial::new(&bridge.names[1], 115_200), 1));
+        let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+        let tally = done(&press, &host).await;
+        assert_all(name, &tally, 5);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_lasting_exception_is_a_fault_until_reset() {
+    for (exception_code, code) in [
+        (1, Code::IllegalFunction),
+        (2, Code::IllegalAddress),
+        (3, Code::IllegalAddress),
+        (4, Code::DeviceFailure),
+        (8, Code::DeviceFailure),
+        (9, Code::DeviceFailure),
+    ] {
+        let press = SimPress::start(Config { strokes: 4, automatic: false, ..quick() }).await.unwrap();
+        let mut host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), SCAN);
+        host.until("ready", |status| status.host.ready).await;
+        let faults = LineFaults { exception: 1.0, exception_code, ..LineFaults::default() };
+        press.command(Command::LineFaults(faults)).unwrap();
+        host.until("fault", |status| status.state.link == LinkState::Fault(code)).await;
+        press.command(Command::LineFaults(LineFaults::default())).unwrap();
+        host.reset();
+        host.until("ready again", |status| status.host.ready).await;
+        press.command(Command::Automatic(true)).unwrap();
+        let tally = done(&press, &host).await;
+        assert_all(&code.to_string(), &tally, 4);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_press_that_comes_back_is_found_again() {
+    let press = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
+    let address = press.modbus().unwrap();
+    let mut host = Host::start(tcp(address), Memory::new(7), press.control(), SCAN);
+    host.until("ready", |status| status.host.ready).await;
+    drop(press);
+    host.until("loss", |status| status.state.link == LinkState::Offline).await;
+    let link = LinkConfig::Tcp { port: address.port() };
+    let back = SimPress::start(Config { automatic: false, link, ..quick() }).await.unwrap();
+    let tally = back.until("a read", LIMIT, |tally| tally.reads > 0).await.unwrap();
+    println!("found again after {} ms", tally.now_ms);
+    host.until("ready again", |status| status.host.ready).await;
+    assert_eq!(back.tally().writes_before_sync, 0);
+    host.stop().await;
+}
+
+/// Two pseudo terminals with their lines joined: a cable.
+struct Bridge {
+    names: [String; 2],
+    pump: tokio::task::JoinHandle<()>,
+}
+
+impl Bridge {
+    fn new() -> Self {
+        let mut lines = Vec::new();
+        let names = [(); 2].map(|()| {
+            let (line, slave) = SerialStream::pair().unwrap();
+            lines.push(line);
+            slave.name().unwrap()
+        });
+        let (mut b, mut a) = (lines.pop().unwrap(), lines.pop().unwrap());
+        let pump = tokio::spawn(async move {
+            // A pseudo terminal that nobody has open gives an error: the cable stays plugged.
+            while tokio::io::copy_bidirectional(&mut a, &mut b).await.is_err() {
+                tokio::time::sleep(Duration::from_millis(5)).await;
+            }
+        });
+        Self { names, pump }
+    }
+}
+
+impl Drop for Bridge {
+    fn drop(&mut self) {
+        self.pump.abort();
+    }
+}
