@@ -17,10 +17,7 @@ pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, go_on: impl Fn() -> Result<
     let hold = Hold::new(mesh, scatter(&membrane.strains(&uv)));
     minimise(mesh, &membrane, &hold, &mut uv, go_on)?;
     let strains = membrane.strains(&uv);
-    let mut sigma = spread(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
-    for (sigma, p) in sigma.iter_mut().zip(&uv) {
-        add_edges(sigma, *p, mesh);
-    }
+    let sigma = spread(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
     let strain = strain_of_vertices(mesh, &strains);
     Ok(Chart { uv, strain: Some(strain), sigma: Some(sigma) })
 }
@@ -47,17 +44,6 @@ fn scatter(strains: &[Strained]) -> f64 {
         s.area * (a * a + b * b + 2.0 * c * c)
     };
     (strains.iter().map(square).sum::<f64>() / area).sqrt()
-}
-
-/// What the uncertainty of two opposite edges leaves between them.
-fn add_edges(sigma: &mut [f64; 2], p: [f64; 2], mesh: &DiskMesh) {
-    let [bottom, right, top, left] = mesh.edge_sigma;
-    for (axis, (low, high, size)) in
-        [(left, right, mesh.width), (bottom, top, mesh.height)].into_iter().enumerate()
-    {
-        let share = (p[axis] / size).clamp(0.0, 1.0);
-        sigma[axis] = sigma[axis].hypot((low * (1.0 - share)).hypot(high * share));
-    }
 }
 
 /// Mean strain of the triangles at each vertex, by area: uu, vv, uv.

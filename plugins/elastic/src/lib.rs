@@ -18,8 +18,8 @@
 //! - (u, v) per vertex: exact on flat, rolled and conical plates; on a sphere of R 10 m, 5 x 2.5 m, 0.01 mm from the material
 //!   when that follows least energy and 0.24 mm (mean; 0.39 mm at most) when its fibres along one side keep their length.
 //! - Strain per vertex: Green's, area-weighted over the triangles around it.
-//! - Uncertainty per vertex: the distance between those two laws of the material, with what the edges' uncertainty
-//!   leaves in between.
+//! - Uncertainty per vertex: the distance between those two laws of the material. What the edges' own uncertainty leaves
+//!   between them is not in it; the host adds that for every flattening.
 //!
 //! # What it needs
 //!
