@@ -17,7 +17,7 @@ use jiff::Timestamp;
 use platen_history::{Error as HistoryError, History};
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
-use platen_press::{Language, ModbusLink, Order, RunError, StrokeKey, channels, run_press};
+use platen_press::{Language, Order, PressLink, RunError, StrokeKey, channels, run_press};
 use tokio::sync::watch;
 
 pub use bench::StrokeReport;
@@ -75,7 +75,7 @@ pub async fn run(
     let bench = std::thread::Builder::new().name("bench".into()).spawn(move || bench.serve(&inbox));
     let bench = bench.map_err(HostError::Thread)?;
 
-    let link = ModbusLink::new(&press.link);
+    let link = PressLink::new(&press);
     let status = tokio::spawn(status::keep(
         plant.output.folder.join("status.json"),
         press.clone(),

@@ -15,8 +15,8 @@ pub use codec::{HostImage, PressImage, Torn, Wrong, describe_inputs, describe_ou
 pub use handshake::{Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
 pub use journal::{Acked, Entry, Journal, Recalled, Record, Stage};
 pub use link::{
-    Client, Consequence, Counts, Link, LinkError, ModbusLink, ROUND_TRIP_LIMITS_MS, Request, Response,
-    TransportError, consequence,
+    Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,
+    Response, ServedLink, TransportError, consequence,
 };
 pub use page::{map_csv, map_markdown, reference_program};
 pub use runner::{

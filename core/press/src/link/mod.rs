@@ -4,15 +4,19 @@
 //! request, checks quantity and echo itself, refuses writes outside the allow-list, and drops the connection at any
 //! error or timeout: after a late answer a Modbus connection is off by one for ever (TCP), or silently wrong (RTU).
 
+mod any;
 mod client;
 mod error;
 mod modbus;
 mod rtu;
+mod served;
 mod tcp;
 
+pub use any::PressLink;
 pub use client::{Client, Counts, ROUND_TRIP_LIMITS_MS};
 pub use error::{Consequence, LinkError, consequence};
 pub use modbus::ModbusLink;
+pub use served::ServedLink;
 
 use std::fmt;
 

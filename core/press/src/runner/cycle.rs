@@ -3,8 +3,8 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
-use platen_plant::press::Press;
-use tokio::time::{Instant, sleep_until};
+use platen_plant::press::{Press, Role};
+use tokio::time::{Instant, sleep, sleep_until};
 
 use super::journal::{Done, Recorder};
 use super::{Answer, Metrics, Order, PressSide, Status};
@@ -20,6 +20,8 @@ const TICK: Duration = Duration::from_millis(100);
 const TORN_LIMIT: u32 = 50;
 /// Time between two reports of how things stand.
 const STATUS: Duration = Duration::from_millis(200);
+/// How long a press that asks may still read the safe registers.
+const FAREWELL: Duration = Duration::from_millis(500);
 /// Attempts to write the safe registers at the end.
 const LAST_WRITES: u32 = 3;
 
@@ -91,6 +93,9 @@ impl<L: Link> Runner<L> {
             self.step(Event::Tick);
         }
         self.write_safe_registers().await;
+        if self.press.role == Role::Server {
+            sleep(FAREWELL).await;
+        }
         self.publish_status();
         self.client.disconnect();
         self.journal.finish().await;

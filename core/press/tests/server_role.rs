@@ -1,0 +1,84 @@
+//! A press that asks: the host is the Modbus server.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod bench;
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use bench::plc::{H, P};
+use bench::{Memory, Plc, SharedPlc};
+use platen_plant::press::{Link, Press, Role};
+use platen_press::{Answer, PressLink, StrokeKey, channels, run_press};
+use tokio_modbus::client::{Context, tcp};
+use tokio_modbus::prelude::*;
+
+/// A port that nobody listens on.
+fn free_port() -> u16 {
+    std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port()
+}
+
+async fn ask(port: u16) -> Context {
+    loop {
+        if let Ok(context) = tcp::connect_slave(([127, 0, 0, 1], port).into(), Slave(1)).await {
+            return context;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+/// The client blocks of a press: writes its own block and reads the host's, every 10 ms.
+async fn exchange(plc: SharedPlc, port: u16) {
+    let mut context = ask(port).await;
+    loop {
+        let own = plc.lock().unwrap().regs[P..P + 32].to_vec();
+        let written = context.write_multiple_registers(P as u16, &own).await;
+        let read = context.read_holding_registers(H as u16, 64).await;
+        let (Ok(Ok(())), Ok(Ok(words))) = (written, read) else {
+            context = ask(port).await;
+            continue;
+        };
+        plc.lock().unwrap().regs[H..H + 64].copy_from_slice(&words);
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn thirty_strokes_of_a_press_that_asks() {
+    let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, 0)));
+    let port = free_port();
+    let mut press = Press::pph1("Press 3", 3, Link::tcp("127.0.0.1", port, 1));
+    press.role = Role::Server;
+    let link = PressLink::new(&press);
+    let (host, side) = channels();
+    let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
+    let ms = Duration::from_millis;
+    let scanner =
+        bench::host(host.orders, host.answers.clone(), ms(20), ms(5), Arc::clone(&scans), Arc::default());
+    tokio::spawn(scanner);
+    let run = tokio::spawn(run_press(press, link, Memory::new(7), side));
+    tokio::spawn(bench::run_plc(plc.clone()));
+    tokio::spawn(exchange(plc.clone(), port));
+    plc.lock().unwrap().to_do = 30;
+    bench::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
+
+    // What is not its own the press may not write, and other functions and units it may not use.
+    let mut stranger = ask(port).await;
+    let refused = stranger.write_multiple_registers(110, &[1, 2]).await.unwrap();
+    assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress));
+    let refused = stranger.read_coils(0, 1).await.unwrap();
+    assert_eq!(refused, Err(ExceptionCode::IllegalFunction));
+    stranger.set_slave(Slave(9));
+    let unheard = tokio::time::timeout(ms(200), stranger.read_holding_registers(100, 1)).await;
+    assert!(unheard.is_err(), "another unit's request was answered");
+
+    host.answers.send(Answer::Stop).unwrap();
+    run.await.unwrap().unwrap();
+    let plc = plc.lock().unwrap();
+    assert_eq!((plc.results.len(), scans.lock().unwrap().len()), (30, 30));
+    for result in &plc.results {
+        assert_eq!(result.dev_max, result.stroke, "the result of another stroke");
+    }
+    assert_eq!(plc.regs[H + 2], 0, "the press has read the safe status");
+}
