@@ -18,8 +18,8 @@ use std::time::Duration;
 
 use platen_plant::press::Measure;
 use platen_press::{
-    Acked, Answer, Entry, Figures, Journal, Measurement, Order, Publication, Recalled, Record, Stage,
-    StrokeKey, Verdict,
+    Acked, Answer, Figures, Journal, Measurement, Order, Publication, Recalled, Record, Stage, StrokeKey,
+    Verdict,
 };
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
@@ -145,9 +145,4 @@ pub async fn until(limit: Duration, what: &str, mut holds: impl FnMut() -> bool)
         }
     });
     assert!(waited.await.is_ok(), "{what}: not within {limit:?}");
-}
-
-/// Never used by value: an entry of a journal as a test writes it.
-pub fn entry(key: StrokeKey, stage: Stage) -> Entry {
-    Entry { key, run_id: 1, data: Default::default(), stage, publication: None }
 }
