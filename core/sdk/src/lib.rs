@@ -62,12 +62,16 @@ mod sink;
 mod comparison;
 #[cfg(feature = "flattening")]
 mod flattening;
+#[cfg(feature = "comparison")]
+mod grid;
 
 #[cfg(feature = "comparison")]
 pub use comparison::{Comparison, Field, Inputs, NodeState, Report};
 pub use error::{Error, ErrorKind, Result};
 #[cfg(feature = "flattening")]
 pub use flattening::Flattening;
+#[cfg(feature = "comparison")]
+pub use grid::PlateGrid;
 pub use info::Info;
 pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};

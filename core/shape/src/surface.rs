@@ -248,6 +248,31 @@ impl Curvature {
     pub fn along(&self, [x, y]: [f64; 2]) -> f64 {
         x * x * self.u + 2.0 * x * y * self.uv + y * y * self.v
     }
+
+    /// The principal curvature that is larger in size.
+    #[must_use]
+    pub fn strongest(&self) -> f64 {
+        if self.max.abs() >= self.min.abs() { self.max } else { self.min }
+    }
+
+    /// Unit direction of that curvature; u where every direction is alike.
+    #[must_use]
+    pub fn strongest_direction(&self) -> [f64; 2] {
+        let strongest = self.strongest();
+        // An eigenvector in the two ways to write it: the longer one is the sharper one.
+        let (a, b) = ([self.uv, strongest - self.u], [strongest - self.v, self.uv]);
+        let [x, y] = if a[0].hypot(a[1]) > b[0].hypot(b[1]) { a } else { b };
+        let length = x.hypot(y);
+        if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] }
+    }
+}
+
+/// The change from one curvature to another, in the same frame.
+impl std::ops::Sub for Curvature {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self::from_form(self.u - other.u, self.v - other.v, self.uv - other.uv)
+    }
 }
 
 #[cfg(test)]

@@ -6,13 +6,10 @@
 //! board: a target that rocks keeps the tilt of the best fit.
 
 use nalgebra::{Matrix3, Rotation3};
-use platen_sdk::{Error, ErrorKind, Result};
+use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
 use platen_shape::{Surface, TargetSurface, Vec3};
 
 use crate::programme;
-
-/// Nodes along each side: every fifth is a node of the result's grid.
-pub(crate) const NODES: usize = 101;
 
 /// The target at rest on the plate.
 #[derive(Debug)]
@@ -44,9 +41,7 @@ impl Deviation {
     /// # Errors
     /// When too little of the plate was seen to carry the target, or the job was cancelled.
     pub(crate) fn new(now: &Surface, target: &TargetSurface, check: &dyn Fn() -> Result<()>) -> Result<Self> {
-        let at = |k: usize, length: f64| length * k as f64 / (NODES - 1) as f64;
-        let uv: Vec<[f64; 2]> =
-            (0..NODES * NODES).map(|i| [at(i % NODES, now.width()), at(i / NODES, now.height())]).collect();
+        let uv = PlateGrid::new(now).map(|u, v| [u, v]);
         let seen: Vec<bool> = uv.iter().map(|&[u, v]| now.mask().seen(u, v)).collect();
         let (rotation, translation) = fit(now, target, &uv, &seen);
         let mut rest = Rest { rotation, translation, movement: Vec3::zeros() };

@@ -123,13 +123,12 @@ pub(crate) fn of_stations(
                 deviation.sigma(now, target, station.at),
             )),
             Quantity::CurvatureDeficit => {
-                let [measured, wanted] = bending(now, target, station.at);
                 let sigma = now.sigma_curvature(u, v);
                 let sigma = match target.bending(u, v) {
                     Some([x, y]) => (x * x * sigma[0]).hypot(2.0 * x * y * sigma[2]).hypot(y * y * sigma[1]),
-                    None => 0.5 * sigma[0].hypot(sigma[1]),
+                    None => sigma[0].max(sigma[1]),
                 };
-                figures.push(figure(wanted - measured, "1/m", sigma));
+                figures.push(figure(target.deficit(&now.curvature(u, v), u, v), "1/m", sigma));
             }
         }
     }

@@ -40,11 +40,13 @@ mod programme;
 mod seat;
 mod section;
 
-use platen_sdk::{Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, Report, Result};
+use platen_sdk::{
+    Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, PlateGrid, Report, Result,
+};
 use platen_shape::TargetSurface;
 use platen_shape::task::{Centre, Figure, Findings, Task, Template, Verdict};
 
-use deviation::{Deviation, NODES};
+use deviation::Deviation;
 use judge::{Judge, Judged};
 use section::Line;
 
@@ -122,7 +124,7 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let verdict = judged.iter().map(|j| j.finding.verdict).max().unwrap_or(Verdict::CannotTell);
     let templates = judged.into_iter().map(|j| j.finding).collect();
     let findings = Findings { verdict: Some(verdict), says, figures: found, templates };
-    Ok(Report { findings, fields: vec![field(deviation)] })
+    Ok(Report { findings, fields: vec![field(PlateGrid::new(now), deviation)] })
 }
 
 fn unjudged(why: &str) -> Report {
@@ -224,17 +226,9 @@ fn search(
     Ok((found, sentence))
 }
 
-fn field(deviation: Deviation) -> Field {
-    let state = |seen: &bool| if *seen { NodeState::Seen } else { NodeState::Unseen };
-    Field {
-        name: "deviation".into(),
-        unit: "m".into(),
-        n_u: NODES,
-        n_v: NODES,
-        components: 1,
-        state: deviation.seen.iter().map(state).collect(),
-        values: deviation.value,
-    }
+fn field(grid: PlateGrid, deviation: Deviation) -> Field {
+    let state = deviation.seen.iter().map(|seen| if *seen { NodeState::Seen } else { NodeState::Unseen });
+    grid.scalar("deviation", "m", deviation.value, state.collect())
 }
 
 platen_sdk::export!(comparison TemplateGap);

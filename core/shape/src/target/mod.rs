@@ -161,15 +161,20 @@ impl TargetSurface {
     #[must_use]
     pub fn bending(&self, u: f64, v: f64) -> Option<[f64; 2]> {
         let k = self.curvature(u, v);
-        let (spread, strongest) = (k.max - k.min, if k.max.abs() >= k.min.abs() { k.max } else { k.min });
-        if spread <= 1e-9 {
-            return None;
-        }
-        // The eigenvector of the strongest curvature: of the two ways to write it the longer one.
-        let (a, b) = ([k.uv, strongest - k.u], [strongest - k.v, k.uv]);
-        let [x, y] = if a[0].hypot(a[1]) > b[0].hypot(b[1]) { a } else { b };
-        let length = x.hypot(y);
-        Some([x / length, y / length])
+        // 1e-9 1/m: radii of 10 m that differ by 0.1 um.
+        (k.max - k.min > 1e-9).then(|| k.strongest_direction())
+    }
+
+    /// Target's curvature minus the measured one, 1/m: positive where the plate has to bend more the target's way. In the
+    /// direction in which the target bends most; where none is special, in the direction that lacks or exceeds most.
+    #[must_use]
+    pub fn deficit(&self, measured: &Curvature, u: f64, v: f64) -> f64 {
+        let goal = self.curvature(u, v);
+        let lacking = match self.bending(u, v) {
+            Some(direction) => goal.along(direction) - measured.along(direction),
+            None => (goal - *measured).strongest(),
+        };
+        lacking * self.side
     }
 
     /// 1 when the centre of the (main) curvature lies on the scanner's side, else -1.

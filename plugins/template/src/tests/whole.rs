@@ -4,6 +4,8 @@ use platen_shape::task::{Quantity, Station};
 
 use super::*;
 
+const NODES: usize = PlateGrid::SIDE;
+
 #[test]
 fn the_target_lies_on_a_plate_of_its_own_shape() {
     for shape in [cylinder(6.0), TargetShape::Sphere { radius: 8.0 }, TargetShape::Flat] {

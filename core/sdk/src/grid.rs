@@ -1,0 +1,119 @@
+//! The nodes at which comparisons give their fields.
+
+use platen_shape::Surface;
+
+use crate::comparison::{Field, NodeState};
+
+/// Even nodes over the whole plate, v outer, u inner; every fifth is a node of the result's own grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlateGrid {
+    width: f64,
+    height: f64,
+}
+
+impl PlateGrid {
+    /// Nodes along each side.
+    pub const SIDE: usize = 101;
+    /// Number of nodes.
+    pub const NODES: usize = Self::SIDE * Self::SIDE;
+
+    /// The grid over the rectangle of a surface.
+    #[must_use]
+    pub fn new(surface: &Surface) -> Self {
+        Self { width: surface.width(), height: surface.height() }
+    }
+
+    /// Place of a node on the plate.
+    #[must_use]
+    pub fn at(&self, node: usize) -> [f64; 2] {
+        let along = |k: usize, length: f64| length * k as f64 / (Self::SIDE - 1) as f64;
+        [along(node % Self::SIDE, self.width), along(node / Self::SIDE, self.height)]
+    }
+
+    /// `f(u, v)` at every node.
+    pub fn map<T>(&self, mut f: impl FnMut(f64, f64) -> T) -> Vec<T> {
+        (0..Self::NODES).map(|node| self.at(node)).map(|[u, v]| f(u, v)).collect()
+    }
+
+    /// Area that a node stands for, square metres.
+    #[must_use]
+    pub fn cell(&self) -> f64 {
+        self.width * self.height / ((Self::SIDE - 1) * (Self::SIDE - 1)) as f64
+    }
+
+    /// A field with one number a node.
+    #[must_use]
+    pub fn scalar(&self, name: &str, unit: &str, values: Vec<f64>, state: Vec<NodeState>) -> Field {
+        self.field(name, unit, 1, values, state)
+    }
+
+    /// A field with several numbers a node.
+    #[must_use]
+    pub fn field(
+        &self,
+        name: &str,
+        unit: &str,
+        components: usize,
+        values: Vec<f64>,
+        state: Vec<NodeState>,
+    ) -> Field {
+        let (name, unit) = (name.into(), unit.into());
+        Field { name, unit, n_u: Self::SIDE, n_v: Self::SIDE, components, values, state }
+    }
+
+    /// Nodes that hang together (by their sides) and share a label; nodes with label 0 belong to none.
+    #[must_use]
+    pub fn patches(label: &[i8]) -> Vec<Vec<usize>> {
+        let mut visited = vec![false; label.len()];
+        let mut patches = Vec::new();
+        for first in (0..label.len()).filter(|&node| label[node] != 0) {
+            if visited[first] {
+                continue;
+            }
+            visited[first] = true;
+            let mut patch = vec![first];
+            let mut next = 0;
+            while let Some(&node) = patch.get(next) {
+                next += 1;
+                for neighbour in neighbours(node) {
+                    if !visited[neighbour] && label[neighbour] == label[first] {
+                        visited[neighbour] = true;
+                        patch.push(neighbour);
+                    }
+                }
+            }
+            patches.push(patch);
+        }
+        patches
+    }
+}
+
+fn neighbours(node: usize) -> impl Iterator<Item = usize> {
+    const SIDE: usize = PlateGrid::SIDE;
+    let (u, v) = (node % SIDE, node / SIDE);
+    let candidates = [
+        (u > 0, node.wrapping_sub(1)),
+        (u + 1 < SIDE, node + 1),
+        (v > 0, node.wrapping_sub(SIDE)),
+        (v + 1 < SIDE, node + SIDE),
+    ];
+    candidates.into_iter().filter_map(|(inside, node)| inside.then_some(node))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_hang_together_by_sides_and_do_not_wrap_round() {
+        let mut label = vec![0_i8; PlateGrid::NODES];
+        // A row's last node and the next row's first are no neighbours; diagonal nodes are none either.
+        for node in [100, 101, 5 * 101 + 5, 6 * 101 + 6] {
+            label[node] = 1;
+        }
+        // Two senses side by side are two patches.
+        (label[2000], label[2001], label[2002]) = (1, 1, -1);
+        let patches = PlateGrid::patches(&label);
+        assert_eq!(patches, [vec![100], vec![101], vec![510], vec![612], vec![2000, 2001], vec![2002]]);
+    }
+}

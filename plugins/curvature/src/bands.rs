@@ -1,0 +1,152 @@
+//! The bend angle of a band.
+
+use std::f64::consts::PI;
+
+use platen_sdk::PlateGrid;
+use platen_shape::Surface;
+use platen_shape::surface::Curvature;
+
+/// A patch of the plate that bent in one sense.
+#[derive(Debug, Clone)]
+pub(crate) struct Band {
+    /// Turn of the plate from one side of the band to the other, radians, positive towards the scanner.
+    pub(crate) angle: f64,
+    /// Sense of the patch, 1 or -1: not the angle's where the swing beside a stronger band was taken for one.
+    pub(crate) sense: f64,
+    /// 95 %, radians.
+    pub(crate) uncertainty: f64,
+    /// Middle of the patch.
+    pub(crate) centre: [f64; 2],
+    /// Direction of the straight lines, from u towards v, 0 to pi.
+    pub(crate) direction: f64,
+    /// Along the straight lines, metres.
+    pub(crate) length: f64,
+    /// Across them.
+    pub(crate) width: f64,
+}
+
+/// Lines across a band on which its change is averaged.
+const LINES: usize = 15;
+
+/// Step along them, metres: a spline's span is ten times as long.
+const STEP: f64 = 5e-3;
+
+/// The foot of a band: where its change has fallen to this share of its peak.
+const FOOT: f64 = 0.25;
+
+/// How far beyond its foot a band is summed, metres. A spline swings through beside a narrow bend, and only with that
+/// swing the turn is the plate's. A fixed length: ends that follow the sign of the change pick the noise that has this sign.
+const BEYOND: f64 = 0.1;
+
+/// Half step of the slopes by which the uncertainty is told, metres.
+const SLOPE_STEP: f64 = 5e-3;
+
+/// The band of a patch of nodes, between `[now, before]`.
+pub(crate) fn measure(
+    surfaces: [&Surface; 2],
+    grid: PlateGrid,
+    patch: &[usize],
+    change: &[Curvature],
+) -> Band {
+    let sum = |take: fn(&Curvature) -> f64| patch.iter().map(|&i| take(&change[i])).sum::<f64>();
+    let total = Curvature::from_form(sum(|k| k.u), sum(|k| k.v), sum(|k| k.uv));
+    let section = Section::new(surfaces, grid, patch, total.strongest_direction());
+    let sense = total.strongest().signum();
+    let [from, to] = section.ends(sense);
+    let terms = section.turn(from, to);
+    let sigma = surfaces[0].sigma_of_heights(&terms).hypot(surfaces[1].sigma_of_heights(&terms));
+    let weight = |i: usize| change[i].strongest().abs();
+    let weights: f64 = patch.iter().map(|&i| weight(i)).sum();
+    let middle = |k: usize| patch.iter().map(|&i| weight(i) * grid.at(i)[k]).sum::<f64>() / weights;
+    let [x, y] = section.across;
+    Band {
+        angle: section.angle(from, to),
+        sense,
+        uncertainty: crate::EXPANDED * sigma,
+        centre: [middle(0), middle(1)],
+        direction: (x.atan2(-y) + PI).rem_euclid(PI),
+        length: section.along[1] - section.along[0],
+        width: to - from,
+    }
+}
+
+/// The section across a band, averaged along it.
+struct Section<'a> {
+    surfaces: [&'a Surface; 2],
+    /// Direction in which the change bends.
+    across: [f64; 2],
+    /// From where to where the patch reaches along the band.
+    along: [f64; 2],
+    /// And across it.
+    reach: [f64; 2],
+}
+
+impl<'a> Section<'a> {
+    fn new(surfaces: [&'a Surface; 2], grid: PlateGrid, patch: &[usize], across @ [x, y]: [f64; 2]) -> Self {
+        let range = |[a, b]: [f64; 2]| {
+            let values = patch.iter().map(|&i| grid.at(i)).map(|[u, v]| a * u + b * v);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| [low.min(s), high.max(s)])
+        };
+        Self { surfaces, across, along: range([-y, x]), reach: range([x, y]) }
+    }
+
+    /// Places on the plate at a distance across the band, spread along it.
+    fn places(&self, s: f64) -> impl Iterator<Item = [f64; 2]> {
+        let ([x, y], [first, last], now) = (self.across, self.along, self.surfaces[0]);
+        (0..LINES)
+            .map(move |k| first + (last - first) * (k as f64 + 0.5) / LINES as f64)
+            .map(move |t| [x * s - y * t, y * s + x * t])
+            .filter(|[u, v]| (0.0..=now.width()).contains(u) && (0.0..=now.height()).contains(v))
+    }
+
+    /// Mean change of curvature across the band, in the mean over the band's length; 0 beyond the plate.
+    fn change(&self, s: f64) -> f64 {
+        let at = |surface: &Surface, [u, v]: [f64; 2]| surface.curvature(u, v).along(self.across);
+        let [now, before] = self.surfaces;
+        let (n, sum) = self
+            .places(s)
+            .fold((0, 0.0), |(n, sum), place| (n + 1, sum + at(now, place) - at(before, place)));
+        sum / f64::from(n.max(1))
+    }
+
+    /// Where the band ends on both sides of its strongest change.
+    fn ends(&self, sense: f64) -> [f64; 2] {
+        let [first, last] = self.reach;
+        let n = ((last - first) / STEP) as usize;
+        let at = |k: usize| first + k as f64 * STEP;
+        let (peak, most) = (0..=n)
+            .map(|k| (at(k), sense * self.change(at(k))))
+            .fold((first, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+        [-1.0, 1.0].map(|way| {
+            let reach = if way < 0.0 { peak - first } else { last - peak };
+            let mut steps = (1..=(reach / STEP) as usize).map(|k| peak + way * k as f64 * STEP);
+            let foot = steps.find(|s| sense * self.change(*s) < FOOT * most).unwrap_or(peak + way * reach);
+            let mut beyond = (0..=(BEYOND / STEP) as usize).rev().map(|k| foot + way * k as f64 * STEP);
+            beyond.find(|s| 2 * self.places(*s).count() > LINES).unwrap_or(foot)
+        })
+    }
+
+    /// The mean change summed from one end to the other (Simpson's rule).
+    fn angle(&self, from: f64, to: f64) -> f64 {
+        let n = 2 * ((to - from) / (2.0 * STEP)).ceil().max(1.0) as usize;
+        let h = (to - from) / n as f64;
+        let weight = |k: usize| match k {
+            _ if k == 0 || k == n => 1.0,
+            _ if k % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        (0..=n).map(|k| weight(k) * self.change(from + k as f64 * h)).sum::<f64>() * h / 3.0
+    }
+
+    /// The mean turn between the two ends as heights: differences of slopes.
+    fn turn(&self, from: f64, to: f64) -> Vec<([f64; 2], f64)> {
+        let slope = |s: f64, sign: f64| {
+            [1.0, -1.0].into_iter().flat_map(move |way| {
+                let places: Vec<[f64; 2]> = self.places(s + way * SLOPE_STEP).collect();
+                let weight = sign * way * 0.5 / (SLOPE_STEP * places.len().max(1) as f64);
+                places.into_iter().map(move |place| (place, weight))
+            })
+        };
+        slope(to, 1.0).chain(slope(from, -1.0)).collect()
+    }
+}

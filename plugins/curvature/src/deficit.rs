@@ -1,0 +1,53 @@
+//! What is still to bend.
+
+use platen_sdk::{NodeState, PlateGrid, Report};
+use platen_shape::TargetSurface;
+use platen_shape::task::Figure;
+
+use crate::{EXPANDED, Nodes, figure, place};
+
+/// Adds the field, the figures and the sentences of the missing curvature.
+pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
+    let grid = nodes.grid;
+    let value: Vec<f64> = (0..PlateGrid::NODES)
+        .map(|i| {
+            let [u, v] = grid.at(i);
+            target.deficit(&nodes.curvature[i], u, v)
+        })
+        .collect();
+    let lod: Vec<f64> = (0..PlateGrid::NODES).map(|i| EXPANDED * sigma(nodes, target, i)).collect();
+    let state: Vec<NodeState> = (0..PlateGrid::NODES)
+        .map(|i| match (nodes.known[i], value[i].abs() < lod[i]) {
+            (false, _) => NodeState::Unseen,
+            (true, true) => NodeState::Unchanged,
+            (true, false) => NodeState::Seen,
+        })
+        .collect();
+
+    let known = state.iter().filter(|s| **s != NodeState::Unseen).count();
+    let enough = state.iter().filter(|s| **s == NodeState::Unchanged).count();
+    let figures = &mut report.findings.figures;
+    figures.push(figure("curvature.enough", enough as f64 / known.max(1) as f64, "1"));
+    // The most of each sense, beyond doubt.
+    for (name, sign, word) in
+        [("curvature.deficit_max", 1.0, "bend more"), ("curvature.deficit_min", -1.0, "bent too far")]
+    {
+        let beyond = |i: &usize| state[*i] == NodeState::Seen && sign * value[*i] > 0.0;
+        let most = (0..value.len()).filter(beyond).max_by(|&a, &b| value[a].abs().total_cmp(&value[b].abs()));
+        let Some(i) = most else { continue };
+        let (uncertainty, at) = (Some(lod[i]), Some(grid.at(i)));
+        figures.push(Figure { uncertainty, at, ..figure(name, value[i], "1/m") });
+        let size = value[i].abs();
+        report.findings.says.push(format!("{word}: {size:.3} 1/m at {}", place(grid.at(i))));
+    }
+    report.fields.push(grid.scalar("curvature_deficit", "1/m", value, state));
+}
+
+/// One sigma of the deficit at a node.
+fn sigma(nodes: &Nodes, target: &TargetSurface, i: usize) -> f64 {
+    let ([u, v], [along_u, along_v, twist]) = (nodes.grid.at(i), nodes.sigma[i]);
+    match target.bending(u, v) {
+        Some([x, y]) => (x * x * along_u).hypot(2.0 * x * y * twist).hypot(y * y * along_v),
+        None => along_u.max(along_v),
+    }
+}
