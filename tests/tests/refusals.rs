@@ -79,11 +79,16 @@ fn measure(scan: &Path, plate: &Path, more: &[&str]) -> Said {
         err: String::from_utf8(output.stderr).unwrap(),
     };
     let parent = std::fs::read_dir(out.parent().unwrap()).unwrap();
-    let parts: Vec<_> =
-        parent.flatten().map(|e| e.path()).filter(|p| p.to_string_lossy().contains(".part")).collect();
+    let parts: Vec<_> = parent.flatten().map(|e| e.path()).filter(|p| is_part_of(p, &out)).collect();
     assert!(parts.is_empty(), "{parts:?}");
     assert_eq!(out.exists(), said.code == Some(0), "{}", said.err);
     said
+}
+
+/// What a half-written folder would be called.
+fn is_part_of(path: &Path, out: &Path) -> bool {
+    let name = |p: &Path| p.file_name().unwrap().to_string_lossy().into_owned();
+    path != out && name(path).starts_with(&format!("{}.", name(out)))
 }
 
 /// One sentence on stderr that holds all of `words`, and nothing on stdout.
@@ -239,7 +244,8 @@ fn a_real_scan_without_a_plate_is_refused() {
     let bench = bench();
     let pump = bench.file("pump.e57");
     std::fs::copy(samples.join("lattice/pumpA.e57"), &pump).unwrap();
-    check(&measure(&pump, &bench.file("plate.toml"), &[]), 1, &["no plate"]);
+    let plate = bench.write("long.toml", PLATE.replace("3000.0", "5000.0").replace("2500.0", "2000.0"));
+    check(&measure(&pump, &plate, &[]), 1, &["plate"]);
 }
 
 #[test]

@@ -1,0 +1,132 @@
+//! The real `platen run` against the simulated press: every check is made on the press's side or on the record.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+mod cell;
+
+use cell::{Host, Press, assert_clean, plant, until};
+
+#[test]
+fn strokes_are_measured_recorded_and_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 5");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let mut host = Host::start(&plant);
+    let stats = press.wait_done();
+    assert_clean(&stats, &host.log());
+    let taken = stats["taken"].as_array().unwrap();
+    assert_eq!(taken.len(), 6, "five strokes and the blank");
+    assert_eq!(stats["plates_served"].as_u64().unwrap(), 7, "one look at the start and one scan a stroke");
+
+    let history = Host::history(&plant);
+    assert_eq!(history.len(), 6);
+    for (record, taken) in history.iter().zip(taken) {
+        assert_eq!(record["key"]["stroke"], taken["stroke_id"]);
+        assert_eq!(record["ack"], "explicit");
+        // run_id is two words, high word first; gap.max is in hundredths of a millimetre.
+        let word = |k: usize| taken["words"][k].as_u64().unwrap();
+        assert_eq!(word(50) << 16 | word(51), record["run_id"].as_u64().unwrap());
+        let gap_mm = record["figures"]["gap.max"].as_f64().unwrap() * 1000.0;
+        assert!((gap_mm - word(55) as f64 * 0.01).abs() < 0.0051, "{gap_mm} mm, register {}", word(55));
+        let document = std::path::Path::new(record["document"].as_str().unwrap());
+        let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();
+        assert_eq!(result["verdict"], record["verdict"]);
+    }
+    let status = host.status().unwrap();
+    assert_eq!(status["status"]["measured"], 6, "{status}");
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    assert_eq!(press.host_status(), 0, "nothing is left valid");
+}
+
+#[test]
+fn a_killed_host_delivers_once_or_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 6\n[stroke_faults]");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    for kills in 1..=4 {
+        let host = Host::start(&plant);
+        // Killed at another point each time: while scanning, while evaluating, after the result.
+        press.wait_taken(kills);
+        let busy = kills % 2 == 0;
+        until("the state to kill in", || (busy == (press.host_status() & 2 != 0)).then_some(()));
+        host.kill();
+    }
+    let mut host = Host::start(&plant);
+    let stats = press.wait_done();
+    let log = host.log();
+    for count in ["writes_outside", "wrong_values", "duplicates", "changed"] {
+        assert_eq!(stats[count], 0, "{count}: {stats:#}\n{log}");
+    }
+    assert_eq!(host.stop(), Some(0));
+    let history = Host::history(&plant);
+    let mut keys: Vec<String> = history.iter().map(|record| record["key"].to_string()).collect();
+    let all = keys.len();
+    keys.sort();
+    keys.dedup();
+    assert_eq!(keys.len(), all, "no stroke is on record twice");
+    for record in &history {
+        assert!(record["verdict"].is_string(), "every stroke accepted has its end: {record}\n{log}");
+    }
+}
+
+#[test]
+fn the_wrong_press_is_never_written_to() {
+    for (config, code) in [("", "502"), ("map_version = 2", "501")] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut press = Press::start(folder.path(), config);
+        if code == "502" {
+            press.ask(r#"{"do":{"press_id":4}}"#);
+        }
+        let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+        let mut host = Host::start(&plant);
+        let status = until("the fault in the status", || {
+            host.status().filter(|s| s.to_string().contains(&format!("\"{code} ")))
+        });
+        assert_eq!(status["running"], true);
+        let stats = press.stats();
+        assert_eq!(stats["writes"], 0, "{stats:#}");
+        assert_eq!(host.stop(), Some(0), "{}", host.log());
+        assert_eq!(press.stats()["writes"], 0);
+    }
+}
+
+#[test]
+fn a_press_that_cannot_be_reached_is_named_and_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    // A port that was free a moment ago.
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let plant = plant(folder.path(), &free.to_string(), "shape = \"flat\"");
+    let mut host = Host::start(&plant);
+    until("the fault in the status", || host.status().filter(|s| s.to_string().contains("\"101 ")));
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
+
+#[test]
+fn a_second_host_on_the_same_record_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let press = Press::start(folder.path(), "automatic = false");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let mut first = Host::start(&plant);
+    until("the first host", || first.status());
+    let mut second = Host::start(&plant);
+    assert_eq!(second.wait(), Some(1));
+    assert!(second.log().contains("history"), "{}", second.log());
+    assert_eq!(first.stop(), Some(0));
+}
+
+#[test]
+fn a_scanner_that_fails_is_reported_to_the_press() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 1\nbaseline = false\nwait_ready = false");
+    // Nobody serves a plate on this port any more.
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{free}\""));
+    let mut host = Host::start(&plant);
+    let status =
+        until("the fault in the status", || host.status().filter(|s| s.to_string().contains("\"201 ")));
+    assert_eq!(status["running"], true);
+    until("the code in the registers", || {
+        let registers = press.ask(r#"{"get":"registers"}"#);
+        (registers["registers"]["h"][6] == 201).then_some(())
+    });
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
