@@ -25,7 +25,9 @@ fn strokes_are_measured_recorded_and_answered() {
         // run_id is two words, high word first; gap.max is in hundredths of a millimetre.
         let word = |k: usize| taken["words"][k].as_u64().unwrap();
         assert_eq!(word(50) << 16 | word(51), record["run_id"].as_u64().unwrap());
-        let gap_mm = record["figures"]["gap.max"].as_f64().unwrap() * 1000.0;
+        let gap_mm =
+            record["figures"]["gap.max"].as_f64().unwrap_or_else(|| panic!("{record:#}\n{}", host.log()));
+        let gap_mm = gap_mm * 1000.0;
         assert!((gap_mm - word(55) as f64 * 0.01).abs() < 0.0051, "{gap_mm} mm, register {}", word(55));
         let document = std::path::Path::new(record["document"].as_str().unwrap());
         let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();

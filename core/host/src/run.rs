@@ -76,10 +76,12 @@ pub async fn run(
     let bench = bench.map_err(HostError::Thread)?;
 
     let link = PressLink::new(&press);
+    let alarm = status::NewestAlarm::default();
     let status = tokio::spawn(status::keep(
         plant.output.folder.join("status.json"),
         press.clone(),
         host.status.clone(),
+        Arc::clone(&alarm),
     ));
     let mut press_side = tokio::spawn(run_press(press, link, journal::Adapter(Arc::clone(&history)), side));
     let mut scanning: Option<(StrokeKey, CancelToken)> = None;
@@ -101,7 +103,7 @@ pub async fn run(
                     hung = Some(HostError::Bench("a plugin hangs or the bench failed".into()));
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
-                dispatch(order, &tasks, &mut scanning, &history);
+                dispatch(order, &tasks, &mut scanning, &history, &alarm);
             }
         }
     };
@@ -123,6 +125,7 @@ fn dispatch(
     tasks: &std::sync::mpsc::Sender<Task>,
     scanning: &mut Option<(StrokeKey, CancelToken)>,
     history: &Arc<Mutex<History>>,
+    newest: &status::NewestAlarm,
 ) {
     match order {
         Order::StartScan { key, run_id, data } => {
@@ -147,8 +150,11 @@ fn dispatch(
             let alarm = code.alarm();
             let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
             let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
-            let text = alarm.text(Language::En);
-            tracing::warn!(code = code.number(), "{stroke}{text}{detail}; {}", alarm.remedy(Language::En));
+            let text =
+                format!("{stroke}{}{detail}; {}", alarm.text(Language::En), alarm.remedy(Language::En));
+            tracing::warn!(code = code.number(), "{text}");
+            let newest_now = (Timestamp::now(), format!("{} {text}", code.number()));
+            *newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(newest_now);
         }
         Order::Seen(image) => tracing::debug!(?image, "the press says"),
     }

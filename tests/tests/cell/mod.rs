@@ -102,7 +102,7 @@ pub(crate) fn plant(folder: &Path, modbus: &str, scanner: &str) -> PathBuf {
     let text = format!(
         "[plant]\nname = \"test\"\n[press]\nname = \"press\"\npress_id = 3\n\
          [press.link]\ntype = \"tcp\"\nhost = \"127.0.0.1\"\nport = {port}\nunit = 1\n\
-         [scanner]\nplugin = \"simulated\"\n[scanner.options]\nstep_deg = 0.15\n{scanner}\n\
+         [scanner]\nplugin = \"simulated\"\n[scanner.options]\nstep_deg = 0.1\n{scanner}\n\
          [frame]\nu_axis = [1.0, 0.0, 0.0]\n[plates]\nfolder = {plates:?}\n\
          [flattening]\nplugin = \"harmonic\"\n[[comparison]]\nplugin = \"template\"\n\
          [output]\nfolder = \"results\"\n"

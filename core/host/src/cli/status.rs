@@ -43,6 +43,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 output::line(&format!("{what}: {text}"))?;
             }
         }
+        if let Some((at, text)) = &status.alarm {
+            output::line(&format!("newest alarm, {at:.0}: {text}"))?;
+        }
         output::line(&format!(
             "strokes {}, measured {}, not measured {}, missed {}",
             status.strokes, status.measured, status.not_measured, status.missed

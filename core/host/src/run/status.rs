@@ -1,12 +1,16 @@
 //! What `platen status` shows: a small file that the running host keeps up to date.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use platen_plant::press::Press;
 use platen_press::{Code, Durations, Language, Status};
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
+
+/// The newest alarm, as the dispatcher hears it.
+pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
 
 /// How things stand on one press.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -25,6 +29,8 @@ pub struct StatusRecord {
     pub error: Option<String>,
     /// What stands in the warning register, in words.
     pub warning: Option<String>,
+    /// The newest alarm since the start, in words, and when it came.
+    pub alarm: Option<(jiff::Timestamp, String)>,
     /// Strokes accepted since the start.
     pub strokes: u64,
     /// Results with a measurement.
@@ -40,7 +46,7 @@ pub struct StatusRecord {
 }
 
 impl StatusRecord {
-    fn of(press: &Press, status: &Status) -> Self {
+    fn of(press: &Press, status: &Status, alarm: &NewestAlarm) -> Self {
         let percentiles = |durations: &Durations| {
             [50.0, 99.0].map(|percent| durations.percentile(percent).map(|d| d.as_secs_f64() * 1000.0))
         };
@@ -52,10 +58,11 @@ impl StatusRecord {
             press: press.name.clone(),
             at: jiff::Timestamp::now(),
             pid: std::process::id(),
-            state: format!("{:?}", status.state),
+            state: status.state.to_string(),
             link_error: status.link_error.map(words),
             error: status.host.error.map(words),
             warning: status.host.warning.map(words),
+            alarm: alarm.lock().unwrap_or_else(PoisonError::into_inner).clone(),
             strokes: status.metrics.strokes,
             measured: status.metrics.measured,
             not_measured: status.metrics.not_measured,
@@ -75,10 +82,15 @@ impl StatusRecord {
 }
 
 /// Keeps the file up to date, at most once a second but at once when the state changes.
-pub(super) async fn keep(path: PathBuf, press: Press, mut status: watch::Receiver<Status>) {
+pub(super) async fn keep(
+    path: PathBuf,
+    press: Press,
+    mut status: watch::Receiver<Status>,
+    alarm: NewestAlarm,
+) {
     let mut reported = false;
     loop {
-        let record = StatusRecord::of(&press, &status.borrow_and_update());
+        let record = StatusRecord::of(&press, &status.borrow_and_update(), &alarm);
         let written = write(&path, &record);
         if let Err(error) = written.as_ref().map_err(|e| format!("{}: {e}", path.display()))
             && !std::mem::replace(&mut reported, true)
@@ -88,7 +100,7 @@ pub(super) async fn keep(path: PathBuf, press: Press, mut status: watch::Receive
         let state = record.state;
         let changed = async {
             while status.changed().await.is_ok() {
-                if format!("{:?}", status.borrow_and_update().state) != state {
+                if status.borrow_and_update().state.to_string() != state {
                     return true;
                 }
             }
