@@ -6,6 +6,11 @@ use platen_scan::ScanHeader;
 /// each other than this factor times the sum of their ranges times the angle between them (paper, eq. 1).
 const FACTOR: f64 = 1.618_033_988_749_895;
 
+/// The same at 82 degrees: a strongly bent plate is seen so along the line of sight. Down a column two cells are joined
+/// up to there if the ranges before and behind them change at nearly the same rate, which they do not at an edge.
+const STEEP_FACTOR: f64 = 3.59;
+const STEEP_RATES: f32 = 2.0;
+
 /// Beams of neighbouring columns close up towards the zenith and the nadir, and with them the bound, until it
 /// falls below the range noise. It is not let below this part of the bound between rows.
 const LEAST_PART_OF_ROW_STEP: f64 = 0.25;
@@ -21,8 +26,8 @@ pub(super) struct Link {
 }
 
 impl Link {
-    fn new(angle: f64, bound_angle: f64) -> Self {
-        Self { chord: (2.0 * (1.0 - angle.cos())) as f32, bound: (FACTOR * bound_angle).powi(2) as f32 }
+    fn new(angle: f64, bound: f64) -> Self {
+        Self { chord: (2.0 * (1.0 - angle.cos())) as f32, bound: bound.powi(2) as f32 }
     }
 
     /// True when samples at ranges `a` and `b` (metres) are on one surface.
@@ -37,8 +42,9 @@ impl Link {
 /// The criterion in both directions of a lattice, each with its own step.
 #[derive(Debug, Clone)]
 pub(super) struct Continuity {
-    /// Between a cell and the one below it.
-    pub(super) down: Link,
+    /// Between a cell and the one below it, at any incidence of the criterion and at steeper ones.
+    down: Link,
+    steep: Link,
     /// Per row, between a cell and the one in the next column.
     pub(super) across: Vec<Link>,
 }
@@ -50,10 +56,31 @@ impl Continuity {
             .map(|row| {
                 let elevation = header.elevation_start - row_step * f64::from(row);
                 let angle = header.azimuth_step * elevation.cos().abs();
-                Link::new(angle, angle.max(LEAST_PART_OF_ROW_STEP * row_step))
+                Link::new(angle, FACTOR * angle.max(LEAST_PART_OF_ROW_STEP * row_step))
             })
             .collect();
-        Self { down: Link::new(row_step, row_step), across }
+        Self {
+            down: Link::new(row_step, FACTOR * row_step),
+            steep: Link::new(row_step, STEEP_FACTOR * row_step),
+            across,
+        }
+    }
+
+    /// True when the second and the third of four consecutive ranges down a column are on one surface.
+    #[inline]
+    pub(super) fn joins_down(&self, ranges: [Option<f32>; 4]) -> bool {
+        let [before, Some(here), Some(next), behind] = ranges else { return false };
+        if self.down.joins(here, next) {
+            return true;
+        }
+        let (Some(before), Some(behind)) = (before, behind) else { return false };
+        let rates = [here - before, next - here, behind - next];
+        let [least, most] = [
+            rates.map(f32::abs).into_iter().fold(f32::MAX, f32::min),
+            rates.map(f32::abs).into_iter().fold(0.0, f32::max),
+        ];
+        let same_way = rates.iter().all(|r| *r > 0.0) || rates.iter().all(|r| *r < 0.0);
+        same_way && most < STEEP_RATES * least && self.steep.joins(here, next)
     }
 }
 
@@ -65,7 +92,7 @@ mod tests {
     #[test]
     fn the_limit_is_an_incidence_of_72_degrees() {
         let step = 8e-4_f64;
-        let link = Link::new(step, step);
+        let link = Link::new(step, FACTOR * step);
         for (incidence, joined) in [(0.398, true), (0.402, false)] {
             // Beams `step` apart on a plane at distance 4 m from the scanner.
             let incidence = incidence * std::f64::consts::PI;

@@ -183,7 +183,7 @@ impl Scene<'_> {
         let bend = excess[0] - 2.0 * excess[1] + excess[2];
         let start = 1.0 - excess[0] / slope;
         let straight = bend.abs() <= 4.0 * 6.0_f64.sqrt() * sigma + 0.1 * slope;
-        if slope < 3.0 * sigma || !straight || !(-1.0..=1.2).contains(&start) {
+        if slope < 3.0 * sigma || !straight || !(-2.5..=1.2).contains(&start) {
             return None;
         }
         let half_width = 2.0 * sigma / slope;

@@ -7,13 +7,13 @@ use super::window::Window;
 /// Label of a cell that is part of no face.
 pub(super) const NO_FACE: u32 = u32::MAX;
 
-/// Largest angle between the normals two cells before and two cells behind a cell of a face, radians. Across an edge
+/// Largest angle between the normals some cells before and behind a cell of a face, radians. Across an edge
 /// between two faces the low-pass copy turns by 90 degrees over about six cells; a plate bent to R 2 m turns by less
 /// than 1 degree over four cells of 6 mm, by 5 at the most grazing sight; noise adds a few.
 const MAX_TURN: f32 = 0.2;
 
-/// Cells on each side over which the turn is taken.
-const STRIDE: usize = 2;
+/// Cells on each side over which the turn is taken, at least; as many as slopes are taken over.
+const LEAST_STRIDE: usize = 2;
 
 /// A face of a component.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +23,10 @@ pub(super) struct Face {
     pub(super) area: f64,
 }
 
-/// Labels the cells of a window by face and lists the faces, the largest first.
-pub(super) fn faces(window: &Window, normals: &[Vector3<f32>]) -> (Vec<u32>, Vec<Face>) {
+/// Labels the cells of a window by face and lists the faces, the largest first. `slope_reach` is that of the normals.
+pub(super) fn faces(window: &Window, normals: &[Vector3<f32>], slope_reach: usize) -> (Vec<u32>, Vec<Face>) {
     let n_rows = window.n_rows;
-    let flat = flat(normals, n_rows);
+    let flat = flat(normals, n_rows, slope_reach.max(LEAST_STRIDE));
     let mut label = vec![NO_FACE; normals.len()];
     let mut faces: Vec<Face> = Vec::new();
     let mut front = Vec::new();
@@ -54,16 +54,16 @@ pub(super) fn faces(window: &Window, normals: &[Vector3<f32>]) -> (Vec<u32>, Vec
 }
 
 /// Cells that have a normal and around which it does not turn. Margins of the window never are.
-fn flat(normals: &[Vector3<f32>], n_rows: usize) -> Vec<bool> {
+fn flat(normals: &[Vector3<f32>], n_rows: usize, stride: usize) -> Vec<bool> {
     let cos_turn = MAX_TURN.cos();
-    let reach = STRIDE * n_rows;
+    let reach = stride * n_rows;
     let none = Vector3::zeros();
     let turns = |a: usize, b: usize| {
         normals[a] != none && normals[b] != none && normals[a].dot(&normals[b]) < cos_turn
     };
     let mut flat = vec![false; normals.len()];
     for at in reach..normals.len().saturating_sub(reach) {
-        flat[at] = normals[at] != none && !turns(at - STRIDE, at + STRIDE) && !turns(at - reach, at + reach);
+        flat[at] = normals[at] != none && !turns(at - stride, at + stride) && !turns(at - reach, at + reach);
     }
     flat
 }

@@ -175,10 +175,9 @@ impl Extractor {
                 let range = f64::from(cells[at].range_m);
                 solid += range * range * self.elevation[first_row as usize + at].1;
                 at += 1;
-                let joined = cells.get(at).is_some_and(|next| {
-                    usable(next) && self.continuity.down.joins(cells[at - 1].range_m, next.range_m)
-                });
-                if !joined {
+                let range = |i: usize| cells.get(i).filter(|cell| usable(cell)).map(|cell| cell.range_m);
+                let before = if at >= 2 { range(at - 2) } else { None };
+                if !self.continuity.joins_down([before, range(at - 1), range(at), range(at + 1)]) {
                     break;
                 }
             }

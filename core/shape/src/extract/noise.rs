@@ -12,6 +12,9 @@ const BLOCK: (usize, usize) = (16, 32);
 /// A block with fewer differences takes the pooled value.
 const LEAST_COUNT: usize = 64;
 
+/// No scanner measures better, metres; a simulated one without noise would leave no room for a plate's curvature.
+const LEAST: f32 = 1e-4;
+
 /// Median of |x| of a normal variable of unit variance.
 const NORMAL_MEDIAN_ABS: f32 = 0.674_489_75;
 
@@ -29,7 +32,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Estimates from the cells where `usable` holds. Without any, the noise is 0.
+    /// Estimates from the cells where `usable` holds. Without any, it is the least.
     pub(super) fn estimate(window: &Window, usable: &[bool]) -> Self {
         let (n_columns, n_rows) = (window.n_columns, window.n_rows);
         let blocks_down = n_rows.div_ceil(BLOCK.1);
@@ -50,9 +53,9 @@ impl Noise {
             all.extend_from_slice(&here);
         }
         let scale = 1.0 / (NORMAL_MEDIAN_ABS * THIRD_DIFFERENCE_GAIN.sqrt());
-        let pooled = if all.is_empty() { 0.0 } else { median(&mut all) * scale };
+        let pooled = if all.is_empty() { LEAST } else { (median(&mut all) * scale).max(LEAST) };
         for value in &mut block {
-            *value = if value.is_finite() { *value * scale } else { pooled };
+            *value = if value.is_finite() { (*value * scale).max(LEAST) } else { pooled };
         }
         Self { pooled, block, blocks_down, n_rows }
     }

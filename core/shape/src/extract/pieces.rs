@@ -2,7 +2,7 @@
 //!
 //! A chain or the ram in front of the plate can cut its face into components. Two pieces are one face when, on most rows
 //! or columns that hold both, the surface leaves the one and enters the other as one smooth curve, and what stands
-//! between them is nearer than both.
+//! between them is nearer than both or was not measured.
 
 use nalgebra::Vector3;
 
@@ -31,7 +31,7 @@ struct End {
     place: u32,
     point: Vec3,
     normal: Vec3,
-    /// What lies next to it is nearer.
+    /// What lies next to it is nearer, or was not measured.
     hidden: bool,
 }
 
@@ -92,13 +92,13 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Vector3<f32>], 
         let end = |place: usize, outward: isize| {
             let inner = place.saturating_add_signed(-outward * INSET as isize).clamp(low, high);
             let at = index(line, place);
-            let hidden = (1..=INSET).any(|far| {
-                place.checked_add_signed(outward * far as isize).is_some_and(|next| {
-                    let beside = index(line, next.min(n_places - 1));
-                    window.cells[beside].valid
-                        && window.cells[beside].range_m < window.cells[at].range_m - IN_FRONT
-                })
-            });
+            // Something nearer, or nothing at all: columns that were left out, a patch without echo.
+            let beside = (1..=INSET).filter_map(|far| place.checked_add_signed(outward * far as isize));
+            let mut beside =
+                beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
+            let near = window.cells[at].range_m - IN_FRONT;
+            let hidden = beside.clone().all(|cell| !cell.valid)
+                || beside.any(|cell| cell.valid && cell.range_m < near);
             let normal = normals[index(line, inner)];
             End { place: offset + place as u32, point: window.point(at), normal: normal.cast(), hidden }
         };

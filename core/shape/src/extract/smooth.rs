@@ -28,7 +28,9 @@ pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity
         }
         let row = index % n_rows;
         let range = |i: usize| window.cells[i].range_m;
-        if row + 1 < n_rows && usable[index + 1] && continuity.down.joins(range(index), range(index + 1)) {
+        let known = |i: Option<usize>| i.filter(|i| usable[*i]).map(range);
+        let below = |k: usize| known((row + k < n_rows).then_some(index + k));
+        if continuity.joins_down([known((row > 0).then(|| index - 1)), below(0), below(1), below(2)]) {
             down[index] = 1.0;
         }
         let link = continuity.across[window.first_row as usize + row];
@@ -80,22 +82,45 @@ fn diffuse(
     }
 }
 
+/// Noise of the range in parts of the spacing of samples from which slopes are taken over more cells; and most cells.
+const NOISE_PER_CELL: f32 = 0.1;
+const MOST_CELLS: usize = 4;
+
+/// Cells on each side over which slopes are taken, so that noise turns normals by a few degrees at most.
+pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
+    let (sum, n) = window
+        .inverse
+        .iter()
+        .zip(&window.own)
+        .filter(|(_, own)| **own)
+        .fold((0.0, 0), |(s, n), (q, _)| (s + q, n + 1));
+    let spacing = (window.header.azimuth_step * window.header.elevation_step).sqrt() as f32;
+    let noise_in_spacings = noise * sum / (n.max(1) as f32 * spacing);
+    ((noise_in_spacings / NOISE_PER_CELL).ceil() as usize).clamp(1, MOST_CELLS)
+}
+
 /// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour.
 ///
 /// On the plane n . x = h the inverse range along the unit direction d is n . d / h: the normal is the gradient of
-/// the inverse range continued homogeneously, q d + q_el e_el + q_az / cos el e_az.
-pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool]) -> Vec<nalgebra::Vector3<f32>> {
+/// the inverse range continued homogeneously, q d + q_el e_el + q_az / cos el e_az. Slopes are taken over `reach`
+/// cells on each side, where there are as many.
+pub(super) fn normals(
+    window: &Window,
+    smooth: &[f32],
+    usable: &[bool],
+    reach: usize,
+) -> Vec<nalgebra::Vector3<f32>> {
     let n_rows = window.n_rows;
     let header = &window.header;
     let mut normals = vec![nalgebra::Vector3::zeros(); smooth.len()];
-    for column in 1..window.n_columns.saturating_sub(1) {
+    for column in reach..window.n_columns.saturating_sub(reach) {
         let (sin_az, cos_az) = window.nominal(column as f64, 0.0).azimuth.sin_cos();
-        for row in 1..n_rows.saturating_sub(1) {
+        for row in reach..n_rows.saturating_sub(reach) {
             let index = column * n_rows + row;
             if !usable[index] {
                 continue;
             }
-            let slope = |stride: usize| slope(smooth, usable, index, stride);
+            let slope = |stride: usize| slope(smooth, usable, index, stride, reach);
             let (Some(q_down), Some(q_next)) = (slope(1), slope(n_rows)) else { continue };
             let (sin_el, cos_el) = window.nominal(0.0, row as f64).elevation.sin_cos();
             let q = f64::from(smooth[index]);
@@ -113,14 +138,11 @@ pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool]) -> Vec<n
     normals
 }
 
-/// Central difference, one-sided where only one neighbour is usable.
+/// Difference per cell between the farthest usable neighbours within `reach`.
 #[inline]
-fn slope(values: &[f32], usable: &[bool], index: usize, stride: usize) -> Option<f32> {
-    let (before, after) = (index - stride, index + stride);
-    match (usable[before], usable[after]) {
-        (true, true) => Some(0.5 * (values[after] - values[before])),
-        (true, false) => Some(values[index] - values[before]),
-        (false, true) => Some(values[after] - values[index]),
-        (false, false) => None,
-    }
+fn slope(values: &[f32], usable: &[bool], index: usize, stride: usize, reach: usize) -> Option<f32> {
+    let behind = (1..=reach).rev().find(|k| usable[index + k * stride]).unwrap_or(0);
+    let before = (1..=reach).rev().find(|k| usable[index - k * stride]).unwrap_or(0);
+    let apart = behind + before;
+    (apart > 0).then(|| (values[index + behind * stride] - values[index - before * stride]) / apart as f32)
 }

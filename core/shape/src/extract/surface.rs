@@ -30,8 +30,9 @@ impl Surface {
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smooth::low_pass(&window, &usable, continuity);
-        let normals = smooth::normals(&window, &smooth, &usable);
-        let (labels, faces) = grow::faces(&window, &normals);
+        let reach = smooth::slope_reach(&window, noise.pooled);
+        let normals = smooth::normals(&window, &smooth, &usable, reach);
+        let (labels, faces) = grow::faces(&window, &normals, reach);
         Self { root, window, noise, pixels, normals, labels, faces }
     }
 

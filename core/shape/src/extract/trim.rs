@@ -4,7 +4,7 @@
 //! face is only a few cells wide the region runs over onto it. So the region is worn down first, and then grown again
 //! cell by cell as far as the raw ranges continue the surface.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use super::local::LocalFace;
 use super::noise::Noise;
@@ -15,6 +15,12 @@ const WEAR: usize = 2;
 
 /// Largest residual of a cell of the face, in standard deviations of its prediction.
 const RESIDUAL_BOUND: f64 = 4.0;
+
+/// Last rings that the fit behind a judgement leaves out.
+const UNTRUSTED_RINGS: usize = 1;
+
+/// A fit that knows a place worse than this, as a variance in that of a sample, is no excuse for a residual.
+const MOST_LEVERAGE: f64 = 0.5;
 
 /// Wears `region` down and keeps its largest connected part: the core of the face.
 pub(super) fn core(window: &Window, region: &[bool]) -> Vec<bool> {
@@ -96,11 +102,14 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
-/// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it.
+/// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it. The last rings
+/// have no part in the fit: a side face whose first cells lie within the noise must not bend it.
 pub(super) fn grow_back(window: &Window, noise: &Noise, core: Vec<bool>) -> Vec<bool> {
     let n_rows = window.n_rows;
+    let mut rings: VecDeque<Vec<usize>> = VecDeque::new();
+    let mut trusted = core.clone();
+    let mut judged = core.clone();
     let mut face = core;
-    let mut judged = face.clone();
     let mut ring: Vec<usize> = (0..face.len()).filter(|&i| face[i]).collect();
     while !ring.is_empty() {
         let mut by_tile: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
@@ -114,21 +123,40 @@ pub(super) fn grow_back(window: &Window, noise: &Noise, core: Vec<bool>) -> Vec<
         }
         ring.clear();
         for (tile, cells) in &by_tile {
-            if let Some(fit) = LocalFace::fit(window, &face, *tile) {
-                ring.extend(cells.iter().filter(|&&cell| continues(window, noise, &fit, cell)));
+            if let Some(fit) = LocalFace::fit(window, &trusted, *tile) {
+                ring.extend(continuing(window, noise, &fit, cells));
             }
         }
         for &cell in &ring {
             face[cell] = true;
         }
+        rings.push_back(ring.clone());
+        if rings.len() > UNTRUSTED_RINGS {
+            for cell in rings.pop_front().into_iter().flatten() {
+                trusted[cell] = true;
+            }
+        }
     }
     face
 }
 
-fn continues(window: &Window, noise: &Noise, fit: &LocalFace, cell: usize) -> bool {
-    let (x, y) = window.place(cell);
-    fit.at(window, x, y).is_some_and(|predicted| {
-        let residual = f64::from(window.cells[cell].range_m) - predicted.range;
-        residual.abs() <= RESIDUAL_BOUND * f64::from(noise.at(cell)) * (1.0 + predicted.leverage).sqrt()
-    })
+/// The cells that a fit continues to: each within its noise, and all together within theirs, since a side face whose
+/// first row is within the noise is not so as a row.
+fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) -> Vec<usize> {
+    let residuals = cells.iter().filter_map(|&cell| {
+        let (x, y) = window.place(cell);
+        let predicted = fit.at(window, x, y)?;
+        let sigma = f64::from(noise.at(cell));
+        let residual = (f64::from(window.cells[cell].range_m) - predicted.range) / sigma;
+        let known = predicted.leverage.min(MOST_LEVERAGE);
+        (residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt()).then_some((cell, residual, known))
+    });
+    let residuals: Vec<(usize, f64, f64)> = residuals.collect();
+    let n = residuals.len() as f64;
+    let mean = residuals.iter().map(|(_, residual, _)| residual).sum::<f64>() / n;
+    let known = residuals.iter().map(|(_, _, known)| known).sum::<f64>() / n;
+    if mean.abs() > RESIDUAL_BOUND * (1.0 / n + known).sqrt() {
+        return Vec::new();
+    }
+    residuals.into_iter().map(|(cell, _, _)| cell).collect()
 }

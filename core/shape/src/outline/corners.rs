@@ -14,9 +14,12 @@ const CORNER_ANGLE: f64 = 150.0;
 /// The paper's k = 128 at 6.3 mm spans 0.8 m of a 4 m plate: this part of the shorter side.
 const NEIGHBOUR_PART: f64 = 0.2;
 
-/// RANSAC: pairs tried per line, and the distance of a point that supports it, in lattice steps.
+/// RANSAC: pairs tried per line, and the distance of a point that supports it, in lattice steps. A pair is that many
+/// times as far apart, or that part of the points' reach.
 const TRIALS: usize = 96;
 const SUPPORT_STEPS: f64 = 1.5;
+const PAIR_SUPPORTS: f64 = 4.0;
+const PAIR_PART: f64 = 0.4;
 
 /// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
 /// by a few degrees only.
@@ -75,8 +78,9 @@ pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 
     for at in around.sharpest_turns(reach) {
         let mut random = Random::new(at as u64);
         let support = SUPPORT_STEPS * step;
-        let before = line(&around.before(at, reach), support, &mut random);
-        let after = line(&around.after(at, reach), support, &mut random);
+        let apart = (PAIR_SUPPORTS * support).min(PAIR_PART * reach);
+        let before = line(&around.before(at, reach), support, apart, &mut random);
+        let after = line(&around.after(at, reach), support, apart, &mut random);
         if let (Some(before), Some(after)) = (before, after) {
             candidates.extend(intersect(&before, &after).map(|point| Corner { point, at }));
         }
@@ -200,13 +204,13 @@ struct Line {
     direction: Vec2,
 }
 
-/// The line through most of the points (RANSAC), then by least squares through those.
-fn line(points: &[Vec2], support: f64, random: &mut Random) -> Option<Line> {
+/// The line through most of the points (RANSAC, from pairs at least `apart`), then by least squares through those.
+fn line(points: &[Vec2], support: f64, apart: f64, random: &mut Random) -> Option<Line> {
     let off = |line: &Line, p: &Vec2| line.direction.perp(&(p - line.point)).abs();
     let mut best: Option<(usize, Line)> = None;
     for _ in 0..TRIALS {
         let (a, b) = (points[random.below(points.len())], points[random.below(points.len())]);
-        let Some(direction) = (b - a).try_normalize(4.0 * support) else { continue };
+        let Some(direction) = (b - a).try_normalize(apart) else { continue };
         let trial = Line { point: a, direction };
         let count = points.iter().filter(|p| off(&trial, p) < support).count();
         if best.as_ref().is_none_or(|(known, _)| count > *known) {

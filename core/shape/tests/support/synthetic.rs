@@ -1,0 +1,246 @@
+//! Scans of closed-form plates: a flat or cylindrical plate with its side faces over a floor, people as upright
+//! cylinders, range noise with heavy tails, dropouts and mixed pixels. Every scan follows from its seed.
+
+#![allow(dead_code, unreachable_pub, reason = "test code of which every file uses its own part")]
+
+use platen_scan::{Column, Direction, Face, ScanHeader, State};
+use platen_shape::{PlateSpec, Vec3};
+
+/// A generator (SplitMix64), so that a seed gives the same scan for ever.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A plate of `width` along its local x, `height` along its local y, its mid-surface through the local origin.
+#[derive(Clone, Copy)]
+pub struct Plate {
+    pub width: f64,
+    pub height: f64,
+    pub thickness: f64,
+    /// Radius of the mid-surface, its axis along y above the plate (concave face up); negative: below. `None`: flat.
+    pub radius: Option<f64>,
+    /// Middle of the mid-surface, metres, scanner frame.
+    pub centre: Vec3,
+    /// Turned about the vertical, radians.
+    pub turn: f64,
+    /// Before that, lifted at its far end about the horizontal across, radians.
+    pub tilt: f64,
+}
+
+impl Plate {
+    fn to_local(self, v: Vec3) -> Vec3 {
+        let (s, c) = self.turn.sin_cos();
+        let v = Vec3::new(c * v.x + s * v.y, c * v.y - s * v.x, v.z);
+        let (s, c) = self.tilt.sin_cos();
+        Vec3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x)
+    }
+
+    fn to_scanner(self, v: Vec3) -> Vec3 {
+        let (s, c) = self.tilt.sin_cos();
+        let v = Vec3::new(c * v.x - s * v.z, v.y, c * v.z + s * v.x);
+        let (s, c) = self.turn.sin_cos();
+        Vec3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
+    }
+
+    /// The upper face's point above (u, v) of the mid-surface, scanner frame.
+    pub fn face(&self, u: f64, v: f64) -> Vec3 {
+        let (x, y) = (u - 0.5 * self.width, v - 0.5 * self.height);
+        let local = match self.radius {
+            None => Vec3::new(x, y, 0.5 * self.thickness),
+            Some(r) => {
+                let (s, c) = (x / r).sin_cos();
+                let face = r - 0.5 * self.thickness;
+                Vec3::new(face * s, y, r - face * c)
+            }
+        };
+        self.centre + self.to_scanner(local)
+    }
+
+    /// Range of the first hit, metres.
+    fn hit(&self, beam: Vec3) -> Option<f64> {
+        let (o, d) = (self.to_local(-self.centre), self.to_local(beam));
+        let half = Vec3::new(0.5 * self.width, 0.5 * self.height, 0.5 * self.thickness);
+        let mut ranges = Vec::with_capacity(8);
+        let plane = |offset: f64, slope: f64| -offset / slope;
+        ranges.extend([plane(o.y - half.y, d.y), plane(o.y + half.y, d.y)]);
+        match self.radius {
+            None => {
+                for side in [-1.0, 1.0] {
+                    ranges.extend([plane(o.x + side * half.x, d.x), plane(o.z + side * half.z, d.z)]);
+                }
+            }
+            Some(r) => {
+                // About the axis: x, z - r.
+                let (ox, oz) = (o.x, o.z - r);
+                for side in [-1.0, 1.0] {
+                    let (s, c) = (side * half.x / r).sin_cos();
+                    // The plane through the axis and this end of the plate: x c + (z - r) s = 0.
+                    ranges.push(plane(ox * c + oz * s, d.x * c + d.z * s));
+                    let face = r + side * half.z;
+                    let (a, b) = (d.x * d.x + d.z * d.z, ox * d.x + oz * d.z);
+                    let discriminant = b * b - a * (ox * ox + oz * oz - face * face);
+                    if discriminant > 0.0 {
+                        ranges.extend([(-b - discriminant.sqrt()) / a, (-b + discriminant.sqrt()) / a]);
+                    }
+                }
+            }
+        }
+        let inside = |range: &f64| {
+            const SLACK: f64 = 1e-9;
+            let p = o + d * *range;
+            let (x, z) = match self.radius {
+                None => (p.x, p.z),
+                Some(r) => {
+                    let (x, z) = (p.x, p.z - r);
+                    let from_axis = x.hypot(z) * r.signum();
+                    (r * (x / r).atan2(-z / r), r - from_axis)
+                }
+            };
+            *range > 0.0 && x.abs() < half.x + SLACK && p.y.abs() < half.y + SLACK && z.abs() < half.z + SLACK
+        };
+        ranges.into_iter().filter(inside).min_by(f64::total_cmp)
+    }
+}
+
+/// What is scanned, and how.
+#[derive(Clone)]
+pub struct Scene {
+    pub plates: Vec<Plate>,
+    /// Upright cylinders: x, y, radius, lowest and highest z.
+    pub people: Vec<[f64; 5]>,
+    /// Height of the floor, below the scanner.
+    pub floor: f64,
+    /// Angle between beams, radians.
+    pub step: f64,
+    /// Half the angle that a beam sees.
+    pub footprint: f64,
+    /// Standard deviation of the range, metres.
+    pub sigma: f64,
+    /// Part of the samples with four times that.
+    pub tails: f64,
+    pub dropouts: f64,
+    pub seed: u64,
+}
+
+impl Scene {
+    pub fn of(plate: Plate) -> Self {
+        Self {
+            plates: vec![plate],
+            people: Vec::new(),
+            floor: -4.5,
+            step: 0.05_f64.to_radians(),
+            footprint: 1.5e-4,
+            sigma: 5e-4,
+            tails: 0.0,
+            dropouts: 0.01,
+            seed: 1,
+        }
+    }
+
+    pub fn spec(&self) -> PlateSpec {
+        let plate = &self.plates[0];
+        PlateSpec {
+            width: plate.width,
+            height: plate.height,
+            thickness: plate.thickness,
+            face_inset: 0.0,
+            u_axis: Some(plate.to_scanner(Vec3::x())),
+            region: None,
+        }
+    }
+
+    fn range(&self, beam: Vec3) -> f64 {
+        let floor = if beam.z < 0.0 { self.floor / beam.z } else { f64::MAX };
+        let plates = self.plates.iter().filter_map(|p| p.hit(beam));
+        let people = self.people.iter().filter_map(|&[x, y, radius, low, high]| {
+            let (a, b) = (beam.x.powi(2) + beam.y.powi(2), beam.x * x + beam.y * y);
+            let discriminant = b * b - a * (x * x + y * y - radius * radius);
+            let range = (b - discriminant.max(0.0).sqrt()) / a;
+            (discriminant > 0.0 && (low..high).contains(&(range * beam.z))).then_some(range)
+        });
+        // A wall far away closes the room.
+        plates.chain(people).fold(floor.min(15.0), f64::min)
+    }
+
+    /// The scan, over the plates and half a metre around them.
+    pub fn scan(&self) -> (ScanHeader, Vec<Column>) {
+        let corners = self.plates.iter().flat_map(|p| {
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5)]
+                .map(|(u, v)| Direction::of(p.face(u * p.width, v * p.height).into()))
+        });
+        let corners: Vec<_> = corners.collect();
+        let span = |f: fn(&Direction) -> f64| {
+            let (low, high) =
+                corners.iter().map(f).fold((9.0, -9.0), |(l, h), a| (f64::min(l, a), f64::max(h, a)));
+            (low - 0.08, high + 0.08)
+        };
+        let ((az_low, az_high), (el_low, el_high)) = (span(|d| d.azimuth), span(|d| d.elevation));
+        let header = ScanHeader {
+            n_rows: ((el_high - el_low) / self.step) as u32,
+            n_columns: ((az_high - az_low) / self.step) as u32,
+            azimuth_start: az_low,
+            azimuth_step: self.step,
+            elevation_start: el_high,
+            elevation_step: self.step,
+            intensity_range: (0, 1),
+            simulated: true,
+            ..ScanHeader::default()
+        };
+        let columns = (0..header.n_columns).map(|index| self.column(&header, index)).collect();
+        (header, columns)
+    }
+
+    fn column(&self, header: &ScanHeader, index: u32) -> Column {
+        let mut random =
+            Random::new(self.seed.wrapping_mul(0x1_0000_0001).wrapping_add(u64::from(index) << 20));
+        let rows = header.n_rows as usize;
+        let azimuth = header.azimuth_start + header.azimuth_step * f64::from(index);
+        let mut column = Column {
+            index,
+            face: Face::Front,
+            first_row: 0,
+            range_m: vec![0.0; rows],
+            azimuth: vec![azimuth; rows],
+            elevation: Vec::with_capacity(rows),
+            intensity: vec![1; rows],
+            state: vec![State::NoReturn; rows],
+        };
+        for row in 0..rows {
+            let elevation = header.elevation_start - header.elevation_step * row as f64;
+            column.elevation.push(elevation);
+            let beam = |across: f64, up: f64| {
+                let d = Direction { azimuth: azimuth + across / elevation.cos(), elevation: elevation + up };
+                self.range(Vec3::from(d.unit()))
+            };
+            let f = self.footprint;
+            let centre = beam(0.0, 0.0);
+            let around = [beam(f, 0.0), beam(-f, 0.0), beam(0.0, f), beam(0.0, -f)];
+            let other = around.into_iter().find(|r| (r - centre).abs() > 0.05);
+            let (share, told) = (random.uniform(), random.uniform() < 0.75);
+            let range = other.filter(|_| told).map_or(centre, |other| share * centre + (1.0 - share) * other);
+            let spread = if random.uniform() < self.tails { 4.0 } else { 1.0 };
+            column.range_m[row] = (range + self.sigma * spread * random.normal()) as f32;
+            if random.uniform() >= self.dropouts {
+                column.state[row] = State::Valid;
+            }
+        }
+        column
+    }
+}
