@@ -7,6 +7,7 @@ mod inspect;
 mod measure;
 mod output;
 mod plugins;
+mod press;
 mod run;
 mod status;
 
@@ -64,6 +65,8 @@ enum Verb {
     Inspect(inspect::Command),
     /// Check plant and plate files, all faults at once
     Check(check::Command),
+    /// The register map in force, and what stands in the registers
+    Press(press::Command),
     /// How a running host stands
     Status(status::Command),
     /// What is on record
@@ -133,6 +136,7 @@ pub fn main() -> ExitCode {
         Verb::Run(command) => run::run(&cli.common, command),
         Verb::Inspect(command) => inspect::run(&cli.common, command),
         Verb::Check(command) => check::run(&cli.common, command),
+        Verb::Press(command) => press::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
         Verb::History(command) => history::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),

@@ -63,7 +63,9 @@ pub fn map(field: &Field, record: &ResultRecord) -> Result<String, PictureError>
                         NodeState::Unchanged => NEUTRAL,
                         NodeState::Seen => diverging(field.values[node] * factor / full),
                     };
-                    root.draw(&Rectangle::new([from, to], colour.filled()))?;
+                    // One pixel more on two sides leaves no seam between neighbours.
+                    let cover = [from, (to.0 + 1, to.1 + 1)];
+                    root.draw(&Rectangle::new(cover, colour.filled()))?;
                     if field.state[node] == NodeState::Unseen {
                         root.draw(&PathElement::new(
                             [(from.0, to.1), (to.0, from.1)],
@@ -132,7 +134,7 @@ fn legend<'a>(root: &Area<'a>, plot_height: u32, full: f64, unit: &str) -> Drawn
     let top = ROOM[2] as i32;
     for y in 0..plot_height as i32 {
         let value = 1.0 - 2.0 * f64::from(y) / f64::from(plot_height);
-        let row = [(left, top + y), (left + 24, top + y + 1)];
+        let row = [(left, top + y), (left + 24, top + y + 2)];
         root.draw(&Rectangle::new(row, diverging(value).filled()))?;
     }
     let text = ("sans-serif", 18).into_text_style(root).pos(Pos::new(HPos::Left, VPos::Center));
