@@ -11,8 +11,8 @@ use platen_shape::surface::Curvature;
 pub(crate) struct Band {
     /// Turn of the plate from one side of the band to the other, radians, positive towards the scanner.
     pub(crate) angle: f64,
-    /// Sense of the patch, 1 or -1: not the angle's where the swing beside a stronger band was taken for one.
-    pub(crate) sense: f64,
+    /// Sense of the patch, 1 or -1: not the angle's where the spline's swing beside a stronger band was taken for one.
+    sense: f64,
     /// 95 %, radians.
     pub(crate) uncertainty: f64,
     /// Middle of the patch.
@@ -23,6 +23,28 @@ pub(crate) struct Band {
     pub(crate) length: f64,
     /// Across them.
     pub(crate) width: f64,
+    /// Unit direction across.
+    across: [f64; 2],
+    /// From where to where it lies across and along, in the coordinates of these directions.
+    span: [[f64; 2]; 2],
+}
+
+/// How far a spline swings beside a narrow bend, metres: two or three of its spans.
+const SWING: f64 = 0.2;
+
+impl Band {
+    /// Bends the way its patch does, by more than chance. Of the many places that a map has, patches are the worst
+    /// ones: where nothing changed, their angles come to one and a half times the uncertainty of a place not picked.
+    pub(crate) fn beyond_doubt(&self) -> bool {
+        self.sense * self.angle > 2.0 * self.uncertainty
+    }
+
+    /// Lies where the spline still swings from this one.
+    pub(crate) fn swings_into(&self, other: &Self) -> bool {
+        let ([x, y], [u, v], [across, along]) = (self.across, other.centre, self.span);
+        let within = |s: f64, [from, to]: [f64; 2]| (from - SWING..=to + SWING).contains(&s);
+        within(x * u + y * v, across) && within(x * v - y * u, along)
+    }
 }
 
 /// Lines across a band on which its change is averaged.
@@ -67,6 +89,8 @@ pub(crate) fn measure(
         direction: (x.atan2(-y) + PI).rem_euclid(PI),
         length: section.along[1] - section.along[0],
         width: to - from,
+        across: section.across,
+        span: [[from, to], section.along],
     }
 }
 

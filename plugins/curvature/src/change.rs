@@ -8,8 +8,12 @@ use platen_shape::task::Figure;
 use crate::bands::{self, Band};
 use crate::{EXPANDED, Nodes, Options, figure, place};
 
-/// Quantiles of chi squared with three degrees of freedom: 95 % and 25 %.
-const CHI_SQUARED: [f64; 2] = [7.815, 1.213];
+/// Median of chi squared with three degrees of freedom.
+const MEDIAN: f64 = 2.366;
+
+/// 95 % quantile of three times F with 3 and 40 degrees of freedom: 7.81, that of chi squared, widened because the scale is told
+/// by the pair's own few tens of independent places.
+const DETECTED: f64 = 8.52;
 
 /// Adds the field, the bands and the sentences of the change between two scans, `[now, before]`.
 pub(crate) fn add(
@@ -25,10 +29,11 @@ pub(crate) fn add(
     let sigma = |i: usize| [0, 1, 2].map(|k| now.sigma[i][k].hypot(before.sigma[i][k]));
     let known = |i: usize| now.known[i] && before.known[i];
     let surprise: Vec<f64> = (0..PlateGrid::NODES).map(|i| surprise(&change[i], sigma(i))).collect();
-    let scale = scale((0..PlateGrid::NODES).filter(|&i| known(i)).map(|i| surprise[i]).collect());
+    let quiet = (0..PlateGrid::NODES).filter(|&i| known(i)).map(|i| surprise[i]);
+    let scale = quiet_scale(quiet.collect());
     let label: Vec<i8> = (0..PlateGrid::NODES)
         .map(|i| {
-            let changed = known(i) && surprise[i] > CHI_SQUARED[0] * scale;
+            let changed = known(i) && surprise[i] > DETECTED * scale;
             if changed { change[i].strongest().signum() as i8 } else { 0 }
         })
         .collect();
@@ -40,12 +45,7 @@ pub(crate) fn add(
     let mut state: Vec<NodeState> = (0..PlateGrid::NODES).map(unchanged).collect();
     patches.iter().flatten().for_each(|&i| state[i] = NodeState::Seen);
 
-    // Where nothing changed, chance makes patches too. Of the many places that a map has they are the worst ones, whose
-    // angles come to one and a half times the uncertainty of a place that was not picked.
-    let beyond_doubt = |band: &Band| band.sense * band.angle > 2.0 * band.uncertainty;
-    let bands = patches.iter().map(|patch| bands::measure(surfaces, grid, patch, &change));
-    let mut bands: Vec<Band> = bands.filter(beyond_doubt).collect();
-    bands.sort_by(|a, b| b.angle.abs().total_cmp(&a.angle.abs()));
+    let bands = bands(surfaces, grid, &patches, &change);
     let mut lod: Vec<f64> = (0..PlateGrid::NODES)
         .filter(|&i| known(i))
         .map(|i| EXPANDED * scale.sqrt() * sigma(i)[0].max(sigma(i)[1]))
@@ -69,25 +69,45 @@ pub(crate) fn add(
     report.fields.push(grid.scalar("curvature_change", "1/m", values, state));
 }
 
-/// How far a change lies beyond its noise: chi squared with three degrees of freedom when nothing changed.
-fn surprise(change: &Curvature, sigma: [f64; 3]) -> f64 {
-    [change.u, change.v, change.uv].iter().zip(sigma).map(|(c, s)| (c / s).powi(2)).sum()
+/// The bands among the patches, strongest first.
+fn bands(
+    surfaces: [&Surface; 2],
+    grid: PlateGrid,
+    patches: &[Vec<usize>],
+    change: &[Curvature],
+) -> Vec<Band> {
+    let mut all: Vec<Band> =
+        patches.iter().map(|patch| bands::measure(surfaces, grid, patch, change)).collect();
+    all.retain(Band::beyond_doubt);
+    all.sort_by(|a, b| b.angle.abs().total_cmp(&a.angle.abs()));
+    let mut bands: Vec<Band> = Vec::new();
+    for band in all {
+        if !bands.iter().any(|stronger| stronger.swings_into(&band)) {
+            bands.push(band);
+        }
+    }
+    bands
 }
 
-/// How much less the change scatters than stated, as a share of the variance.
+/// How much less the change scatters than stated, as a share of the variance, from the quieter half of the plate.
 ///
-/// The splines' covariances count what smoothing takes away from the plate's own shape; between two scans of a shape that
-/// stayed, that is the same both times and cancels. How much it is cannot be told from the splines, but from the
-/// quieter part of the plate (B. Efron, Large-scale simultaneous hypothesis testing: the choice of a null hypothesis,
-/// JASA 99, 2004): the first quartile, so that a change of up to half of the plate hardly matters. Never above 1: a
-/// plate that is less quiet than stated has changed, or wants calibrating.
-fn scale(mut surprise: Vec<f64>) -> f64 {
-    let quartile = surprise.len() / 4;
+/// A spline's covariance counts what smoothing takes away from the plate's own shape, most of all from its curvature;
+/// between two scans of a shape that stayed, most of that is the same both times and cancels. How much depends on the
+/// smoothing that each scan was given, and is told by the pair itself (B. Efron, Large-scale simultaneous hypothesis testing:
+/// the choice of a null hypothesis, JASA 99, 2004). Never above 1: a plate less quiet than stated has changed over half
+/// of it, or wants calibrating.
+fn quiet_scale(mut surprise: Vec<f64>) -> f64 {
     if surprise.is_empty() {
         return 1.0;
     }
-    let (_, quiet, _) = surprise.select_nth_unstable_by(quartile, f64::total_cmp);
-    (*quiet / CHI_SQUARED[1]).min(1.0)
+    let middle = surprise.len() / 2;
+    let (_, median, _) = surprise.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN).min(1.0)
+}
+
+/// How far a change lies beyond its noise: chi squared with three degrees of freedom when nothing changed.
+fn surprise(change: &Curvature, sigma: [f64; 3]) -> f64 {
+    [change.u, change.v, change.uv].iter().zip(sigma).map(|(c, s)| (c / s).powi(2)).sum()
 }
 
 fn figures(number: usize, band: &Band) -> [Figure; 4] {

@@ -41,6 +41,24 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
         report.findings.says.push(format!("{word}: {size:.3} 1/m at {}", place(grid.at(i))));
     }
     report.fields.push(grid.scalar("curvature_deficit", "1/m", value, state));
+    gaussian(report, nodes, target);
+}
+
+/// The Gaussian curvature that is missing, for targets that have any. Bending alone does not change it: the plate has
+/// to stretch for it.
+fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
+    let grid = nodes.grid;
+    let goal = grid.map(|u, v| target.curvature(u, v).gaussian);
+    // 1e-9 1/m^2: a sphere of 30 km.
+    if goal.iter().all(|goal| goal.abs() < 1e-9) {
+        return;
+    }
+    let value: Vec<f64> = goal.iter().zip(&nodes.curvature).map(|(goal, k)| goal - k.gaussian).collect();
+    let known = |i: &usize| nodes.known[*i];
+    let total = |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>();
+    report.findings.figures.push(figure("gaussian.missing_share", total(&value) / total(&goal), "1"));
+    let state = nodes.known.iter().map(|known| if *known { NodeState::Seen } else { NodeState::Unseen });
+    report.fields.push(grid.scalar("gaussian_missing", "1/m2", value, state.collect()));
 }
 
 /// One sigma of the deficit at a node.

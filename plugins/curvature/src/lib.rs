@@ -6,8 +6,9 @@
 //!
 //! Level of detection, 95 %. One curvature: 1.96 sqrt(s^2 + s_corr^2), s from the spline's covariance. The change has
 //! three numbers (along u, along v, twist): a place is *unchanged* when the sum of (change / s)^2, s^2 from both splines and
-//! s_corr, lies below 7.81, the 95 % quantile of chi squared with three degrees of freedom. s_corr is the correlated
-//! error of a position, taken as a wave of length L: s_position (2 pi / L)^2.
+//! s_corr, lies below the 95 % quantile of what it is by chance, after s was scaled down to the scatter of the quieter half
+//! of the plate. s_corr is the correlated error of a position, taken as a wave of length L:
+//! s_position (2 pi / L)^2.
 //!
 //! Changed places that hang together, and have one sense, are a band. Its bend angle is the change of curvature summed
 //! on lines across it, to where the change ends, and averaged along it.
@@ -29,10 +30,12 @@
 //! Fields, mid-surface, positive when the centre lies on the scanner's side, 1/m: `kappa_u`, `kappa_v`, `kappa_uv` (twist),
 //! `kappa_max`, `kappa_min` (principal), `gaussian` (1/m2); with an earlier scan `curvature_change`, the
 //! change in the direction in which it is strongest; with a target `curvature_deficit`, positive where the plate has to
-//! bend more, neutral where it is enough.
+//! bend more, neutral where it is enough; with a sphere or torus `gaussian_missing` (1/m2), for which the plate still has to
+//! stretch.
 //!
 //! Figures: `curvature.lod`, `bend.N.angle` with its place, `bend.N.direction` of the straight lines, `bend.N.length` and
-//! `bend.N.width`; `curvature.deficit_max`, `curvature.deficit_min` and `curvature.enough`, the share that is done.
+//! `bend.N.width`; `curvature.deficit_max`, `curvature.deficit_min` and `curvature.enough`, the share that is done;
+//! `gaussian.missing_share` of the target's Gaussian curvature, 1 for any plate that only bent.
 
 mod bands;
 mod change;

@@ -157,6 +157,7 @@ fn the_deficit_says_bend_more_or_too_far_on_either_face() {
         assert!((at(17).0 - 0.125).abs() < 6e-3 && at(17).1 == NodeState::Seen, "{:?}", at(17));
         assert!((at(84).0 - (0.125 - 1.0 / 6.0)).abs() < 6e-3 && at(84).1 == NodeState::Seen, "{:?}", at(84));
         assert!(at(50).0.abs() < 6e-3);
+        assert!(report.fields.iter().all(|f| f.name != "gaussian_missing"), "a cylinder needs no stretching");
         let says = &report.findings.says;
         assert!(
             says[0].starts_with("bend more: 0.1") && says[1].starts_with("bent too far: 0.0"),
@@ -173,6 +174,10 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
     let report = run(&inputs(plate(SIGMA, 5, |_| 1.0 / 8.0), None, Some((target, Facing::Inside))));
     let middle = field(&report, "curvature_deficit").values[PlateGrid::NODES / 2];
     assert!((middle - 1.0 / 8.0).abs() < 2e-3, "{middle}");
+    // Bending alone has none of the sphere's Gaussian curvature.
+    let missing = field(&report, "gaussian_missing").values[PlateGrid::NODES / 2];
+    assert!((missing - 1.0 / 64.0).abs() < 5e-4, "{missing}");
+    assert!((found(&report, "gaussian.missing_share").expect("known").value - 1.0).abs() < 0.02);
 }
 
 #[test]

@@ -1,10 +1,13 @@
 //! The rigid motion of the plate as a whole.
 
 use nalgebra::{Matrix6, Rotation3, Vector6};
-use platen_sdk::{Job, Result};
+use platen_sdk::{PlateGrid, Result};
 use platen_shape::Vec3;
 
-use crate::grid::{NODES, Nodes};
+use crate::grid::Nodes;
+
+/// Nodes along each side.
+const NODES: usize = PlateGrid::SIDE;
 
 /// Standard deviation of a material point within the surface, metres: what scans of good plates show. The normal
 /// direction is known ten times better and decides the alignment; this keeps it from sliding.
@@ -83,12 +86,12 @@ pub(crate) fn corners(nodes: &Nodes) -> Motion {
 }
 
 /// The largest part that kept its shape lies where it lay.
-pub(crate) fn unchanged(job: &Job<'_>, nodes: &Nodes) -> Result<Motion> {
+pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result<Motion> {
     let start = whole(nodes);
     let mut best = (f64::NEG_INFINITY, start.clone());
     for row in 0..VOTERS {
         for column in 0..VOTERS {
-            job.check()?;
+            check()?;
             let motion = local(nodes, &start, row, column);
             let votes = votes(nodes, &motion);
             if votes > best.0 {
@@ -99,7 +102,7 @@ pub(crate) fn unchanged(job: &Job<'_>, nodes: &Nodes) -> Result<Motion> {
     let mut motion = best.1;
     for _ in 0..20 {
         let weights = weights(nodes, &motion);
-        step(nodes, &mut motion, weights.into_iter().enumerate(), inflation(nodes));
+        step(nodes, &mut motion, weights.into_iter().enumerate(), SHARING);
     }
     Ok(motion)
 }
@@ -108,7 +111,7 @@ pub(crate) fn unchanged(job: &Job<'_>, nodes: &Nodes) -> Result<Motion> {
 fn whole(nodes: &Nodes) -> Motion {
     let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
     for _ in 0..6 {
-        step(nodes, &mut motion, (0..nodes.len()).step_by(7).map(|i| (i, 1.0)), 1.0);
+        step(nodes, &mut motion, (0..PlateGrid::NODES).step_by(7).map(|i| (i, 1.0)), 1.0);
     }
     motion
 }
@@ -136,7 +139,7 @@ fn scaled_residual(nodes: &Nodes, motion: &Motion, i: usize) -> f64 {
 
 fn votes(nodes: &Nodes, motion: &Motion) -> f64 {
     let near = |i: &usize| nodes.seen[*i] && scaled_residual(nodes, motion, *i).abs() < TUKEY;
-    (0..nodes.len()).step_by(3).filter(near).count() as f64
+    (0..PlateGrid::NODES).step_by(3).filter(near).count() as f64
 }
 
 /// Tukey's weights.
@@ -145,14 +148,12 @@ fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
         let r = scaled_residual(nodes, motion, i) / TUKEY;
         if r.abs() < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 }
     };
-    (0..nodes.len()).map(weight).collect()
+    (0..PlateGrid::NODES).map(weight).collect()
 }
 
-/// Neighbouring nodes share their error: a spline over `n` nodes has fewer independent ones. One in 25 is
-/// independent, as the result's own grid.
-fn inflation(nodes: &Nodes) -> f64 {
-    if nodes.len() > 1000 { 25.0 } else { 1.0 }
-}
+/// Nodes that share their error: a spline has fewer independent places than the fields have nodes. One in 25 is, as the
+/// nodes of the result's own grid.
+const SHARING: f64 = 25.0;
 
 /// One Gauss-Newton step of the weighted fit over the places given; `inflation` widens the covariance.
 fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize, f64)>, inflation: f64) {

@@ -35,12 +35,12 @@ mod align;
 mod detect;
 mod grid;
 
-use platen_sdk::{Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, Report, Result};
+use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, NodeState, PlateGrid, Report, Result};
 use platen_shape::Surface;
 use platen_shape::task::{Figure, Findings};
 
 use align::{Alignment, Motion};
-use grid::{NODES, Nodes};
+use grid::Nodes;
 
 platen_sdk::options! {
     /// Options of `displacement`.
@@ -73,26 +73,27 @@ impl Comparison for Displacement {
     }
 
     fn compare(&mut self, job: &Job<'_>, inputs: &Inputs) -> Result<Report> {
-        let earlier = if self.0.against == "before" { &inputs.before } else { &inputs.baseline };
-        let Some(earlier) = earlier else {
-            let says = format!("no {} scan: displacement is not known", self.0.against);
-            return Ok(Report {
-                findings: Findings { says: vec![says], ..Findings::default() },
-                fields: Vec::new(),
-            });
-        };
-        same_plate(&inputs.now, earlier)?;
-        let nodes = Nodes::new(&inputs.now, earlier);
-        let motion = match self.0.alignment.as_str() {
-            "corners" => align::corners(&nodes),
-            "none" => Motion::none(),
-            _ => align::unchanged(job, &nodes)?,
-        };
-        let alignment = Alignment { motion, name: &self.0.alignment };
-        let changes =
-            detect::changes(&nodes, &alignment.motion, inputs.task.sigma_correlated, self.0.min_patch);
-        Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &self.0.against))
+        compare(&self.0, inputs, &|| job.check())
     }
+}
+
+/// `check` fails when the job was cancelled.
+fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
+    let earlier = if options.against == "before" { &inputs.before } else { &inputs.baseline };
+    let Some(earlier) = earlier else {
+        let says = vec![format!("no {} scan: displacement is not known", options.against)];
+        return Ok(Report { findings: Findings { says, ..Findings::default() }, fields: Vec::new() });
+    };
+    same_plate(&inputs.now, earlier)?;
+    let nodes = Nodes::new(&inputs.now, earlier);
+    let motion = match options.alignment.as_str() {
+        "corners" => align::corners(&nodes),
+        "none" => Motion::none(),
+        _ => align::unchanged(check, &nodes)?,
+    };
+    let alignment = Alignment { motion, name: &options.alignment };
+    let changes = detect::changes(&nodes, &alignment.motion, inputs.task.sigma_correlated, options.min_patch);
+    Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &options.against))
 }
 
 fn same_plate(now: &Surface, earlier: &Surface) -> Result<()> {
@@ -113,7 +114,7 @@ fn report(
     supports_changed: bool,
     against: &str,
 ) -> Report {
-    let largest = (0..nodes.len())
+    let largest = (0..PlateGrid::NODES)
         .filter(|&i| changes.state[i] != NodeState::Unseen)
         .max_by(|&a, &b| changes.normal[a].abs().total_cmp(&changes.normal[b].abs()));
     let changed = changes.state.iter().filter(|s| **s == NodeState::Seen).count();
@@ -127,8 +128,8 @@ fn report(
             "changed over {:.0} % of the plate, most {:+.1} mm at u {:.0}, v {:.0} mm ({how})",
             share * 100.0,
             changes.normal[i] * 1000.0,
-            nodes.uv[i][0] * 1000.0,
-            nodes.uv[i][1] * 1000.0,
+            nodes.grid.at(i)[0] * 1000.0,
+            nodes.grid.at(i)[1] * 1000.0,
         )),
         None => says.push(format!("nothing changed above {:.2} mm ({how})", changes.median_lod * 1000.0)),
     }
@@ -154,19 +155,13 @@ fn report(
     if let Some(i) = largest {
         figures.push(Figure {
             uncertainty: Some(changes.lod[i]),
-            at: Some(nodes.uv[i]),
+            at: Some(nodes.grid.at(i)),
             ..figure("displacement.max", changes.normal[i], "m")
         });
     }
 
-    let field = |name: &str, components: usize, values: Vec<f64>| Field {
-        name: name.into(),
-        unit: "m".into(),
-        n_u: NODES,
-        n_v: NODES,
-        components,
-        values,
-        state: changes.state.clone(),
+    let field = |name: &str, components: usize, values: Vec<f64>| {
+        nodes.grid.field(name, "m", components, values, changes.state.clone())
     };
     let vectors = changes.vectors.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
     let fields =
@@ -175,3 +170,6 @@ fn report(
 }
 
 platen_sdk::export!(comparison Displacement);
+
+#[cfg(test)]
+mod tests;

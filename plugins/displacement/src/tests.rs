@@ -1,0 +1,230 @@
+//! Known movements, bands and null pairs on plates of closed form.
+
+use nalgebra::Rotation3;
+use platen_shape::Vec3;
+use platen_shape::surface::{Axis, Fit, Mask};
+use platen_shape::task::Task;
+
+use super::*;
+
+const WIDTH: f64 = 3.0;
+const HEIGHT: f64 = 2.0;
+
+/// Noise of 24,000 points that stands for 0.5 mm on the 167,000 of a scan at 6 mm.
+const SIGMA: f64 = 0.19e-3;
+
+struct Noise(fastrand::Rng);
+
+impl Noise {
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.0.f64()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.0.f64()).cos()
+    }
+}
+
+/// Mid-surface and normal of a plate bent along u: 9 m round, and `extra` radians more over 0.3 m round u = 2.
+fn shape(extra: f64) -> impl Fn(f64) -> (Vec3, Vec3) {
+    let n = 6000;
+    let h = WIDTH / f64::from(n);
+    let curvature = move |u: f64| {
+        let x = ((u - 2.0) / 0.3 + 0.5).clamp(0.0, 1.0);
+        1.0 / 9.0 + extra / 0.3 * (1.0 - (std::f64::consts::TAU * x).cos())
+    };
+    let mut profile = vec![(0.0, 0.0, 0.0_f64)];
+    for i in 0..n {
+        let (x, z, angle) = profile[i as usize];
+        let middle = angle + 0.5 * h * curvature((f64::from(i) + 0.25) * h);
+        let next = angle + h * curvature((f64::from(i) + 0.5) * h);
+        profile.push((x + h * middle.cos(), z + h * middle.sin(), next));
+    }
+    move |u| {
+        let (x, z, angle) = profile[(u / h).round() as usize];
+        (Vec3::new(x, 0.0, z), Vec3::new(-angle.sin(), 0.0, angle.cos()))
+    }
+}
+
+/// A scan of that plate: noise along the normal, and an error `wave(u, v)` that the fit cannot know of.
+fn plate(sigma: f64, seed: u64, extra: f64, wave: impl Fn(f64, f64) -> f64) -> Surface {
+    let mut noise = Noise(fastrand::Rng::with_seed(seed));
+    let shape = shape(extra);
+    let mut fit = Fit::new(Axis::new(0.0, WIDTH, 48), Axis::new(0.0, HEIGHT, 32));
+    for i in 0..24_000 {
+        let (u, v) =
+            ((f64::from(i % 200) + 0.5) * WIDTH / 200.0, (f64::from(i / 200) + 0.5) * HEIGHT / 120.0);
+        let (p, n) = shape(u);
+        let p = p + Vec3::y() * v + n * (sigma * noise.normal() + wave(u, v));
+        fit.add(u, v, p.into(), sigma.powi(-2));
+    }
+    let mut mask = Mask::unseen(WIDTH, HEIGHT, 0.1);
+    (0..600).for_each(|i| mask.mark(0.1 * (f64::from(i % 30) + 0.5), 0.1 * (f64::from(i / 30) + 0.5)));
+    Surface::new(fit.solve([0.0, 0.0, 1.0]).expect("determined"), 0.04, mask)
+}
+
+/// The plate lying elsewhere.
+fn moved(surface: &Surface, turn: Rotation3<f64>, away: Vec3) -> Surface {
+    let mut parts = surface.to_parts();
+    for p in &mut parts.control {
+        *p = (turn * Vec3::from(*p) + away).into();
+    }
+    Surface::from_parts(parts).expect("sound")
+}
+
+fn run(now: Surface, before: Surface, alignment: &str, sigma_correlated: f64, min_patch: f64) -> Report {
+    let task = Task {
+        plate: "P".into(),
+        width: WIDTH,
+        height: HEIGHT,
+        thickness: 0.04,
+        target: None,
+        reference_lines: Vec::new(),
+        templates: Vec::new(),
+        stations: Vec::new(),
+        sigma_correlated,
+        sigma_true: None,
+        supports_changed: false,
+    };
+    let inputs = Inputs { task, now, before: Some(before), baseline: None };
+    let options = Options { against: "before".into(), alignment: alignment.into(), min_patch };
+    compare(&options, &inputs, &|| Ok(())).expect("sound")
+}
+
+fn value(report: &Report, name: &str) -> f64 {
+    report.findings.figures.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("no {name}")).value
+}
+
+fn none(_: f64, _: f64) -> f64 {
+    0.0
+}
+
+#[test]
+fn a_plate_that_only_moved_did_not_change_and_its_movement_is_reported() {
+    let before = plate(SIGMA, 1, 0.0, none);
+    let turn = Rotation3::from_euler_angles(0.02, -0.01, 0.3);
+    let away = Vec3::new(0.4, -0.2, 0.05);
+    let now = moved(&plate(SIGMA, 2, 0.0, none), turn, away);
+    for alignment in ["unchanged", "corners"] {
+        let report = run(now.clone(), before.clone(), alignment, 0.0, 0.02);
+        assert!((value(&report, "displacement.plate_rotation") - turn.angle()).abs() < 2e-4, "{alignment}");
+        let middle = before.face(WIDTH / 2.0, HEIGHT / 2.0);
+        let way = (turn * middle + away - middle).norm();
+        assert!((value(&report, "displacement.plate_translation") - way).abs() < 2e-4, "{alignment}");
+        let size = report.fields[1].values.iter().map(|d| d * d).sum::<f64>() / 10_201.0;
+        println!("{alignment}: {:.3} mm rms along the normal", size.sqrt() * 1e3);
+        assert!(size.sqrt() < 0.05e-3, "{alignment} {size}");
+    }
+}
+
+#[test]
+fn a_new_bend_lifts_one_side_and_leaves_the_other() {
+    let extra = 0.02;
+    let before = plate(SIGMA, 3, 0.0, none);
+    let turn = Rotation3::from_euler_angles(0.01, 0.02, -0.2);
+    let now = moved(&plate(SIGMA, 4, extra, none), turn, Vec3::new(1.0, 0.3, 0.1));
+    let report = run(now, before, "unchanged", 0.0, 0.02);
+    let (vectors, normal) = (&report.fields[0], &report.fields[1]);
+    // The larger part, up to u = 1.85, lies still; beyond the bend the plate is turned by 0.02.
+    let (old, new) = (shape(0.0), shape(extra));
+    let (mut square, mut square_vector, mut still, mut changed) = (0.0, 0.0, 0, 0);
+    for i in 0..PlateGrid::NODES {
+        let u = WIDTH * (i % PlateGrid::SIDE) as f64 / 100.0;
+        let face = |(p, n): (Vec3, Vec3)| p + n * 0.02;
+        let (true_now, true_then) = (face(new(u)), face(old(u)));
+        let truth = turn * (true_now - true_then);
+        let found = Vec3::new(vectors.values[3 * i], vectors.values[3 * i + 1], vectors.values[3 * i + 2]);
+        square += (normal.values[i] - truth.dot(&(turn * new(u).1))).powi(2);
+        square_vector += (found - truth).norm_squared();
+        still += usize::from(u < 1.7 && vectors.state[i] == NodeState::Unchanged);
+        changed += usize::from(u > 2.3 && vectors.state[i] == NodeState::Seen);
+    }
+    let rms = |square: f64| (square / PlateGrid::NODES as f64).sqrt();
+    println!("normal {:.3} mm rms, vector {:.3} mm rms", rms(square) * 1e3, rms(square_vector) * 1e3);
+    assert!(rms(square) < 0.05e-3 && rms(square_vector) < 0.5e-3);
+    assert!(still as f64 > 0.9 * 57.0 * 101.0 && changed as f64 > 0.95 * 24.0 * 101.0, "{still} {changed}");
+    assert!(report.findings.says[0].contains("aligned by unchanged"), "{:?}", report.findings.says);
+}
+
+/// Changes between pairs of scans of one shape: 0.5 mm noise, a small shift of the pose, and a wave of `amplitude` whose phase
+/// and direction differ between the two.
+fn null_pairs(seeds: std::ops::Range<u64>, amplitude: f64, sigma_correlated: f64) -> Vec<detect::Changes> {
+    let mut random = fastrand::Rng::with_seed(seeds.start);
+    let mut scan = |seed: u64| {
+        let [phase, along, across] = [random.f64(), 2.0 * random.f64() - 1.0, 2.0 * random.f64() - 1.0];
+        let wave =
+            |u: f64, v: f64| amplitude * (std::f64::consts::TAU * (along * u + across * v + phase)).sin();
+        let turn = Rotation3::from_euler_angles(1e-4 * random.f64(), 1e-4 * random.f64(), 0.0);
+        moved(&plate(SIGMA, seed, 0.01, wave), turn, Vec3::new(0.0, 0.0, 1e-3 * random.f64()))
+    };
+    let pairs = seeds.map(|seed| [scan(2 * seed), scan(2 * seed + 1)]);
+    let changes = pairs.map(|[now, before]| {
+        let nodes = Nodes::new(&now, &before);
+        let motion = align::unchanged(&|| Ok(()), &nodes).expect("not cancelled");
+        detect::changes(&nodes, &motion, sigma_correlated, 0.0)
+    });
+    changes.collect()
+}
+
+fn changed_share(pairs: &[detect::Changes]) -> f64 {
+    let changed =
+        pairs.iter().flat_map(|pair| &pair.state).filter(|state| **state == NodeState::Seen).count();
+    changed as f64 / (pairs.len() * PlateGrid::NODES) as f64
+}
+
+/// What null pairs show in excess of what is stated, pooled over the plate, and the false change of other pairs with it, beside
+/// that without it.
+fn calibrated(seeds: u64, amplitude: f64) -> [f64; 3] {
+    let calibrating = null_pairs(seeds..seeds + 12, amplitude, 0.0);
+    let pooled = |square: fn(&detect::Changes) -> f64| calibrating.iter().map(square).sum::<f64>();
+    let shown = pooled(|pair| pair.normal.iter().map(|d| d * d).sum());
+    let stated = pooled(|pair| pair.lod.iter().map(|lod| (lod / 1.96).powi(2)).sum());
+    let nodes = (calibrating.len() * PlateGrid::NODES) as f64;
+    let sigma_correlated = ((shown - stated) / nodes).max(0.0).sqrt();
+    let judged = changed_share(&null_pairs(seeds + 100..seeds + 120, amplitude, sigma_correlated));
+    let uncalibrated = changed_share(&calibrating);
+    println!(
+        "wave of {:.2} mm: false change {uncalibrated:.3}; calibrated to {:.3} mm: {judged:.3}",
+        amplitude * 1e3,
+        sigma_correlated * 1e3
+    );
+    [uncalibrated, sigma_correlated, judged]
+}
+
+#[test]
+fn null_pairs_show_five_percent_of_the_area_once_calibrated() {
+    for (seeds, amplitude) in [(1000, 0.0), (3000, 0.1e-3)] {
+        let [before, sigma, after] = calibrated(seeds, amplitude);
+        // Two waves of any phase differ by this much, less what the alignment takes.
+        assert!((0.6 * amplitude..amplitude.max(0.02e-3)).contains(&sigma), "{sigma}");
+        // 20 pairs, each of which scatters by 0.05.
+        assert!((0.02..0.08).contains(&after), "wave of {amplitude}: {before} before, {after} after");
+    }
+}
+
+#[test]
+fn a_change_of_three_times_the_level_of_detection_is_found() {
+    let before = plate(SIGMA, 5, 0.0, none);
+    let lod =
+        value(&run(plate(SIGMA, 6, 0.0, none), before.clone(), "unchanged", 0.0, 0.02), "displacement.lod");
+    // A plateau over a twelfth of the plate.
+    let rise = |u: f64, v: f64| {
+        let step = |x: f64| x.clamp(0.0, 1.0) * x.clamp(0.0, 1.0) * (3.0 - 2.0 * x.clamp(0.0, 1.0));
+        let edge = |x: f64, from: f64, to: f64| step((x - from) / 0.15) * step((to - x) / 0.15);
+        3.0 * lod * edge(u, 0.4, 1.3) * edge(v, 0.5, 1.4)
+    };
+    let report = run(plate(SIGMA, 7, 0.0, rise), before, "unchanged", 0.0, 0.02);
+    let inside = |i: &usize| {
+        let (u, v) = (3.0 * (i % PlateGrid::SIDE) as f64 / 100.0, 2.0 * (i / PlateGrid::SIDE) as f64 / 100.0);
+        (0.55..=1.15).contains(&u) && (0.65..=1.25).contains(&v)
+    };
+    let plateau: Vec<usize> = (0..PlateGrid::NODES).filter(inside).collect();
+    let found = plateau.iter().filter(|i| report.fields[1].state[**i] == NodeState::Seen).count();
+    assert!(found as f64 > 0.95 * plateau.len() as f64, "{found} of {}", plateau.len());
+}
+
+#[test]
+fn another_plate_is_refused_and_no_plate_is_said() {
+    let now = plate(SIGMA, 8, 0.0, none);
+    let mut parts = now.to_parts();
+    parts.knots_v.iter_mut().for_each(|knot| *knot *= 1.1);
+    let other = Surface::from_parts(parts).expect("sound");
+    assert!(same_plate(&now, &other).expect_err("refused").to_string().contains("not the same plate"));
+}
