@@ -23,6 +23,8 @@ pub(crate) struct Band {
     pub(crate) length: f64,
     /// Across them.
     pub(crate) width: f64,
+    /// The nodes of the patch.
+    pub(crate) nodes: Vec<usize>,
     /// Unit direction across.
     across: [f64; 2],
     /// From where to where it lies across and along, in the coordinates of these directions.
@@ -89,6 +91,7 @@ pub(crate) fn measure(
         direction: (x.atan2(-y) + PI).rem_euclid(PI),
         length: section.along[1] - section.along[0],
         width: to - from,
+        nodes: patch.to_vec(),
         across: section.across,
         span: [[from, to], section.along],
     }

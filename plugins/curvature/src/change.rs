@@ -41,11 +41,11 @@ pub(crate) fn add(
     let patches: Vec<Vec<usize>> =
         PlateGrid::patches(&label).into_iter().filter(|patch| patch.len() >= least).collect();
 
+    let bands = bands(surfaces, grid, &patches, &change);
     let unchanged = |i: usize| if known(i) { NodeState::Unchanged } else { NodeState::Unseen };
     let mut state: Vec<NodeState> = (0..PlateGrid::NODES).map(unchanged).collect();
-    patches.iter().flatten().for_each(|&i| state[i] = NodeState::Seen);
+    bands.iter().flat_map(|band| &band.nodes).for_each(|&i| state[i] = NodeState::Seen);
 
-    let bands = bands(surfaces, grid, &patches, &change);
     let mut lod: Vec<f64> = (0..PlateGrid::NODES)
         .filter(|&i| known(i))
         .map(|i| EXPANDED * scale.sqrt() * sigma(i)[0].max(sigma(i)[1]))
@@ -55,8 +55,11 @@ pub(crate) fn add(
 
     let findings = &mut report.findings;
     findings.figures.push(figure("curvature.lod", median_lod, "1/m"));
-    let changed = state.iter().filter(|s| **s == NodeState::Seen).count();
-    findings.figures.push(figure("curvature.changed_share", changed as f64 / lod.len().max(1) as f64, "1"));
+    let share = |n: usize| n as f64 / lod.len().max(1) as f64;
+    let above = label.iter().filter(|label| **label != 0).count();
+    let changed = bands.iter().map(|band| band.nodes.len()).sum();
+    findings.figures.push(figure("curvature.above_lod", share(above), "1"));
+    findings.figures.push(figure("curvature.changed_share", share(changed), "1"));
     findings.figures.extend(bands.iter().enumerate().flat_map(|(k, band)| figures(k + 1, band)));
     findings.says.extend(bands.iter().map(|band| sentence(band, &options.against)));
     if bands.is_empty() {
