@@ -265,14 +265,14 @@ impl Extractor {
     }
 
     fn patch(&self, surface: &Surface, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
-        let Surface { window, noise, pixels, .. } = surface;
+        let Surface { window, noise, pixels, slope_reach, normals, .. } = surface;
         let mut face = vec![false; window.cells.len()];
         for region in regions {
-            for (cell, core) in face.iter_mut().zip(trim::core(window, region)) {
+            for (cell, core) in face.iter_mut().zip(trim::core(window, region, *slope_reach)) {
                 *cell |= core;
             }
         }
-        let face = trim::grow_back(window, noise, face);
+        let face = trim::grow_back(window, noise, normals, face);
         let mut number = vec![0; face.len()];
         let mut samples = Vec::new();
         for cell in (0..face.len()).filter(|&cell| face[cell]) {

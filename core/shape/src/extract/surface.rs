@@ -10,7 +10,7 @@ use super::pieces::Piece;
 use super::smooth;
 use super::window::Window;
 
-/// A component with its noise, mixed pixels, normals and faces.
+/// A component with its noise, mixed pixels, slope_reach, normals and faces.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
     /// The component, or the first of several.
@@ -18,7 +18,9 @@ pub(super) struct Surface {
     pub(super) window: Window,
     pub(super) noise: Noise,
     pub(super) pixels: Vec<Pixel>,
-    normals: Vec<Vector3<f32>>,
+    /// Cells on each side over which the normals' slopes are taken.
+    pub(super) slope_reach: usize,
+    pub(super) normals: Vec<Vector3<f32>>,
     labels: Vec<u32>,
     faces: Vec<Face>,
 }
@@ -30,10 +32,10 @@ impl Surface {
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smooth::low_pass(&window, &usable, continuity);
-        let reach = smooth::slope_reach(&window, noise.pooled);
-        let normals = smooth::normals(&window, &smooth, &usable, reach);
-        let (labels, faces) = grow::faces(&window, &normals, reach);
-        Self { root, window, noise, pixels, normals, labels, faces }
+        let slope_reach = smooth::slope_reach(&window, noise.pooled);
+        let normals = smooth::normals(&window, &smooth, &usable, slope_reach);
+        let (labels, faces) = grow::faces(&window, &normals, slope_reach);
+        Self { root, window, noise, pixels, slope_reach, normals, labels, faces }
     }
 
     /// Faces of at least `least` square metres. `number` is the surface's own, for [`Piece::surface`].

@@ -6,12 +6,14 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use nalgebra::Vector3;
+
 use super::local::LocalFace;
 use super::noise::Noise;
 use super::window::Window;
 
-/// Cells by which the region is worn down: more than half of the widest side face that smoothing bridges.
-const WEAR: usize = 2;
+/// Cells by which the region is worn down beyond the reach of slopes: half of the widest bridge to a side face.
+const WEAR: usize = 1;
 
 /// Largest residual of a cell of the face, in standard deviations of its prediction.
 const RESIDUAL_BOUND: f64 = 4.0;
@@ -19,12 +21,16 @@ const RESIDUAL_BOUND: f64 = 4.0;
 /// Last rings that the fit behind a judgement leaves out.
 const UNTRUSTED_RINGS: usize = 1;
 
+/// Cosine of 72 degrees: a normal of the low-pass copy that differs by more is that of a side face, whatever the range.
+const COS_OTHER_FACE: f32 = 0.3;
+
 /// A fit that knows a place worse than this, as a variance in that of a sample, is no excuse for a residual.
 const MOST_LEVERAGE: f64 = 0.5;
 
-/// Wears `region` down and keeps its largest connected part: the core of the face.
-pub(super) fn core(window: &Window, region: &[bool]) -> Vec<bool> {
-    let near_edge = widen(&obstacles(window, region), window.n_rows, WEAR);
+/// Wears `region` down and keeps its largest connected part: the core of the face. `slope_reach` is that of the normals
+/// by which the region was told.
+pub(super) fn core(window: &Window, region: &[bool], slope_reach: usize) -> Vec<bool> {
+    let near_edge = widen(&obstacles(window, region), window.n_rows, slope_reach + WEAR);
     let core: Vec<bool> = region.iter().zip(&near_edge).map(|(region, near)| *region && !*near).collect();
     largest_part(&core, window.n_rows)
 }
@@ -103,20 +109,31 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
 /// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it. The last rings
-/// have no part in the fit: a side face whose first cells lie within the noise must not bend it.
-pub(super) fn grow_back(window: &Window, noise: &Noise, core: Vec<bool>) -> Vec<bool> {
+/// have no part in the fit: a side face whose first cells lie within the noise must not bend it. And no cell may have
+/// the normal of another face than the cell of the core from which it was reached.
+pub(super) fn grow_back(
+    window: &Window,
+    noise: &Noise,
+    normals: &[Vector3<f32>],
+    core: Vec<bool>,
+) -> Vec<bool> {
     let n_rows = window.n_rows;
     let mut rings: VecDeque<Vec<usize>> = VecDeque::new();
+    let mut origin: Vec<u32> = (0..core.len() as u32).collect();
     let mut trusted = core.clone();
     let mut judged = core.clone();
     let mut face = core;
     let mut ring: Vec<usize> = (0..face.len()).filter(|&i| face[i]).collect();
     while !ring.is_empty() {
         let mut by_tile: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-        for next in ring.iter().flat_map(|&at| neighbours(at, n_rows, face.len())) {
+        for (at, next) in
+            ring.iter().flat_map(|&at| neighbours(at, n_rows, face.len()).map(move |next| (at, next)))
+        {
             if !judged[next] {
                 judged[next] = true;
-                if window.cells[next].valid && window.cells[next].inside {
+                origin[next] = origin[at];
+                let other_face = is_other_face(normals, next, origin[at] as usize);
+                if window.cells[next].valid && window.cells[next].inside && !other_face {
                     by_tile.entry(LocalFace::tile(window, next)).or_default().push(next);
                 }
             }
@@ -140,6 +157,11 @@ pub(super) fn grow_back(window: &Window, noise: &Noise, core: Vec<bool>) -> Vec<
     face
 }
 
+/// True when a cell has the normal of another face than a cell of the core; cells beyond the component have none.
+fn is_other_face(normals: &[Vector3<f32>], cell: usize, core: usize) -> bool {
+    normals[cell] != Vector3::zeros() && normals[cell].dot(&normals[core]) < COS_OTHER_FACE
+}
+
 /// The cells that a fit continues to: each within its noise, and all together within theirs, since a side face whose
 /// first row is within the noise is not so as a row.
 fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) -> Vec<usize> {
@@ -149,7 +171,8 @@ fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) 
         let sigma = f64::from(noise.at(cell));
         let residual = (f64::from(window.cells[cell].range_m) - predicted.range) / sigma;
         let known = predicted.leverage.min(MOST_LEVERAGE);
-        (residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt()).then_some((cell, residual, known))
+        let within = residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt();
+        within.then_some((cell, residual, known))
     });
     let residuals: Vec<(usize, f64, f64)> = residuals.collect();
     let n = residuals.len() as f64;

@@ -181,6 +181,11 @@ impl Scene {
 
     /// The scan, over the plates and half a metre around them.
     pub fn scan(&self) -> (ScanHeader, Vec<Column>) {
+        self.scan_around(0.08)
+    }
+
+    /// The scan over the plates and `around` radians beside them, as far as a dome goes.
+    pub fn scan_around(&self, around: f64) -> (ScanHeader, Vec<Column>) {
         let corners = self.plates.iter().flat_map(|p| {
             [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5)]
                 .map(|(u, v)| Direction::of(p.face(u * p.width, v * p.height).into()))
@@ -189,9 +194,12 @@ impl Scene {
         let span = |f: fn(&Direction) -> f64| {
             let (low, high) =
                 corners.iter().map(f).fold((9.0, -9.0), |(l, h), a| (f64::min(l, a), f64::max(h, a)));
-            (low - 0.08, high + 0.08)
+            (low - around, high + around)
         };
-        let ((az_low, az_high), (el_low, el_high)) = (span(|d| d.azimuth), span(|d| d.elevation));
+        let (mut az, mut el) = (span(|d| d.azimuth), span(|d| d.elevation));
+        az = (az.0.max(-std::f64::consts::PI), az.1.min(std::f64::consts::PI));
+        el = (el.0.max(-62.5_f64.to_radians()), el.1.min(std::f64::consts::FRAC_PI_2));
+        let ((az_low, az_high), (el_low, el_high)) = (az, el);
         let header = ScanHeader {
             n_rows: ((el_high - el_low) / self.step) as u32,
             n_columns: ((az_high - az_low) / self.step) as u32,
