@@ -307,8 +307,7 @@ fn a_stroke_shows_as_displacement_and_a_null_pair_does_not() {
         if changed {
             assert!(n_changed > 40, "{now}: only {n_changed} places changed");
         } else {
-            let says = result["says"].to_string();
-            assert!(n_changed < found.len() / 5, "{now}: {n_changed} of {} changed; {says}", found.len());
+            assert_eq!(n_changed, 0, "{now}: {}", result["says"]);
         }
     }
 }
