@@ -16,8 +16,9 @@ use super::job::{self, CancelToken, EmittedFrame, HostBuffer, JobSpec, Listed};
 use super::values::Values;
 use super::{Kind, Library, PluginError, host_table};
 
-/// Time that a plugin has to return once it was cancelled.
-const GRACE: Duration = Duration::from_millis(500);
+/// Time that a plugin has to return once it was cancelled. A plugin that outlasts it ends the host, so that a busy
+/// computer must not look like a hanging plugin.
+const GRACE: Duration = Duration::from_secs(2);
 
 /// How often a waiting job looks whether it was cancelled.
 const CANCEL_POLL: Duration = Duration::from_millis(20);

@@ -21,6 +21,8 @@ use crate::stroke::{self, NotMeasured, Scanned};
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
+/// A scan is given at least this long, whatever its driver estimates: networks stall, computers are busy.
+const LEAST_ESTIMATE: Duration = Duration::from_secs(10);
 /// Time for a scanner to connect.
 const OPEN_LIMIT: Duration = Duration::from_secs(60);
 /// Time between two tries to reach a scanner.
@@ -130,7 +132,7 @@ impl Bench {
             rig::scanner(&self.plant, &self.catalogue).map_err(|e| e.to_string()).and_then(|scanner| {
                 scanner.instance().open(OPEN_LIMIT).map_err(|e| e.to_string())?;
                 let estimate = scanner.estimate(None, OPEN_LIMIT).map_err(|e| e.to_string())?;
-                Ok((scanner, estimate))
+                Ok((scanner, estimate.map(|estimate| estimate.max(LEAST_ESTIMATE))))
             });
         match scanner {
             Ok((scanner, estimate)) => {
