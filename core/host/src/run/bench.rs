@@ -253,7 +253,10 @@ impl Bench {
             (Measure::EvaluateTime, start.elapsed()),
             (Measure::StrokeToResultTime, stroke.started.elapsed()),
         ];
-        let measurement = figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
+        let mut measurement =
+            figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
+        // A result whose files are lost still goes to the press, and says so.
+        measurement.warning = folder.is_none().then_some(Code::StorageDegraded);
         Ok((measurement, record, folder))
     }
 
