@@ -1,19 +1,17 @@
-//! Every fault of the line, one by one and mixed, on TCP, on RTU through TCP and on a serial line.
+//! Every fault of the line, one by one and mixed, on TCP and on RTU through TCP. Serial lines are tried in `core/press`.
 //!
 //! After each run the press has all its results, each under its own stroke, each scanned once.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod rig;
 
 use std::time::Duration;
 
-use platen_plant::press::{Link, Press, Serial};
+use platen_plant::press::{Link, Press};
 use platen_press::{Code, LinkState};
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
 use platen_sim_press::{Command, Config, SimPress, Tally};
 use rig::{Host, LIMIT, Memory, assert_clean, done, quick, tcp};
-use tokio_serial::{SerialPort, SerialStream};
 
 const SCAN: Duration = Duration::from_millis(5);
 
@@ -84,24 +82,6 @@ async fn late_answers_and_resets_on_many_strokes() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn strokes_on_a_serial_line_with_late_answers_and_noise() {
-    for (name, line_faults) in [
-        ("clean", LineFaults::default()),
-        ("late", LineFaults { late: 0.02, ..LineFaults::default() }),
-        ("noise", LineFaults { noise: 0.03, bit_flip: 0.03, half: 0.01, ..LineFaults::default() }),
-    ] {
-        let bridge = Bridge::new();
-        let link = LinkConfig::Rtu { device: bridge.names[0].clone().into(), baud: 115_200 };
-        let press = SimPress::start(Config { strokes: 5, link, line_faults, ..quick() }).await.unwrap();
-        let plant = Press::pph1("Press 3", 3, Link::rtu(Serial::new(&bridge.names[1], 115_200), 1));
-        let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
-        let tally = done(&press, &host).await;
-        assert_all(name, &tally, 5);
-        host.stop().await;
-    }
-}
-
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_lasting_exception_is_a_fault_until_reset() {
     for (exception_code, code) in [
         (1, Code::IllegalFunction),
@@ -142,35 +122,4 @@ async fn a_press_that_comes_back_is_found_again() {
     host.until("ready again", |status| status.host.ready).await;
     assert_eq!(back.tally().writes_before_sync, 0);
     host.stop().await;
-}
-
-/// Two pseudo terminals with their lines joined: a cable.
-struct Bridge {
-    names: [String; 2],
-    pump: tokio::task::JoinHandle<()>,
-}
-
-impl Bridge {
-    fn new() -> Self {
-        let mut lines = Vec::new();
-        let names = [(); 2].map(|()| {
-            let (line, slave) = SerialStream::pair().unwrap();
-            lines.push(line);
-            slave.name().unwrap()
-        });
-        let (mut b, mut a) = (lines.pop().unwrap(), lines.pop().unwrap());
-        let pump = tokio::spawn(async move {
-            // A pseudo terminal that nobody has open gives an error: the cable stays plugged.
-            while tokio::io::copy_bidirectional(&mut a, &mut b).await.is_err() {
-                tokio::time::sleep(Duration::from_millis(5)).await;
-            }
-        });
-        Self { names, pump }
-    }
-}
-
-impl Drop for Bridge {
-    fn drop(&mut self) {
-        self.pump.abort();
-    }
 }
