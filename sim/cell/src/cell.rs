@@ -1,15 +1,18 @@
-//! Verb `cell`: a press whose scanner drops a file into a folder at each stroke, the way an export script of a real
-//! scanner does.
+//! Verb `cell`: a press and a scanner on one plate. The scanner serves scans over TCP, or drops a file into a folder at
+//! each stroke, the way an export script of a real scanner does.
 //!
-//! The scanner starts when the host has accepted a stroke and the plate lies still; the file is named
-//! `SESSION-STROKE-ATTEMPT.e57` and appears whole. It knows the press only by its second port.
+//! Files: the scanner starts when the host has accepted a stroke and the plate lies still; the file is named
+//! `SESSION-STROKE-ATTEMPT.e57` and appears whole. The scanner knows the press only by its second port.
 
+use crate::bridge;
 use crate::error::Error;
 use crate::line::{Line, Wanted};
 use crate::press;
 use crate::scanner::Device;
 use clap::Args;
+use platen_sim_press::SimPress;
 use platen_sim_scanner::FileFormat;
+use platen_sim_scanner::stream::Bridge;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,13 +27,15 @@ pub(crate) struct Command {
     #[command(flatten)]
     press: press::Command,
     /// Folder for scans
-    #[arg(long, value_name = "FOLDER")]
-    drop: PathBuf,
+    #[arg(long, value_name = "FOLDER", required_unless_present = "serve")]
+    drop: Option<PathBuf>,
     /// Format of the scans: e57, ptx, xyz or xyb
     #[arg(long, default_value = "e57")]
     format: String,
     #[command(flatten)]
     device: Device,
+    #[command(flatten)]
+    serve: bridge::Serve,
 }
 
 /// Runs press and scanner until the press is told to end.
@@ -39,27 +44,40 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
     if FileFormat::of(&example).is_none() {
         return Err(Error::Format { path: example });
     }
-    std::fs::create_dir_all(&command.drop)?;
     let press = press::start(&command.press).await?;
-    let ending = Arc::new(AtomicBool::new(false));
-    let scanner = Scanner {
-        address: press.control().to_string(),
-        drop: command.drop,
-        format: command.format,
-        device: command.device,
-        ending: Arc::clone(&ending),
-    };
+    let control = press.control().to_string();
+    let bridge = command.serve.start(&command.device, bridge::plate_of(control.clone()))?;
+    press::announce(Some(&press), bridge.as_ref().map(Bridge::address))?;
+    match command.drop {
+        Some(drop) => {
+            let ending = Arc::new(AtomicBool::new(false));
+            let (format, device) = (command.format, command.device);
+            let scanner = Scanner { address: control, drop, format, device, ending: Arc::clone(&ending) };
+            dropping(press, &command.press, scanner, &ending).await?;
+        }
+        None => press::until_told(press, &command.press).await?,
+    }
+    bridge.as_ref().map_or(Ok(()), bridge::report)
+}
+
+/// Runs the press beside a scanner that drops files.
+async fn dropping(
+    press: SimPress,
+    command: &press::Command,
+    scanner: Scanner,
+    ending: &AtomicBool,
+) -> Result<(), Error> {
+    std::fs::create_dir_all(&scanner.drop)?;
     let mut scans = tokio::task::spawn_blocking(move || scanner.run());
-    let ended = tokio::select! {
-        ended = press::until_told(press, &command.press) => {
+    tokio::select! {
+        ended = press::until_told(press, command) => {
             ending.store(true, Ordering::Relaxed);
             // Without the press the scanner loses its line; that is no failure any more.
             let _ = scans.await;
             ended
         }
         failed = &mut scans => failed.map_err(std::io::Error::other)?,
-    };
-    ended
+    }
 }
 
 struct Scanner {

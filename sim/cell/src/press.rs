@@ -6,6 +6,7 @@ use clap::Args;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
 use std::io::Write;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -52,24 +53,20 @@ impl Command {
 /// Runs the press until it is told to end.
 pub(crate) async fn run(command: &Command) -> Result<(), Error> {
     let press = start(command).await?;
+    announce(Some(&press), None)?;
     until_told(press, command).await
 }
 
-/// Starts the press and says where it serves.
+/// Starts the press.
 pub(crate) async fn start(command: &Command) -> Result<SimPress, Error> {
-    let press = SimPress::start(command.config()?).await?;
-    announce(&press)?;
-    Ok(press)
+    Ok(SimPress::start(command.config()?).await?)
 }
 
 /// Lets the press run until it is told to end.
 pub(crate) async fn until_told(mut press: SimPress, command: &Command) -> Result<(), Error> {
-    let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {
         ended = press.ended() => ended?,
-        _ = terminate.recv() => {}
-        interrupted = tokio::signal::ctrl_c() => interrupted?,
-        () = orphaned(), if command.with_parent => {}
+        told = told_to_end(command.with_parent) => told?,
     }
     if let Ok(tally) = serde_json::to_string(&press.tally()) {
         tracing::info!(%tally, "press ends");
@@ -77,10 +74,28 @@ pub(crate) async fn until_told(mut press: SimPress, command: &Command) -> Result
     Ok(())
 }
 
+/// Resolves on SIGTERM, on Ctrl-C and, where wanted, when standard input closes.
+pub(crate) async fn told_to_end(with_parent: bool) -> Result<(), Error> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    tokio::select! {
+        _ = terminate.recv() => {}
+        interrupted = tokio::signal::ctrl_c() => interrupted?,
+        () = orphaned(), if with_parent => {}
+    }
+    Ok(())
+}
+
 /// Says where the ports are, in one line. A press on a serial line has no Modbus port.
-fn announce(press: &SimPress) -> Result<(), Error> {
-    let modbus = press.modbus().map(|address| address.to_string());
-    let line = serde_json::json!({ "modbus": modbus, "plate": press.control().to_string() });
+pub(crate) fn announce(press: Option<&SimPress>, scanner: Option<SocketAddr>) -> Result<(), Error> {
+    let mut line = serde_json::Map::new();
+    if let Some(press) = press {
+        line.insert("modbus".into(), press.modbus().map(|address| address.to_string()).into());
+        line.insert("plate".into(), press.control().to_string().into());
+    }
+    if let Some(scanner) = scanner {
+        line.insert("scanner".into(), scanner.to_string().into());
+    }
+    let line = serde_json::Value::from(line);
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}")?;
     out.flush()?;

@@ -25,6 +25,7 @@ mod ray;
 mod scan;
 mod scene;
 mod solid;
+pub mod stream;
 mod surroundings;
 
 pub use column::{SimColumn, SimState, TruthCell};

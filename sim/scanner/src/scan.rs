@@ -5,7 +5,7 @@ use crate::instrument::Instrument;
 use crate::lattice::SimLattice;
 use crate::measure::{Trace, View};
 use crate::scene::Scene;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 /// Columns worked on at a time: enough to keep threads busy, few enough to deliver steadily.
 const BATCH: u32 = 64;
@@ -18,14 +18,26 @@ pub fn scan(
     lattice: &SimLattice,
     instrument: &Instrument,
     threads: usize,
+    deliver: impl FnMut(SimColumn) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    scan_range(scene, lattice, instrument, threads, 0..lattice.n_columns, deliver)
+}
+
+/// Scans some neighbouring columns of a lattice; they are the same as in the whole scan.
+pub(crate) fn scan_range(
+    scene: &Scene,
+    lattice: &SimLattice,
+    instrument: &Instrument,
+    threads: usize,
+    columns: Range<u32>,
     mut deliver: impl FnMut(SimColumn) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
     let view = View { scene, lattice, instrument };
     let mut traces: Vec<Trace> = Vec::new();
     // Column of traces[0].
-    let mut first = 0;
-    for start in (0..lattice.n_columns).step_by(BATCH as usize) {
-        let end = (start + BATCH).min(lattice.n_columns);
+    let mut first = columns.start.saturating_sub(1);
+    for start in columns.clone().step_by(BATCH as usize) {
+        let end = (start + BATCH).min(columns.end);
         // One more than is measured: the neighbour of the last.
         let traced = first + traces.len() as u32;
         traces
@@ -61,11 +73,7 @@ pub fn scan_all(
 }
 
 /// `work` for every column of a range, in order; neighbouring columns go to different threads.
-fn parallel<T: Send>(
-    columns: std::ops::Range<u32>,
-    threads: usize,
-    work: impl Fn(u32) -> T + Sync,
-) -> Vec<T> {
+fn parallel<T: Send>(columns: Range<u32>, threads: usize, work: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = threads.clamp(1, columns.len().max(1));
     if threads == 1 {
         return columns.map(work).collect();

@@ -1,0 +1,463 @@
+//! One connection: a thread reads what the driver says, another sends. Heartbeats and Abort are heard however much is
+//! waiting to be sent.
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::json;
+
+use super::bridge::{Scan, Shared, altered, count};
+use super::disturb::Step;
+use super::fault::FaultKind;
+use super::frame::{self, Frame, FrameError};
+use super::message::{
+    Abort, Exception, Hello, Refusal, Resume, Role, ScanBegin, ScanEnd, Start, Status, Wanted,
+};
+
+/// Time between two Status frames.
+const STATUS: Duration = Duration::from_millis(900);
+
+/// Columns sent between two looks at what the driver says.
+const ROUND: usize = 16;
+
+/// What a connection waits for.
+#[derive(Debug)]
+pub(super) enum Event {
+    /// The driver says this.
+    Frame(Frame),
+    /// The driver has gone, or what it says is no frame.
+    Gone,
+    /// A scan has grown or ended.
+    Grown,
+}
+
+/// The connection ends.
+struct Hangup;
+
+type Flow = Result<(), Hangup>;
+
+/// A scan that is being sent.
+struct Sending {
+    scan: Arc<Scan>,
+    /// Which columns are still to be sent; all of them until the lattice is known.
+    wanted: Option<Vec<bool>>,
+    missing: Option<Vec<[u32; 2]>>,
+    /// Columns looked at, in the order they were measured.
+    looked_at: usize,
+    /// Columns to be sent next.
+    next: VecDeque<u32>,
+}
+
+struct Connection<'a> {
+    shared: &'a Arc<Shared>,
+    number: u32,
+    stream: TcpStream,
+    sequence: u64,
+    client: Option<(String, Role)>,
+    sending: Option<Sending>,
+    columns_sent: u32,
+    events: Sender<Event>,
+}
+
+/// Serves a driver until one side hangs up.
+pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
+    let (events, heard) = channel();
+    let Ok(reading) = stream.try_clone() else { return };
+    let reader = {
+        let (events, shared) = (events.clone(), Arc::clone(shared));
+        std::thread::spawn(move || read(reading, number, &shared, &events))
+    };
+    let mut connection = Connection {
+        shared,
+        number,
+        stream,
+        sequence: 0,
+        client: None,
+        sending: None,
+        columns_sent: 0,
+        events,
+    };
+    // Small frames must not wait for large ones to fill a packet.
+    let _ = connection.stream.set_nodelay(true);
+    let Err(Hangup) = connection.run(&heard);
+    // The reader ends with the connection; one that has gone needs no hanging up.
+    let _ = connection.stream.shutdown(Shutdown::Both);
+    let _ = reader.join();
+}
+
+/// Reads until the driver has gone. What cannot wait is done here.
+fn read(mut stream: TcpStream, connection: u32, shared: &Shared, events: &Sender<Event>) {
+    for due in 0.. {
+        let frame = match frame::read(&mut stream, due) {
+            Ok(frame) => frame,
+            Err(error) => {
+                if !matches!(error, FrameError::Gone) {
+                    tracing::warn!(connection, %error, "the driver is hung up on");
+                }
+                // A sender that has ended needs no word.
+                let _ = events.send(Event::Gone);
+                return;
+            }
+        };
+        shared.heard(connection);
+        if frame.kind == frame::ABORT
+            && let Ok(abort) = serde_json::from_slice::<Abort>(&frame.payload)
+        {
+            shared.abort(&abort.job);
+        }
+        if events.send(Event::Frame(frame)).is_err() {
+            return;
+        }
+    }
+}
+
+impl Connection<'_> {
+    fn run(&mut self, heard: &Receiver<Event>) -> Result<std::convert::Infallible, Hangup> {
+        let mut status_due = Instant::now() + STATUS;
+        loop {
+            let wait = if self.has_more() { Duration::ZERO } else { status_due - Instant::now() };
+            match heard.recv_timeout(wait) {
+                Ok(Event::Frame(frame)) => self.command(&frame)?,
+                Ok(Event::Gone) | Err(RecvTimeoutError::Disconnected) => return Err(Hangup),
+                Ok(Event::Grown) | Err(RecvTimeoutError::Timeout) => {}
+            }
+            self.go_on()?;
+            if Instant::now() >= status_due {
+                if self.client.is_some() {
+                    self.status()?;
+                }
+                status_due = Instant::now() + STATUS;
+            }
+        }
+    }
+
+    fn say(&mut self, kind: u16, scan: u32, message: &impl Serialize) -> Flow {
+        let payload = serde_json::to_vec(message).map_err(|_| Hangup)?;
+        self.send(Frame { kind, scan, payload })
+    }
+
+    fn refuse(&mut self, scan: u32, refusal: &Refusal) -> Flow {
+        self.say(frame::ERROR, scan, refusal)
+    }
+
+    fn command(&mut self, frame: &Frame) -> Flow {
+        let controls = matches!(self.client, Some((_, Role::Controller)));
+        match (frame.kind, &self.client) {
+            (frame::HELLO, None) => self.hello(frame),
+            (frame::HEARTBEAT, _) => Ok(()),
+            (kind, Some(_)) if kind & frame::MUST_KNOW == 0 => Ok(()),
+            (frame::CONFIGURE | frame::START | frame::RESUME | frame::ABORT, Some(_)) if !controls => {
+                self.refuse(0, &Refusal::new("denied", "a monitor only listens"))
+            }
+            (frame::CONFIGURE, Some(_)) => self.configure(frame),
+            (frame::START, Some(_)) => self.start(frame),
+            (frame::RESUME, Some(_)) => self.resume(frame),
+            // The reader has done it already.
+            (frame::ABORT, Some(_)) => Ok(()),
+            (kind, _) => {
+                self.refuse(0, &Refusal::new("unknown_type", format!("{kind:#06x} now")))?;
+                Err(Hangup)
+            }
+        }
+    }
+
+    /// The message in a frame, or a refusal that names what is wrong.
+    fn parse<T: DeserializeOwned>(&mut self, frame: &Frame) -> Result<T, Hangup> {
+        match serde_json::from_slice(&frame.payload) {
+            Ok(message) => Ok(message),
+            Err(error) => {
+                self.refuse(frame.scan, &Refusal::new("config", format!("{:#06x}: {error}", frame.kind)))?;
+                Err(Hangup)
+            }
+        }
+    }
+
+    fn hello(&mut self, frame: &Frame) -> Flow {
+        let hello: Hello = self.parse(frame)?;
+        let [lowest, highest] = hello.versions;
+        if lowest > frame::VERSION || highest < frame::VERSION {
+            self.refuse(0, &Refusal::new("version", "this bridge speaks 1.0"))?;
+            return Err(Hangup);
+        }
+        if hello.role == Role::Controller
+            && let Err(busy) = self.shared.lease(&hello.client, self.number)
+        {
+            self.refuse(0, &busy)?;
+            return Err(Hangup);
+        }
+        let late = self.shared.disturb().once(FaultKind::ConnectLate, |_| true);
+        if let Some(ms) = late {
+            std::thread::sleep(Duration::from_millis(ms.into()));
+        }
+        self.client = Some((hello.client, hello.role));
+        let modes: Vec<_> = [1, 2, 4, 5, 8, 10, 16, 20, 32]
+            .into_iter()
+            .flat_map(|divisor| [122, 244, 488, 976].map(|rate_kpts| (divisor, rate_kpts)))
+            .filter(|(divisor, rate_kpts)| crate::Device::new(*divisor, *rate_kpts, 1).is_ok())
+            .map(|(divisor, rate_kpts)| json!({"divisor": divisor, "rate_kpts": rate_kpts}))
+            .collect();
+        let config = &self.shared.config;
+        let serial =
+            if self.shared.suffers(FaultKind::WrongScanner) { "SIM9999" } else { config.serial.as_str() };
+        let capabilities = json!({
+            "version": frame::VERSION, "model": "platen simulated scanner", "serial": serial,
+            "firmware": env!("CARGO_PKG_VERSION"), "live": config.live, "modes": modes, "max_rows": 17351,
+            "max_columns": 40960, "faces": 2, "kept_scans": config.kept_scans, "clock": "monotonic",
+            "clock_synced": false,
+        });
+        self.say(frame::CAPABILITIES, 0, &capabilities)
+    }
+
+    /// What would be done.
+    fn plan(&self, wanted: Wanted) -> Result<super::head::Plan, Refusal> {
+        if let Some(left) = self.shared.at_first(FaultKind::Asleep) {
+            let text = "the scanner is starting up";
+            return Err(Refusal::new("scanner", text).retry(left.as_millis() as u64 + 1));
+        }
+        if self.shared.suffers(FaultKind::SdkMissing) {
+            return Err(Refusal::new("scanner", "the scanner's library is not registered on this computer"));
+        }
+        let (wanted, notes) = altered(self.shared, wanted);
+        let mut plan = self.shared.head.plan(&wanted).map_err(|why| Refusal::new("config", why))?;
+        plan.altered.splice(0..0, notes);
+        Ok(plan)
+    }
+
+    fn configure(&mut self, frame: &Frame) -> Flow {
+        let wanted = self.parse(frame)?;
+        match self.plan(wanted) {
+            Ok(plan) => {
+                let w = plan.wanted;
+                let duration_s = self.shared.config.time_scale * plan.duration_s;
+                self.say(frame::CONFIGURED, 0, &json!({
+                    "divisor": w.divisor, "rate_kpts": w.rate_kpts, "compression": w.compression, "window": w.window,
+                    "duration_s": duration_s, "altered": plan.altered,
+                }))
+            }
+            Err(refusal) => self.refuse(0, &refusal),
+        }
+    }
+
+    fn start(&mut self, frame: &Frame) -> Flow {
+        count(&self.shared.counts.starts);
+        let start: Start = self.parse(frame)?;
+        let card_missing = self.shared.suffers(FaultKind::CardMissing);
+        let scan = match self.plan(start.wanted) {
+            Ok(_) if card_missing => Err(Refusal::new("scanner", "there is no card in the scanner")),
+            Ok(plan) => self.shared.begin(&start.job, plan),
+            Err(refusal) => Err(refusal),
+        };
+        match scan {
+            Ok(scan) => {
+                let lost = self.shared.disturb().once(FaultKind::ReplyLost, |_| true);
+                if lost.is_some() {
+                    self.shared.was_cut(false);
+                    return Err(Hangup);
+                }
+                self.sending_of(scan, None);
+                Ok(())
+            }
+            Err(refusal) => self.refuse(0, &refusal),
+        }
+    }
+
+    fn resume(&mut self, frame: &Frame) -> Flow {
+        count(&self.shared.counts.resumes);
+        let resume: Resume = self.parse(frame)?;
+        match self.shared.scan_of(&resume.job).filter(|scan| scan.spool.number == frame.scan) {
+            Some(scan) => {
+                self.sending_of(scan, Some(resume.missing));
+                Ok(())
+            }
+            None => {
+                let text = format!("scan {} of job {} is not kept here", frame.scan, resume.job);
+                self.refuse(frame.scan, &Refusal::new("gone", text))
+            }
+        }
+    }
+
+    fn sending_of(&mut self, scan: Arc<Scan>, missing: Option<Vec<[u32; 2]>>) {
+        scan.spool.listen(self.events.clone());
+        let next = VecDeque::new();
+        self.sending = Some(Sending { scan, wanted: None, missing, looked_at: 0, next });
+    }
+
+    /// True when something can be sent at once.
+    fn has_more(&self) -> bool {
+        let Some(sending) = &self.sending else { return false };
+        let spool = &sending.scan.spool;
+        match sending.wanted {
+            None => spool.begun().is_some() || spool.is_over(),
+            Some(_) => spool.arrival(sending.looked_at).is_some() || spool.is_over(),
+        }
+    }
+
+    /// Sends what has come of the scan that is asked for.
+    fn go_on(&mut self) -> Flow {
+        let Some(mut sending) = self.sending.take() else { return Ok(()) };
+        let scan = Arc::clone(&sending.scan);
+        let (spool, number) = (&scan.spool, scan.spool.number);
+        if let Some(why) = spool.refused() {
+            return self.refuse(number, &Refusal::new("scanner", why));
+        }
+        if sending.wanted.is_none() {
+            let Some(begin) = spool.begun() else {
+                self.sending = Some(sending);
+                return Ok(());
+            };
+            sending.wanted = Some(wanted(begin.columns, sending.missing.as_deref()));
+            self.say(frame::SCAN_BEGIN, number, &ScanBegin { job: spool.job.clone(), begin })?;
+        }
+        // Looked at before the columns: whatever came before the end is seen then.
+        let ended = spool.ended();
+        if sending.look(&mut |end| self.shared.disturb().below(end), self.within()) {
+            for column in sending.next.drain(..) {
+                self.column(number, spool.payload(column).map_err(|_| Hangup)?)?;
+            }
+        }
+        match ended.filter(|_| spool.arrival(sending.looked_at).is_none()) {
+            Some(_) if scan.overflowed() => {
+                self.refuse(number, &Refusal::new("overflow", "the bridge's disk is full; make room on it"))
+            }
+            Some(end) => self.end(number, end),
+            None => {
+                self.sending = Some(sending);
+                Ok(())
+            }
+        }
+    }
+
+    /// Columns are shuffled within so many.
+    fn within(&self) -> usize {
+        self.shared.disturb().lasting(FaultKind::Shuffled).map_or(1, |n| n.max(1) as usize)
+    }
+
+    fn column(&mut self, scan: u32, payload: Vec<u8>) -> Flow {
+        self.send(Frame { kind: frame::COLUMN, scan, payload })?;
+        self.columns_sent += 1;
+        count(&self.shared.counts.columns_sent);
+        Ok(())
+    }
+
+    fn end(&mut self, scan: u32, mut end: ScanEnd) -> Flow {
+        if self.shared.suffers(FaultKind::WrongDigest) {
+            end.digest ^= 1;
+        }
+        self.say(frame::SCAN_END, scan, &end)
+    }
+
+    /// Sends a frame, or what becomes of it on its way.
+    fn send(&mut self, frame: Frame) -> Flow {
+        let steps = self.shared.disturb().pass(frame, self.columns_sent);
+        for step in steps {
+            match step {
+                Step::Send(frame) => self.write(&frame, None)?,
+                Step::SendSpoiled(frame, bit) => self.write(&frame, Some(bit))?,
+                Step::Header(length, bit) => {
+                    let mut head = frame::header(frame::COLUMN, 0, self.sequence, length, frame::VERSION[0]);
+                    if let Some(bit) = bit {
+                        head[bit / 8] ^= 1 << (bit % 8);
+                    }
+                    self.stream.write_all(&head).map_err(|_| Hangup)?;
+                    count(&self.shared.counts.cuts);
+                    return Err(Hangup);
+                }
+                Step::Wait(long) => std::thread::sleep(long),
+                Step::Cut | Step::Die => {
+                    self.shared.was_cut(step == Step::Die);
+                    return Err(Hangup);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, frame: &Frame, spoiled: Option<usize>) -> Flow {
+        let mut bytes = frame::bytes(frame, self.sequence);
+        if self.shared.suffers(FaultKind::VersionMismatch) {
+            let head = frame::header(frame.kind, frame.scan, self.sequence, frame.payload.len() as u32, 2);
+            bytes[..frame::HEADER].copy_from_slice(&head);
+        }
+        if let Some(bit) = spoiled {
+            bytes[frame::HEADER + bit / 8] ^= 1 << (bit % 8);
+        }
+        self.sequence += 1;
+        self.stream.write_all(&bytes).map_err(|_| Hangup)
+    }
+
+    fn status(&mut self) -> Flow {
+        let status = status(self.shared);
+        self.say(frame::STATUS, 0, &status)
+    }
+}
+
+impl Sending {
+    /// Puts the next columns that are wanted into `next`, `within` at a time in random order; false when none came.
+    fn look(&mut self, below: &mut dyn FnMut(u32) -> u32, within: usize) -> bool {
+        let Some(wanted) = &mut self.wanted else { return false };
+        while self.next.len() < ROUND.max(within) {
+            let Some(column) = self.scan.spool.arrival(self.looked_at) else { break };
+            self.looked_at += 1;
+            if std::mem::take(&mut wanted[column as usize]) {
+                self.next.push_back(column);
+            }
+        }
+        if within > 1 {
+            for last in (1..self.next.len()).rev() {
+                self.next.swap(last, below(last as u32 + 1) as usize);
+            }
+        }
+        !self.next.is_empty()
+    }
+}
+
+/// Which columns are to be sent.
+fn wanted(columns: u32, missing: Option<&[[u32; 2]]>) -> Vec<bool> {
+    let Some(missing) = missing else { return vec![true; columns as usize] };
+    let asked = |column: u32| missing.iter().any(|[first, last]| (*first..=*last).contains(&column));
+    (0..columns).map(asked).collect()
+}
+
+/// How things stand.
+fn status(shared: &Shared) -> Status {
+    let suffers = |kind| shared.suffers(kind);
+    let running = shared.running();
+    let (state, progress) = match &running {
+        _ if suffers(FaultKind::StaleStatus) => ("ready", 1.0),
+        _ if shared.at_first(FaultKind::Asleep).is_some() => ("connecting", 0.0),
+        None => ("ready", 0.0),
+        Some(_) if suffers(FaultKind::ProgressJump) => ("scanning", 0.0),
+        Some(scan) if !scan.spool.has_begun() || scan.spool.progress() == 0.0 => ("starting", 0.0),
+        Some(scan) if scan.spool.progress() < 1.0 => ("scanning", scan.spool.progress()),
+        Some(_) => ("finishing", 1.0),
+    };
+    let mut exceptions = Vec::new();
+    let mut except = |level: u8, text: String| exceptions.push(Exception { level, text });
+    if let Some(stalls @ 1..) = running.filter(|scan| !scan.spool.has_begun()).map(|scan| scan.stalls()) {
+        except(3, format!("the mirror is not up to speed, try {stalls} of 5"));
+    }
+    if suffers(FaultKind::BatteryLow) {
+        except(3, "the battery is at 4 %".to_owned());
+    }
+    if suffers(FaultKind::Temperature) {
+        except(3, "the scanner is at 46 degrees, at most 40 are allowed".to_owned());
+    }
+    if suffers(FaultKind::Contamination) {
+        except(3, "the mirror is dirty".to_owned());
+    }
+    Status {
+        state,
+        progress,
+        temperature_c: Some(if suffers(FaultKind::Temperature) { 46.0 } else { 31.5 }),
+        battery: Some(if suffers(FaultKind::BatteryLow) { 0.04 } else { 0.8 }),
+        exceptions,
+        time_ns: shared.begun.elapsed().as_nanos() as u64,
+        synced: false,
+    }
+}

@@ -1,0 +1,137 @@
+//! Frames on the wire and in recordings, section 1 of the protocol's page. Written from that page alone.
+
+use std::io::{ErrorKind, Read};
+
+/// Bytes before the payload.
+pub(super) const HEADER: usize = 32;
+
+/// Most bytes of a payload.
+pub(super) const LONGEST: usize = 1 << 20;
+
+/// The version spoken.
+pub(super) const VERSION: [u8; 2] = [1, 0];
+
+pub(super) const HELLO: u16 = 0x8001;
+pub(super) const CAPABILITIES: u16 = 0x8002;
+pub(super) const CONFIGURE: u16 = 0x8003;
+pub(super) const CONFIGURED: u16 = 0x8004;
+pub(super) const START: u16 = 0x8005;
+pub(super) const ABORT: u16 = 0x8006;
+pub(super) const RESUME: u16 = 0x8007;
+pub(super) const HEARTBEAT: u16 = 0x0008;
+pub(super) const STATUS: u16 = 0x0009;
+pub(super) const ERROR: u16 = 0x800A;
+pub(super) const SCAN_BEGIN: u16 = 0x8010;
+pub(super) const COLUMN: u16 = 0x8011;
+pub(super) const SCAN_END: u16 = 0x8012;
+/// Who does not know a type with this bit must refuse it.
+pub(super) const MUST_KNOW: u16 = 0x8000;
+
+/// One frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Frame {
+    pub(super) kind: u16,
+    pub(super) scan: u32,
+    pub(super) payload: Vec<u8>,
+}
+
+/// Why no further frame can be read.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum FrameError {
+    /// Nothing more comes.
+    #[error("the other side has gone")]
+    Gone,
+    /// What came is no frame, and nothing behind it can be trusted.
+    #[error("{0}")]
+    Untrusted(&'static str),
+    /// The system refuses.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+}
+
+/// The 32 bytes before a payload, sealed.
+pub(super) fn header(kind: u16, scan: u32, sequence: u64, length: u32, major: u8) -> [u8; HEADER] {
+    let mut bytes = [0; HEADER];
+    bytes[..4].copy_from_slice(b"PSB1");
+    bytes[4..6].copy_from_slice(&[major, VERSION[1]]);
+    bytes[6..8].copy_from_slice(&kind.to_le_bytes());
+    bytes[8..12].copy_from_slice(&length.to_le_bytes());
+    bytes[16..24].copy_from_slice(&sequence.to_le_bytes());
+    bytes[24..28].copy_from_slice(&scan.to_le_bytes());
+    let seal = seal(&bytes);
+    bytes[12..16].copy_from_slice(&seal.to_le_bytes());
+    bytes
+}
+
+fn seal(header: &[u8; HEADER]) -> u32 {
+    crc32c::crc32c_append(crc32c::crc32c(&header[..12]), &header[16..])
+}
+
+/// The bytes of a frame.
+pub(super) fn bytes(frame: &Frame, sequence: u64) -> Vec<u8> {
+    let head = header(frame.kind, frame.scan, sequence, frame.payload.len() as u32, VERSION[0]);
+    [&head[..], &frame.payload, &crc32c::crc32c(&frame.payload).to_le_bytes()].concat()
+}
+
+/// Reads the frame whose number is due; blocks until it is whole.
+pub(super) fn read(from: &mut impl Read, due: u64) -> Result<Frame, FrameError> {
+    let mut head = [0; HEADER];
+    fill(from, &mut head)?;
+    let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+    let untrusted = |what| Err(FrameError::Untrusted(what));
+    if head[..4] != *b"PSB1" {
+        return untrusted("wrong magic");
+    }
+    if word(12) != seal(&head) {
+        return untrusted("wrong checksum of a header");
+    }
+    if head[4] != VERSION[0] {
+        return untrusted("another major version");
+    }
+    let length = word(8) as usize;
+    if length > LONGEST {
+        return untrusted("a payload beyond 1 MiB");
+    }
+    if u64::from(word(16)) | u64::from(word(20)) << 32 != due {
+        return untrusted("a frame out of sequence");
+    }
+    let mut payload = vec![0; length];
+    fill(from, &mut payload)?;
+    let mut sum = [0; 4];
+    fill(from, &mut sum)?;
+    if u32::from_le_bytes(sum) != crc32c::crc32c(&payload) {
+        return untrusted("wrong checksum of a payload");
+    }
+    Ok(Frame { kind: u16::from_le_bytes([head[6], head[7]]), scan: word(24), payload })
+}
+
+fn fill(from: &mut impl Read, bytes: &mut [u8]) -> Result<(), FrameError> {
+    from.read_exact(bytes).map_err(|error| match error.kind() {
+        ErrorKind::UnexpectedEof | ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => FrameError::Gone,
+        _ => error.into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_those_of_the_page() {
+        assert_eq!(crc32c::crc32c(b"123456789"), 0xE306_9283);
+        let frame = Frame { kind: STATUS, scan: 7, payload: b"{}".to_vec() };
+        let written = bytes(&frame, 258);
+        assert_eq!(written[..12], *b"PSB1\x01\x00\x09\x00\x02\x00\x00\x00");
+        assert_eq!(written[16..34], *b"\x02\x01\0\0\0\0\0\0\x07\0\0\0\0\0\0\0{}");
+        assert!(matches!(read(&mut &written[..], 258), Ok(again) if again == frame));
+        assert!(matches!(
+            read(&mut &written[..], 259),
+            Err(FrameError::Untrusted("a frame out of sequence"))
+        ));
+        for bit in 0..8 * written.len() {
+            let mut spoiled = written.clone();
+            spoiled[bit / 8] ^= 1 << (bit % 8);
+            assert!(read(&mut &spoiled[..], 258).is_err(), "bit {bit}");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The JSON messages of the protocol, sections 2 to 7 of its page.
+
+use serde::{Deserialize, Serialize};
+
+/// Part of the dome, radians.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// First azimuth.
+    pub azimuth_start: f64,
+    /// Towards growing azimuth.
+    pub azimuth_width: f64,
+    /// Lowest elevation.
+    pub elevation_min: f64,
+    /// Highest elevation.
+    pub elevation_max: f64,
+}
+
+/// What is wanted of a scan, or what will be done.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Wanted {
+    /// Resolution 1/divisor.
+    pub divisor: u32,
+    /// Thousands of points per second.
+    pub rate_kpts: u32,
+    /// n: n^2 samples become one.
+    #[serde(default = "one")]
+    pub compression: u32,
+    /// Part of the dome; everything without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window: Option<Region>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// What is in a record of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Values {
+    /// Range and intensity.
+    Range,
+    /// Range, intensity, and how far the beam is from the even lattice.
+    Polar,
+}
+
+/// ScanBegin without its job: the lattice as it will be sent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Begin {
+    /// Cells of a column.
+    pub rows: u32,
+    /// Columns.
+    pub columns: u32,
+    /// Azimuth of column 0, radians.
+    pub azimuth_start: f64,
+    /// Between columns.
+    pub azimuth_step: f64,
+    /// Elevation of row 0, radians.
+    pub elevation_start: f64,
+    /// Between rows.
+    pub elevation_step: f64,
+    /// What a record holds.
+    pub values: Values,
+    /// Metres of one unit of range.
+    pub range_unit_m: f64,
+    /// Least and greatest intensity.
+    pub intensity: [u16; 2],
+    /// First column of the back face.
+    pub seam_column: Option<u32>,
+    /// `azimuth` or `time`.
+    pub order: String,
+    /// Maker, model, serial number.
+    pub instrument: String,
+    /// Seconds since 1970, when known.
+    pub acquired_unix_s: Option<f64>,
+    /// No real light was used.
+    pub simulated: bool,
+    /// What is not as asked for.
+    #[serde(default)]
+    pub altered: Vec<String>,
+}
+
+/// ScanBegin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct ScanBegin {
+    pub(super) job: String,
+    #[serde(flatten)]
+    pub(super) begin: Begin,
+}
+
+/// ScanEnd.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct ScanEnd {
+    pub(super) outcome: Outcome,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reason: Option<String>,
+    pub(super) columns: u32,
+    pub(super) points: u64,
+    pub(super) warm_up_columns: u32,
+    pub(super) digest: u32,
+}
+
+/// How a scan ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Outcome {
+    Complete,
+    Aborted,
+    Failed,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Hello {
+    pub(super) versions: [[u8; 2]; 2],
+    pub(super) client: String,
+    pub(super) role: Role,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Role {
+    Controller,
+    Monitor,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Start {
+    pub(super) job: String,
+    #[serde(flatten)]
+    pub(super) wanted: Wanted,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Abort {
+    pub(super) job: String,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Resume {
+    pub(super) job: String,
+    /// First and last of each run.
+    pub(super) missing: Vec<[u32; 2]>,
+}
+
+/// Error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Refusal {
+    pub(super) code: &'static str,
+    pub(super) text: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) retry_ms: Option<u64>,
+}
+
+impl Refusal {
+    pub(super) fn new(code: &'static str, text: impl Into<String>) -> Self {
+        Self { code, text: text.into(), retry_ms: None }
+    }
+
+    pub(super) fn retry(self, retry_ms: u64) -> Self {
+        Self { retry_ms: Some(retry_ms), ..self }
+    }
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Status {
+    pub(super) state: &'static str,
+    pub(super) progress: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) temperature_c: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) battery: Option<f64>,
+    pub(super) exceptions: Vec<Exception>,
+    pub(super) time_ns: u64,
+    pub(super) synced: bool,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Exception {
+    pub(super) level: u8,
+    pub(super) text: String,
+}

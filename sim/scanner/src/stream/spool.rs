@@ -1,0 +1,214 @@
+//! A scan on disk: the frames of ScanBegin, the columns in the order they were measured, and ScanEnd, as they go over
+//! the wire. What is kept for Resume and what is recorded for a replay are the same bytes.
+
+use std::fs::File;
+use std::io::{BufReader, Seek, Write};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::sync::mpsc::Sender;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::connection::Event;
+use super::frame::{self, Frame};
+use super::message::{Begin, Outcome, ScanBegin, ScanEnd};
+use super::payload;
+
+/// Where a column lies.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    at: u64,
+    length: u32,
+    crc: u32,
+    points: u64,
+}
+
+/// One scan, growing or whole.
+#[derive(Debug)]
+pub(super) struct Spool {
+    pub(super) job: String,
+    pub(super) number: u32,
+    file: File,
+    /// Nothing is shown before the scan has ended.
+    held_back: bool,
+    inner: Mutex<Inner>,
+}
+
+#[derive(Debug, Default)]
+struct Inner {
+    begin: Option<Begin>,
+    places: Vec<Option<Place>>,
+    arrived: Vec<u32>,
+    at: u64,
+    sequence: u64,
+    end: Option<ScanEnd>,
+    /// Why there will be no scan at all.
+    refused: Option<String>,
+    listeners: Vec<Sender<Event>>,
+}
+
+impl Spool {
+    /// An empty one; in `file`, or in a file without a name.
+    pub(super) fn new(job: &str, number: u32, file: Option<&Path>, held_back: bool) -> std::io::Result<Self> {
+        let file = match file {
+            Some(path) => File::options().read(true).write(true).create(true).truncate(true).open(path)?,
+            None => tempfile::tempfile()?,
+        };
+        Ok(Self { job: job.to_owned(), number, file, held_back, inner: Mutex::default() })
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells `listener` of everything that comes from now on.
+    pub(super) fn listen(&self, listener: Sender<Event>) {
+        self.inner().listeners.push(listener);
+    }
+
+    /// The lattice is known.
+    pub(super) fn begin(&self, begin: Begin) -> std::io::Result<()> {
+        let mut inner = self.inner();
+        let message = ScanBegin { job: self.job.clone(), begin: begin.clone() };
+        inner.places = vec![None; begin.columns as usize];
+        inner.begin = Some(begin);
+        inner.append(&self.file, frame::SCAN_BEGIN, self.number, serde_json::to_vec(&message)?)?;
+        inner.tell();
+        Ok(())
+    }
+
+    /// A column was measured.
+    pub(super) fn column(&self, bytes: Vec<u8>) -> std::io::Result<()> {
+        let mut inner = self.inner();
+        let Some(number) = payload::number(&bytes).filter(|n| (*n as usize) < inner.places.len()) else {
+            return Err(std::io::Error::other("a column outside of its lattice"));
+        };
+        let (length, crc, points) = (bytes.len() as u32, crc32c::crc32c(&bytes), payload::points(&bytes));
+        let at = inner.append(&self.file, frame::COLUMN, self.number, bytes)?;
+        inner.places[number as usize] = Some(Place { at, length, crc, points });
+        inner.arrived.push(number);
+        inner.tell();
+        Ok(())
+    }
+
+    /// The scan has ended.
+    pub(super) fn end(
+        &self,
+        outcome: Outcome,
+        reason: Option<String>,
+        warm_up_columns: u32,
+    ) -> std::io::Result<()> {
+        let mut inner = self.inner();
+        let sound = inner.places.iter().flatten();
+        let digest = sound.clone().fold(0, |sum, place| crc32c::crc32c_append(sum, &place.crc.to_le_bytes()));
+        let (columns, points) = (sound.clone().count() as u32, sound.map(|place| place.points).sum());
+        let end = ScanEnd { outcome, reason, columns, points, warm_up_columns, digest };
+        inner.append(&self.file, frame::SCAN_END, self.number, serde_json::to_vec(&end)?)?;
+        inner.end = Some(end);
+        inner.tell();
+        Ok(())
+    }
+
+    /// There will be no scan.
+    pub(super) fn refuse(&self, why: String) {
+        let mut inner = self.inner();
+        inner.refused = Some(why);
+        inner.tell();
+    }
+
+    /// Why there will be no scan.
+    pub(super) fn refused(&self) -> Option<String> {
+        self.inner().refused.clone()
+    }
+
+    /// True when the lattice is known, whether or not it may be shown.
+    pub(super) fn has_begun(&self) -> bool {
+        self.inner().begin.is_some()
+    }
+
+    /// True when nothing more comes.
+    pub(super) fn is_over(&self) -> bool {
+        let inner = self.inner();
+        inner.end.is_some() || inner.refused.is_some()
+    }
+
+    /// What was announced, once it may be shown.
+    pub(super) fn begun(&self) -> Option<Begin> {
+        let inner = self.inner();
+        inner.begin.clone().filter(|_| !self.held_back || inner.end.is_some())
+    }
+
+    /// How it ended.
+    pub(super) fn ended(&self) -> Option<ScanEnd> {
+        self.inner().end.clone()
+    }
+
+    /// Share of the columns that was measured.
+    pub(super) fn progress(&self) -> f64 {
+        let inner = self.inner();
+        inner.arrived.len() as f64 / inner.places.len().max(1) as f64
+    }
+
+    /// Number of the `nth` column that came, once it may be shown.
+    pub(super) fn arrival(&self, nth: usize) -> Option<u32> {
+        let inner = self.inner();
+        (!self.held_back || inner.end.is_some()).then(|| inner.arrived.get(nth).copied()).flatten()
+    }
+
+    /// Bytes on disk.
+    pub(super) fn bytes(&self) -> u64 {
+        self.inner().at
+    }
+
+    /// The payload of a column that came.
+    pub(super) fn payload(&self, number: u32) -> std::io::Result<Vec<u8>> {
+        let place = self.inner().places.get(number as usize).copied().flatten();
+        let place = place.ok_or_else(|| std::io::Error::other("the column is not there"))?;
+        let mut bytes = vec![0; place.length as usize];
+        self.file.read_exact_at(&mut bytes, place.at)?;
+        Ok(bytes)
+    }
+}
+
+impl Inner {
+    /// Writes a frame and gives the place of its payload.
+    fn append(&mut self, mut file: &File, kind: u16, scan: u32, payload: Vec<u8>) -> std::io::Result<u64> {
+        let bytes = frame::bytes(&Frame { kind, scan, payload }, self.sequence);
+        file.write_all(&bytes)?;
+        let place = self.at + frame::HEADER as u64;
+        self.at += bytes.len() as u64;
+        self.sequence += 1;
+        Ok(place)
+    }
+
+    fn tell(&mut self) {
+        self.listeners.retain(|listener| listener.send(Event::Grown).is_ok());
+    }
+}
+
+/// Reads a recording: what was announced, then every column to `column`, then how many warm-up columns it has.
+///
+/// # Errors
+/// The file is not there or holds no whole scan.
+pub(super) fn read_recording(
+    path: &Path,
+    mut begun: impl FnMut(Begin) -> bool,
+    mut column: impl FnMut(Vec<u8>) -> bool,
+) -> std::io::Result<u32> {
+    let broken = |what: String| std::io::Error::other(format!("{}: {what}", path.display()));
+    let mut file = BufReader::new(File::open(path).map_err(|error| broken(error.to_string()))?);
+    file.rewind()?;
+    for sequence in 0.. {
+        let frame = frame::read(&mut file, sequence)
+            .map_err(|error| broken(format!("frame {sequence}: {error}; this is no whole recording")))?;
+        let going_on = match frame.kind {
+            frame::SCAN_BEGIN => begun(serde_json::from_slice::<ScanBegin>(&frame.payload)?.begin),
+            frame::COLUMN => column(frame.payload),
+            frame::SCAN_END => return Ok(serde_json::from_slice::<ScanEnd>(&frame.payload)?.warm_up_columns),
+            _ => true,
+        };
+        if !going_on {
+            return Ok(0);
+        }
+    }
+    Ok(0)
+}

@@ -1,0 +1,80 @@
+//! The reference bridge of the simulator, and the real driver library loaded by the host's loader, over a real socket.
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use std::net::SocketAddr;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use platen_host::plugin::{Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use platen_host::rig;
+use platen_plant::PlantFile;
+use platen_scan::{Lattice, ScanEnd, Window};
+use platen_sim_plate::{PlateState, Shape};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, Shop};
+
+/// Longest scan that a test waits for; nothing here takes so long unless it is broken.
+pub(crate) const LIMIT: Duration = Duration::from_secs(60);
+
+/// A bent plate of the size of recipe 9.
+pub(crate) fn plate() -> PlateState {
+    let shape = Shape::Cylinder { radius_mm: 9018.0, axis_deg: 90.0 };
+    PlateState { shape, ..PlateState::flat(3000.0, 2500.0, 36.0) }
+}
+
+/// A scanner before that plate.
+pub(crate) fn shop() -> Shop {
+    Shop { threads: 2, ..Shop::new(Box::new(|| Ok(Some(plate())))) }
+}
+
+/// A bridge with these faults, its seed fixed.
+pub(crate) fn bridge(faults: &[&str]) -> Bridge {
+    start(faults, BridgeConfig::default(), shop())
+}
+
+pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: Shop) -> Bridge {
+    let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+    Bridge::start(BridgeConfig { faults, ..config }, Box::new(shop)).unwrap()
+}
+
+/// The driver as a plant file asks for it; `options` are further lines.
+pub(crate) fn driver(address: SocketAddr, options: &str) -> Scanner {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plant.toml");
+    let text = format!(
+        "[plant]\nname = \"test\"\n[scanner]\nplugin = \"faro-stream\"\n\
+         [scanner.options]\naddress = \"{address}\"\n{options}\n"
+    );
+    std::fs::write(&file, text).unwrap();
+    let plant = PlantFile::load(&file).unwrap();
+    rig::scanner(&plant, &Catalogue::new(Some(platen_tests::built()))).unwrap()
+}
+
+/// 31 x 32 cells on the plate, at the coarsest resolution.
+pub(crate) const COARSE: &str = "divisor = 32\nrate_kpts = 122";
+pub(crate) const WINDOW: Window =
+    Window { azimuth_start: -0.075, azimuth_width: 0.15, elevation_min: -0.65, elevation_max: -0.5 };
+
+/// One scan, every column in its place, or why there is none.
+pub(crate) fn scan(
+    scanner: &Scanner,
+    window: Option<&Window>,
+    limit: Duration,
+) -> Result<(Lattice, ScanEnd), PluginError> {
+    let mut lattice: Option<Lattice> = None;
+    let end = scanner.scan(JobSpec::untriggered(limit), window, &mut |event| {
+        match event {
+            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
+            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
+        }
+        ControlFlow::Continue(())
+    })?;
+    Ok((lattice.unwrap(), end))
+}
+
+/// Everything that a scan says, so that two can be compared to the last bit.
+pub(crate) fn cells(lattice: &Lattice) -> Vec<(Option<u64>, Option<[u64; 2]>, u16)> {
+    let direction = |cell| lattice.direction(cell).map(|d| [d.azimuth.to_bits(), d.elevation.to_bits()]);
+    (0..lattice.n_columns() * lattice.n_rows())
+        .map(|cell| (lattice.range(cell).map(f64::to_bits), direction(cell), lattice.intensity(cell)))
+        .collect()
+}
