@@ -163,3 +163,27 @@ pub trait Journal: Send + 'static {
     /// When it cannot be written. Later steps of the same stroke may still come.
     fn record(&mut self, record: &Record) -> Result<(), Self::Error>;
 }
+
+/// The journal of a trial: it remembers within this process only.
+#[derive(Debug, Clone)]
+pub struct MemoryJournal(Recalled);
+
+impl MemoryJournal {
+    /// An empty one of the installation `owner`, not 0.
+    pub fn new(owner: u16) -> Self {
+        Self(Recalled::empty(owner))
+    }
+}
+
+impl Journal for MemoryJournal {
+    type Error = std::convert::Infallible;
+
+    fn recall(&mut self) -> Result<Recalled, Self::Error> {
+        Ok(self.0.clone())
+    }
+
+    fn record(&mut self, record: &Record) -> Result<(), Self::Error> {
+        self.0.replay(record);
+        Ok(())
+    }
+}

@@ -6,19 +6,25 @@ mod handshake;
 mod journal;
 mod link;
 mod page;
+mod probe;
+mod program;
 mod reconcile;
+mod replay;
 mod runner;
 mod stroke;
 
 pub use alarm::{Alarm, Code, Language, Severity, alarms_csv};
 pub use codec::{HostImage, PressImage, Torn, Wrong, describe_inputs, describe_outputs, saturates};
 pub use handshake::{Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
-pub use journal::{Acked, Entry, Journal, Recalled, Record, Stage};
+pub use journal::{Acked, Entry, Journal, MemoryJournal, Recalled, Record, Stage};
 pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,
     Response, ServedLink, TransportError, consequence,
 };
-pub use page::{map_csv, map_markdown, reference_program};
+pub use page::{map_csv, map_markdown};
+pub use probe::{Reading, readings};
+pub use program::reference_program;
+pub use replay::{Replayed, Sample, Side, replay};
 pub use runner::{
     Answer, Durations, HostSide, Metrics, Order, PressSide, RunError, Status, channels, run_press,
 };

@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use platen_plant::press::{Block, Field, Input, Kind, Output, Place, Press, Profile, Table, Unit};
+use platen_plant::press::{
+    Block, Field, Input, Kind, Output, Parity, Place, Press, Role, Table, Transport, Unit,
+};
+
+use crate::reference_program;
 
 /// One field on the page.
 struct Row {
@@ -12,13 +16,15 @@ struct Row {
     name: &'static str,
     field: Field,
     meaning: &'static str,
+    /// The number that the plant file asks for elsewhere than in the field.
+    must_be: Option<u16>,
 }
 
 fn rows<N: Copy>(fields: &BTreeMap<N, Field>, about: impl Fn(N) -> (&'static str, &'static str)) -> Vec<Row> {
     let row = |(&name, field): (&N, &Field)| {
         let (name, meaning) = about(name);
         let bit = if let Place::Bit(_, bit) = field.place { Some(bit) } else { None };
-        Row { offset: field.place.offset(), bit, name, field: field.clone(), meaning }
+        Row { offset: field.place.offset(), bit, name, field: field.clone(), meaning, must_be: None }
     };
     let mut rows: Vec<_> = fields.iter().map(row).collect();
     rows.sort_by_key(|row| (row.offset.is_none(), row.offset, row.bit));
@@ -26,7 +32,11 @@ fn rows<N: Copy>(fields: &BTreeMap<N, Field>, about: impl Fn(N) -> (&'static str
 }
 
 fn inputs(press: &Press) -> Vec<Row> {
-    rows(&press.map.inputs, |input: Input| (input.name(), input.meaning()))
+    let mut rows = rows(&press.map.inputs, |input: Input| (input.name(), input.meaning()));
+    for row in rows.iter_mut().filter(|row| row.name == Input::PressId.name()) {
+        row.must_be = Some(press.press_id);
+    }
+    rows
 }
 
 fn outputs(press: &Press) -> Vec<Row> {
@@ -82,6 +92,9 @@ impl Row {
     fn notes(&self) -> String {
         let field = &self.field;
         let mut notes = Vec::new();
+        if let Some(number) = self.must_be {
+            notes.push(format!("must be {number}"));
+        }
         if let Place::Constant(number) = field.place {
             notes.push(format!("always {number}"));
         }
@@ -115,23 +128,26 @@ pub fn map_markdown(press: &Press) -> String {
         press.press_id
     );
     page += "Addresses are zero-based, as on the wire; beside them in 6-digit notation. ";
-    page += "Each block travels in one transaction.\n";
+    page += "Each block travels in one transaction.\n\n## Connection\n\n";
+    for line in connection(press) {
+        let _ = writeln!(page, "- {line}");
+    }
     let functions = |table| if table == Table::Holding { "function 3" } else { "function 4" };
     let (read, write) = (&map.read, &map.write);
-    let read_by = functions(read.table);
+    let (to_host, to_press) = if press.role == Role::Server {
+        ("the press writes", format!("the press reads {} registers with function 3", write.count))
+    } else {
+        ("the host reads", format!("the host writes {} registers with function 16", write.count))
+    };
+    let by = if press.role == Role::Server { "function 16" } else { functions(read.table) };
     section(
         &mut page,
-        &format!("Press to host: the host reads {} registers with {read_by}", read.count),
+        &format!("Press to host: {to_host} {} registers with {by}", read.count),
         read,
         &inputs(press),
     );
-    section(
-        &mut page,
-        &format!("Host to press: the host writes {} registers with function 16", write.count),
-        write,
-        &outputs(press),
-    );
-    let _ = write!(page, "\nThe host writes holding registers {} (zero-based) and no others. ", press.write);
+    section(&mut page, &format!("Host to press: {to_press}"), write, &outputs(press));
+    let _ = write!(page, "\nThe host changes registers {} (zero-based) and no others. ", press.write);
     page += "Registers without a row are reserved: leave them 0.\n\n## Rules\n\n";
     for rule in rules(press) {
         let _ = writeln!(page, "- {rule}");
@@ -142,6 +158,54 @@ pub fn map_markdown(press: &Press) -> String {
         reference_program(press)
     );
     page
+}
+
+/// How the two find each other.
+fn connection(press: &Press) -> Vec<String> {
+    let (link, ms) = (&press.link, |time: std::time::Duration| time.as_millis());
+    let mut lines = Vec::new();
+    match (&link.transport, press.role) {
+        (Transport::Tcp(socket), Role::Server) => {
+            lines.push(format!(
+                "The host is the Modbus TCP server at {}:{}, unit {}; the press is the client.",
+                socket.host, socket.port, link.unit
+            ));
+            lines.push(
+                "Write your block and read the host's in turn, every 20 to 100 ms, each whole in one request. Without a \
+                 write for 2 s the host takes the press for gone."
+                    .into(),
+            );
+        }
+        (Transport::Tcp(socket), Role::Client) => lines.push(format!(
+            "The press is the Modbus TCP server at {}:{}, unit {}. One connection is held open.",
+            socket.host, socket.port, link.unit
+        )),
+        (Transport::RtuOverTcp(socket, _), _) => lines.push(format!(
+            "The press is a Modbus RTU slave, unit {}, behind the gateway {}:{} that passes RTU frames unchanged.",
+            link.unit, socket.host, socket.port
+        )),
+        (Transport::Rtu(serial, _), _) => lines.push(format!(
+            "The press is a Modbus RTU slave, unit {}: {} baud, 8 data bits, {} parity, {} stop bit{}.",
+            link.unit,
+            serial.baud,
+            match serial.parity {
+                Parity::Even => "even",
+                Parity::Odd => "odd",
+                Parity::None => "no",
+            },
+            serial.stop_bits,
+            if serial.stop_bits == 1 { "" } else { "s" }
+        )),
+    }
+    if press.role == Role::Client {
+        let most = press.write.max_writes_per_s;
+        lines.push(format!(
+            "The host polls every {} ms, expects each answer within {} ms and writes at most {most} times a second.",
+            ms(link.poll),
+            ms(link.response_timeout)
+        ));
+    }
+    lines
 }
 
 fn section(page: &mut String, title: &str, block: &Block, rows: &[Row]) {
@@ -214,6 +278,40 @@ fn rules(press: &Press) -> Vec<String> {
     } else if !map.counts_strokes() {
         rules.push("Drop trigger when the result is read: that is the acknowledge.".into());
     }
+    if has(Input::Enable) {
+        rules.push("Hold enable at 1 while strokes are to be measured; 0 during a scan gives it up.".into());
+    }
+    if has(Input::ClearToScan) {
+        rules.push(
+            "Raise clear_to_scan when ram and plate are at rest, and hold it until status_scan_done: only then is the \
+             plate free to move."
+                .into(),
+        );
+    }
+    if has(Input::Baseline) {
+        rules.push(
+            "For a scan of the blank before its first stroke raise baseline together with trigger, under a stroke_id of \
+             its own."
+                .into(),
+        );
+    }
+    if has(Input::Rescan) && has(Input::Attempt) {
+        rules.push(
+            "To measure the same stroke again count attempt up by one and raise rescan; stroke_id stays. The result is \
+             the one whose attempt_echo is your attempt."
+                .into(),
+        );
+    }
+    if has(Input::PartEnd) {
+        rules.push("Raise part_end for at least 0.5 s when the plate leaves.".into());
+    }
+    if has(Input::ErrorReset) {
+        rules.push("Raise error_reset for at least 0.5 s to clear latched errors and missed_count.".into());
+    }
+    if map.outputs.contains_key(&Output::ErrorCode) {
+        rules
+            .push("The texts of error_code and warning_code: platen press map PLANT --format alarms.".into());
+    }
     if has(Input::Heartbeat) {
         let limit = press.timeouts.heartbeat_in.as_secs_f64();
         rules.push(format!("Count heartbeat up at least every {} s.", limit / 4.0));
@@ -221,55 +319,6 @@ fn rules(press: &Press) -> Vec<String> {
     rules.push("A figure without a value holds its \"no value\" word, never 0.".into());
     rules.push("The host measures only: no output of it may start, stop or release motion.".into());
     rules
-}
-
-/// The program of the press that goes with the map: P is its block, H the host's.
-pub fn reference_program(press: &Press) -> String {
-    let map = &press.map;
-    if map.profile != Profile::Pph1 {
-        let ack = if map.inputs.contains_key(&Input::Ack) {
-            "IF waiting AND valid THEN (* copy values, judge *) waiting := FALSE; P.ack := TRUE; END_IF;\n\
-             IF P.ack AND NOT H.status_result_valid THEN P.ack := FALSE; END_IF;\n"
-        } else {
-            "IF waiting AND valid THEN (* copy values, judge *) waiting := FALSE; END_IF;\n"
-        };
-        return format!(
-            "IF stroke_done AND NOT waiting THEN waiting := TRUE; tRes(IN := FALSE); END_IF;\n\
-             accepted := waiting AND (accepted OR H.status_busy);\n\
-             valid := accepted AND H.status_result_valid AND NOT H.status_busy;\n{ack}\
-             P.trigger := waiting;\n\
-             tRes(IN := waiting, PT := T#180s);  (* longer than the scan and evaluation limits together *)\n\
-             IF tRes.Q THEN waiting := FALSE; alarm := TRUE; END_IF;  (* go on without a measurement *)\n\
-             IF NOT waiting THEN accepted := FALSE; END_IF;\n"
-        );
-    }
-    let has = |output| map.outputs.contains_key(&output);
-    let tail =
-        if map.inputs.contains_key(&Input::StrokeIdTail) { "P.stroke_id_tail := stroke_id; " } else { "" };
-    let session =
-        if has(Output::SessionEcho) { "\n            AND (H.session_echo = P.session_id)" } else { "" };
-    let seq =
-        if has(Output::ResultSeqTail) { "\n         AND (H.result_seq = H.result_seq_tail)" } else { "" };
-    let simulated = if has(Output::StatusSimulated) { " AND NOT H.status_simulated" } else { "" };
-    let wrap = map.counter;
-    format!(
-        "IF stroke_done AND NOT waiting THEN\n  \
-           IF stroke_id >= {} THEN stroke_id := {}; ELSE stroke_id := stroke_id + 1; END_IF;\n  \
-           {tail}P.stroke_id := stroke_id; waiting := TRUE; tAcc(IN := FALSE); tRes(IN := FALSE);\n\
-         END_IF;\n\
-         accepted := waiting AND (H.ack_stroke_id = stroke_id){session};\n\
-         P.trigger := waiting AND NOT accepted;\n\
-         tAlive(IN := H.heartbeat = lastBeat, PT := T#2s); lastBeat := H.heartbeat; hostAlive := NOT tAlive.Q;\n\
-         tAcc(IN := waiting AND NOT accepted, PT := T#500ms);  (* alarm only: the host may be busy *)\n\
-         tRes(IN := waiting, PT := T#180s);  (* longer than the scan and evaluation limits together *)\n\
-         valid := accepted AND H.status_result_valid AND (H.result_stroke_id = stroke_id){seq}\n         \
-           AND hostAlive{simulated};\n\
-         IF valid THEN (* copy values, judge *) waiting := FALSE; P.ack := TRUE; END_IF;\n\
-         IF P.ack AND NOT H.status_result_valid THEN P.ack := FALSE; END_IF;\n\
-         IF waiting AND (tRes.Q OR NOT hostAlive) THEN waiting := FALSE; alarm := TRUE; END_IF;\n\
-         (* then the stroke goes on without a measurement: the plant decides *)\n",
-        wrap.wrap, wrap.first
-    )
 }
 
 #[cfg(test)]
@@ -299,14 +348,24 @@ mod tests {
     }
 
     #[test]
-    fn the_program_asks_only_for_what_the_press_has() {
-        assert!(reference_program(&press()).contains("H.session_echo = P.session_id"));
+    fn the_page_says_how_to_connect() {
+        let mut other = press();
+        let rtu = Link::rtu(platen_plant::press::Serial::new("/dev/ttyS0", 38_400), 7);
+        other.link = rtu;
+        assert!(map_markdown(&other).contains("unit 7: 38400 baud, 8 data bits, even parity, 1 stop bit."));
+        let mut served = press();
+        served.role = Role::Server;
+        let page = map_markdown(&served);
+        assert!(
+            page.contains("server at 192.0.2.10:502") && page.contains("the press writes 32 registers"),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn a_press_that_does_not_count_is_told_so() {
         let mut bare = press();
-        bare.map.outputs.remove(&Output::SessionEcho);
-        assert!(!reference_program(&bare).contains("session"));
         bare.map = RegisterMap::word();
-        let program = reference_program(&bare);
-        assert!(!program.contains("stroke_id") && !program.contains("P.ack"), "{program}");
         assert!(map_markdown(&bare).contains("Stroke counting is not available"));
     }
 }

@@ -4,13 +4,16 @@
 
 mod bench;
 
+use std::io::{Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bench::{Memory, Plc, SharedPlc};
 use platen_plant::press::{Block, Link, Press, Quiet, Serial, Table, Transport};
 use platen_press::{Answer, Client, ModbusLink, StrokeKey, channels, run_press};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use serialport::{SerialPort, TTYPort};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpListener;
 use tokio::net::tcp::OwnedWriteHalf;
 
@@ -93,18 +96,21 @@ async fn gateway(plc: SharedPlc, late: u64, seed: u64) -> u16 {
     port
 }
 
-/// Answers on one side of a line.
-async fn slave(mut line: impl AsyncRead + AsyncWrite + Unpin, plc: SharedPlc) {
+/// Answers on the press's side of a pseudo terminal until the test ends. A thread of its own: a terminal that nobody
+/// has open is hung up, which an event loop would report for ever after.
+fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
     let (mut frame, mut bytes) = (Vec::new(), [0; 260]);
-    loop {
-        match line.read(&mut bytes).await {
+    line.set_timeout(Duration::from_millis(10)).unwrap();
+    while !ended.load(Ordering::Relaxed) {
+        match line.read(&mut bytes) {
             Ok(n) => frame.extend(&bytes[..n]),
+            Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
             // Nobody has the other side open.
-            Err(_) => tokio::time::sleep(Duration::from_millis(10)).await,
+            Err(_) => std::thread::sleep(Duration::from_millis(10)),
         }
-        if let Some(reply) = answer(&plc, &frame) {
+        if let Some(reply) = answer(plc, &frame) {
             frame.clear();
-            line.write_all(&reply).await.unwrap();
+            line.write_all(&reply).unwrap();
         }
     }
 }
@@ -152,13 +158,17 @@ async fn late_answers_through_a_gateway_are_never_taken_for_others() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn strokes_over_a_pseudo_terminal() {
     let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, 0)));
-    let (master, port) = tokio_serial::SerialStream::pair().unwrap();
-    let device = tokio_serial::SerialPort::name(&port).unwrap();
+    let (master, port) = TTYPort::pair().unwrap();
+    let device = port.name().unwrap();
     drop(port);
-    tokio::spawn(slave(master, plc.clone()));
+    let ended = Arc::new(AtomicBool::new(false));
+    let (its_plc, its_end) = (plc.clone(), Arc::clone(&ended));
+    let thread = std::thread::spawn(move || slave(master, &its_plc, &its_end));
     let mut link = Link::rtu(Serial::new(device, 115_200), 1);
     link.poll = Duration::from_millis(10);
     strokes(link, plc, 10).await;
+    ended.store(true, Ordering::Relaxed);
+    thread.join().unwrap();
 }
 
 /// Blocks of one length, so that a late answer could pass for the next one.

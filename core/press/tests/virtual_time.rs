@@ -34,6 +34,7 @@ struct Host {
     answers: tokio::sync::mpsc::UnboundedSender<Answer>,
     status: tokio::sync::watch::Receiver<platen_press::Status>,
     reachable: Arc<std::sync::atomic::AtomicBool>,
+    reset_next: Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl Cell {
@@ -64,11 +65,12 @@ impl Cell {
         press.mode = self.mode;
         let link = MemoryLink::new(self.plc.clone(), self.chaos, self.seed);
         let reachable = Arc::clone(&link.reachable);
+        let reset_next = Arc::clone(&link.reset_next);
         let (HostSide { orders, answers, status }, side) = channels();
         let (scans, alarms) = (Arc::clone(&self.scans), Arc::clone(&self.alarms));
         let scanner = tokio::spawn(bench::host(orders, answers.clone(), MS(40), MS(10), scans, alarms));
         let run = tokio::spawn(run_press(press, link, journal.clone(), side));
-        Host { run, scanner, answers, status, reachable }
+        Host { run, scanner, answers, status, reachable, reset_next }
     }
 
     /// Lets the press do `strokes` more and waits until it is done with them.
@@ -252,6 +254,95 @@ async fn a_link_cut_in_the_middle_of_a_scan_delivers_once() {
     bench::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
     host.stop().await;
     assert_eq!(cell.check(), (4, 4));
+}
+
+/// In step again, in virtual time after `change`.
+async fn in_step_after(host: &mut Host, change: impl FnOnce(&mut Host)) -> Duration {
+    let connects = host.status.borrow().counts.connects;
+    change(host);
+    let start = tokio::time::Instant::now();
+    let back = |status: &platen_press::Status| status.counts.connects > connects && status.host.ready;
+    tokio::time::timeout(MS(60_000), host.status.wait_for(back)).await.unwrap().unwrap();
+    start.elapsed()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_press_that_was_away_is_found_within_two_seconds() {
+    let cell = Cell::new(0);
+    let mut host = cell.start();
+    cell.strokes(2).await;
+    for away in [50, 700, 5_000, 30_000, 61_300] {
+        host.reachable.store(false, Ordering::SeqCst);
+        tokio::time::sleep(MS(away)).await;
+        let took = in_step_after(&mut host, |host| host.reachable.store(true, Ordering::SeqCst)).await;
+        println!("away {away} ms: in step {} ms after it was back", took.as_millis());
+        assert!(took <= MS(2000), "{took:?} after {away} ms");
+    }
+    host.stop().await;
+    assert_eq!(cell.check(), (2, 2));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_single_reset_costs_little() {
+    let cell = Cell::new(0);
+    let mut host = cell.start();
+    cell.strokes(2).await;
+    for _ in 0..20 {
+        tokio::time::sleep(MS(1000)).await;
+        let took = in_step_after(&mut host, |host| host.reset_next.store(true, Ordering::SeqCst)).await;
+        // A poll and a status report until it is noticed, then at once.
+        assert!(took <= MS(20 + 200 + 30), "{took:?}");
+    }
+    host.stop().await;
+    cell.check();
+}
+
+/// The bar of a clean link: 99 % within three polls and 20 ms, on the press's clock.
+#[tokio::test(start_paused = true)]
+async fn trigger_to_busy_on_a_clean_link() {
+    let cell = Cell::new(0);
+    let host = cell.start();
+    cell.strokes(1000).await;
+    host.stop().await;
+    let mut times = cell.plc().accept_ms.clone();
+    times.sort_unstable();
+    let p99 = times[times.len() * 99 / 100];
+    println!(
+        "trigger to busy: median {} ms, 99 % within {p99} ms, most {} ms",
+        times[times.len() / 2],
+        times[times.len() - 1]
+    );
+    assert!(p99 <= 3 * 20 + 20, "{p99} ms");
+}
+
+/// The host dies just before and just after each record of a stroke's journal is on the disk.
+#[tokio::test(start_paused = true)]
+async fn a_host_killed_round_each_record_of_the_journal() {
+    for dies_before in [true, false] {
+        for record in 0..12 {
+            let cell = Cell::new(0);
+            cell.plc().to_do = 3;
+            cell.journal.dies_at(record, dies_before);
+            let host = cell.start();
+            bench::until(MS(10_000), "the record", || cell.journal.died()).await;
+            host.kill().await;
+            cell.journal.revive();
+            let host = cell.start();
+            bench::until(MS(60_000), "the strokes", || cell.plc().idle()).await;
+            host.stop().await;
+            let (results, scans) = cell.check();
+            let interrupted = cell.plc().results.iter().filter(|result| result.status & 1 << 12 != 0).count();
+            let point = format!("record {record}, {}", if dies_before { "before" } else { "after" });
+            assert_eq!(results, 3, "{point}: a stroke was lost");
+            assert!(
+                scans + interrupted >= 3 && interrupted <= 1,
+                "{point}: {scans} scans, {interrupted} interrupted"
+            );
+            let mut seqs: Vec<_> = cell.plc().results.iter().map(|result| result.seq).collect();
+            seqs.dedup();
+            assert_eq!(seqs.len(), 3, "{point}: a result came twice");
+        }
+    }
 }
 
 #[tokio::test(start_paused = true)]

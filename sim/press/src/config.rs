@@ -134,6 +134,12 @@ pub enum LinkConfig {
         #[serde(default = "default_baud")]
         baud: u32,
     },
+    /// RTU on a pseudo terminal that the press makes: a serial line without hardware. A connection that is cut is an
+    /// adapter that is pulled and comes back under another name.
+    Pty {
+        /// A link to the terminal is put here, as `/dev/serial/by-id` has them.
+        device: PathBuf,
+    },
 }
 
 impl Default for LinkConfig {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `{"get":"plate"}` | `{"plate":{...}}`, `{"plate":null}` when no plate lies in the press, `{"error":"..."}` while it moves |
 //! | `{"get":"stats"}` | `{"stats":{...}}`, a [`crate::tally::Tally`] |
+//! | `{"get":"counts"}` | `{"counts":{...}}`, the same without the results taken, whose number is `results` |
 //! | `{"get":"registers"}` | `{"registers":{"p":[..],"h":[..]}}` |
 //! | `{"do":"stroke"}`, `{"do":{"counter":65530}}`, any [`Command`] | `{"ok":true}` or `{"error":"..."}` |
 
@@ -55,6 +56,8 @@ pub enum Command {
     FreezeMs(u64),
     /// All connections are reset.
     Cut,
+    /// The serial adapter is pulled and comes back after so many milliseconds, under another name.
+    PullMs(u64),
     /// Faults of the line from now on.
     LineFaults(LineFaults),
     /// Faults of the program from the next stroke on.
@@ -76,6 +79,7 @@ enum Line {
 enum Get {
     Plate,
     Stats,
+    Counts,
     Registers,
 }
 
@@ -121,6 +125,13 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
         }
         Ok(Line::Get(Get::Stats)) => serde_json::to_value(&shared.machine().press.tally)
             .map(|tally| serde_json::json!({ "stats": tally })),
+        Ok(Line::Get(Get::Counts)) => {
+            let (tally, results) = shared.machine().press.tally.counts();
+            serde_json::to_value(&tally).map(|mut counts| {
+                counts["results"] = results.into();
+                serde_json::json!({ "counts": counts })
+            })
+        }
         Ok(Line::Get(Get::Registers)) => {
             let machine = shared.machine();
             let (p, h) = (machine.table.p_block(), machine.table.h_block().0.to_vec());
@@ -162,6 +173,10 @@ pub(crate) fn obey(command: Command, shared: &Shared) -> Result<()> {
             shared.line().frozen_until = Some(Instant::now() + Duration::from_millis(ms));
         }
         Command::Cut => shared.cut(),
+        Command::PullMs(ms) => {
+            shared.line().pulled_until = Some(Instant::now() + Duration::from_millis(ms));
+            shared.cut();
+        }
         Command::LineFaults(faults) => shared.line().faults = faults,
         Command::StrokeFaults(faults) => press.set_stroke_faults(faults),
         Command::Stop => {

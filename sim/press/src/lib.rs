@@ -31,6 +31,7 @@ pub mod frame;
 mod line;
 pub mod press;
 pub mod program;
+mod pty;
 pub mod registers;
 mod server;
 mod shared;
@@ -98,6 +99,13 @@ impl SimPress {
                     .map_err(|source| Error::Serial { device: device.clone(), source })?;
                 let serve =
                     line::serve_serial(serial, device, *baud, config.unit, server, Arc::clone(&shared));
+                tasks.spawn(forever(serve));
+                None
+            }
+            LinkConfig::Pty { device } => {
+                let refused = |source| Error::Serial { device: device.display().to_string(), source };
+                let first = pty::plug(device).map_err(refused)?;
+                let serve = line::serve_pty(first, device.clone(), config.unit, server, Arc::clone(&shared));
                 tasks.spawn(forever(serve));
                 None
             }

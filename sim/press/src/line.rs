@@ -5,10 +5,11 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, WriteHalf};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, WriteHalf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Mutex;
 use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBits};
@@ -16,6 +17,7 @@ use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBit
 use crate::damage::{Answer, damage, exception};
 use crate::faults::LineFault;
 use crate::frame::{Framing, Message, Split, split_tcp};
+use crate::pty;
 use crate::shared::Shared;
 
 /// A serial slave drops a frame that stops in the middle for this long.
@@ -78,6 +80,26 @@ pub(crate) async fn serve_serial(
     }
 }
 
+/// Serves a pseudo terminal for ever; one that was pulled comes back under another name, behind the same link.
+pub(crate) async fn serve_pty(
+    first: DuplexStream,
+    device: PathBuf,
+    unit: u8,
+    server: SocketAddr,
+    shared: Arc<Shared>,
+) {
+    let mut line = Some(first);
+    loop {
+        if let Some(line) = line.take() {
+            let ended = Relay::new(line, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
+            tracing::debug!(?ended, "adapter pulled");
+        }
+        tokio::time::sleep(RETRY).await;
+        shared.plugged_in().await;
+        line = pty::plug(&device).inspect_err(|error| tracing::debug!(%error, "no adapter")).ok();
+    }
+}
+
 /// The writing half of the client's stream; gone once the connection was reset.
 type Writer<S> = Arc<Mutex<Option<WriteHalf<S>>>>;
 
@@ -106,11 +128,11 @@ impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
 
     /// Until the client leaves, the press cuts the line, or a fault resets it.
     async fn run(mut self, server: SocketAddr) -> io::Result<()> {
-        let mut server = TcpStream::connect(server).await?;
-        server.set_nodelay(true)?;
         let shared = Arc::clone(&self.shared);
         let mut cuts = shared.cuts.subscribe();
         cuts.mark_unchanged();
+        let mut server = TcpStream::connect(server).await?;
+        server.set_nodelay(true)?;
         let writer = Arc::clone(&self.writer);
         let ended = tokio::select! {
             ended = self.pass(&mut server) => ended,

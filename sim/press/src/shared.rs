@@ -25,6 +25,7 @@ pub(crate) struct Line {
     pub(crate) faults: LineFaults,
     pub(crate) random: fastrand::Rng,
     pub(crate) frozen_until: Option<Instant>,
+    pub(crate) pulled_until: Option<Instant>,
 }
 
 /// Everything the tasks of one press share.
@@ -52,6 +53,7 @@ impl Shared {
                 faults: config.line_faults.clone(),
                 random: fastrand::Rng::with_seed(config.seed),
                 frozen_until: None,
+                pulled_until: None,
             }),
             started: Instant::now(),
             cycles: watch::Sender::new(0),
@@ -112,6 +114,14 @@ impl Shared {
                 Some(until) if until > Instant::now() => tokio::time::sleep_until(until).await,
                 _ => return,
             }
+        }
+    }
+
+    /// Waits while the adapter of a serial line is not plugged in.
+    pub(crate) async fn plugged_in(&self) {
+        let until = self.line().pulled_until.take();
+        if let Some(until) = until {
+            tokio::time::sleep_until(until).await;
         }
     }
 

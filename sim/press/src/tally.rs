@@ -106,6 +106,15 @@ pub struct Taken {
 }
 
 impl Tally {
+    /// The counts alone, and the number of results taken: what can be asked often in a long run.
+    #[must_use]
+    pub fn counts(&mut self) -> (Self, usize) {
+        let taken = std::mem::take(&mut self.taken);
+        let counts = self.clone();
+        self.taken = taken;
+        (counts, self.taken.len())
+    }
+
     /// Counts and keeps a sentence about a wrong value.
     pub fn wrong(&mut self, sentence: String) {
         self.wrong_values += 1;

@@ -13,7 +13,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 use tokio_modbus::prelude::*;
-use tokio_serial::{SerialPort, SerialStream};
+use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
 const LIMIT: Duration = Duration::from_secs(30);
 /// Transaction 7, unit 1, one register from 7: the number of the press.
@@ -106,13 +106,20 @@ async fn rtu_through_tcp_carries_the_handshake() {
     host.abort();
 }
 
+/// A press on a pseudo terminal, and the host's end of it.
+async fn serial(config: Config) -> (SimPress, SerialStream, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let device = folder.path().join("adapter");
+    let config = Config { link: LinkConfig::Pty { device: device.clone() }, ..config };
+    let press = SimPress::start(config).await.unwrap();
+    press.until("a cycle", LIMIT, |tally| tally.now_ms > 0).await.unwrap();
+    let line = tokio_serial::new(device.to_string_lossy(), 115_200).open_native_async().unwrap();
+    (press, line, folder)
+}
+
 #[tokio::test]
 async fn a_serial_line_carries_the_handshake() {
-    let (line, slave) = SerialStream::pair().unwrap();
-    let device = slave.name().unwrap();
-    drop(slave);
-    let config = Config { link: LinkConfig::Rtu { device: device.into(), baud: 115_200 }, ..quick() };
-    let press = SimPress::start(config).await.unwrap();
+    let (press, line, _folder) = serial(quick()).await;
     let host = tokio::spawn(Host::on(client::rtu::attach_slave(line, Slave(1))).run(counted));
     let tally = press.until("done", LIMIT, |tally| tally.done).await.unwrap();
     assert_eq!((tally.taken.len(), tally.wrong_values, tally.writes_outside), (7, 0, 0));
@@ -120,18 +127,38 @@ async fn a_serial_line_carries_the_handshake() {
 }
 
 #[tokio::test]
-async fn a_serial_press_is_silent_for_other_units_and_broken_frames() {
-    let (mut line, slave) = SerialStream::pair().unwrap();
-    let device = slave.name().unwrap();
-    drop(slave);
-    let config = Config {
-        automatic: false,
-        link: LinkConfig::Rtu { device: device.into(), baud: 115_200 },
-        line_faults: LineFaults { echo: true, ..LineFaults::default() },
-        ..quick()
+async fn a_pulled_adapter_comes_back_under_another_name() {
+    let (press, mut line, folder) = serial(Config { automatic: false, ..quick() }).await;
+    let device = folder.path().join("adapter");
+    let before = std::fs::read_link(&device).unwrap();
+    assert_eq!(ask(&mut line).await, [1, 3, 2, 0, 3]);
+    press.command(Command::PullMs(0)).unwrap();
+    let ended = timeout(LIMIT, line.read(&mut [0; 16])).await.unwrap();
+    assert!(matches!(ended, Ok(0) | Err(_)), "{ended:?}");
+    let back = async {
+        while std::fs::read_link(&device).unwrap() == before {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
     };
-    let press = SimPress::start(config).await.unwrap();
-    press.until("a cycle", LIMIT, |tally| tally.now_ms > 0).await.unwrap();
+    timeout(LIMIT, back).await.unwrap();
+    let mut line = tokio_serial::new(device.to_string_lossy(), 115_200).open_native_async().unwrap();
+    assert_eq!(ask(&mut line).await, [1, 3, 2, 0, 3]);
+}
+
+/// The answer to a request for the number of the press, without its check sum.
+async fn ask(line: &mut SerialStream) -> [u8; 5] {
+    let mut request = vec![1, 3, 0, 7, 0, 1];
+    request.extend(platen_sim_press::frame::crc16(&request).to_le_bytes());
+    line.write_all(&request).await.unwrap();
+    let mut answer = [0; 7];
+    timeout(LIMIT, line.read_exact(&mut answer)).await.unwrap().unwrap();
+    answer[..5].try_into().unwrap()
+}
+
+#[tokio::test]
+async fn a_serial_press_is_silent_for_other_units_and_broken_frames() {
+    let line_faults = LineFaults { echo: true, ..LineFaults::default() };
+    let (press, mut line, _folder) = serial(Config { automatic: false, line_faults, ..quick() }).await;
     let framed = |unit: u8| {
         let mut bytes = vec![unit, 3, 0, 7, 0, 1];
         bytes.extend(platen_sim_press::frame::crc16(&bytes).to_le_bytes());

@@ -6,3 +6,4 @@ mod words;
 
 pub use host_image::{HostImage, describe_outputs, saturates};
 pub use press_image::{PressImage, Torn, Wrong, describe_inputs};
+pub(crate) use words::{bits, raw_number};

@@ -158,12 +158,16 @@ impl PressImage {
     /// A press without an `enable` or `clear_to_scan` always gives both. One that counts no strokes and has no `ack`
     /// acknowledges by dropping its trigger.
     ///
+    /// What marks another press or another map does not change while a press writes: it is told before all else.
+    ///
     /// # Errors
     /// [`Torn`] when the press was writing meanwhile: read again.
     pub fn decode(map: &RegisterMap, press_id: u16, words: &[u16]) -> Result<Self, Torn> {
         let reader = Reader { map, words };
         let stroke_id = reader.count(Input::StrokeId).unwrap_or(0);
-        if let Some(tail) = reader.count(Input::StrokeIdTail).filter(|&tail| tail != stroke_id) {
+        let wrong = reader.wrong(press_id);
+        let tail = reader.count(Input::StrokeIdTail).filter(|&tail| tail != stroke_id);
+        if let (Some(tail), None) = (tail, wrong) {
             return Err(Torn { head: stroke_id, tail });
         }
         let trigger = reader.switch(Input::Trigger).unwrap_or(false);
@@ -182,7 +186,7 @@ impl PressImage {
             session_id: reader.count(Input::SessionId).unwrap_or(0),
             attempt: reader.count(Input::Attempt).unwrap_or(0),
             data: reader.data(),
-            wrong: reader.wrong(press_id),
+            wrong,
         })
     }
 }

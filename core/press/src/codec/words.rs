@@ -25,7 +25,7 @@ fn split(order: WordOrder, bits: u32) -> [u16; 2] {
 }
 
 /// The bits of one value: `words` are its registers. Empty for texts.
-pub(super) fn bits(kind: Kind, order: WordOrder, words: &[u16]) -> Option<u32> {
+pub(crate) fn bits(kind: Kind, order: WordOrder, words: &[u16]) -> Option<u32> {
     match (kind.registers(), words) {
         (1, &[word]) => Some(u32::from(word)),
         (2, &[first, second]) if !matches!(kind, Kind::Ascii { .. }) => Some(join(order, [first, second])),
@@ -39,7 +39,7 @@ pub(super) fn registers(kind: Kind, order: WordOrder, bits: u32) -> Vec<u16> {
 }
 
 /// The raw number that the bits of one value mean.
-pub(super) fn raw_number(kind: Kind, bits: u32) -> f64 {
+pub(crate) fn raw_number(kind: Kind, bits: u32) -> f64 {
     match kind {
         Kind::Bool | Kind::U16 | Kind::Ascii { .. } => f64::from(bits as u16),
         Kind::I16 => f64::from(bits as u16 as i16),

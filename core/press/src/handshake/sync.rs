@@ -142,10 +142,11 @@ impl Handshake {
         Transition::T5
     }
 
-    /// Strokes that went by in the same session meanwhile are counted when the next one comes.
+    /// Strokes that went by in the same session meanwhile are counted when the next one comes; a press that has made
+    /// none yet stands before its first.
     pub(super) fn become_idle(&mut self, now: Duration) -> Transition {
         self.work = Work::Idle;
-        if let Some(press) = self.press.as_ref().filter(|press| !press.trigger && press.stroke_id != 0) {
+        if let Some(press) = self.press.as_ref().filter(|press| !press.trigger) {
             let same_session = self.counted.filter(|(session, _)| *session == press.session_id);
             self.counted = same_session.or(Some((press.session_id, press.stroke_id)));
         }

@@ -43,7 +43,12 @@ pub(super) struct Runner<L> {
 pub(super) struct Clock {
     started: Instant,
     next_connect: Instant,
+    /// Wait before the next try to connect but one; zero after a connection that worked.
     backoff: Duration,
+    connected: Instant,
+    /// Since when the press has not been in step.
+    lost: Option<Instant>,
+    delivered: Instant,
     next_poll: Instant,
     next_read_back: Instant,
     read_back_every: Duration,
@@ -59,7 +64,10 @@ impl Clock {
         Self {
             started: now,
             next_connect: now,
-            backoff: press.link.backoff_min,
+            backoff: Duration::ZERO,
+            connected: now,
+            lost: Some(now),
+            delivered: now,
             next_poll: now,
             next_read_back: now,
             read_back_every: READ_BACK[usize::from(press.link.is_serial())],
@@ -131,7 +139,8 @@ impl<L: Link> Runner<L> {
         }
         self.registers.forget();
         self.faults = Faults { unreachable_told: self.faults.unreachable_told, ..Faults::default() };
-        self.clock.next_poll = Instant::now();
+        self.clock.connected = Instant::now();
+        self.clock.next_poll = self.clock.connected;
         self.step(Event::Connected);
         Ok(())
     }
@@ -268,17 +277,20 @@ impl<L: Link> Runner<L> {
     }
 
     fn lose_link(&mut self) {
+        self.clock.lost.get_or_insert_with(Instant::now);
         self.last_press = None;
         self.step(Event::Disconnected);
         self.back_off();
     }
 
-    /// The pause before the next connection, doubled each time, a quarter more or less by chance: two hosts that lost
-    /// the same press shall not come back in step.
+    /// The pause before the next connection: none after a connection that worked for a while, then doubled each time,
+    /// a quarter more or less by chance, for two hosts that lost the same press shall not come back in step.
     fn back_off(&mut self) {
+        let (least, most) = (self.press.link.backoff_min, self.press.link.backoff_max);
         let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
-        self.clock.next_connect = Instant::now() + self.clock.backoff.mul_f64(0.75 + 0.5 * chance);
-        self.clock.backoff = (self.clock.backoff * 2).min(self.press.link.backoff_max);
+        let wait = self.clock.backoff.mul_f64(0.75 + 0.5 * chance);
+        self.clock.next_connect = (Instant::now() + wait).max(self.clock.connected + least);
+        self.clock.backoff = (self.clock.backoff * 2).clamp(least, most);
     }
 
     fn next_due(&self) -> Instant {
@@ -321,6 +333,7 @@ impl<L: Link> Runner<L> {
         if let Some(error) = &done.error {
             tracing::error!(error, stroke = %done.key, "the journal cannot be written");
         }
+        self.metrics.journal.add(done.took);
         self.step(Event::Journaled { key: done.key, stage: done.stage, ok: done.error.is_none() });
     }
 
@@ -337,7 +350,7 @@ impl<L: Link> Runner<L> {
                 if let Err(record) = self.journal.record(record) {
                     let (key, stage) = (record.key(), record.stage());
                     let error = Some("the journal panicked".into());
-                    self.journaled(Done { key, stage, error });
+                    self.journaled(Done { key, stage, error, took: Duration::ZERO });
                 }
             }
             Effect::StartScan { key, run_id, data } => self.order(Order::StartScan { key, run_id, data }),
@@ -346,6 +359,7 @@ impl<L: Link> Runner<L> {
             Effect::PartEnd => self.order(Order::PartEnd),
             Effect::Alarm(code) => self.alarm(code, None),
             Effect::Reconnect => {
+                self.clock.lost.get_or_insert_with(Instant::now);
                 self.client.disconnect();
                 self.last_press = None;
                 self.back_off();
@@ -375,6 +389,7 @@ impl<L: Link> Runner<L> {
                 self.clock.busy_untold = true;
             }
             Transition::T17 => self.delivered(),
+            Transition::T18 => self.metrics.result_to_ack.add(self.clock.delivered.elapsed()),
             Transition::T20 => self.metrics.ack_timeouts += 1,
             _ => {}
         }
@@ -382,17 +397,30 @@ impl<L: Link> Runner<L> {
 
     /// In step with the press: the next loss is a new one.
     fn arrived(&mut self) {
-        self.clock.backoff = self.press.link.backoff_min;
+        self.clock.backoff = Duration::ZERO;
         self.faults.unreachable_told = false;
+        if let Some(lost) = self.clock.lost.take() {
+            self.metrics.link_down += lost.elapsed();
+        }
     }
 
+    /// The log line of a stroke.
     fn delivered(&mut self) {
         let Some(result) = &self.handshake.image().result else { return };
-        self.metrics.stroke_to_result.add(self.clock.triggered.elapsed());
+        let stroke_to_result = self.clock.triggered.elapsed();
+        self.clock.delivered = Instant::now();
+        self.metrics.stroke_to_result.add(stroke_to_result);
         match result.measurement.verdict {
             Verdict::NotMeasured(_) => self.metrics.not_measured += 1,
             Verdict::Pass | Verdict::Fail | Verdict::CannotTell => self.metrics.measured += 1,
         }
+        tracing::info!(
+            stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict,
+            trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_millis()),
+            stroke_to_result_ms = stroke_to_result.as_millis(),
+            missed = self.handshake.missed_total(), connections = self.client.counts().connects,
+            "result in the registers"
+        );
     }
 
     /// At every change of state, else a few times a second.

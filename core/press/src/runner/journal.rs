@@ -1,7 +1,10 @@
 //! The journal beside the loop: a slow disk must not stop the heartbeat.
 
+use std::time::Duration;
+
 use tokio::sync::mpsc;
 use tokio::task::{JoinHandle, spawn_blocking};
+use tokio::time::Instant;
 
 use crate::{Journal, Recalled, Record, Stage, StrokeKey};
 
@@ -11,6 +14,7 @@ pub(super) struct Done {
     pub(super) key: StrokeKey,
     pub(super) stage: Stage,
     pub(super) error: Option<String>,
+    pub(super) took: Duration,
 }
 
 /// The way to the journal: records are written in the order in which they are sent.
@@ -38,12 +42,13 @@ async fn write<J: Journal>(
 ) {
     while let Some(record) = queue.recv().await {
         let (key, stage) = (record.key(), record.stage());
+        let asked = Instant::now();
         let written = spawn_blocking(move || (journal.record(&record), journal)).await;
         let Ok((result, back)) = written else { return };
         journal = back;
         let error = result.err().map(|error| error.to_string());
         // Nobody may be left to hear it when the host ends.
-        let _ = tell.send(Done { key, stage, error });
+        let _ = tell.send(Done { key, stage, error, took: asked.elapsed() });
     }
 }
 

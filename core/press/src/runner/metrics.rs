@@ -23,6 +23,11 @@ impl Durations {
         self.count += 1;
     }
 
+    /// The latest one.
+    pub fn last(&self) -> Option<Duration> {
+        self.latest.back().copied()
+    }
+
     /// The duration that `percent` of the latest ones do not exceed (nearest rank); `None` when there are none.
     pub fn percentile(&self, percent: f64) -> Option<Duration> {
         let mut sorted: Vec<_> = self.latest.iter().copied().collect();
@@ -53,6 +58,12 @@ pub struct Metrics {
     pub trigger_to_busy: Durations,
     /// From the acceptance to the echo of the result.
     pub stroke_to_result: Durations,
+    /// From the echo of the result to the poll that saw the press's acknowledge.
+    pub result_to_ack: Durations,
+    /// From asking for a record of the journal until it would survive a power cut.
+    pub journal: Durations,
+    /// Time without being in step with the press, the present loss apart.
+    pub link_down: Duration,
 }
 
 #[cfg(test)]

@@ -22,12 +22,14 @@ pub struct MemoryLink {
     random: u64,
     connected: bool,
     pub reachable: std::sync::Arc<std::sync::atomic::AtomicBool>,
+    /// The next request meets a reset connection.
+    pub reset_next: std::sync::Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl MemoryLink {
     pub fn new(plc: SharedPlc, chaos: Chaos, seed: u64) -> Self {
         let reachable = std::sync::Arc::new(true.into());
-        Self { plc, chaos, random: seed | 1, connected: false, reachable }
+        Self { plc, chaos, random: seed | 1, connected: false, reachable, reset_next: Default::default() }
     }
 
     /// xorshift64*
@@ -57,7 +59,8 @@ impl Link for MemoryLink {
             return Err(TransportError::NotConnected);
         }
         tokio::time::sleep(Duration::from_micros(200)).await;
-        if self.chance() < self.chaos.reset {
+        let reset = self.reset_next.swap(false, std::sync::atomic::Ordering::SeqCst);
+        if reset || self.chance() < self.chaos.reset {
             return Err(std::io::Error::from(std::io::ErrorKind::ConnectionReset).into());
         }
         let late = self.chance() < self.chaos.late;

@@ -13,6 +13,7 @@ pub mod plc;
 pub mod server;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -32,6 +33,9 @@ pub type SharedPlc = Arc<Mutex<Plc>>;
 pub struct Memory {
     pub records: Arc<Mutex<Vec<Record>>>,
     pub full: Arc<Mutex<bool>>,
+    /// The power cut that is to come: before or after this record.
+    cut: Arc<Mutex<Option<(usize, bool)>>>,
+    dead: Arc<AtomicBool>,
     owner: u16,
 }
 
@@ -41,7 +45,23 @@ pub struct Full;
 
 impl Memory {
     pub fn new(owner: u16) -> Self {
-        Self { records: Arc::default(), full: Arc::default(), owner }
+        let (records, full, cut, dead) = Default::default();
+        Self { records, full, cut, dead, owner }
+    }
+
+    /// Power fails just before or just after the record with this number, counted from 0, is on the disk.
+    pub fn dies_at(&self, record: usize, before: bool) {
+        *self.cut.lock().unwrap() = Some((record, before));
+    }
+
+    pub fn died(&self) -> bool {
+        self.dead.load(Ordering::SeqCst)
+    }
+
+    /// Power is back.
+    pub fn revive(&self) {
+        *self.cut.lock().unwrap() = None;
+        self.dead.store(false, Ordering::SeqCst);
     }
 
     /// The last publication of each stroke.
@@ -79,7 +99,19 @@ impl Journal for Memory {
         if *self.full.lock().unwrap() {
             return Err(Full);
         }
-        self.records.lock().unwrap().push(record.clone());
+        let mut records = self.records.lock().unwrap();
+        let cut = self.cut.lock().unwrap().filter(|(at, _)| *at == records.len());
+        // After the cut nothing reaches the disk, and nobody hears of it.
+        let lost = self.died() || cut.is_some_and(|(_, before)| before);
+        if !lost {
+            records.push(record.clone());
+        }
+        drop(records);
+        if lost || cut.is_some() {
+            self.dead.store(true, Ordering::SeqCst);
+            // A panic without a message: it is meant.
+            std::panic::resume_unwind(Box::new("the power is cut"));
+        }
         Ok(())
     }
 }

@@ -1,0 +1,66 @@
+//! A pseudo terminal as a serial line: the host opens its name, the press has its other end.
+//!
+//! A terminal that nobody has open is hung up, which an event loop would report for ever after. So threads of their own
+//! read and write it; they end, and with them the terminal, when the press lets go of its end.
+
+use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use std::{io, thread};
+
+use serialport::{SerialPort, TTYPort};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, ReadHalf, WriteHalf, duplex, split};
+use tokio::runtime::Handle;
+
+/// Longest wait in one read, and between two looks at a terminal that nobody has open.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Makes a terminal, links `device` to it, and gives the press's end.
+pub(crate) fn plug(device: &Path) -> io::Result<DuplexStream> {
+    let (mut line, host) = TTYPort::pair()?;
+    line.set_timeout(LOOK)?;
+    let name = host.name().ok_or_else(|| io::Error::other("the terminal has no name"))?;
+    relink(&name, device)?;
+    let (near, far) = duplex(4096);
+    let (heard, said) = split(far);
+    let writer = line.try_clone_native()?;
+    let pulled = Arc::new(AtomicBool::new(false));
+    let runtime = Handle::current();
+    let (also_pulled, also_runtime) = (Arc::clone(&pulled), runtime.clone());
+    thread::Builder::new()
+        .name("pty write".into())
+        .spawn(move || write_line(writer, heard, &also_runtime, &also_pulled))?;
+    thread::Builder::new().name("pty read".into()).spawn(move || read_line(line, said, &runtime, &pulled))?;
+    Ok(near)
+}
+
+/// Replaces the link at one go: whoever opens it finds the old terminal or the new one.
+fn relink(name: &str, device: &Path) -> io::Result<()> {
+    let fresh = device.with_extension("new");
+    std::os::unix::fs::symlink(name, &fresh)?;
+    std::fs::rename(fresh, device)
+}
+
+fn read_line(mut line: TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
+    let mut bytes = [0; 512];
+    while !pulled.load(Ordering::Relaxed) {
+        match line.read(&mut bytes) {
+            Ok(n @ 1..) if runtime.block_on(press.write_all(&bytes[..n])).is_err() => return,
+            Ok(1..) => {}
+            Err(error) if error.kind() == ErrorKind::TimedOut => {}
+            // Nobody has the terminal open.
+            Ok(0) | Err(_) => thread::sleep(LOOK),
+        }
+    }
+}
+
+fn write_line(mut line: TTYPort, mut press: ReadHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
+    let mut bytes = [0; 512];
+    while let Ok(n @ 1..) = runtime.block_on(press.read(&mut bytes)) {
+        // What is said on a line where nobody listens is lost.
+        let _ = line.write_all(&bytes[..n]);
+    }
+    pulled.store(true, Ordering::Relaxed);
+}
