@@ -10,6 +10,7 @@
 pub mod evaluate;
 pub mod extract;
 pub mod flatten;
+mod kernels;
 pub mod measure;
 pub mod mesh;
 pub mod outline;

@@ -19,6 +19,8 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
+use crate::kernels::apart;
+
 /// Why a system could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SparseError {
@@ -194,18 +196,14 @@ impl<const D: usize> Spd<D> {
         let Some(symbolic) = &self.symbolic else { return Ok(()) };
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|e| too_large(unknowns, e))?;
-        symbolic
-            .factorize_numeric_llt(
-                &mut self.factor,
-                SparseColMatRef::new(self.matrix.as_ref(), &self.values),
-                Side::Upper,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .map_err(|_| SparseError::NotPositiveDefinite { unknowns })?;
-        Ok(())
+        let (factor, matrix) = (&mut self.factor, SparseColMatRef::new(self.matrix.as_ref(), &self.values));
+        let factored = apart(|| {
+            let stack = MemStack::new(&mut memory);
+            let shift = Default::default();
+            let plan = Default::default();
+            symbolic.factorize_numeric_llt(factor, matrix, Side::Upper, shift, Par::Seq, stack, plan).is_ok()
+        });
+        if factored { Ok(()) } else { Err(SparseError::NotPositiveDefinite { unknowns }) }
     }
 
     /// Solves with the last factor, in place; each column of `columns` is one right-hand side, one entry per node.
@@ -223,12 +221,11 @@ impl<const D: usize> Spd<D> {
                 x[place as usize * D..][..D].copy_from_slice(value);
             }
         }
-        LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, unknowns, columns.len()),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        let right = MatMut::from_column_major_slice_mut(&mut x, unknowns, columns.len());
+        apart(|| {
+            let stack = MemStack::new(&mut memory);
+            LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(Conj::No, right, Par::Seq, stack);
+        });
         for (column, x) in columns.iter_mut().zip(x.chunks_exact(unknowns)) {
             for (value, &place) in column.iter_mut().zip(&self.place) {
                 value.copy_from_slice(&x[place as usize * D..][..D]);

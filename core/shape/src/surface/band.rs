@@ -13,6 +13,8 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
+use crate::kernels::apart;
+
 /// Rows of the net that one B-spline reaches back to.
 const REACH: usize = 3;
 
@@ -139,7 +141,11 @@ impl BandMatrix {
     }
 
     /// Cholesky factorisation, left-looking over block rows.
-    pub(crate) fn factor(mut self) -> Result<BandFactor, NotPositive> {
+    pub(crate) fn factor(self) -> Result<BandFactor, NotPositive> {
+        apart(|| self.factor_here())
+    }
+
+    fn factor_here(mut self) -> Result<BandFactor, NotPositive> {
         let (layout, m) = (self.layout, self.layout.block());
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(m, Par::Seq, Default::default()));
         let mut work = Mat::<f64>::zeros(m, m);
@@ -185,6 +191,10 @@ impl BandFactor {
 
     /// Solves A X = B in place; rows of `x` in the net's order, one column per component.
     pub(crate) fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
+        apart(|| self.solve_here(x));
+    }
+
+    fn solve_here<const D: usize>(&self, x: &mut [[f64; D]]) {
         let mut work = self.forward(x);
         let (layout, m) = (self.layout, self.layout.block());
         for row in (0..layout.n_rows()).rev() {
@@ -206,7 +216,7 @@ impl BandFactor {
     /// Variance `f' A^-1 f` of a linear functional with coefficients `f` in the net's order.
     pub(crate) fn variance(&self, f: &[f64]) -> f64 {
         let columns: Vec<[f64; 1]> = f.iter().map(|x| [*x]).collect();
-        self.forward(&columns).as_ref().squared_norm_l2()
+        apart(|| self.forward(&columns).as_ref().squared_norm_l2())
     }
 
     /// L^-1 B in block order.
@@ -232,7 +242,7 @@ impl BandFactor {
     /// The inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
     /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
     pub(crate) fn local_inverse(&self) -> Vec<[f64; 49]> {
-        let band = self.inverse_band();
+        let band = apart(|| self.inverse_band());
         let layout = self.layout;
         let (n_u, n_v) = (layout.n_u, layout.n_v);
         let mut local = vec![[0.0; 49]; n_u * n_v];
