@@ -7,11 +7,12 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::{Job, Result, ScanSink};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
-    Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
-    Surroundings, scan,
+    CellCounts, Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
+    Surroundings, scan, truth_document,
 };
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Period of the cyclic range error, metres.
@@ -65,6 +66,14 @@ pub(crate) struct Shot {
     threads: usize,
     pace: Option<Pace>,
     note: String,
+    truth: Option<Truth>,
+}
+
+/// Where the truth goes, and the plate that it is about.
+#[derive(Debug)]
+struct Truth {
+    path: PathBuf,
+    state: PlateState,
 }
 
 impl Shot {
@@ -88,6 +97,7 @@ impl Shot {
             instrument: instrument(options, &lattice, number),
             threads: threads(options),
             note,
+            truth: options.truth_file.clone().zip(state).map(|(path, state)| Truth { path, state }),
         })
     }
 
@@ -95,11 +105,12 @@ impl Shot {
     pub(crate) fn take(&self, out: &mut impl Receiver) -> Result<()> {
         let started = Instant::now();
         out.begin(&self.header())?;
-        let mut points = 0;
+        let (mut points, mut counts) = (0, CellCounts::default());
         let mut failed = None;
         let ended = scan(&self.scene, &self.lattice, &self.instrument, self.threads, |column| {
             let done = f64::from(column.index + 1) / f64::from(self.lattice.n_columns);
             points += column.state.iter().filter(|state| **state == SimState::Valid).count() as u64;
+            counts.add(&column);
             match self.deliver(column, started, done, out) {
                 Ok(()) => ControlFlow::Continue(()),
                 Err(error) => {
@@ -113,6 +124,11 @@ impl Shot {
         }
         if let Some(pace) = &self.pace {
             pace.wait_for_end(started, || out.check(1.0))?;
+        }
+        if let Some(truth) = &self.truth {
+            let document = truth_document(&truth.state, &self.scene, &counts);
+            std::fs::write(&truth.path, document.to_string())
+                .map_err(|source| Error::Truth { path: truth.path.clone(), source })?;
         }
         out.end(&ScanEnd {
             columns: self.lattice.n_columns,

@@ -21,6 +21,9 @@ pub(crate) enum Error {
     /// The description file cannot be read.
     #[error("{path}: {source}")]
     File { path: PathBuf, source: std::io::Error },
+    /// The truth cannot be written.
+    #[error("{path}: cannot be written: {source}")]
+    Truth { path: PathBuf, source: std::io::Error },
     /// The description file is wrong.
     #[error("{path}: {message}")]
     Description { path: PathBuf, message: String },
@@ -44,6 +47,8 @@ impl From<Error> for platen_sdk::Error {
                 Self::new(ErrorKind::Busy, message).hint("scan again when the plate is at rest").retryable()
             }
             Error::File { .. } => Self::new(ErrorKind::NotFound, message).hint("set the option plate_file"),
+            Error::Truth { .. } => Self::new(ErrorKind::NotFound, message)
+                .hint("set the option truth_file to a file in a folder that exists"),
             Error::Description { .. } | Error::Plate(_) => {
                 Self::new(ErrorKind::Config, message).hint("correct the description of the plate")
             }

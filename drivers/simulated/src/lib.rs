@@ -34,6 +34,7 @@
 //! | `seed` | of all random numbers |
 //! | `time_scale`, `rate_kpts` | share of a real scanner's time that a scan takes, and the rate it would have |
 //! | `threads` | 0: one per core |
+//! | `truth_file` | where to write what a measurement of the scan should find, as JSON: for benches and tests |
 
 mod capture;
 mod error;
@@ -102,6 +103,8 @@ options! {
         rate_kpts: String = "122", choices ["122", "244", "488", "976"];
         /// Threads; 0 takes one per core.
         threads: i64 = 0, min 0, max 256;
+        /// File that gets, after each scan, what a measurement of it should find, as JSON.
+        truth_file: Option<std::path::PathBuf>;
     }
 }
 

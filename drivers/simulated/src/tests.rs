@@ -36,6 +36,7 @@ fn options() -> Options {
         time_scale: 0.0,
         rate_kpts: "122".into(),
         threads: 2,
+        truth_file: None,
     }
 }
 

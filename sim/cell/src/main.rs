@@ -20,7 +20,6 @@ mod error;
 mod line;
 mod press;
 mod scanner;
-mod truth;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -1,11 +1,12 @@
 //! Verb `scanner`: one scan of a plate into a file, or as many as are asked for over TCP.
 
 use crate::error::Error;
-use crate::{bridge, document, press, truth};
+use crate::{bridge, document, press};
 use clap::{Args, ValueEnum};
 use platen_sim_plate::{Plate, PlateError, PlateState};
 use platen_sim_scanner::{
-    FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings, scan_all,
+    CellCounts, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings, scan_all,
+    truth_document,
 };
 use std::path::{Path, PathBuf};
 
@@ -138,8 +139,10 @@ fn write(command: &Command, plate: &Path, out: &Path) -> Result<(), Error> {
     let impossible = |source| Error::Plate { path: plate.into(), source };
     let shot = command.device.shot(Some(&state), 0).map_err(impossible)?;
     shot.write(out)?;
-    if let (Some(path), Some(plate)) = (&command.truth, shot.scene.plate()) {
-        let truth = truth::document(&state, plate, &shot.scene, &shot.scan.columns);
+    if let Some(path) = &command.truth {
+        let mut counts = CellCounts::default();
+        shot.scan.columns.iter().for_each(|column| counts.add(column));
+        let truth = truth_document(&state, &shot.scene, &counts);
         std::fs::write(path, format!("{truth:#}\n"))?;
     }
     Ok(())

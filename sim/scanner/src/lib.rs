@@ -27,6 +27,7 @@ mod scene;
 mod solid;
 pub mod stream;
 mod surroundings;
+mod truth;
 
 pub use column::{SimColumn, SimState, TruthCell};
 pub use device::{Device, DeviceError};
@@ -39,3 +40,4 @@ pub use scan::{scan, scan_all};
 pub use scene::{MARKER_RADIUS, Scene};
 pub use solid::Solid;
 pub use surroundings::Surroundings;
+pub use truth::{CellCounts, truth_document};

@@ -1,0 +1,87 @@
+//! What a measurement of a simulated scan should find.
+
+use crate::column::{SimColumn, SimState};
+use crate::ray::Label;
+use crate::scene::Scene;
+use platen_sim_plate::{Plate, PlateState};
+use serde_json::{Value, json};
+
+/// Places of the coarse grid along each direction.
+const GRID: u32 = 21;
+
+/// Largest distance of neighbouring places of the fine grid, metres.
+const FINE: f64 = 0.05;
+
+/// How many cells of a scan saw what.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CellCounts {
+    /// All cells.
+    pub cells: u64,
+    /// Cells whose middle ray meets the plate's upper face.
+    pub plate_top: u64,
+    /// Those of them that were measured.
+    pub plate_top_valid: u64,
+    /// Cells whose footprint straddles an edge.
+    pub mixed: u64,
+}
+
+impl CellCounts {
+    /// Counts a column in.
+    pub fn add(&mut self, column: &SimColumn) {
+        for (truth, state) in column.truth.iter().zip(&column.state) {
+            let on_plate = truth.label == Label::PlateTop;
+            self.cells += 1;
+            self.plate_top += u64::from(on_plate);
+            self.plate_top_valid += u64::from(on_plate && *state == SimState::Valid);
+            self.mixed += u64::from(truth.mixed);
+        }
+    }
+}
+
+/// The truth as a document: the plate's state, corners, markers and two grids of the upper face (metres, scanner frame),
+/// curvature of the mid-surface (1/m), and how many cells saw it.
+///
+/// Grids are even over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 places with curvatures, `face` is
+/// finer, at most 50 mm from place to place, positions only. Null when no plate is in the scene.
+pub fn truth_document(state: &PlateState, scene: &Scene, counts: &CellCounts) -> Value {
+    let Some(plate) = scene.plate() else { return Value::Null };
+    let corners: Vec<[f64; 3]> = plate.corners().map(Into::into).to_vec();
+    let marker = |[u, v]: &[f64; 2]| json!({ "u_mm": u * 1e3, "v_mm": v * 1e3, "position_m": position(plate, *u, *v), "seen": scene.sees(plate.top(*u, *v)) });
+    let coarse = |value: &dyn Fn(f64, f64) -> Value| places(plate, [GRID; 2], value);
+    let fine = [plate.width(), plate.height()].map(|length| (length / FINE).ceil() as u32 + 1);
+    json!({
+        "state": state,
+        "corners_m": corners,
+        "markers": plate.markers().iter().map(marker).collect::<Vec<_>>(),
+        "grid": {
+            "nu": GRID,
+            "nv": GRID,
+            "position_m": coarse(&|u, v| position(plate, u, v)),
+            "kappa_u_per_m": coarse(&|u, v| json!(plate.curvature(u, v, 0.0).kappa_u)),
+            "kappa_v_per_m": coarse(&|u, v| json!(plate.curvature(u, v, 0.0).kappa_v)),
+        },
+        "face": {
+            "nu": fine[0],
+            "nv": fine[1],
+            "position_m": places(plate, fine, &|u, v| position(plate, u, v)),
+        },
+        "counts": {
+            "cells": counts.cells,
+            "plate_top_cells": counts.plate_top,
+            "plate_top_valid": counts.plate_top_valid,
+            "mixed": counts.mixed,
+        },
+    })
+}
+
+fn position(plate: &Plate, u: f64, v: f64) -> Value {
+    let [x, y, z]: [f64; 3] = plate.top(u, v).into();
+    json!([x, y, z])
+}
+
+/// A value for each place of an even grid.
+fn places(plate: &Plate, [nu, nv]: [u32; 2], value: &dyn Fn(f64, f64) -> Value) -> Vec<Value> {
+    let share = |k: u32, n: u32| f64::from(k) / f64::from(n - 1);
+    let at = |k: u32| (share(k % nu, nu) * plate.width(), share(k / nu, nv) * plate.height());
+    (0..nu * nv).map(at).map(|(u, v)| value(u, v)).collect()
+}
