@@ -1,5 +1,6 @@
 //! The command line: one module for each verb. Results go to stdout, the log to stderr.
 
+mod bench;
 mod check;
 mod demo;
 mod history;
@@ -73,6 +74,8 @@ enum Verb {
     History(history::Command),
     /// What plugins are installed, and their options
     Plugins(plugins::Command),
+    /// The paper's tables beside this machine's figures, on simulated scans
+    Bench(bench::Command),
 }
 
 /// Why a verb ended without its result.
@@ -141,6 +144,7 @@ pub fn main() -> ExitCode {
         Verb::History(command) => history::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
+        Verb::Bench(command) => bench::run(&cli.common, command),
     };
     match result {
         Ok(code) => code,

@@ -1,5 +1,6 @@
 //! The host: loads plugins, measures plates, runs strokes, answers on the command line.
 
+pub mod accuracy;
 pub mod cli;
 pub mod files;
 pub mod picture;

@@ -1,0 +1,62 @@
+//! Processor time, memory and name of this machine.
+
+use std::time::Duration;
+
+use rustix::time::{ClockId, clock_gettime};
+use serde::Serialize;
+
+/// Processor time of this process so far, all threads together: what else the machine does hardly counts in it.
+pub(super) fn cpu_time() -> Duration {
+    time_of(ClockId::ProcessCPUTime)
+}
+
+/// Processor time of this thread so far.
+pub(super) fn thread_time() -> Duration {
+    time_of(ClockId::ThreadCPUTime)
+}
+
+fn time_of(clock: ClockId) -> Duration {
+    let now = clock_gettime(clock);
+    let seconds = u64::try_from(now.tv_sec).unwrap_or(0);
+    Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or(0))
+}
+
+/// Largest memory that this process has had so far, megabytes of 2^20 bytes; `None` where the system does not tell.
+pub(super) fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().trim_end_matches(" kB").parse::<f64>().ok()? / 1024.0)
+}
+
+/// What the figures were taken on.
+#[derive(Debug, Serialize)]
+pub(super) struct Machine {
+    /// Model of the processor.
+    processor: String,
+    /// Logical cores.
+    cores: usize,
+    /// Mean number of running programs over the last minute: above 0.5 others were at work.
+    load: Option<f64>,
+}
+
+impl Machine {
+    pub(super) fn here() -> Self {
+        let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model =
+            info.lines().find(|line| line.starts_with("model name")).and_then(|line| line.split(": ").nth(1));
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        Self {
+            processor: model.unwrap_or("unknown processor").to_owned(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            load: load.split(' ').next().and_then(|first| first.parse().ok()),
+        }
+    }
+
+    pub(super) fn says(&self) -> String {
+        let load = self.load.map(|load| format!(", load {load:.1}")).unwrap_or_default();
+        format!(
+            "{}, {} cores{load}; times: CPU ms of one measurement on one thread, medians",
+            self.processor, self.cores
+        )
+    }
+}
