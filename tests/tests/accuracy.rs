@@ -1,0 +1,154 @@
+//! Accuracy over many simulated scans, and the paper's tables: what `platen bench` finds, held against the bounds.
+//!
+//! `PLATEN_SEEDS` sets how many scans of each plate are measured.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+use serde_json::Value as Json;
+
+/// Scans of each plate, unless `PLATEN_SEEDS` says otherwise.
+const SEEDS: &str = "3";
+/// Range noise at 10 m, millimetres: with the filters of a scanner, and beyond its full rate.
+const NOISE_MM: [f64; 2] = [0.8, 2.0];
+
+const DEVELOPABLE: &[&str] = &["cylinder", "cone", "bands", "half-bent"];
+const DOUBLY_CURVED: &[&str] = &["sphere", "torus"];
+const CONSTANT: &[&str] = &["cylinder", "cone", "sphere", "torus"];
+const NARROW: &[&str] = &["bands", "half-bent"];
+const ALL: &[&str] = &["cylinder", "cone", "bands", "half-bent", "sphere", "torus"];
+
+/// Figure, plates, largest mean over the seeds at each noise.
+const BOUNDS: &[(&str, &[&str], [f64; 2])] = &[
+    ("corners_rms_mm", ALL, [0.5, 0.5]),
+    ("markers_mean_mm", DEVELOPABLE, [0.25, 0.25]),
+    ("markers_mean_mm", DOUBLY_CURVED, [0.4, 0.4]),
+    ("surface_inside_rms_mm", ALL, [0.03, 0.06]),
+    ("surface_edge_rms_mm", ALL, [0.06, 0.12]),
+    ("d_u_std_mm", ALL, [0.1, 0.1]),
+    ("d_v_std_mm", ALL, [0.1, 0.1]),
+    ("theta_std_deg", ALL, [0.02, 0.02]),
+    ("curvature_rms_per_m", CONSTANT, [3e-4, 3e-4]),
+    ("curvature_rms_per_m", NARROW, [9e-3, 9e-3]),
+];
+
+/// Figure of a stroke, largest mean over the seeds at each noise.
+const STROKES: &[(&str, [f64; 2])] = &[
+    ("displacement_normal_rms_mm", [0.05, 0.05]),
+    ("displacement_vector_rms_mm", [0.5, 0.5]),
+    ("band_angle_error_deg", [0.02, 0.02]),
+    ("template_gap_error_mm", [0.1, 0.1]),
+    ("false_change_share", [0.06, 0.06]),
+];
+
+fn bench(arguments: &[&str]) -> Json {
+    let folder = tempfile::tempdir().unwrap();
+    let output = platen_tests::program("platen")
+        .args(["bench", "--json", "--out"])
+        .arg(folder.path().join("bench"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn number(row: &Json, pointer: &str) -> f64 {
+    row.pointer(pointer).and_then(Json::as_f64).unwrap_or_else(|| panic!("no {pointer} in {row}"))
+}
+
+fn seeds() -> String {
+    std::env::var("PLATEN_SEEDS").unwrap_or_else(|_| SEEDS.to_owned())
+}
+
+/// Says one figure and, where it is too large, adds it to the failures.
+fn hold(failures: &mut Vec<String>, of: &str, noise_mm: f64, name: &str, row: &Json, bound: f64) {
+    let [mean, worst] = ["mean", "worst"].map(|what| number(row, &format!("/{name}/{what}")));
+    println!("| {of} | {noise_mm} | {name} | {mean:.5} | {worst:.5} | {bound} |");
+    if mean.is_nan() || mean > bound {
+        failures.push(format!("{of} at {noise_mm} mm: {name} {mean:.5} in the mean, bound {bound}"));
+    }
+}
+
+#[test]
+fn plates_and_strokes_are_measured_within_the_bounds() {
+    let noise = NOISE_MM.map(|mm| mm.to_string()).join(",");
+    let found = bench(&[
+        "accuracy",
+        "--threads",
+        "2",
+        "--seeds",
+        &seeds(),
+        "--noise-mm",
+        &noise,
+        "--flattening",
+        "elastic,harmonic",
+    ]);
+    let rows = found.pointer("/accuracy/single").and_then(Json::as_array).unwrap();
+    let row = |plate: &str, noise_mm: f64, flattening: &str| {
+        let is = |row: &&Json| {
+            row["plate"] == plate && row["noise_mm"] == noise_mm && row["flattening"] == flattening
+        };
+        rows.iter().find(is).unwrap_or_else(|| panic!("no {plate} at {noise_mm} with {flattening}"))
+    };
+    let mut failures = Vec::new();
+    println!("| plate | noise mm | figure | mean over {} seeds | worst | bound of the mean |", seeds());
+    for (name, plates, bounds) in BOUNDS {
+        for plate in *plates {
+            for (noise_mm, bound) in NOISE_MM.into_iter().zip(bounds) {
+                hold(&mut failures, plate, noise_mm, name, row(plate, noise_mm, "elastic"), *bound);
+            }
+        }
+    }
+    let pairs = found.pointer("/accuracy/pairs").and_then(Json::as_array).unwrap();
+    for (name, bounds) in STROKES {
+        for (pair, bound) in pairs.iter().zip(bounds) {
+            hold(&mut failures, "stroke", number(pair, "/noise_mm"), name, pair, *bound);
+        }
+    }
+
+    // What the paper's harmonic map gets wrong by itself shows, or the comparison would not be fair.
+    for plate in DOUBLY_CURVED {
+        let [elastic, harmonic] = ["elastic", "harmonic"]
+            .map(|flattening| number(row(plate, NOISE_MM[0], flattening), "/markers_mean_mm/mean"));
+        println!(
+            "| {plate} | {} | markers, harmonic against elastic | {harmonic:.3} | {elastic:.3} | |",
+            NOISE_MM[0]
+        );
+        assert!(
+            harmonic > 2.0 * elastic && harmonic > 0.3,
+            "{plate}: harmonic {harmonic}, elastic {elastic} mm"
+        );
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn the_papers_tables_stand_beside_our_figures() {
+    let arguments =
+        ["--step-deg", "0.1", "--meshes", "1000", "--repeat", "1", "--flattening", "elastic,harmonic"];
+    let found = bench(&arguments);
+    assert!(found.pointer("/machine/processor").is_some_and(Json::is_string));
+    assert_eq!(found.pointer("/tables/table_1/paper/plate_points"), Some(&Json::from(277_721)));
+    let points = number(&found, "/tables/table_1/here/plate_points");
+    // A coarser lattice: the number of points falls with the square of its step.
+    let expected = 277_721.0 * (360.0 / 10_240.0 / 0.1_f64).powi(2);
+    assert!((points / expected - 1.0).abs() < 0.03, "{points} points, {expected} expected");
+    let steps = found.pointer("/tables/table_2").and_then(Json::as_array).unwrap();
+    for step in steps {
+        assert!(number(step, "/here_ms/elastic") > 0.0 && number(step, "/paper_ms/harmonic") > 0.0, "{step}");
+    }
+    assert!(number(&found, "/tables/table_3/here/0/here_ms/harmonic") > 0.0);
+    for flattening in ["elastic", "harmonic"] {
+        let side = number(&found, &format!("/tables/table_4/here/{flattening}/d_u_std_mm"));
+        assert!(side < number(&found, "/tables/table_4/paper/0/d_u_std_mm"), "{flattening}: d_u {side} mm");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_figures_on_any_number_of_threads() {
+    let figures = |threads| {
+        let arguments =
+            ["--step-deg", "0.12", "--meshes", "500", "--repeat", "1", "--seed", "3", "--threads", threads];
+        bench(&arguments)["tables"]["table_4"]["here"].clone()
+    };
+    assert_eq!(figures("1"), figures("2"));
+}
