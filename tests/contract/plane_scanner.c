@@ -35,7 +35,7 @@ static platen_status column(const platen_job *job, uint32_t index, double height
   platen_column head = {sizeof head, index, 0, 0, {0, ROWS}, {0, ROWS}, {0, ROWS}, {0, ROWS}, {0, ROWS}};
   head.azimuth.offset = at, at += ROWS * sizeof(double);
   head.elevation.offset = at, at += ROWS * sizeof(double);
-  head.range_m.offset = at, at += ROWS * sizeof(float);
+  head.range_m.offset = at, at += ROWS * sizeof(double);
   head.intensity.offset = at, at += ROWS * sizeof(uint16_t);
   head.state.offset = at, at += ROWS;
   if (host->buffer_alloc(host, job->job_id, at, 8, &buffer) != PLATEN_OK) return PLATEN_E_MEMORY;
@@ -45,7 +45,7 @@ static platen_status column(const platen_job *job, uint32_t index, double height
     double elevation = -0.3 - STEP * row;
     ((double *)(base + head.azimuth.offset))[row] = STEP * index;
     ((double *)(base + head.elevation.offset))[row] = elevation;
-    ((float *)(base + head.range_m.offset))[row] = (float)(height / -sin(elevation));
+    ((double *)(base + head.range_m.offset))[row] = height / -sin(elevation);
     ((uint16_t *)(base + head.intensity.offset))[row] = 1000;
     base[head.state.offset + row] = 0;
   }

@@ -72,7 +72,7 @@ enum { PLATEN_FRAME_INCOMPLETE = 1, PLATEN_FRAME_SIMULATED = 2, PLATEN_FRAME_LAS
 
 typedef struct platen_frame {
   uint32_t struct_size, flags;
-  const char *format, *frame_id; /* "platen.column/1", "scanner" */
+  const char *format, *frame_id; /* "platen.column/2", "scanner" */
   int64_t mono_ns;
   uint64_t count;
   platen_buffer buffer; /* emit() takes it */
@@ -180,7 +180,7 @@ typedef struct platen_span {
 } platen_span;
 
 #define PLATEN_FORMAT_SCAN "platen.scan/1"         /* driver -> host, first */
-#define PLATEN_FORMAT_COLUMN "platen.column/1"     /* driver -> host */
+#define PLATEN_FORMAT_COLUMN "platen.column/2"     /* driver -> host */
 #define PLATEN_FORMAT_SCAN_END "platen.scan-end/1" /* driver -> host, last */
 #define PLATEN_FORMAT_WINDOW "platen.window/1"     /* host -> driver, optional */
 #define PLATEN_FORMAT_MESH "platen.mesh/1"         /* host -> flattening */
@@ -203,7 +203,7 @@ typedef struct platen_scan {
 
 typedef struct platen_column {
   uint32_t struct_size, index, face, first_row; /* face 0 front, 1 back */
-  platen_span range_m;                          /* f32 */
+  platen_span range_m;                          /* f64 */
   platen_span azimuth, elevation;               /* f64 */
   platen_span intensity;                        /* u16 */
   platen_span state;                            /* u8: 0 valid, 1 direction only, 2 no return */

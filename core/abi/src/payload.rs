@@ -94,14 +94,14 @@ header! {
 
 header! {
     /// One column, driver to host, in any order. The arrays have one element per row.
-    Column = c"platen.column/1" {
+    Column = c"platen.column/2" {
         /// Place in the lattice, by increasing azimuth.
         index: u32,
         /// 0 front, 1 back.
         face: u32,
         /// Row of the first element.
         first_row: u32,
-        /// f32 metres.
+        /// f64 metres.
         range_m: Span,
         /// f64 radians.
         azimuth: Span,

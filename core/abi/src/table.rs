@@ -129,7 +129,7 @@ pub struct Frame {
     pub struct_size: u32,
     /// Bits of [`frame_flag`].
     pub flags: u32,
-    /// What the buffer holds, e.g. `platen.column/1`.
+    /// What the buffer holds, e.g. `platen.column/2`.
     pub format: *const c_char,
     /// Coordinate frame, e.g. `scanner`.
     pub frame_id: *const c_char,

@@ -26,8 +26,11 @@ impl Direction {
     }
 }
 
-/// Azimuth brought into (-pi, pi].
+/// Azimuth brought into (-pi, pi]; one that lies there stays as it is, to the last bit.
 pub fn wrap_azimuth(azimuth: f64) -> f64 {
+    if -PI < azimuth && azimuth <= PI {
+        return azimuth;
+    }
     let wrapped = azimuth.rem_euclid(TAU);
     if wrapped > PI { wrapped - TAU } else { wrapped }
 }

@@ -37,7 +37,7 @@ pub struct Column {
     /// Row of the first entry.
     pub first_row: u32,
     /// Distance along the beam, metres.
-    pub range_m: Vec<f32>,
+    pub range_m: Vec<f64>,
     /// Radians.
     pub azimuth: Vec<f64>,
     /// Radians.
@@ -85,7 +85,7 @@ pub enum ColumnError {
         /// Row.
         row: u32,
         /// Range.
-        range_m: f32,
+        range_m: f64,
         /// Radians.
         azimuth: f64,
         /// Radians.
@@ -172,7 +172,7 @@ mod tests {
     fn what_no_scanner_measures_is_refused_with_its_place() {
         assert!(matches!(column().check(2), Err(ColumnError::Rows { end: 3, n_rows: 2, .. })));
         let mut bad = column();
-        bad.range_m[1] = f32::NAN;
+        bad.range_m[1] = f64::NAN;
         assert!(matches!(bad.check(3), Err(ColumnError::NotFinite { row: 2, .. })));
         bad.state[1] = State::NoReturn;
         assert_eq!(bad.check(3), Ok(()));

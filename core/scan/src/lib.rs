@@ -13,6 +13,7 @@ mod column;
 mod lattice;
 pub mod orient;
 mod scan;
+mod text;
 
 pub use angle::{Direction, Window, wrap_azimuth};
 pub use column::{Column, ColumnError, Face, State};

@@ -17,13 +17,14 @@ mod decide;
 mod fit;
 mod intensity;
 mod occupancy;
+mod own;
 mod survey;
 
 pub use apply::Assembler;
 pub use decide::{Plan, Unit};
 pub use survey::Survey;
 
-use crate::State;
+use crate::{Direction, State};
 
 /// One cell as a file stores it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,8 @@ pub struct RawCell {
     pub column: u32,
     /// Position in the file's own unit and frame; any point on the beam when only its direction is known.
     pub xyz: [f64; 3],
+    /// The same place as range and direction, where the file stores these: they are kept to the last bit.
+    pub beam: Option<(f64, Direction)>,
     /// In the file's own scale.
     pub intensity: f64,
     /// What the file says of the cell. A valid cell at the origin or without finite numbers counts as missing.

@@ -118,7 +118,7 @@ impl ScanSink<'_> {
             index: column.index,
             face: u32::from(column.face == Face::Back),
             first_row: column.first_row,
-            range_m: layout.add::<f32>(n),
+            range_m: layout.add::<f64>(n),
             azimuth: layout.add::<f64>(n),
             elevation: layout.add::<f64>(n),
             intensity: layout.add::<u16>(n),

@@ -78,7 +78,7 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
         &[c"platen.window/1".as_ptr(), std::ptr::null()],
         &[
             c"platen.scan/1".as_ptr(),
-            c"platen.column/1".as_ptr(),
+            c"platen.column/2".as_ptr(),
             c"platen.scan-end/1".as_ptr(),
             std::ptr::null(),
         ],

@@ -54,7 +54,7 @@ fn nothing_panics_and_all_numbers_are_finite() {
         if random.uniform() < 0.2 {
             // Noise that is no surface at all.
             for column in &mut columns {
-                column.range_m.iter_mut().for_each(|r| *r *= 0.5 + random.uniform() as f32);
+                column.range_m.iter_mut().for_each(|r| *r *= 0.5 + random.uniform());
                 column
                     .state
                     .iter_mut()

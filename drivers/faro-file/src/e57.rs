@@ -9,7 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use e57::{E57Reader, IndexBounds, PointCloud, RawValues, Record, RecordDataType, RecordName};
 use platen_scan::orient::RawCell;
-use platen_scan::{Direction, State};
+use platen_scan::{Direction, ScanHeader, State};
 
 use crate::error::{Error, Result};
 use crate::source::{About, Source, Visit};
@@ -190,6 +190,7 @@ fn describe(cloud: &PointCloud) -> About {
         intensity: declared_intensity(cloud),
         instrument: instrument.join(" "),
         acquired_unix_s: cloud.acquisition_start.as_ref().map(|time| time.gps_time + GPS_EPOCH_UNIX_S),
+        own: cloud.description.as_deref().and_then(ScanHeader::from_text),
         notes,
         ..About::default()
     }
@@ -289,9 +290,10 @@ impl Fields {
             Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
         };
         let [a, b, c] = [number(&self.position[0])?, number(&self.position[1])?, number(&self.position[2])?];
-        let xyz = if self.spherical { from_spherical(a, b, c, state) } else { [a, b, c] };
+        let beam = self.spherical.then(|| beam(a, b, c, state));
+        let xyz = beam.map_or([a, b, c], |(range, direction)| direction.unit().map(|c| c * range));
         let intensity = self.intensity.as_ref().map_or(Ok(0.0), number)?;
-        Ok(Some(RawCell { row, column, xyz, intensity, state }))
+        Ok(Some(RawCell { row, column, xyz, beam, intensity, state }))
     }
 }
 
@@ -304,9 +306,9 @@ fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
 }
 
 /// A range that is not positive is no measurement; without a range the direction stands alone.
-fn from_spherical(range: f64, azimuth: f64, elevation: f64, state: State) -> [f64; 3] {
+fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> (f64, Direction) {
     let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
-    Direction { azimuth, elevation }.unit().map(|c| c * range)
+    (range, Direction { azimuth, elevation })
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ impl<R: Read + Seek> Source for Ptx<R> {
                 let cell = cell(next(&mut lines)?);
                 let (xyz, intensity) =
                     cell.ok_or_else(|| unsound(lines.number, "4, 7 or 10 numbers of a cell"))?;
-                visit(&RawCell { row, column, xyz, intensity, state: State::Valid })?;
+                visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })?;
             }
         }
         Ok(())

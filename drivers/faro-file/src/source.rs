@@ -18,6 +18,8 @@ pub(crate) struct About {
     pub(crate) instrument: String,
     /// Seconds since 1970 UTC.
     pub(crate) acquired_unix_s: Option<f64>,
+    /// Header and warm-up columns of the scan that this program wrote to the file.
+    pub(crate) own: Option<(ScanHeader, u32)>,
     /// One sentence for everything that was decided while opening.
     pub(crate) notes: Vec<String>,
 }
@@ -52,8 +54,8 @@ struct Remembered<'a> {
     complete: bool,
 }
 
-/// Most cells that are kept, 200 MB; a larger file is decoded twice.
-const REMEMBERED: u64 = 1 << 22;
+/// Most cells that are kept, 210 MB; a larger file is decoded twice.
+const REMEMBERED: u64 = 5 << 19;
 
 impl Remembered<'_> {
     fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
@@ -93,6 +95,11 @@ fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver)
     })?;
     let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
     let mut plan = survey.decide(&Expected { intensity: about.intensity, mirror, ..*known })?;
+    if let Some((own, warm_up_columns)) = &about.own
+        && plan.take_over(own, *warm_up_columns)
+    {
+        return Ok((plan, checksum));
+    }
     plan.header.notes.splice(0..0, about.notes);
     plan.header.instrument = about.instrument;
     plan.header.acquired_unix_s = about.acquired_unix_s;

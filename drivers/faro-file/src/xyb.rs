@@ -126,7 +126,7 @@ impl<R: Read + Seek> Source for Xyb<R> {
             Order::Lines(in_a_line) => {
                 let (mut row, mut column) = (0, 0);
                 while let Some((xyz, intensity)) = next(&mut reader)? {
-                    visit(&RawCell { row, column, xyz, intensity, state: State::Valid })?;
+                    visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })?;
                     row += 1;
                     if row == in_a_line {
                         (row, column) = (0, column + 1);
@@ -140,7 +140,7 @@ impl<R: Read + Seek> Source for Xyb<R> {
                     placed.into_iter().try_for_each(|place| {
                         let (row, column, (xyz, intensity)) =
                             (place.row.saturating_sub(lowest), place.column, place.record);
-                        visit(&RawCell { row, column, xyz, intensity, state: State::Valid })
+                        visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
                     })
                 };
                 while let Some((xyz, intensity)) = next(&mut reader)? {

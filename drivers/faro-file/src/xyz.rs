@@ -96,7 +96,7 @@ fn cell(fields: &[&[u8]; text::MAX_FIELDS], n: usize) -> Option<RawCell> {
     let (row, column) = (text::whole(fields[0])?, text::whole(fields[1])?);
     let xyz = [text::number(fields[2])?, text::number(fields[3])?, text::number(fields[4])?];
     let intensity = intensity.map_or(Some(0.0), |k| text::number(fields[k]))?;
-    Some(RawCell { row, column, xyz, intensity, state: State::Valid })
+    Some(RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
 }
 
 fn cut<R>(lines: &Lines<R>, what: &str) -> Error {

@@ -132,7 +132,7 @@ impl Layout {
             };
             let elevation = b.elevation_start + b.elevation_step * f64::from(first_row + i as u32);
             let k = if self.rows_flipped() { n - 1 - i } else { i };
-            column.range_m[k] = (f64::from(range) * b.range_unit_m) as f32;
+            column.range_m[k] = f64::from(range) * b.range_unit_m;
             column.intensity[k] = u16_at(record, 4);
             column.azimuth[k] = wrap_azimuth(azimuth + off(6));
             column.elevation[k] = elevation + off(10);

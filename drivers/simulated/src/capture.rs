@@ -248,7 +248,7 @@ fn converted(column: SimColumn) -> Column {
         face: if column.back_face { Face::Back } else { Face::Front },
         first_row: 0,
         state: column.state.iter().map(state).collect(),
-        range_m: column.range_m,
+        range_m: column.range_m.into_iter().map(f64::from).collect(),
         azimuth: column.azimuth,
         elevation: column.elevation,
         intensity: column.intensity,

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use platen_abi::payload::{self, Header, Malformed};
-use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
+use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window, wrap_azimuth};
 
 use super::instance::{InputFrame, raw_window};
 use super::job::HostBuffer;
@@ -182,8 +182,8 @@ fn column(bytes: &[u8]) -> Result<Column, Malformed> {
         index: head.index,
         face: if head.face == 0 { Face::Front } else { Face::Back },
         first_row: head.first_row,
-        range_m: payload::slice::<f32>(bytes, head.range_m)?.to_vec(),
-        azimuth: payload::slice::<f64>(bytes, head.azimuth)?.to_vec(),
+        range_m: payload::slice::<f64>(bytes, head.range_m)?.to_vec(),
+        azimuth: payload::slice(bytes, head.azimuth)?.iter().map(|a: &f64| wrap_azimuth(*a)).collect(),
         elevation: payload::slice::<f64>(bytes, head.elevation)?.to_vec(),
         intensity: payload::slice::<u16>(bytes, head.intensity)?.to_vec(),
         state: payload::slice::<u8>(bytes, head.state)?.iter().map(state).collect(),

@@ -1,13 +1,15 @@
 //! Second look at the cells: columns of the normalised lattice.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
-use crate::{Column, Direction, Outcome, ScanEnd, State};
+use crate::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
 /// One normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     row: u32,
-    range_m: f32,
+    range_m: f64,
     direction: Direction,
     intensity: u16,
     state: State,
@@ -50,7 +52,11 @@ impl<'a> Assembler<'a> {
         if samples.len() < expected {
             return Ok(None);
         }
-        let column = to_column(column, samples);
+        let face = match self.plan.header.seam_column {
+            Some(seam) if column >= seam => Face::Back,
+            _ => Face::Front,
+        };
+        let column = Column { face, ..to_column(column, samples) };
         *samples = Vec::new();
         self.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
         Ok(Some(column))
@@ -69,7 +75,7 @@ impl<'a> Assembler<'a> {
         let end = ScanEnd {
             columns: self.plan.header.n_columns,
             points: self.points,
-            warm_up_columns: 0,
+            warm_up_columns: self.plan.warm_up_columns,
             outcome: Outcome::Complete,
         };
         Ok((empty, end))
@@ -110,13 +116,23 @@ impl Plan {
         }
     }
 
+    /// Range in metres and direction of a cell that is stored so; not beyond the zenith, where azimuth means another.
+    fn beam(&self, cell: &RawCell) -> Option<(f64, Direction)> {
+        let plain = self.mirror == Mirror::None && self.unit == Unit::Metre;
+        let (range, direction) = cell.beam.filter(|_| plain)?;
+        let up_to_zenith = (-FRAC_PI_2..=FRAC_PI_2).contains(&direction.elevation);
+        up_to_zenith.then(|| (range, Direction { azimuth: wrap_azimuth(direction.azimuth), ..direction }))
+    }
+
     fn sample(&self, cell: &RawCell, row: u32) -> Sample {
-        let position = self.position(cell);
-        let range_m = position.iter().map(|c| c * c).sum::<f64>().sqrt() as f32;
+        let (range_m, direction) = self.beam(cell).unwrap_or_else(|| {
+            let position = self.position(cell);
+            (position.iter().map(|c| c * c).sum::<f64>().sqrt(), Direction::of(position))
+        });
         Sample {
             row,
             range_m,
-            direction: Direction::of(position),
+            direction,
             intensity: self.intensity.apply(cell.intensity),
             state: true_state(cell),
         }

@@ -45,6 +45,7 @@ pub struct Plan {
     /// Correlations of the normalised rows with elevation and columns with azimuth, as stored.
     pub correlation: (f64, f64),
     pub(super) intensity: Scale,
+    pub(super) warm_up_columns: u32,
     pub(super) first_row: u32,
     pub(super) first_column: u32,
     /// Column (after flipping) that becomes column 0 of a full circle.
@@ -107,6 +108,7 @@ impl Survey {
             mirror: expected.mirror,
             correlation: (down.correlation, round.correlation),
             intensity,
+            warm_up_columns: 0,
             first_row: row_range.start as u32,
             first_column: column_range.start as u32,
             cut,

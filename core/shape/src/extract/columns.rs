@@ -82,7 +82,7 @@ pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32
         }
         let row = column.first_row + i as u32;
         let elevation = header.elevation_start - header.elevation_step * f64::from(row);
-        let range_m = column.range_m[i];
+        let range_m = column.range_m[i] as f32;
         let azimuth_off = column.azimuth[i] - azimuth;
         let azimuth_off = if azimuth_off.abs() < 3.0 { azimuth_off } else { wrap_azimuth(azimuth_off) };
         Cell {

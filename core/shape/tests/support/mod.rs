@@ -160,7 +160,7 @@ fn lattice(cells: &Cells) -> (ScanHeader, Vec<Column>) {
         let column = if flip_columns { last_slow - slow } else { slow } as usize;
         let row = if flip_rows { last_fast - fast } else { fast } as usize;
         let column = &mut columns[column];
-        column.range_m[row] = (x * x + y * y + z * z).sqrt() as f32;
+        column.range_m[row] = (x * x + y * y + z * z).sqrt();
         column.azimuth[row] = directions[i].azimuth;
         column.elevation[row] = directions[i].elevation;
         column.state[row] = State::Valid;

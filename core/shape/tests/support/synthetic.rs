@@ -244,7 +244,7 @@ impl Scene {
             let (share, told) = (random.uniform(), random.uniform() < 0.75);
             let range = other.filter(|_| told).map_or(centre, |other| share * centre + (1.0 - share) * other);
             let spread = if random.uniform() < self.tails { 4.0 } else { 1.0 };
-            column.range_m[row] = (range + self.sigma * spread * random.normal()) as f32;
+            column.range_m[row] = range + self.sigma * spread * random.normal();
             if random.uniform() >= self.dropouts {
                 column.state[row] = State::Valid;
             }

@@ -52,7 +52,7 @@ fn notes(lattice: &Lattice) -> String {
     lattice.header().notes.join("\n")
 }
 
-/// Half a step of a range stored as f32.
+/// A micrometre.
 const EXACT: f64 = 1e-6;
 
 #[test]
