@@ -112,7 +112,7 @@ impl Lab {
         }
         let scanner = Scanner::create(&library, &values).unwrap();
         scanner.instance().open(LIMIT).unwrap();
-        let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec).unwrap();
+        let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec, None).unwrap();
         stroke::measure_scanned(&mut self.rig, &scanned, spec).unwrap()
     }
 

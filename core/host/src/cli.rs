@@ -2,6 +2,7 @@
 
 mod bench;
 mod check;
+mod convert;
 mod demo;
 mod history;
 mod inspect;
@@ -10,6 +11,8 @@ mod output;
 mod plugins;
 mod press;
 mod run;
+mod scan;
+mod scan_source;
 mod status;
 
 use std::path::PathBuf;
@@ -20,6 +23,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::files::FilesError;
 use crate::plugin::{Catalogue, PluginError};
 use crate::rig::RigError;
+use crate::scan_file::ScanFileError;
 
 /// Measures plates on a press, stroke by stroke.
 #[derive(Debug, Parser)]
@@ -62,6 +66,10 @@ enum Verb {
     Run(run::Command),
     /// Measure a plate in one scan file
     Measure(measure::Command),
+    /// One scan of the plant's scanner to a file
+    Scan(scan::Command),
+    /// A scan file in another format
+    Convert(convert::Command),
     /// What is in a scan file, and how it was oriented
     Inspect(inspect::Command),
     /// Check plant and plate files, all faults at once
@@ -110,6 +118,15 @@ impl From<RigError> for CliError {
     }
 }
 
+impl From<ScanFileError> for CliError {
+    fn from(error: ScanFileError) -> Self {
+        match error {
+            ScanFileError::Format(_) | ScanFileError::Exists(_) => Self::Usage(error.to_string()),
+            failed => Self::Failed(failed.to_string()),
+        }
+    }
+}
+
 impl From<FilesError> for CliError {
     fn from(error: FilesError) -> Self {
         Self::Failed(error.to_string())
@@ -137,6 +154,8 @@ pub fn main() -> ExitCode {
     let result = match &cli.verb {
         Verb::Demo(command) => demo::run(&cli.common, command),
         Verb::Run(command) => run::run(&cli.common, command),
+        Verb::Scan(command) => scan::run(&cli.common, command),
+        Verb::Convert(command) => convert::run(&cli.common, command),
         Verb::Inspect(command) => inspect::run(&cli.common, command),
         Verb::Check(command) => check::run(&cli.common, command),
         Verb::Press(command) => press::run(&cli.common, command),

@@ -9,4 +9,5 @@ pub mod progress;
 pub mod record;
 pub mod rig;
 pub mod run;
+pub mod scan_file;
 pub mod stroke;

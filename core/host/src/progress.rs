@@ -7,6 +7,11 @@ pub fn phase(what: &str) {
     show(&format!("\r\x1b[2K{what} ..."));
 }
 
+/// Shows how much of it is done, 0 to 1.
+pub fn share(what: &str, done: f64) {
+    show(&format!("\r\x1b[2K{what} ... {:.0} %", done.min(1.0) * 100.0));
+}
+
 /// Takes the progress line away.
 pub fn done() {
     show("\r\x1b[2K");

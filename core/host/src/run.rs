@@ -5,6 +5,7 @@
 //! the history before anything is promised to the press; the stroke before and the baseline are asked from there, so
 //! that a restart changes nothing.
 
+mod archive;
 mod bench;
 mod figures;
 mod journal;
@@ -12,6 +13,7 @@ mod status;
 mod surface_file;
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_history::{Error as HistoryError, History};
@@ -26,6 +28,9 @@ pub use status::StatusRecord;
 use crate::plugin::{CancelToken, Catalogue};
 use crate::rig::{Rig, RigError};
 use bench::{Bench, Task};
+
+/// Time for the last scan to reach its file when the host stops.
+const LAST_SCAN: Duration = Duration::from_secs(20);
 
 /// Why a host cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -112,6 +117,11 @@ pub async fn run(
         token.cancel();
     }
     status.abort();
+    // A scan that is still being written is finished; a plugin that hangs is not waited for.
+    let end = tokio::time::Instant::now() + LAST_SCAN;
+    while hung.is_none() && !bench.is_finished() && tokio::time::Instant::now() < end {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
     match ended {
         Ok(result) => result?,
         Err(panic) => return Err(HostError::Bench(panic.to_string())),

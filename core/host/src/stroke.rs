@@ -8,7 +8,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use platen_scan::{ColumnError, ScanHeader, Window};
+use platen_scan::{Column, ColumnError, ScanEnd, ScanHeader, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, Measurement, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
@@ -56,7 +56,44 @@ pub struct Scanned {
     pub extract: Duration,
 }
 
-/// Scans; the plate is extracted while columns arrive.
+/// A whole scan as it came, for the archive.
+#[derive(Debug, Default)]
+pub struct Tape {
+    header: Option<ScanHeader>,
+    columns: Vec<Column>,
+    cells: usize,
+    end: Option<ScanEnd>,
+}
+
+/// Most cells that are held (29 bytes each): a full dome of the finest step that anyone measures plates with.
+const TAPE_CELLS: usize = 50_000_000;
+
+impl Tape {
+    fn push(&mut self, column: Column) {
+        self.cells += column.len();
+        if self.cells > TAPE_CELLS {
+            self.columns = Vec::new();
+        } else {
+            self.columns.push(column);
+        }
+    }
+
+    /// The scan.
+    ///
+    /// # Errors
+    /// Why it is not whole.
+    pub fn finish(self) -> Result<(ScanHeader, Vec<Column>, ScanEnd), String> {
+        match (self.header, self.end) {
+            _ if self.cells > TAPE_CELLS => {
+                Err(format!("{} cells are too many to hold; measure a window", self.cells))
+            }
+            (Some(header), Some(end)) => Ok((header, self.columns, end)),
+            _ => Err("it has no end".to_owned()),
+        }
+    }
+}
+
+/// Scans; the plate is extracted while columns arrive. All that came goes to the tape, when there is one.
 ///
 /// # Errors
 /// No scan, or no plate in it.
@@ -65,16 +102,26 @@ pub fn scan(
     job: JobSpec,
     window: Option<&Window>,
     spec: &PlateSpec,
+    mut tape: Option<&mut Tape>,
 ) -> Result<Scanned, NotMeasured> {
     let start = Instant::now();
     let mut extractor: Option<(ScanHeader, Extractor)> = None;
     let mut wrong: Option<NotMeasured> = None;
     let mut take = |event| match (event, &mut extractor) {
         (ScanEvent::Begin(header), _) => {
+            if let Some(tape) = tape.as_deref_mut() {
+                tape.header = Some(header.clone());
+            }
             extractor = Some((header.clone(), Extractor::new(&header, spec)));
             Ok(())
         }
-        (ScanEvent::Column(column), Some((_, extractor))) => Ok(extractor.push(&column)?),
+        (ScanEvent::Column(column), Some((_, extractor))) => {
+            extractor.push(&column)?;
+            if let Some(tape) = tape.as_deref_mut() {
+                tape.push(column);
+            }
+            Ok(())
+        }
         (ScanEvent::Column(_), None) => Err(NotMeasured::NoHeader),
     };
     let end = scanner.scan(job, window, &mut |event| match take(event) {
@@ -88,6 +135,9 @@ pub fn scan(
         return Err(error);
     }
     let end = end?;
+    if let Some(tape) = tape {
+        tape.end = Some(end);
+    }
     let (header, mut extractor) = extractor.ok_or(NotMeasured::NoHeader)?;
     let acquired = Instant::now();
     extractor.leave_out_warm_up(end.warm_up_columns);

@@ -1,21 +1,35 @@
 //! `platen inspect`: what is in a scan file, and how it was oriented.
 
+mod picture;
+
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::Args;
-use platen_scan::{ScanHeader, State};
+use platen_scan::{Column, ScanHeader, State};
 
-use super::{CliError, Common, measure, output};
-use crate::plugin::{JobSpec, ScanEvent};
+use super::scan_source::{self, READ_LIMIT};
+use super::{CliError, Common, output};
+use crate::plugin::ScanEvent;
+use crate::scan_file::ScanFileError;
+use picture::RangePicture;
 
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  platen inspect scan.e57")]
+#[command(
+    after_help = "Examples:\n  platen inspect scan.e57\n  platen inspect scan.ptx --picture scan.png\n\n\
+                        The picture shows the scan as the scanner saw it: colour is distance, brightness the strength \
+                        of the echo, black is where nothing came back."
+)]
 pub(super) struct Command {
-    /// Scan file
+    /// Scan file: structured E57, PTX, XYZ with row and column, XYB
     scan: PathBuf,
+    /// Which scan of a file that holds several, from 1
+    #[arg(long, value_name = "N")]
+    cloud: Option<u32>,
+    /// New file for a picture of the ranges
+    #[arg(long, value_name = "OUT.png")]
+    picture: Option<PathBuf>,
 }
 
 /// What was counted while the columns came by.
@@ -24,40 +38,64 @@ struct Counts {
     columns: u32,
     valid: u64,
     direction_only: u64,
-    nearest_m: f32,
-    farthest_m: f32,
+    nearest_m: f64,
+    farthest_m: f64,
+}
+
+impl Counts {
+    fn add(&mut self, column: &Column) {
+        self.columns += 1;
+        for (state, range) in column.state.iter().zip(&column.range_m) {
+            match state {
+                State::Valid => {
+                    self.valid += 1;
+                    self.nearest_m = self.nearest_m.min(*range);
+                    self.farthest_m = self.farthest_m.max(*range);
+                }
+                State::DirectionOnly => self.direction_only += 1,
+                State::NoReturn => {}
+            }
+        }
+    }
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
-    let scanner = measure::open_file(&common.catalogue(), &command.scan)?;
-    let mut header = ScanHeader::default();
-    let mut counts = Counts { nearest_m: f32::INFINITY, ..Counts::default() };
-    let job = JobSpec::untriggered(Duration::from_secs(600));
-    let end = scanner.scan(job, None, &mut |event| {
+    if let Some(picture) = command.picture.as_ref().filter(|picture| picture.exists()) {
+        return Err(ScanFileError::Exists(picture.clone()).into());
+    }
+    let scanner = scan_source::open(&common.catalogue(), &command.scan, command.cloud)?;
+    let (mut header, mut picture) = (ScanHeader::default(), RangePicture::default());
+    let mut counts = Counts { nearest_m: f64::INFINITY, ..Counts::default() };
+    let what = format!("reading {}", command.scan.display());
+    let end = scan_source::follow(&scanner, READ_LIMIT, None, &what, &mut |event| {
         match event {
-            ScanEvent::Begin(begun) => header = begun,
+            ScanEvent::Begin(begun) => {
+                picture = RangePicture::new(&begun);
+                header = begun;
+            }
             ScanEvent::Column(column) => {
-                counts.columns += 1;
-                for (state, range) in column.state.iter().zip(&column.range_m) {
-                    match state {
-                        State::Valid => {
-                            counts.valid += 1;
-                            counts.nearest_m = counts.nearest_m.min(*range);
-                            counts.farthest_m = counts.farthest_m.max(*range);
-                        }
-                        State::DirectionOnly => counts.direction_only += 1,
-                        State::NoReturn => {}
-                    }
-                }
+                counts.add(&column);
+                picture.add(&column);
             }
         }
         ControlFlow::Continue(())
     });
     end.map_err(|e| CliError::Failed(format!("{}: {e}", command.scan.display())))?;
+    if let Some(path) = &command.picture {
+        picture.write(path).map_err(|e| {
+            CliError::Failed(format!(
+                "{}: cannot be written: {e}; check the folder and its disk",
+                path.display()
+            ))
+        })?;
+    }
     if common.json {
         output::json(&json(&header, &counts))?;
     } else {
         print(&header, &counts)?;
+        if let Some(path) = &command.picture {
+            say_picture(path, &picture)?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -88,11 +126,34 @@ fn print(header: &ScanHeader, counts: &Counts) -> Result<(), CliError> {
         header.elevation_start.to_degrees(),
         header.elevation_step.to_degrees()
     ))?;
+    if counts.direction_only > 0 {
+        output::line(&format!("{} cells of which only the direction is known", counts.direction_only))?;
+    }
+    let (low, high) = header.intensity_range;
+    output::line(&format!("intensity {low} to {high}"))?;
+    if let Some(seam) = header.seam_column {
+        output::line(&format!("two faces: the back face begins at column {seam}"))?;
+    }
     if !header.instrument.is_empty() {
         output::line(&format!("instrument: {}", header.instrument))?;
+    }
+    let acquired = header.acquired_unix_s.and_then(|time| jiff::Timestamp::from_second(time as i64).ok());
+    if let Some(time) = acquired {
+        output::line(&format!("scanned at {time}"))?;
+    }
+    if header.simulated {
+        output::line("simulated: no real instrument stood there")?;
     }
     for note in &header.notes {
         output::line(&format!("  {note}"))?;
     }
     Ok(())
+}
+
+fn say_picture(path: &Path, picture: &RangePicture) -> Result<(), CliError> {
+    let (width, height) = picture.size();
+    output::line(&format!(
+        "wrote {}: {width} x {height} pixels as the scanner saw it; dark violet is near, yellow far, black no echo",
+        path.display()
+    ))
 }

@@ -2,21 +2,19 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use clap::Args;
-use platen_plant::{OptionValue, PlantFile, PlateFile, PluginUse, Value};
+use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_shape::task::Verdict;
 
+use super::scan_source::{self, READ_LIMIT};
 use super::{CliError, Common, output};
-use crate::plugin::{Catalogue, JobSpec, Scanner, Surfaces};
+use crate::plugin::{Catalogue, JobSpec, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
 use crate::stroke::{self, Measured, Scanned};
 use crate::{files, progress};
-
-/// A file of the finest full dome takes minutes to read.
-const READ_LIMIT: Duration = Duration::from_secs(600);
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
@@ -109,23 +107,13 @@ fn measure_file(
     plate: &PlateFile,
 ) -> Result<(Scanned, Measured), CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
-    let scanner = open_file(catalogue, scan)?;
+    let scanner = scan_source::open(catalogue, scan, None)?;
     progress::phase(&format!("measuring {}", scan.display()));
     let spec = rig.spec(plate);
     let job = JobSpec::untriggered(READ_LIMIT);
-    let scanned = stroke::scan(&scanner, job, None, &spec).map_err(|e| failed(&e))?;
+    let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
     let measured = stroke::measure_scanned(rig, &scanned, &spec).map_err(|e| failed(&e))?;
     Ok((scanned, measured))
-}
-
-/// The file driver, set to one file.
-pub(super) fn open_file(catalogue: &Catalogue, scan: &Path) -> Result<Scanner, CliError> {
-    let (library, mut values) = rig::load(catalogue, &PluginUse::by_default("faro-file"))?;
-    let file = std::path::absolute(scan)?;
-    values.push(OptionValue { name: "file".into(), value: Value::Path(file), given: true });
-    let scanner = Scanner::create(&library, &values)?;
-    scanner.instance().open(READ_LIMIT).map_err(|e| CliError::Failed(format!("{}: {e}", scan.display())))?;
-    Ok(scanner)
 }
 
 fn print(record: &ResultRecord) -> Result<(), CliError> {

@@ -12,12 +12,13 @@ use platen_press::{Answer, Code, Measurement, StrokeData, StrokeKey};
 use platen_shape::Surface;
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::archive::Archive;
 use super::{Watcher, figures, surface_file};
 use crate::files;
 use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
-use crate::stroke::{self, NotMeasured, Scanned};
+use crate::stroke::{self, NotMeasured, Scanned, Tape};
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -60,6 +61,7 @@ struct InHand {
     data: Box<StrokeData>,
     plate: PlateFile,
     scanned: Scanned,
+    tape: Option<Tape>,
     started: Instant,
     scanned_at: jiff::Timestamp,
 }
@@ -73,6 +75,7 @@ pub(super) struct Bench {
     scanner: Option<Scanner>,
     scan_limit: Option<Duration>,
     history: Arc<Mutex<History>>,
+    archive: Archive,
     answers: UnboundedSender<Answer>,
     watcher: Option<Watcher>,
     in_hand: Option<InHand>,
@@ -95,6 +98,7 @@ impl Bench {
             scanner: None,
             scan_limit: press.timeouts.scan,
             history,
+            archive: Archive::start(&plant.output),
             answers,
             watcher,
             in_hand: None,
@@ -151,19 +155,20 @@ impl Bench {
     fn scan(&mut self, key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken) -> bool {
         let started = Instant::now();
         self.in_hand = None;
+        let mut tape = self.archive.tape();
         let scanned = self.plate(&data).and_then(|plate| {
             let spec = self.rig.spec(&plate);
             let scanner =
                 self.scanner.as_ref().ok_or((Code::ScannerNotReady, "not connected".to_owned(), false))?;
             let limit = self.scan_limit.unwrap_or(SCAN_LIMIT);
             let job = JobSpec { stroke: u64::from(key.stroke), trigger: started, limit, cancel: token };
-            let scanned = stroke::scan(scanner, job, None, &spec).map_err(|e| refusal(&e))?;
+            let scanned = stroke::scan(scanner, job, None, &spec, tape.as_mut()).map_err(|e| refusal(&e))?;
             Ok((plate, scanned))
         });
         match scanned {
             Ok((plate, scanned)) => {
                 let scanned_at = jiff::Timestamp::now();
-                self.in_hand = Some(InHand { key, run_id, data, plate, scanned, started, scanned_at });
+                self.in_hand = Some(InHand { key, run_id, data, plate, scanned, tape, started, scanned_at });
                 self.say(Answer::Acquired(key));
                 false
             }
@@ -171,7 +176,9 @@ impl Bench {
                 if matches!(code, Code::ScanFailed | Code::ScannerNotReady) {
                     self.scanner = None;
                 }
+                let found_no_plate = matches!(code, Code::PlateNotFound);
                 self.fail(key, data.baseline, code, why, started);
+                self.archive.keep(self.folder(run_id), tape.filter(|_| found_no_plate));
                 hung
             }
         }
@@ -205,13 +212,14 @@ impl Bench {
 
     /// True when a plugin hangs.
     fn evaluate(&mut self, key: StrokeKey) -> bool {
-        let Some(stroke) = self.in_hand.take().filter(|stroke| stroke.key == key) else {
+        let Some(mut stroke) = self.in_hand.take().filter(|stroke| stroke.key == key) else {
             self.fail(key, false, Code::Interrupted, "its scan is gone".into(), Instant::now());
             return false;
         };
         let start = Instant::now();
         let (baseline, started) = (stroke.data.baseline, stroke.started);
-        match self.measure(&stroke, start) {
+        let (folder, tape) = (self.folder(stroke.run_id), stroke.tape.take());
+        let hung = match self.measure(&stroke, start) {
             Ok((measurement, record, folder)) => {
                 self.say(Answer::Result(key, Box::new(measurement)));
                 let elapsed = started.elapsed();
@@ -223,7 +231,14 @@ impl Bench {
                 self.fail(key, baseline, code, why, started);
                 hung
             }
-        }
+        };
+        self.archive.keep(folder, tape);
+        hung
+    }
+
+    /// Where the files of a stroke go.
+    fn folder(&self, run_id: u32) -> PathBuf {
+        self.plant.output.folder.join(format!("run-{run_id:06}"))
     }
 
     /// From the plate's face to the result and its files.
@@ -287,7 +302,7 @@ impl Bench {
         reports: &[Result<crate::plugin::Report, PluginError>],
         surface: &Surface,
     ) -> Option<PathBuf> {
-        let folder = self.plant.output.folder.join(format!("run-{:06}", stroke.run_id));
+        let folder = self.folder(stroke.run_id);
         let sound: Vec<_> = reports.iter().flatten().collect();
         let written = files::write(&folder, record, &sound).map_err(|e| e.to_string()).and_then(|_| {
             surface_file::write(&folder, surface).map_err(|e| format!("{}: {e}", folder.display()))?;

@@ -1,0 +1,38 @@
+//! `platen convert`: a scan file in another format.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::scan_source::{self, READ_LIMIT};
+use super::{CliError, Common, scan};
+use crate::scan_file;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  platen convert scan.ptx scan.e57\n  platen convert two-scans.e57 second.xyb --cloud 2\n\n\
+                        The lattice is written as it was oriented: row 0 at the top, columns by growing azimuth, \
+                        right-handed, metres, in the scanner's own frame."
+)]
+pub(super) struct Command {
+    /// Scan file: structured E57, PTX, XYZ with row and column, XYB
+    input: PathBuf,
+    /// New file; its ending says the format: .e57, .ptx, .xyz or .xyb
+    output: PathBuf,
+    /// Which scan of a file that holds several, from 1
+    #[arg(long, value_name = "N")]
+    cloud: Option<u32>,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let (input, output) = (&command.input, &command.output);
+    scan::check_output(output)?;
+    let scanner = scan_source::open(&common.catalogue(), input, command.cloud)?;
+    let what = format!("converting {}", input.display());
+    let written = scan_file::write(output, |sink| {
+        scan_source::follow(&scanner, READ_LIMIT, None, &what, sink)
+            .map_err(|e| CliError::Failed(format!("{}: {e}", input.display())))
+    })?;
+    scan::say(common, output, &written)
+}
