@@ -1,15 +1,19 @@
-//! Times extraction and outline on closed-form scans of growing size: `cargo run --release -p platen-shape --example
-//! extraction [dome]`. One thread, processor time of this thread, the best of a few runs; `dome` adds 44 million cells.
+//! Times the stages on closed-form scans of growing size: `cargo run --release -p platen-shape --example extraction
+//! [dome]`. Processor time of this one thread, so that other work on the machine does not count; the best of a few
+//! runs. `dome` adds a scan of 44 million cells.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a figure printer")]
 
+#[path = "../tests/support/harmonic.rs"]
+mod harmonic;
 #[path = "../tests/support/synthetic.rs"]
 mod synthetic;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use platen_shape::Vec3;
+use harmonic::Harmonic;
 use platen_shape::extract::Extractor;
 use platen_shape::outline::outline;
+use platen_shape::{Vec3, measure};
 use synthetic::{Plate, Scene};
 
 fn scene(step: f64) -> Scene {
@@ -25,6 +29,13 @@ fn scene(step: f64) -> Scene {
     Scene { sigma: 1e-3, dropouts: 0.02, step, ..Scene::of(plate) }
 }
 
+/// Time that this thread has run, from the scheduler (Linux).
+fn processor_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split_whitespace().next().and_then(|n| n.parse().ok());
+    Duration::from_nanos(nanoseconds.unwrap_or(0))
+}
+
 /// Largest resident size of this process so far, megabytes.
 fn peak_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -34,38 +45,52 @@ fn peak_mb() -> f64 {
 
 fn run(name: &str, scene: &Scene, around: f64, runs: usize) {
     let (header, columns) = scene.scan_around(around);
+    let spec = scene.spec();
     let before = peak_mb();
-    let mut best = [Duration::MAX; 3];
+    let mut best = [Duration::MAX; 6];
     let (mut samples, mut cells) = (0, 0);
     for _ in 0..runs {
-        let start = Instant::now();
-        let mut extractor = Extractor::new(&header, &scene.spec());
+        let mut at = processor_time();
+        let mut lap = || std::mem::replace(&mut at, processor_time());
+        let mut laps = vec![];
+        let mut extractor = Extractor::new(&header, &spec);
         for column in &columns {
             extractor.push(column).expect("a sound column");
         }
-        let pushed = start.elapsed();
+        laps.push(lap());
         let patch = extractor.finish().expect("a plate");
-        let extracted = start.elapsed();
-        outline(&patch, &scene.spec()).expect("an outline");
-        let times = [pushed, extracted - pushed, start.elapsed() - extracted];
+        laps.push(lap());
+        let outline = outline(&patch, &spec).expect("an outline");
+        laps.push(lap());
+        let m = measure(&patch, &outline, &spec, &mut Harmonic, &mut processor_time).expect("a measurement");
+        laps.extend([lap(), processor_time()]);
+        let mut times: Vec<Duration> = laps.windows(2).map(|w| w[1] - w[0]).collect();
+        times.truncate(3);
+        times.extend([m.timings.mesh, m.timings.flatten, m.timings.surface]);
         for (best, time) in best.iter_mut().zip(times) {
             *best = time.min(*best);
         }
         samples = patch.samples.len();
         cells = columns.iter().map(platen_scan::Column::len).sum();
     }
-    let [push, finish, outline] = best.map(|d| d.as_secs_f64() * 1e3);
-    let more = peak_mb() - before;
+    let total: Duration = best.iter().sum();
+    let [push, finish, outline, mesh, flatten, surface] = best.map(|d| d.as_secs_f64() * 1e3);
     println!(
-        "{name}: {cells} cells, {samples} on the plate; columns {push:.0} ms, the rest {finish:.0} ms, outline {outline:.0} ms; \
-         {more:.0} MB above the scan"
+        "{name}: {cells} cells, {samples} on the plate; ms: columns {push:.0}, the rest of extraction {finish:.0}, \
+         outline {outline:.0}, mesh {mesh:.0}, harmonic {flatten:.0}, surface {surface:.0}; all {:.0}, after the last \
+         column {:.0}; {:.0} MB above the scan",
+        total.as_secs_f64() * 1e3,
+        (total - best[0]).as_secs_f64() * 1e3,
+        peak_mb() - before
     );
 }
 
 fn main() {
-    let step = 0.0352_f64.to_radians();
-    run("table scan", &scene(step), 0.12, 5);
-    run("half the step", &scene(0.5 * step), 0.12, 3);
+    let step = 0.056_f64.to_radians();
+    run("table scan", &scene(step), 0.3, 9);
+    if std::env::args().any(|argument| argument == "half") {
+        run("half the step", &scene(0.5 * step), 0.3, 3);
+    }
     if std::env::args().any(|argument| argument == "dome") {
         run("dome", &scene(step), std::f64::consts::PI, 1);
     }

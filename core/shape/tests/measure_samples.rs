@@ -3,23 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "test code: helpers fail like tests")]
 
+#[path = "support/harmonic.rs"]
+mod harmonic;
 mod support;
 
-use platen_shape::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
+use harmonic::Harmonic;
 use platen_shape::outline::outline;
-use platen_shape::{Chart, DiskMesh, Flatten, FlattenError, Measurement, Surface, measure};
+use platen_shape::{Measurement, Surface, measure};
 use serde_json::Value;
-
-struct Harmonic;
-
-impl Flatten for Harmonic {
-    fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError> {
-        let refused = |message| FlattenError::Refused { message, hint: "a test's own fault".into() };
-        let uv = fixed_boundary(mesh, &cotangents(mesh), &boundary_by_arc_length(mesh))
-            .map_err(|e| refused(e.to_string()))?;
-        Ok(Chart { uv, ..Chart::default() })
-    }
-}
 
 fn measured(sample: &support::Sample) -> Measurement {
     let patch = support::extract(sample, 0..sample.columns.len()).unwrap();

@@ -34,7 +34,18 @@ pub(super) fn find(
     let mut crossings = Vec::new();
     let mut cut = 0.0;
     let scene = Scene { window, noise, face, pixels };
-    for index in (0..face.len()).filter(|&i| face[i]) {
+    let inside = |i: usize| face.get(i).is_some_and(|f| *f);
+    // Cells amid the face leave it nowhere.
+    let is_rim = |i: &usize| {
+        let i = *i;
+        let n_rows = window.n_rows;
+        face[i]
+            && !(inside(i + 1)
+                && inside(i.wrapping_sub(1))
+                && inside(i + n_rows)
+                && inside(i.wrapping_sub(n_rows)))
+    };
+    for index in (0..face.len()).filter(is_rim) {
         for step in [(0, -1), (0, 1), (-1, 0), (1, 0)] {
             let Some(first) = scene.beside(index, step, 1) else { continue };
             if face[first] {
@@ -107,7 +118,7 @@ impl Scene<'_> {
         end: End,
         sample: u32,
     ) -> Option<(Crossing, bool)> {
-        let (x, y) = self.window.place(index);
+        let (x, y) = self.window.place_of(index);
         let on_face = |t: f64| fit.at(self.window, x + t * step.0 as f64, y + t * step.1 as f64);
         let (far, measured) = match end {
             End::Sound(far) | End::Mixed(far) => (far, self.beside(index, step, far)),
@@ -158,7 +169,7 @@ impl Scene<'_> {
         index: usize,
         step: (isize, isize),
     ) -> Option<f64> {
-        let (x, y) = self.window.place(index);
+        let (x, y) = self.window.place_of(index);
         let far = far as f64;
         let predicted = fit.at(self.window, x + far * step.0 as f64, y + far * step.1 as f64)?;
         Some(f64::from(self.window.cells[at].range_m) - predicted.range)

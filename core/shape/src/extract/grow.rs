@@ -70,10 +70,9 @@ fn flat(normals: &[Vector3<f32>], n_rows: usize, stride: usize) -> Vec<bool> {
 
 /// Area of the surface that a cell stands for.
 fn area(window: &Window, index: usize, normal: &Vector3<f32>) -> f64 {
-    let direction = window.nominal((index / window.n_rows) as f64, (index % window.n_rows) as f64);
-    let towards = -crate::Vec3::from(direction.unit());
-    let cos_incidence = towards.dot(&normal.cast()).max(0.05);
+    let sight = window.nominal(index / window.n_rows, index % window.n_rows);
+    let cos_incidence = -sight.unit().dot(&normal.cast()).min(-0.05);
     let range = f64::from(window.cells[index].range_m);
-    let steps = window.header.azimuth_step * direction.elevation.cos() * window.header.elevation_step;
+    let steps = window.header.azimuth_step * sight.elevation.cos * window.header.elevation_step;
     range * range * steps / cos_incidence
 }

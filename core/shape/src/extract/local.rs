@@ -33,13 +33,27 @@ pub(super) struct OnFace {
     pub(super) point: Vec3,
     /// Unit normal towards the scanner.
     pub(super) normal: Vec3,
-    /// Variance of the range in units of that of a sample.
-    pub(super) leverage: f64,
 }
 
 fn basis(x: f64, y: f64) -> SVector<f64, 6> {
     SVector::from([1.0, x, y, x * x, x * y, y * y])
 }
+
+/// x^p y^q up to the fourth order: the products of two functions of the basis.
+fn monomials(x: f64, y: f64) -> [f64; 15] {
+    let (xx, xy, yy) = (x * x, x * y, y * y);
+    [1.0, x, y, xx, xy, yy, xx * x, xx * y, x * yy, yy * y, xx * xx, xx * xy, xx * yy, xy * yy, yy * yy]
+}
+
+/// Which monomial is the product of two functions of the basis.
+const PRODUCTS: [[usize; 6]; 6] = [
+    [0, 1, 2, 3, 4, 5],
+    [1, 3, 4, 6, 7, 8],
+    [2, 4, 5, 7, 8, 9],
+    [3, 6, 7, 10, 11, 12],
+    [4, 7, 8, 11, 12, 13],
+    [5, 8, 9, 12, 13, 14],
+];
 
 impl LocalFace {
     /// The square of cells that shares a fit with `index`.
@@ -54,28 +68,26 @@ impl LocalFace {
         let middle = |tile: usize| (tile * TILE) as f64 + 0.5 * (TILE as f64 - 1.0);
         let (column, row) = (middle(tile.0), middle(tile.1));
         let rows = span(tile.1, window.n_rows);
-        let mut a = SMatrix::<f64, 6, 6>::zeros();
+        let mut moments = [0.0; 15];
         let mut b = SVector::<f64, 6>::zeros();
-        let (mut n, mut scale) = (0, 0.0);
+        let (mut n, mut scale, mut per_scale) = (0, 0.0, 0.0);
         for c in span(tile.0, window.n_columns) {
-            for r in rows.clone() {
-                let index = c * window.n_rows + r;
-                if face[index] {
-                    let (x, y) = window.place(index);
-                    let (f, q) = (basis(x - column, y - row), f64::from(window.inverse[index]));
-                    if n == 0 {
-                        scale = q;
-                    }
-                    n += 1;
-                    a.syger(1.0, &f, &f, 1.0);
-                    b.axpy(q / scale, &f, 1.0);
+            for r in rows.clone().filter(|r| face[c * window.n_rows + r]) {
+                let (x, y) = window.place(c, r);
+                let q = f64::from(window.inverse[c * window.n_rows + r]);
+                if n == 0 {
+                    (scale, per_scale) = (q, 1.0 / q);
                 }
+                n += 1;
+                let (x, y) = (x - column, y - row);
+                moments.iter_mut().zip(monomials(x, y)).for_each(|(sum, m)| *sum += m);
+                b.axpy(q * per_scale, &basis(x, y), 1.0);
             }
         }
         if n < LEAST_CELLS {
             return None;
         }
-        a.fill_upper_triangle_with_lower_triangle();
+        let mut a = SMatrix::from_fn(|i, k| moments[PRODUCTS[i][k]]);
         // A trace of ridge on the second order alone lets a narrow strip fall back to a plane.
         for k in 3..6 {
             a[(k, k)] += 1.0;
@@ -96,23 +108,19 @@ impl LocalFace {
         if q <= 0.0 || q.is_nan() {
             return None;
         }
-        let direction = window.nominal(x, y);
-        let (sin_az, cos_az) = direction.azimuth.sin_cos();
-        let (sin_el, cos_el) = direction.elevation.sin_cos();
-        let header = &window.header;
-        let q_az = self.scale * (c[1] + 2.0 * c[3] * dx + c[4] * dy) / (header.azimuth_step * cos_el);
-        let q_el = -self.scale * (c[2] + c[4] * dx + 2.0 * c[5] * dy) / header.elevation_step;
-        let outward = q * cos_el - q_el * sin_el;
-        let gradient = Vec3::new(
-            outward * cos_az - q_az * sin_az,
-            outward * sin_az + q_az * cos_az,
-            q * sin_el + q_el * cos_el,
-        );
+        let sight = window.sight(x, y);
+        let by_azimuth = self.scale * (c[1] + 2.0 * c[3] * dx + c[4] * dy) / window.header.azimuth_step;
+        let by_elevation = -self.scale * (c[2] + c[4] * dx + 2.0 * c[5] * dy) / window.header.elevation_step;
         Some(OnFace {
             range: 1.0 / q,
-            point: Vec3::from(direction.unit()) / q,
-            normal: -gradient.normalize(),
-            leverage: f.dot(&self.normal_matrix.solve(&f)),
+            point: sight.unit() / q,
+            normal: sight.normal(q, by_azimuth, by_elevation)?,
         })
+    }
+
+    /// Variance of the range there, in units of that of a sample.
+    pub(super) fn leverage(&self, x: f64, y: f64) -> f64 {
+        let f = basis(x - self.column, y - self.row);
+        f.dot(&self.normal_matrix.solve(&f))
     }
 }

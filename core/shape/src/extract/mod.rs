@@ -22,20 +22,23 @@ mod noise;
 mod pieces;
 mod refusal;
 mod regions;
+mod sight;
 mod smooth;
 mod spread;
 mod surface;
 mod trim;
 mod window;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use platen_scan::{Column, ColumnError, ScanHeader};
 
 use crate::{Patch, PlateSpec, Sample};
-use columns::{Cell, Columns, Kept, Segment, cells_of};
+use columns::{Cell, Columns, Kept, MARGIN, Segment, cells_of};
 use continuity::Continuity;
 use pieces::Piece;
 pub use refusal::Refusal;
-use regions::{Regions, Run};
+use regions::{Extent, Regions, Run};
 use spread::Spread;
 use surface::Surface;
 
@@ -66,6 +69,10 @@ pub struct Extractor {
     regions: Regions,
     columns: Columns,
     warm_up_columns: u32,
+    /// Columns up to here have come without a gap, and in order.
+    in_order: u32,
+    /// Surfaces of components of about the plate's size that no later column can reach.
+    closed: BTreeMap<u32, Surface>,
 }
 
 impl Extractor {
@@ -80,6 +87,8 @@ impl Extractor {
             regions: Regions::default(),
             columns: Columns::default(),
             warm_up_columns: 0,
+            in_order: 0,
+            closed: BTreeMap::new(),
         }
     }
 
@@ -111,12 +120,35 @@ impl Extractor {
         self.join(column.index);
         let limit_mm2 = self.plate_mm2(OUTGROWN);
         self.columns.sweep(&mut self.regions, self.header.n_columns, limit_mm2);
+        self.look_at_closed(column.index);
         Ok(())
     }
 
     /// Declares the first `columns` columns of each face laser warm-up: they are left out.
     pub fn leave_out_warm_up(&mut self, columns: u32) {
-        self.warm_up_columns = columns;
+        if self.warm_up_columns != columns {
+            self.warm_up_columns = columns;
+            self.closed.clear();
+        }
+    }
+
+    /// Looks at the components that ended so many columns before `newest` that nothing more joins them: most of the
+    /// work on the plate is done before the last column comes, as long as columns come in order.
+    fn look_at_closed(&mut self, newest: u32) {
+        if newest != self.in_order {
+            return;
+        }
+        self.in_order += 1;
+        let Some(last) = newest.checked_sub(MARGIN + 1) else { return };
+        let runs = self.columns.get(last).map_or(0..0, |column| column.runs.clone());
+        let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
+        for root in roots {
+            let extent = self.regions.extent(root);
+            if extent.columns.1 == last && self.may_be_plate(extent) && self.is_near_size(root) {
+                let surface = self.surface(&[root]);
+                self.closed.insert(root, surface);
+            }
+        }
     }
 
     /// The plate's face, once all columns have come.
@@ -137,8 +169,16 @@ impl Extractor {
         }
         let chosen = choose::choose(&candidates, &self.spec)?;
         let chosen: Vec<&Piece> = chosen.pieces.iter().map(|&i| &pieces[i]).collect();
-        let (surface, regions) = self.plate_surface(&surfaces, &chosen);
-        self.patch(&surface, &regions)
+        let joined;
+        let surface = match self.roots(&surfaces, &chosen).as_slice() {
+            [_] => &surfaces[chosen[0].surface],
+            several => {
+                joined = self.surface(several);
+                &joined
+            }
+        };
+        let region = |piece: &&Piece| surfaces[piece.surface].region(piece.label, &surface.window);
+        self.patch(surface, &chosen.iter().map(region).collect::<Vec<_>>())
     }
 
     fn check(&self) -> Result<(), Refusal> {
@@ -199,27 +239,23 @@ impl Extractor {
         );
     }
 
-    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
-    fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
-        let (least, most) = (self.plate_mm2(LEAST_PART), self.plate_mm2(OUTGROWN));
-        let diagonal = self.spec.width.hypot(self.spec.height);
-        let mut spread: std::collections::BTreeMap<u32, Spread> = std::collections::BTreeMap::new();
-        let mut order = Vec::new();
-        for index in 0..self.columns.len() {
+    /// True when a component may hold a piece of the plate.
+    fn may_be_plate(&self, extent: Extent) -> bool {
+        (self.plate_mm2(LEAST_PART)..=self.plate_mm2(OUTGROWN)).contains(&extent.area_mm2)
+    }
+
+    /// True when a component holds little besides the plate.
+    fn is_near_size(&mut self, root: u32) -> bool {
+        let extent = self.regions.extent(root);
+        if extent.area_mm2 > self.plate_mm2(NEAR_SIZE.0) {
+            return false;
+        }
+        let mut spread = Spread::default();
+        for index in extent.columns.0..=extent.columns.1 {
             let Some(column) = self.columns.get(index) else { continue };
             let azimuth = self.header.azimuth_start + self.header.azimuth_step * f64::from(index);
             let (sin_az, cos_az) = azimuth.sin_cos();
-            for number in column.runs.clone() {
-                let root = self.regions.root(number);
-                let area_mm2 = self.regions.extent(root).area_mm2;
-                if area_mm2 < least || area_mm2 > most {
-                    continue;
-                }
-                let run = self.regions.run(number);
-                let spread = spread.entry(root).or_insert_with(|| {
-                    order.push(root);
-                    Spread::default()
-                });
+            for run in self.regions.runs_of(&[root], column.runs.clone()) {
                 for row in [run.first_row, run.end_row - 1] {
                     let (sin_el, cos_el) = self.elevation[row as usize];
                     let range = f64::from(column.range(row));
@@ -227,14 +263,26 @@ impl Extractor {
                 }
             }
         }
-        order.into_iter().partition(|root| {
-            let area = self.regions.extent(*root).area_mm2;
-            area <= self.plate_mm2(NEAR_SIZE.0) && spread[root].width() <= NEAR_SIZE.1 * diagonal
-        })
+        spread.width() <= NEAR_SIZE.1 * self.spec.width.hypot(self.spec.height)
+    }
+
+    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
+    fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
+        let mut roots = Vec::new();
+        for index in 0..self.columns.len() {
+            let runs = self.columns.get(index).map_or(0..0, |column| column.runs.clone());
+            for number in runs {
+                let root = self.regions.root(number);
+                if self.may_be_plate(self.regions.extent(root)) && !roots.contains(&root) {
+                    roots.push(root);
+                }
+            }
+        }
+        roots.into_iter().partition(|root| self.is_near_size(*root))
     }
 
     fn surfaces(&mut self, roots: &[u32]) -> Vec<Surface> {
-        roots.iter().map(|root| self.surface(&[*root])).collect()
+        roots.iter().map(|root| self.closed.remove(root).unwrap_or_else(|| self.surface(&[*root]))).collect()
     }
 
     fn surface(&mut self, roots: &[u32]) -> Surface {
@@ -250,8 +298,8 @@ impl Extractor {
         numbered.flat_map(|(surface, number)| surface.pieces(number, least)).collect()
     }
 
-    /// The surface that holds all chosen pieces, and each piece as cells of it.
-    fn plate_surface(&mut self, surfaces: &[Surface], chosen: &[&Piece]) -> (Surface, Vec<Vec<bool>>) {
+    /// The components that hold the chosen pieces.
+    fn roots(&self, surfaces: &[Surface], chosen: &[&Piece]) -> Vec<u32> {
         let mut roots = Vec::new();
         for piece in chosen {
             let root = surfaces[piece.surface].root;
@@ -259,9 +307,7 @@ impl Extractor {
                 roots.push(root);
             }
         }
-        let whole = if roots.len() == 1 { surfaces[chosen[0].surface].clone() } else { self.surface(&roots) };
-        let regions = chosen.iter().map(|p| surfaces[p.surface].region(p.label, &whole.window)).collect();
-        (whole, regions)
+        roots
     }
 
     fn patch(&self, surface: &Surface, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
@@ -274,7 +320,7 @@ impl Extractor {
         }
         let face = trim::grow_back(window, noise, normals, face);
         let mut number = vec![0; face.len()];
-        let mut samples = Vec::new();
+        let mut samples = Vec::with_capacity(face.iter().filter(|f| **f).count());
         for cell in (0..face.len()).filter(|&cell| face[cell]) {
             number[cell] = samples.len() as u32;
             samples.push(Sample {

@@ -7,7 +7,6 @@
 
 use super::continuity::Continuity;
 use super::window::Window;
-use crate::Vec3;
 
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];
@@ -99,11 +98,8 @@ pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
     ((noise_in_spacings / NOISE_PER_CELL).ceil() as usize).clamp(1, MOST_CELLS)
 }
 
-/// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour.
-///
-/// On the plane n . x = h the inverse range along the unit direction d is n . d / h: the normal is the gradient of
-/// the inverse range continued homogeneously, q d + q_el e_el + q_az / cos el e_az. Slopes are taken over `reach`
-/// cells on each side, where there are as many.
+/// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour. Slopes are taken over
+/// `reach` cells on each side, where there are as many.
 pub(super) fn normals(
     window: &Window,
     smooth: &[f32],
@@ -111,10 +107,10 @@ pub(super) fn normals(
     reach: usize,
 ) -> Vec<nalgebra::Vector3<f32>> {
     let n_rows = window.n_rows;
-    let header = &window.header;
+    let (per_azimuth, per_elevation) =
+        (1.0 / window.header.azimuth_step, -1.0 / window.header.elevation_step);
     let mut normals = vec![nalgebra::Vector3::zeros(); smooth.len()];
     for column in reach..window.n_columns.saturating_sub(reach) {
-        let (sin_az, cos_az) = window.nominal(column as f64, 0.0).azimuth.sin_cos();
         for row in reach..n_rows.saturating_sub(reach) {
             let index = column * n_rows + row;
             if !usable[index] {
@@ -122,17 +118,12 @@ pub(super) fn normals(
             }
             let slope = |stride: usize| slope(smooth, usable, index, stride, reach);
             let (Some(q_down), Some(q_next)) = (slope(1), slope(n_rows)) else { continue };
-            let (sin_el, cos_el) = window.nominal(0.0, row as f64).elevation.sin_cos();
-            let q = f64::from(smooth[index]);
-            let q_el = -f64::from(q_down) / header.elevation_step;
-            let q_az = f64::from(q_next) / (header.azimuth_step * cos_el);
-            let outward = q * cos_el - q_el * sin_el;
-            let gradient = Vec3::new(
-                outward * cos_az - q_az * sin_az,
-                outward * sin_az + q_az * cos_az,
-                q * sin_el + q_el * cos_el,
+            let normal = window.nominal(column, row).normal(
+                f64::from(smooth[index]),
+                per_azimuth * f64::from(q_next),
+                per_elevation * f64::from(q_down),
             );
-            normals[index] = (-gradient.normalize()).cast();
+            normals[index] = normal.unwrap_or_default().cast();
         }
     }
     normals

@@ -56,14 +56,9 @@ fn widen(mask: &[bool], n_rows: usize, by: usize) -> Vec<bool> {
         let mut wide = mask.to_vec();
         for k in 1..=by {
             let shift = k * stride;
-            if shift < mask.len() {
-                for i in shift..mask.len() {
-                    wide[i] |= mask[i - shift];
-                }
-                for i in 0..mask.len() - shift {
-                    wide[i] |= mask[i + shift];
-                }
-            }
+            let shift = shift.min(mask.len());
+            wide[shift..].iter_mut().zip(mask).for_each(|(wide, set)| *wide |= *set);
+            wide.iter_mut().zip(&mask[shift..]).for_each(|(wide, set)| *wide |= *set);
         }
         wide
     };
@@ -123,7 +118,8 @@ pub(super) fn grow_back(
     let mut trusted = core.clone();
     let mut judged = core.clone();
     let mut face = core;
-    let mut ring: Vec<usize> = (0..face.len()).filter(|&i| face[i]).collect();
+    let at_rim = |i: &usize| face[*i] && neighbours(*i, n_rows, face.len()).any(|next| !face[next]);
+    let mut ring: Vec<usize> = (0..face.len()).filter(at_rim).collect();
     while !ring.is_empty() {
         let mut by_tile: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
         for (at, next) in
@@ -166,11 +162,11 @@ fn is_other_face(normals: &[Vector3<f32>], cell: usize, core: usize) -> bool {
 /// first row is within the noise is not so as a row.
 fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) -> Vec<usize> {
     let residuals = cells.iter().filter_map(|&cell| {
-        let (x, y) = window.place(cell);
+        let (x, y) = window.place_of(cell);
         let predicted = fit.at(window, x, y)?;
         let sigma = f64::from(noise.at(cell));
         let residual = (f64::from(window.cells[cell].range_m) - predicted.range) / sigma;
-        let known = predicted.leverage.min(MOST_LEVERAGE);
+        let known = fit.leverage(x, y).min(MOST_LEVERAGE);
         let within = residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt();
         within.then_some((cell, residual, known))
     });

@@ -1,9 +1,10 @@
 //! A component of the lattice and what lies right around it, as a dense grid.
 
-use platen_scan::{Direction, ScanHeader};
+use platen_scan::ScanHeader;
 
 use super::columns::{Cell, Columns, MARGIN, union};
 use super::regions::{Regions, Run};
+use super::sight::{Sight, Turn};
 use crate::Vec3;
 
 /// Cells of one or more components with a margin, column after column: index `column * n_rows + row`, both counted from
@@ -21,6 +22,11 @@ pub(super) struct Window {
     /// Cells of the component.
     pub(super) own: Vec<bool>,
     pub(super) header: ScanHeader,
+    /// Nominal azimuth of each column and elevation of each row.
+    azimuths: Vec<Turn>,
+    elevations: Vec<Turn>,
+    /// One over the steps of azimuth and elevation.
+    per_step: (f64, f64),
 }
 
 impl Window {
@@ -42,6 +48,13 @@ impl Window {
             inverse: vec![0.0; n],
             own: vec![false; n],
             header: header.clone(),
+            per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
+            azimuths: (first_column..end_column)
+                .map(|i| Turn::of(header.azimuth_start + header.azimuth_step * f64::from(i)))
+                .collect(),
+            elevations: (first_row..end_row)
+                .map(|i| Turn::of(header.elevation_start - header.elevation_step * f64::from(i)))
+                .collect(),
         };
         let own: Vec<Vec<Run>> = (first_column..end_column)
             .map(|index| regions.runs_of(roots, columns.get(index).map_or(0..0, |c| c.runs.clone())))
@@ -90,39 +103,45 @@ impl Window {
         }
     }
 
-    /// Direction of a place in the window, in cells and parts of cells, on the nominal lattice.
-    pub(super) fn nominal(&self, column: f64, row: f64) -> Direction {
-        Direction {
-            azimuth: self.header.azimuth_start
-                + self.header.azimuth_step * (f64::from(self.first_column) + column),
-            elevation: self.header.elevation_start
-                - self.header.elevation_step * (f64::from(self.first_row) + row),
+    /// Nominal direction of a cell.
+    #[inline]
+    pub(super) fn nominal(&self, column: usize, row: usize) -> Sight {
+        Sight { azimuth: self.azimuths[column], elevation: self.elevations[row] }
+    }
+
+    /// Direction of a place in or near the window, in cells and parts of cells, on the nominal lattice.
+    pub(super) fn sight(&self, column: f64, row: f64) -> Sight {
+        let nearest = |x: f64, n: usize| ((x + 0.5).max(0.0) as usize).min(n - 1);
+        let (i, k) = (nearest(column, self.n_columns), nearest(row, self.n_rows));
+        Sight {
+            azimuth: self.azimuths[i].by((column - i as f64) * self.header.azimuth_step),
+            elevation: self.elevations[k].by((k as f64 - row) * self.header.elevation_step),
         }
     }
 
     /// True direction of a cell in cells and parts of cells, as (column, row).
     #[inline]
-    pub(super) fn place(&self, index: usize) -> (f64, f64) {
-        let (column, row) = (index / self.n_rows, index % self.n_rows);
-        let cell = &self.cells[index];
+    pub(super) fn place(&self, column: usize, row: usize) -> (f64, f64) {
+        let cell = &self.cells[column * self.n_rows + row];
         (
-            column as f64 + f64::from(cell.azimuth_off) / self.header.azimuth_step,
-            row as f64 - f64::from(cell.elevation_off) / self.header.elevation_step,
+            column as f64 + f64::from(cell.azimuth_off) * self.per_step.0,
+            row as f64 - f64::from(cell.elevation_off) * self.per_step.1,
         )
     }
 
-    /// True direction of a cell.
-    pub(super) fn direction(&self, index: usize) -> Direction {
-        let nominal = self.nominal((index / self.n_rows) as f64, (index % self.n_rows) as f64);
-        let cell = &self.cells[index];
-        Direction {
-            azimuth: nominal.azimuth + f64::from(cell.azimuth_off),
-            elevation: nominal.elevation + f64::from(cell.elevation_off),
-        }
+    /// The same of a cell by its index.
+    pub(super) fn place_of(&self, index: usize) -> (f64, f64) {
+        self.place(index / self.n_rows, index % self.n_rows)
     }
 
     /// Position of a valid cell, metres.
     pub(super) fn point(&self, index: usize) -> Vec3 {
-        Vec3::from(self.direction(index).unit()) * f64::from(self.cells[index].range_m)
+        let cell = &self.cells[index];
+        let nominal = self.nominal(index / self.n_rows, index % self.n_rows);
+        let sight = Sight {
+            azimuth: nominal.azimuth.by(f64::from(cell.azimuth_off)),
+            elevation: nominal.elevation.by(f64::from(cell.elevation_off)),
+        };
+        sight.unit() * f64::from(cell.range_m)
     }
 }

@@ -7,7 +7,7 @@
 use super::Quality;
 use crate::mesh::foot::walk;
 use crate::mesh::{Face, biweight, sigma_across};
-use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
+use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Spans, Surface, Undetermined};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend.
@@ -37,8 +37,8 @@ pub(super) fn settle(
     let mut fit = Fit::<3>::new(Axis::of_length(spec.width, SPAN), Axis::of_length(spec.height, SPAN));
     let mut seen = Seen::new(spec);
     let mut variance = 0.0;
-    walk(&face.face, patch.samples.iter(), |sample, foot| {
-        let [u, v] = carried.point(foot.at[0], foot.at[1]);
+    walk(&Spans::of(&carried), patch.samples.iter(), |sample, foot| {
+        let [.., u, v] = foot.value;
         let sigma = face.noise_scale * sigma_across(sample, &foot.normal);
         let weight = biweight(foot.height / sigma) / (sigma * sigma);
         let mid = sample.point - foot.normal * (0.5 * spec.thickness) - middle;
@@ -60,8 +60,9 @@ pub(super) fn settle(
     Ok(Settled { surface, quality })
 }
 
-/// The chart as a spline over (a, b): least squares on the vertices, with a penalty that acts below three spans only.
-fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<2>, Undetermined> {
+/// The face over (a, b) and with it the chart, (x, y, z, 0, u, v): the latter by least squares on the vertices, with a
+/// penalty that acts below three spans only.
+fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<6>, Undetermined> {
     let (a, b) = (face.mid.u, face.mid.v);
     let mut fit = Fit::<2>::new(a, b);
     for ([x, y], uv) in places.iter().zip(&chart.uv) {
@@ -69,7 +70,10 @@ fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<2>, Unde
     }
     let density = places.len() as f64 / (a.end() * b.end());
     let weight = |step: f64| density * (3.0 * step / std::f64::consts::TAU).powi(6);
-    Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net)
+    let uv = fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net;
+    let control =
+        face.face.control.iter().zip(&uv.control).map(|([x, y, z], [u, v])| [*x, *y, *z, 0.0, *u, *v]);
+    Ok(Net { u: a, v: b, control: control.collect() })
 }
 
 /// Mean normal of the plate: at right angles to both diagonals.

@@ -9,7 +9,7 @@
 use super::MeshError;
 use super::edges::coons;
 use super::foot::walk;
-use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
+use crate::surface::{Axis, Fit, Fitted, Net, Spans, Undetermined};
 use crate::{Outline, Patch, PlateSpec, Sample, Vec3};
 
 /// Length of a span of the smooth face, metres. Bends of a press are three and more times as wide; finer detail is left
@@ -59,7 +59,7 @@ impl Face {
 
 /// Standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
 pub(crate) fn sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
-    let cosine = sample.point.normalize().dot(normal).abs();
+    let cosine = sample.point.dot(normal).abs() / sample.point.norm();
     f64::from(sample.sigma) * cosine.max(LEAST_COSINE)
 }
 
@@ -93,7 +93,7 @@ impl Heights {
         let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
         let thinned = patch.samples.iter().filter(|s| s.column % every == 0 && s.row % every == 0);
         let mut out = Self { places: Vec::new(), heights: Vec::new(), sigmas: Vec::new() };
-        walk(base, thinned, |sample, foot| {
+        walk(&Spans::of(base), thinned, |sample, foot| {
             out.places.push(foot.at);
             out.heights.push(foot.height);
             out.sigmas.push(sigma_across(sample, &foot.normal));

@@ -1,13 +1,15 @@
 //! Foot points: the place on a surface that is nearest to a point in space.
 
 use crate::Vec3;
-use crate::surface::{Axis, Net};
+use crate::surface::{Axis, Spans};
 
-/// The place of a point over a surface.
+/// The place of a point over a surface: the first three components of a net, which may carry more.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Foot {
+pub(crate) struct Foot<const D: usize> {
     /// Coordinates of the foot.
     pub(crate) at: [f64; 2],
+    /// The net in the foot.
+    pub(crate) value: [f64; D],
     /// Unit normal in the foot, along p_u x p_v.
     pub(crate) normal: Vec3,
     /// Height of the point over the surface, along the normal, metres.
@@ -26,21 +28,25 @@ const COARSE: usize = 24;
 
 /// A place of a surface with its tangents, ready for steps from it.
 #[derive(Clone, Copy)]
-struct Tangent {
+struct Tangent<const D: usize> {
     at: [f64; 2],
+    /// The net and its derivatives.
+    frame: [[f64; D]; 3],
+    /// The first three components of those.
     point: Vec3,
     along: [Vec3; 2],
     /// Inverse of the metric (e, f; f, g): g, -f and e over its determinant.
     inverse: [f64; 3],
 }
 
-impl Tangent {
-    fn of(net: &Net<3>, at: [f64; 2]) -> Self {
-        let [point, along_u, along_v] = net.frame(at[0], at[1]).map(Vec3::from);
+impl<const D: usize> Tangent<D> {
+    fn of(spans: &Spans<D>, at: [f64; 2]) -> Self {
+        let frame = spans.frame(at[0], at[1]);
+        let [point, along_u, along_v] = frame.map(|c| Vec3::new(c[0], c[1], c[2]));
         let (e, f, g) = (along_u.norm_squared(), along_u.dot(&along_v), along_v.norm_squared());
-        let determinant = e * g - f * f;
-        let inverse = [g / determinant, -f / determinant, e / determinant];
-        Self { at, point, along: [along_u, along_v], inverse }
+        let per_area = 1.0 / (e * g - f * f);
+        let inverse = [g * per_area, -f * per_area, e * per_area];
+        Self { at, frame, point, along: [along_u, along_v], inverse }
     }
 
     /// From here to the foot of `p` on the tangent plane; not finite where the surface is degenerate.
@@ -49,42 +55,41 @@ impl Tangent {
         let (x, y) = (self.along[0].dot(&d), self.along[1].dot(&d));
         [self.inverse[0] * x + self.inverse[1] * y, self.inverse[1] * x + self.inverse[2] * y]
     }
+
+    /// The foot of `p` after a last, small step from here.
+    fn foot(&self, p: &Vec3, at: [f64; 2], [du, dv]: [f64; 2]) -> Foot<D> {
+        let [value, along_u, along_v] = &self.frame;
+        let across = self.along[0].cross(&self.along[1]);
+        let normal = across * (1.0 / across.norm());
+        Foot {
+            at,
+            value: std::array::from_fn(|d| value[d] + du * along_u[d] + dv * along_v[d]),
+            normal,
+            height: normal.dot(&(p - self.point)),
+        }
+    }
 }
 
 /// Finds feet one after the other; each search starts at the one before.
-pub(crate) struct FootFinder<'a> {
-    net: &'a Net<3>,
-    last: Option<Tangent>,
+pub(crate) struct FootFinder<'a, const D: usize> {
+    spans: &'a Spans<D>,
+    last: Option<Tangent<D>>,
 }
 
-impl<'a> FootFinder<'a> {
-    pub(crate) fn new(net: &'a Net<3>) -> Self {
-        Self { net, last: None }
+impl<'a, const D: usize> FootFinder<'a, D> {
+    pub(crate) fn new(spans: &'a Spans<D>) -> Self {
+        Self { spans, last: None }
     }
 
     /// The foot of `p`: Gauss-Newton, which converges at a rate of height times curvature. `None` beyond the margin.
-    pub(crate) fn find(&mut self, p: &Vec3) -> Option<Foot> {
-        let near = self.last.and_then(|start| self.descend(p, start));
-        let (foot, tangent) = near.or_else(|| self.descend(p, Tangent::of(self.net, self.coarse(p))))?;
-        self.last = Some(tangent);
-        Some(foot)
-    }
-
-    fn descend(&self, p: &Vec3, mut tangent: Tangent) -> Option<(Foot, Tangent)> {
-        let (u, v) = (&self.net.u, &self.net.v);
-        let within = |x: f64, axis: &Axis| x.clamp(axis.start() - MARGIN, axis.end() + MARGIN);
-        for _ in 0..MAX_STEPS {
-            let [du, dv] = tangent.step(p);
-            let to = [tangent.at[0] + du, tangent.at[1] + dv];
-            let inside = [within(to[0], u), within(to[1], v)];
-            if du * du + dv * dv < SMALL_STEP * SMALL_STEP {
-                let normal = tangent.along[0].cross(&tangent.along[1]).normalize();
-                let foot = Foot { at: to, normal, height: normal.dot(&(p - tangent.point)) };
-                return (to == inside).then_some((foot, tangent));
-            }
-            tangent = Tangent::of(self.net, inside);
+    pub(crate) fn find(&mut self, p: &Vec3) -> Option<Foot<D>> {
+        if let Some(foot) = self.last.as_mut().and_then(|last| descend(self.spans, p, last)) {
+            return Some(foot);
         }
-        None
+        let mut start = Tangent::of(self.spans, self.coarse(p));
+        let foot = descend(self.spans, p, &mut start)?;
+        self.last = Some(start);
+        Some(foot)
     }
 
     /// The nearest of a coarse grid of places.
@@ -94,8 +99,8 @@ impl<'a> FootFinder<'a> {
         };
         let mut best = ([0.0; 2], f64::INFINITY);
         for k in 0..COARSE * COARSE {
-            let at = [place(&self.net.u, k % COARSE), place(&self.net.v, k / COARSE)];
-            let distance = (Vec3::from(self.net.point(at[0], at[1])) - p).norm_squared();
+            let at = [place(&self.spans.u, k % COARSE), place(&self.spans.v, k / COARSE)];
+            let distance = (Tangent::of(self.spans, at).point - p).norm_squared();
             if distance < best.1 {
                 best = (at, distance);
             }
@@ -104,15 +109,30 @@ impl<'a> FootFinder<'a> {
     }
 }
 
+/// Moves `tangent` to the foot of `p`. `None` beyond the margin.
+fn descend<const D: usize>(spans: &Spans<D>, p: &Vec3, tangent: &mut Tangent<D>) -> Option<Foot<D>> {
+    let within = |x: f64, axis: &Axis| x.clamp(axis.start() - MARGIN, axis.end() + MARGIN);
+    for _ in 0..MAX_STEPS {
+        let step = tangent.step(p);
+        let to = [tangent.at[0] + step[0], tangent.at[1] + step[1]];
+        let inside = [within(to[0], &spans.u), within(to[1], &spans.v)];
+        if step[0] * step[0] + step[1] * step[1] < SMALL_STEP * SMALL_STEP {
+            return (to == inside).then(|| tangent.foot(p, to, step));
+        }
+        *tangent = Tangent::of(spans, inside);
+    }
+    None
+}
+
 /// Visits samples in lattice order with the feet found so far: within a column from sample to sample, at a new column
 /// from the first foot of the column before.
-pub(crate) fn walk<'s>(
-    net: &Net<3>,
+pub(crate) fn walk<'s, const D: usize>(
+    spans: &Spans<D>,
     samples: impl Iterator<Item = &'s crate::Sample>,
-    mut visit: impl FnMut(&'s crate::Sample, Foot),
+    mut visit: impl FnMut(&'s crate::Sample, &Foot<D>),
 ) {
-    let mut finder = FootFinder::new(net);
-    let mut column_start: Option<(u32, Tangent)> = None;
+    let mut finder = FootFinder::new(spans);
+    let mut column_start: Option<(u32, Tangent<D>)> = None;
     for sample in samples {
         let new_column = column_start.is_none_or(|(column, _)| column != sample.column);
         if let (true, Some((_, start))) = (new_column, column_start) {
@@ -122,7 +142,7 @@ pub(crate) fn walk<'s>(
             if let (true, Some(start)) = (new_column, finder.last) {
                 column_start = Some((sample.column, start));
             }
-            visit(sample, foot);
+            visit(sample, &foot);
         }
     }
 }
@@ -130,6 +150,7 @@ pub(crate) fn walk<'s>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Net;
 
     #[test]
     fn feet_on_a_cylinder_are_the_closed_form() {
@@ -137,7 +158,8 @@ mod tests {
         let r = 5.0;
         let point = |u: f64, v: f64| [r * (u / r).sin(), v, r * (1.0 - (u / r).cos())];
         let net = Net::approximate(axes[0], axes[1], point);
-        let mut finder = FootFinder::new(&net);
+        let spans = Spans::of(&net);
+        let mut finder = FootFinder::new(&spans);
         for k in 0..200 {
             let (u, v, h) =
                 (4.0 * f64::from(k) / 199.0, 2.0 * f64::from(k % 7) / 6.0, 0.01 * f64::from(k % 5));

@@ -12,6 +12,9 @@ type Cell = u32;
 const SIDE: u32 = 5;
 const DIAGONAL: u32 = 7;
 
+/// A lattice square with all four cells.
+const ALL: u8 = 0b1111;
+
 /// The cells of the face in their bounding rectangle, one empty column and row around them; index
 /// `column * n_rows + row`. Cells that something hides, or that did not return, between two cells of the face belong
 /// to it; holes in the plate do not.
@@ -82,51 +85,64 @@ impl Grid {
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
             ends[crossing.sample as usize][side(crossing.step)] = true;
         }
-        let mut filled = Vec::new();
-        for column in 0..self.n_columns {
-            let line = (0..self.n_rows).map(|row| column * self.n_rows + row);
-            gaps(line, &self.sample, |a, b| !ends[a][side([0, 1])] && !ends[b][side([0, -1])], &mut filled);
+        let goes_on = |from: u32, to: u32, step: [i8; 2]| {
+            let ends = |number: u32, step: [i8; 2]| ends[number as usize - 1][side(step)];
+            !ends(from, step) && !ends(to, step.map(|s| -s))
+        };
+        // The last cell with a sample on this column and on each row; the border has none.
+        let mut on_row = vec![0; self.n_rows];
+        for column in 1..self.n_columns - 1 {
+            let mut on_column = 0;
+            for (row, on_row) in on_row.iter_mut().enumerate() {
+                let cell = column * self.n_rows + row;
+                let here = self.sample[cell];
+                if here == 0 {
+                    continue;
+                }
+                for (last, stride, step) in [(on_column, 1, [0, 1]), (*on_row, self.n_rows, [1, 0])] {
+                    if last != 0 && cell - last > stride && goes_on(self.sample[last], here, step) {
+                        (last + stride..cell).step_by(stride).for_each(|gap| self.inside[gap] = true);
+                    }
+                }
+                (on_column, *on_row) = (cell, cell);
+            }
         }
-        for row in 0..self.n_rows {
-            let line = (0..self.n_columns).map(|column| column * self.n_rows + row);
-            gaps(line, &self.sample, |a, b| !ends[a][side([1, 0])] && !ends[b][side([-1, 0])], &mut filled);
-        }
-        for cell in filled {
-            self.inside[cell] = true;
-        }
+    }
+
+    /// Lattice squares by their corner at the least column and row, the four cells of each as bits: itself, below, next
+    /// below, next. 0 where fewer than three are inside: no triangle covers the square.
+    fn squares(&self) -> Vec<u8> {
+        let (inside, n_rows) = (&self.inside, self.n_rows);
+        let (below, next_below, next) = (&inside[1..], &inside[n_rows + 1..], &inside[n_rows..]);
+        let corners = inside.iter().zip(below).zip(next_below.iter().zip(next));
+        let bits = corners
+            .map(|((a, b), (c, d))| u8::from(*a) | u8::from(*b) << 1 | u8::from(*c) << 2 | u8::from(*d) << 3);
+        bits.map(|bits| if bits.count_ones() >= 3 { bits } else { 0 }).collect()
     }
 
     /// Edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives two
     /// triangles, one with three cells gives one.
     fn boundary_edges(&self) -> Vec<(Cell, Cell)> {
-        let n_rows = self.n_rows;
-        // Corners of the square below and behind a cell: itself, below, next below, next.
-        let corners = |at: usize| [at, at + 1, at + n_rows + 1, at + n_rows];
-        let covered = |at: usize| {
-            let inside = corners(at).map(|c| self.inside[c]);
-            (inside.iter().filter(|i| **i).count() >= 3).then_some(inside)
-        };
+        let (n_rows, squares) = (self.n_rows, self.squares());
         let mut edges = Vec::new();
         let mut add = |a: usize, b: usize| edges.push((a.min(b) as Cell, a.max(b) as Cell));
-        for column in 0..self.n_columns - 1 {
-            for row in 0..n_rows - 1 {
-                let at = column * n_rows + row;
-                let here = covered(at);
-                // The edges down and across from `at`, each shared with the square before it.
-                let before = if column > 0 { covered(at - n_rows) } else { None };
-                let above = if row > 0 { covered(at - 1) } else { None };
-                let down = (here.is_some_and(|i| i[0] && i[1]), before.is_some_and(|i| i[3] && i[2]));
-                let across = (here.is_some_and(|i| i[0] && i[3]), above.is_some_and(|i| i[1] && i[2]));
-                if down.0 != down.1 {
-                    add(at, at + 1);
-                }
-                if across.0 != across.1 {
-                    add(at, at + n_rows);
-                }
-                if let Some(missing) = here.and_then(|i| i.iter().position(|inside| !inside)) {
-                    let square = corners(at);
-                    add(square[(missing + 1) % 4], square[(missing + 3) % 4]);
-                }
+        for (at, &here) in squares.iter().enumerate().skip(n_rows) {
+            let (before, above) = (squares[at - n_rows], squares[at - 1]);
+            if here == before && here == above && (here == 0 || here == ALL) {
+                continue;
+            }
+            // The edges down and across from `at`, each shared with the square before it.
+            let has = |square: u8, edge: u8| square & edge == edge;
+            if has(here, 0b0011) != has(before, 0b1100) {
+                add(at, at + 1);
+            }
+            if has(here, 0b1001) != has(above, 0b0110) {
+                add(at, at + n_rows);
+            }
+            if here != 0 && here != ALL {
+                let missing = here.trailing_ones() as usize;
+                let square = [at, at + 1, at + n_rows + 1, at + n_rows];
+                add(square[(missing + 1) % 4], square[(missing + 3) % 4]);
             }
         }
         edges
@@ -176,29 +192,6 @@ fn side(step: [i8; 2]) -> usize {
         [0, _] => 1,
         [-1, _] => 2,
         _ => 3,
-    }
-}
-
-/// Cells between consecutive samples of a line between which `open` (by their indices) says that the face goes on.
-fn gaps(
-    line: impl Iterator<Item = usize>,
-    sample: &[u32],
-    open: impl Fn(usize, usize) -> bool,
-    filled: &mut Vec<usize>,
-) {
-    let mut last: Option<usize> = None;
-    let mut between = Vec::new();
-    for cell in line {
-        match sample[cell].checked_sub(1) {
-            None => between.push(cell),
-            Some(here) => {
-                if last.is_some_and(|last| open(last, here as usize)) {
-                    filled.append(&mut between);
-                }
-                between.clear();
-                last = Some(here as usize);
-            }
-        }
     }
 }
 

@@ -140,26 +140,31 @@ pub(super) fn footprint<'a>(lines: impl Iterator<Item = &'a Line>, step: f64) ->
 /// The footprint at an edge that is known, near that of all edges: the one that best parts its mixed pixels from the
 /// sound ones.
 pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64, step: f64) -> f64 {
-    const TRIALS: i32 = 40;
+    /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
+    const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
+    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
+    const TOGETHER: usize = 16;
     let soft = SOFTNESS * step;
     let telling: Vec<(&Line, f64)> =
         lines.iter().filter(|l| l.tells_footprint()).map(|l| (l, edge(l.along))).collect();
+    let likelihood = |line: &Line, edge: f64, footprint: f64| {
+        let seen = footprint * line.per_radian;
+        let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / soft);
+        let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
+        line.mixed
+            .map_or(sound, |(low, high)| sound * (is_mixed(low) + STRAY_PART) * (is_mixed(high) + STRAY_PART))
+    };
     let fits = |footprint: f64| {
         let off = (footprint / all - 1.0) / FOOTPRINT_SPREAD;
-        let lines = telling.iter().map(|(line, edge)| {
-            let seen = footprint * line.per_radian;
-            let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / soft);
-            let sound = (1.0 - is_mixed(line.high)).ln() + (1.0 - is_mixed(line.low)).ln();
-            sound
-                + line.mixed.map_or(0.0, |(low, high)| {
-                    (is_mixed(low) + STRAY_PART).ln() + (is_mixed(high) + STRAY_PART).ln()
-                })
-        });
-        lines.sum::<f64>() - 0.5 * off * off
+        let together =
+            |lines: &[(&Line, f64)]| lines.iter().map(|(l, e)| likelihood(l, *e, footprint)).product::<f64>();
+        telling.chunks(TOGETHER).map(|lines| together(lines).ln()).sum::<f64>() - 0.5 * off * off
     };
-    let trial = |k: i32| all * (1.0 + 0.02 * f64::from(k));
-    let best = (-TRIALS..=TRIALS).map(|k| (fits(trial(k)), k)).max_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or(all, |(_, k)| trial(k))
+    SEARCH.iter().fold(all, |from, (steps, size)| {
+        let trials = (-steps..=*steps).map(|k| from + all * size * f64::from(k));
+        let trials = trials.map(|footprint| (fits(footprint), footprint));
+        trials.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, footprint)| footprint)
+    })
 }
 
 /// Where a line says the edge is.
@@ -186,14 +191,17 @@ struct Bound {
 }
 
 impl Bound {
-    /// Logarithm of the likelihood of an edge by its distances inside of the two places, in units of softness, its
-    /// slope and the negative second derivative of its lower bound (expectation maximisation).
-    fn log_likelihood(sure: f64, likely: f64) -> (f64, f64, f64) {
-        let (a, b) = (log_normal_cdf(sure), log_normal_cdf(likely));
-        let (a_part, b_part) = (HIDDEN_PART * a.0.exp(), (1.0 - HIDDEN_PART) * b.0.exp());
+    /// Likelihood of an edge by its distances inside of the two places, in units of softness, the slope of its
+    /// logarithm and the negative second derivative of a lower bound of that (expectation maximisation).
+    fn likelihood(sure: f64, likely: f64) -> (f64, f64, f64) {
+        if sure.min(likely) > CERTAIN {
+            return (1.0, 0.0, 0.0);
+        }
+        let (a, b) = (normal(sure), normal(likely));
+        let (a_part, b_part) = (HIDDEN_PART * a.0, (1.0 - HIDDEN_PART) * b.0);
         let sum = (a_part + b_part).max(f64::MIN_POSITIVE);
         let (a_part, b_part) = (a_part / sum, b_part / sum);
-        (sum.ln(), a_part * a.1 + b_part * b.1, a_part * a.2 + b_part * b.2)
+        (sum, a_part * a.1 + b_part * b.1, a_part * a.2 + b_part * b.2)
     }
 }
 
@@ -214,18 +222,18 @@ impl Bracket {
     /// `least_soft` widens the bracket, to reach it from far away.
     pub(super) fn pull(&self, at: f64, least_soft: f64) -> (f64, f64) {
         let soft = self.soft.max(least_soft);
-        let (log_likelihood, slope, bend) = match self.evidence {
+        let (likelihood, slope, bend) = match self.evidence {
             Evidence::At(place) => {
                 let off = (place - at) / soft;
-                (-0.5 * off * off, off, 1.0)
+                ((-0.5 * off * off).exp(), off, 1.0)
             }
             Evidence::Between(above, below) => {
-                let a = Bound::log_likelihood((at - above.sure) / soft, (at - above.likely) / soft);
-                let b = Bound::log_likelihood((below.sure - at) / soft, (below.likely - at) / soft);
-                (a.0 + b.0, a.1 - b.1, a.2 + b.2)
+                let a = Bound::likelihood((at - above.sure) / soft, (at - above.likely) / soft);
+                let b = Bound::likelihood((below.sure - at) / soft, (below.likely - at) / soft);
+                (a.0 * b.0, a.1 - b.1, a.2 + b.2)
             }
         };
-        let mine = (1.0 - STRAY_PART) * log_likelihood.exp();
+        let mine = (1.0 - STRAY_PART) * likelihood;
         let belongs = mine / (mine + STRAY_PART * STRAY_LIKELIHOOD);
         // In the middle of a wide bracket nothing pulls: a small weight keeps the step finite.
         let bend = bend.max(1e-3);
@@ -241,28 +249,43 @@ impl Bracket {
     }
 }
 
-/// Logarithm of the normal distribution function, its slope and its negative second derivative.
-fn log_normal_cdf(z: f64) -> (f64, f64, f64) {
-    let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+/// Beyond so many standard deviations the distribution function is 0 or 1, to a hundred-millionth.
+const CERTAIN: f64 = 5.6;
+
+/// The normal distribution function, its logarithm's slope and negative second derivative.
+fn normal(z: f64) -> (f64, f64, f64) {
     // Below, the density by the series of Mills' ratio; its error there is below 1 in 500.
     const TAIL: f64 = -4.0;
-    let (log, slope) = if z < TAIL {
+    if z > CERTAIN {
+        return (1.0, 0.0, 0.0);
+    }
+    let bell = (-0.5 * z * z).exp();
+    let density = bell / (2.0 * std::f64::consts::PI).sqrt();
+    let (cdf, slope) = if z < TAIL {
         let slope = -z / (1.0 - 1.0 / (z * z) + 3.0 / z.powi(4));
-        (-0.5 * z * z - (slope * (2.0 * std::f64::consts::PI).sqrt()).ln(), slope)
+        (density / slope, slope)
     } else {
-        let cdf = normal_cdf(z);
-        (cdf.ln(), density / cdf)
+        let cdf = if z < 0.0 { upper_tail(-z, bell) } else { 1.0 - upper_tail(z, bell) };
+        (cdf, density / cdf)
     };
-    (log, slope, slope * (slope + z))
+    (cdf, slope, slope * (slope + z))
 }
 
-/// Abramowitz and Stegun 7.1.26, to 1.5e-7.
-fn normal_cdf(x: f64) -> f64 {
-    let z = x.abs() / std::f64::consts::SQRT_2;
-    let t = 1.0 / (1.0 + 0.327_591_1 * z);
+/// The normal distribution function.
+fn normal_cdf(z: f64) -> f64 {
+    if z.abs() > CERTAIN {
+        return f64::from(z > 0.0);
+    }
+    let tail = upper_tail(z.abs(), (-0.5 * z * z).exp());
+    if z < 0.0 { tail } else { 1.0 - tail }
+}
+
+/// One minus the normal distribution function at `z` of 0 or more, where `bell` is exp(-z^2 / 2): Abramowitz and
+/// Stegun 7.1.26, to 1.5e-7.
+fn upper_tail(z: f64, bell: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.327_591_1 / std::f64::consts::SQRT_2 * z);
     let series = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
-    let tail = t * series.iter().rev().fold(0.0, |sum, c| sum * t + c) * (-z * z).exp();
-    if x < 0.0 { 0.5 * tail } else { 1.0 - 0.5 * tail }
+    0.5 * series.iter().rev().fold(0.0, |sum, c| sum * t + c) * t * bell
 }
 
 #[cfg(test)]
@@ -273,13 +296,14 @@ mod tests {
     fn the_logarithm_and_its_derivatives_agree() {
         // ln of the distribution function at -5, 0 and 1.5, from tables.
         for (z, log) in [(-5.0, -15.064_998), (0.0, -std::f64::consts::LN_2), (1.5, -0.069_143)] {
-            assert!((log_normal_cdf(z).0 - log).abs() < 3e-3, "{z}: {}", log_normal_cdf(z).0);
+            assert!((normal(z).0.ln() - log).abs() < 3e-3, "{z}: {}", normal(z).0.ln());
         }
         for z in [-6.0, -3.0, -0.7, 0.4, 2.0] {
             let h = 1e-3;
-            let (below, above) = (log_normal_cdf(z - h), log_normal_cdf(z + h));
-            assert!(((above.0 - below.0) / (2.0 * h) - log_normal_cdf(z).1).abs() < 0.02);
-            assert!((-(above.1 - below.1) / (2.0 * h) - log_normal_cdf(z).2).abs() < 0.05);
+            let (below, above) = (normal(z - h), normal(z + h));
+            assert!(((above.0 / below.0).ln() / (2.0 * h) - normal(z).1).abs() < 0.02);
+            assert!((-(above.1 - below.1) / (2.0 * h) - normal(z).2).abs() < 0.05);
+            assert!((normal(z).0 - normal_cdf(z)).abs() < 2e-7);
         }
     }
 

@@ -166,35 +166,43 @@ impl<'a> Loop<'a> {
 
     /// Angle at a point between the points `reach` before and behind it; a right turn counts as none.
     fn angle(&self, at: usize, reach: f64) -> f64 {
-        let before = self.before(at, reach).last().copied().unwrap_or(self.points[at]) - self.points[at];
-        let after = self.after(at, reach).last().copied().unwrap_or(self.points[at]) - self.points[at];
+        let off =
+            |count: usize, stride: usize| self.points[(at + count * stride) % self.n()] - self.points[at];
+        let before = off(self.n_before(at, reach), self.n() - 1);
+        let after = off(self.n_after(at, reach), 1);
         if after.perp(&before) <= 0.0 { std::f64::consts::PI } else { before.angle(&after) }
     }
 
     /// Points from `at` backwards over `reach`, at least one.
     fn before(&self, at: usize, reach: f64) -> Vec<Vec2> {
-        self.walk(at, reach, self.n() - 1)
+        (1..=self.n_before(at, reach)).map(|k| self.points[(at + self.n() - k) % self.n()]).collect()
     }
 
     /// Points from `at` forwards over `reach`, at least one.
     fn after(&self, at: usize, reach: f64) -> Vec<Vec2> {
-        self.walk(at, reach, 1)
+        (1..=self.n_after(at, reach)).map(|k| self.points[(at + k) % self.n()]).collect()
     }
 
-    fn walk(&self, at: usize, reach: f64, stride: usize) -> Vec<Vec2> {
-        let whole = self.length[self.n()];
-        let mut walked = vec![];
-        let mut here = at;
-        for _ in 1..self.n() {
-            here = (here + stride) % self.n();
-            let way = (self.length[here] - self.length[at]).rem_euclid(whole);
-            let way = if stride == 1 { way } else { (whole - way).rem_euclid(whole) };
-            if way > reach && !walked.is_empty() {
-                break;
-            }
-            walked.push(self.points[here]);
-        }
-        walked
+    fn n_after(&self, at: usize, reach: f64) -> usize {
+        let (n, whole) = (self.n(), self.length[self.n()]);
+        let to = self.length[at] + reach;
+        let last = if to < whole {
+            self.length[..n].partition_point(|l| *l <= to) - 1
+        } else {
+            n - 1 + self.length[..n].partition_point(|l| *l <= to - whole)
+        };
+        (last - at).clamp(1, n - 1)
+    }
+
+    fn n_before(&self, at: usize, reach: f64) -> usize {
+        let (n, whole) = (self.n(), self.length[self.n()]);
+        let to = self.length[at] - reach;
+        let back = if to >= 0.0 {
+            at - self.length[..n].partition_point(|l| *l < to)
+        } else {
+            at + n - self.length[..n].partition_point(|l| *l < to + whole)
+        };
+        back.clamp(1, n - 1)
     }
 }
 

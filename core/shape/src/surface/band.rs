@@ -148,26 +148,41 @@ impl BandMatrix {
     fn factor_here(mut self) -> Result<BandFactor, NotPositive> {
         let (layout, m) = (self.layout, self.layout.block());
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(m, Par::Seq, Default::default()));
-        let mut work = Mat::<f64>::zeros(m, m);
         for row in 0..layout.n_rows() {
             for back in (0..=REACH.min(row)).rev() {
                 let column = row - back;
-                work.copy_from(view(&self.blocks[layout.range(row, back)], m));
+                // Blocks of earlier rows lie before this one, those of this row farther back behind it.
+                let here = layout.range(row, back);
+                let (before, rest) = self.blocks.split_at_mut(here.start);
+                let (target, after) = rest.split_at_mut(here.len());
+                let mut target = view_mut(target, m);
+                let behind = |k: usize| {
+                    let range = layout.range(row, row - k);
+                    view(&after[range.start - here.end..range.end - here.end], m)
+                };
                 for k in row.saturating_sub(REACH)..column {
-                    let left = view(&self.blocks[layout.range(row, row - k)], m);
-                    let right = view(&self.blocks[layout.range(column, column - k)], m);
-                    matmul(work.as_mut(), Accum::Add, left, right.transpose(), -1.0, Par::Seq);
+                    let right = if back == 0 {
+                        behind(k)
+                    } else {
+                        view(&before[layout.range(column, column - k)], m)
+                    };
+                    matmul(target.as_mut(), Accum::Add, behind(k), right.transpose(), -1.0, Par::Seq);
                 }
                 if back == 0 {
                     let stack = MemStack::new(&mut memory);
-                    cholesky_in_place(work.as_mut(), Default::default(), Par::Seq, stack, Default::default())
-                        .map_err(|_| NotPositive)?;
-                    (0..m).for_each(|c| work.col_mut(c).subrows_mut(0, c).fill(0.0));
+                    cholesky_in_place(
+                        target.as_mut(),
+                        Default::default(),
+                        Par::Seq,
+                        stack,
+                        Default::default(),
+                    )
+                    .map_err(|_| NotPositive)?;
+                    (0..m).for_each(|c| target.as_mut().col_mut(c).subrows_mut(0, c).fill(0.0));
                 } else {
-                    let diagonal = view(&self.blocks[layout.range(column, 0)], m);
-                    solve_lower_triangular_in_place(diagonal, work.as_mut().transpose_mut(), Par::Seq);
+                    let diagonal = view(&before[layout.range(column, 0)], m);
+                    solve_lower_triangular_in_place(diagonal, target.transpose_mut(), Par::Seq);
                 }
-                view_mut(&mut self.blocks[layout.range(row, back)], m).copy_from(&work);
             }
         }
         if self.blocks.iter().any(|x| !x.is_finite()) {

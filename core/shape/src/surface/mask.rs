@@ -3,10 +3,10 @@
 /// Cells of the original rectangle, and whether samples lie in them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mask {
-    width: f64,
-    height: f64,
     n_u: usize,
     n_v: usize,
+    /// Cells per metre along u and along v.
+    per_metre: [f64; 2],
     seen: Vec<bool>,
 }
 
@@ -16,7 +16,7 @@ impl Mask {
     pub fn unseen(width: f64, height: f64, cell: f64) -> Self {
         let count = |length: f64| ((length / cell).ceil() as usize).clamp(1, 4096);
         let (n_u, n_v) = (count(width), count(height));
-        Self { width, height, n_u, n_v, seen: vec![false; n_u * n_v] }
+        Self::of(width, height, [n_u, n_v], vec![false; n_u * n_v])
     }
 
     /// A mask from its cells, v outer, u inner; `None` when their number does not fit.
@@ -24,7 +24,11 @@ impl Mask {
     pub fn from_cells(width: f64, height: f64, cells: [usize; 2], seen: Vec<bool>) -> Option<Self> {
         let [n_u, n_v] = cells;
         let fits = n_u > 0 && n_u.checked_mul(n_v) == Some(seen.len()) && !seen.is_empty();
-        fits.then_some(Self { width, height, n_u, n_v, seen })
+        fits.then(|| Self::of(width, height, cells, seen))
+    }
+
+    fn of(width: f64, height: f64, [n_u, n_v]: [usize; 2], seen: Vec<bool>) -> Self {
+        Self { n_u, n_v, per_metre: [n_u as f64 / width, n_v as f64 / height], seen }
     }
 
     /// Number of cells along u and along v.
@@ -59,9 +63,10 @@ impl Mask {
 
     /// Marks the cells between two neighbouring samples.
     pub fn mark_between(&mut self, from: [f64; 2], to: [f64; 2]) {
-        let cells = ((to[0] - from[0]) / self.width * self.n_u as f64)
-            .abs()
-            .max(((to[1] - from[1]) / self.height * self.n_v as f64).abs());
+        let cells = (0..2).map(|d| ((to[d] - from[d]) * self.per_metre[d]).abs()).fold(0.0, f64::max);
+        if cells <= 0.5 {
+            return;
+        }
         let n = (2.0 * cells).ceil().min(256.0) as usize;
         for k in 1..n {
             let f = k as f64 / n as f64;
@@ -70,8 +75,8 @@ impl Mask {
     }
 
     fn index(&self, u: f64, v: f64) -> usize {
-        let cell = |x: f64, length: f64, n: usize| ((x / length * n as f64).max(0.0) as usize).min(n - 1);
-        cell(v, self.height, self.n_v) * self.n_u + cell(u, self.width, self.n_u)
+        let cell = |x: f64, n: usize| (x.max(0.0) as usize).min(n - 1);
+        cell(v * self.per_metre[1], self.n_v) * self.n_u + cell(u * self.per_metre[0], self.n_u)
     }
 }
 

@@ -8,13 +8,16 @@ use super::axis::{Axis, BASIS, multiply, pairs};
 use super::band::BandMatrix;
 use super::net::Net;
 use super::smoothing::{GAUSS, GridValues};
+use super::spans::bicubic;
 use nalgebra::{Matrix4, Vector4};
 
 /// Weighted sums over the points of one cell.
 #[derive(Debug, Clone, Copy)]
 struct Cell<const D: usize> {
-    gram: [[f64; 7]; 7],
-    rhs: [[[f64; D]; 4]; 4],
+    /// Sum of w s^p t^q at `[q][p]`; one slot more than powers, for whole vector registers.
+    gram: [[f64; 8]; 7],
+    /// Sum of w s^p t^q y at `[q][component][p]`.
+    rhs: [[[f64; 4]; D]; 4],
     n_points: u32,
 }
 
@@ -29,8 +32,8 @@ impl<const D: usize> Cell<D> {
         let gram =
             Matrix4::from_fn(|a, b| self.gram[BILINEAR[a].1 + BILINEAR[b].1][BILINEAR[a].0 + BILINEAR[b].0]);
         let rhs = Vector4::from_fn(|a, _| {
-            let sums = &self.rhs[BILINEAR[a].1][BILINEAR[a].0];
-            sums.iter().zip(&direction).map(|(x, y)| x * y).sum()
+            let sums = &self.rhs[BILINEAR[a].1];
+            sums.iter().zip(&direction).map(|(x, y)| x[BILINEAR[a].0] * y).sum()
         });
         // Points spread over the whole cell give pivots down to 1/144 of their mass; a quarter of it will do.
         let cholesky = gram.cholesky()?;
@@ -55,7 +58,7 @@ pub(crate) struct Moments<const D: usize> {
 
 impl<const D: usize> Moments<D> {
     pub(crate) fn new(u: Axis, v: Axis) -> Self {
-        let empty = Cell { gram: [[0.0; 7]; 7], rhs: [[[0.0; D]; 4]; 4], n_points: 0 };
+        let empty = Cell { gram: [[0.0; 8]; 7], rhs: [[[0.0; 4]; D]; 4], n_points: 0 };
         Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, weight: 0.0, n_points: 0 }
     }
 
@@ -74,11 +77,11 @@ impl<const D: usize> Moments<D> {
                 *slot += f * sp;
             }
         }
-        for (row, tq) in cell.rhs.iter_mut().zip(q) {
-            for (slot, sp) in row.iter_mut().zip(p) {
-                let f = w * tq * sp;
-                for d in 0..D {
-                    slot[d] += f * y[d];
+        for (rows, tq) in cell.rhs.iter_mut().zip(q) {
+            for (row, y) in rows.iter_mut().zip(y) {
+                let f = w * tq * y;
+                for (slot, sp) in row.iter_mut().zip(p) {
+                    *slot += f * sp;
                 }
             }
         }
@@ -113,11 +116,11 @@ impl<const D: usize> Moments<D> {
         let mut sum = self.square;
         for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points > 0) {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
-            let polynomial = polynomial(net, i, k);
+            let polynomial = bicubic(net, i, k);
             for d in 0..D {
                 for (a, q) in (0..4).flat_map(|q| (0..4).map(move |p| (p, q))) {
                     // The polynomial's own image under the cell's moments, less twice the right-hand side.
-                    let mut image = -2.0 * cell.rhs[q][a][d];
+                    let mut image = -2.0 * cell.rhs[q][d][a];
                     for (row, moments) in polynomial.iter().zip(&cell.gram[q..]) {
                         image += row.iter().zip(&moments[a..]).map(|(c, m)| c[d] * m).sum::<f64>();
                     }
@@ -152,8 +155,8 @@ impl<const D: usize> Moments<D> {
             for (a, bu) in BASIS.iter().enumerate() {
                 let slot = &mut rhs[(k + b) * self.u.n_coefficients() + i + a];
                 for (fv, sums) in bv.iter().zip(&cell.rhs) {
-                    for (fu, sum) in bu.iter().zip(sums) {
-                        slot.iter_mut().zip(sum).for_each(|(x, y)| *x += fv * fu * y);
+                    for (x, sums) in slot.iter_mut().zip(sums) {
+                        *x += fv * bu.iter().zip(sums).map(|(fu, y)| fu * y).sum::<f64>();
                     }
                 }
             }
@@ -161,22 +164,7 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// The net's polynomial in a cell: `[q][p]` is the coefficient of s^p t^q.
-fn polynomial<const D: usize>(net: &Net<D>, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
-    let mut polynomial = [[[0.0; D]; 4]; 4];
-    for (b, bv) in BASIS.iter().enumerate() {
-        for (control, bu) in net.row(i, k + b).iter().zip(&BASIS) {
-            for (row, fv) in polynomial.iter_mut().zip(bv) {
-                for (slot, fu) in row.iter_mut().zip(bu) {
-                    slot.iter_mut().zip(control).for_each(|(x, c)| *x += fv * fu * c);
-                }
-            }
-        }
-    }
-    polynomial
-}
-
-fn powers(t: f64) -> [f64; 7] {
+fn powers(t: f64) -> [f64; 8] {
     let (t2, t3) = (t * t, t * t * t);
-    [1.0, t, t2, t3, t2 * t2, t2 * t3, t3 * t3]
+    [1.0, t, t2, t3, t2 * t2, t2 * t3, t3 * t3, 0.0]
 }

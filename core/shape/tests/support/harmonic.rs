@@ -1,0 +1,17 @@
+//! The paper's harmonic map, as a flattening without its plugin.
+
+#![allow(unreachable_pub, reason = "test code")]
+
+use platen_shape::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
+use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
+
+pub struct Harmonic;
+
+impl Flatten for Harmonic {
+    fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError> {
+        let refused = |message| FlattenError::Refused { message, hint: "a test's own fault".into() };
+        let uv = fixed_boundary(mesh, &cotangents(mesh), &boundary_by_arc_length(mesh))
+            .map_err(|e| refused(e.to_string()))?;
+        Ok(Chart { uv, ..Chart::default() })
+    }
+}
