@@ -9,6 +9,7 @@ mod archive;
 mod bench;
 mod figures;
 mod journal;
+mod region;
 mod status;
 mod surface_file;
 

@@ -48,6 +48,8 @@ pub struct Scanned {
     pub header: ScanHeader,
     /// Valid cells of the whole scan.
     pub n_valid: u64,
+    /// Columns before the laser was warm; they are not used.
+    pub warm_up_columns: u32,
     /// The plate's scanned face.
     pub patch: Patch,
     /// From the start to the last column.
@@ -142,7 +144,14 @@ pub fn scan(
     let acquired = Instant::now();
     extractor.leave_out_warm_up(end.warm_up_columns);
     let patch = extractor.finish()?;
-    Ok(Scanned { header, n_valid: end.points, patch, acquire: acquired - start, extract: acquired.elapsed() })
+    Ok(Scanned {
+        header,
+        n_valid: end.points,
+        warm_up_columns: end.warm_up_columns,
+        patch,
+        acquire: acquired - start,
+        extract: acquired.elapsed(),
+    })
 }
 
 /// The plate's shape, from its scanned face.

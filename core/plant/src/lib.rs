@@ -28,7 +28,7 @@ pub use fault::{Fault, Faults};
 pub use field::{Field, Located};
 pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options, deprecated_options};
-pub use plant::{PlantFile, PluginUse};
+pub use plant::{PlantFile, PluginUse, ScanWindow};
 pub use plate::PlateFile;
 pub use schema::{PLANT_SCHEMA, PLATE_SCHEMA, options_schema, plant_schema};
 pub use source::Place;

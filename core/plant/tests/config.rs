@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use platen_plant::plant::{KeepScans, RegionOfInterest};
 use platen_plant::plate::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
-use platen_plant::{PlantFile, PlateFile};
+use platen_plant::{PlantFile, PlateFile, ScanWindow};
 
 fn config() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config")
@@ -161,4 +161,21 @@ fn an_empty_plant_file_says_what_the_default_says() {
     assert!(PlantFile::parse("p.toml", "comparison = []").unwrap().comparisons.is_empty());
     let always = PlantFile::parse("p.toml", "[output]\nkeep_scans = 'always'").unwrap();
     assert_eq!(always.output.keep_scans, KeepScans::Always);
+}
+
+#[test]
+fn the_scan_window_is_one_of_three_words() {
+    let window = |word: &str| {
+        let text =
+            format!("[scanner]\nplugin = 'faro-stream'\nwindow = '{word}'\n[scanner.options]\nfree = 1");
+        PlantFile::parse("p.toml", &text).map(|plant| plant.scan_window).map_err(|faults| faults.to_string())
+    };
+    assert_eq!(window("everything"), Ok(ScanWindow::Everything));
+    assert_eq!(window("region"), Ok(ScanWindow::Region));
+    assert_eq!(PlantFile::parse("p.toml", "").unwrap().scan_window, ScanWindow::Plate);
+    let refused = window("all").unwrap_err();
+    assert!(
+        refused.starts_with("p.toml:3:10: scanner.window") && refused.contains("everything"),
+        "{refused}"
+    );
 }

@@ -22,6 +22,23 @@ const FLATTENING: &str = "elastic";
 /// Used where the plant file lists no comparison; `comparison = []` asks for none.
 const COMPARISONS: [&str; 2] = ["displacement", "template"];
 
+/// Words of `window` in `[scanner]`.
+const WINDOWS: [(&str, ScanWindow); 3] =
+    [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
+
+/// Which part of the dome is scanned, by a driver that plans its scans (one that estimates their time).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ScanWindow {
+    /// Where the last stroke's plate lay and some room round it; the region of interest for a new plate, and once more
+    /// for a plate that has moved out.
+    #[default]
+    Plate,
+    /// Always the region of interest.
+    Region,
+    /// What the driver scans by itself.
+    Everything,
+}
+
 /// A checked plant file, but for the options of its plugins: those wait for the plugins' own declarations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantFile {
@@ -33,6 +50,8 @@ pub struct PlantFile {
     pub press: Option<Press>,
     /// Where scans come from; needed to run, not to measure a file.
     pub scanner: Option<PluginUse>,
+    /// Which part of the dome it scans.
+    pub scan_window: ScanWindow,
     /// How the scanner stands to the press and the plate.
     pub frame: Frame,
     /// Folder of the plate files.
@@ -53,6 +72,7 @@ impl Default for PlantFile {
             seed: 1,
             press: None,
             scanner: None,
+            scan_window: ScanWindow::default(),
             frame: Frame::default(),
             plates: PathBuf::from("plates"),
             flattening: PluginUse::by_default(FLATTENING),
@@ -119,7 +139,9 @@ impl PlantFile {
             Ok((name?, seed?))
         });
         let scanner = root.table("scanner").optional();
-        let scanner = scanner.and_then(|table| table.map(PluginUse::read).transpose());
+        let window = |table: &mut Table<'_>| table.choice("window", &WINDOWS).or(default.scan_window);
+        let scanner =
+            scanner.and_then(|table| table.map(|table| PluginUse::read_with(table, window)).transpose());
         let press = root.table("press").optional();
         let press = press.and_then(|table| table.map(Press::read).transpose());
         let frame = root.section("frame").and_then(Frame::read);
@@ -139,11 +161,13 @@ impl PlantFile {
         root.finish();
 
         let (name, seed) = plant?;
+        let (scanner, scan_window) = scanner?.unzip();
         Ok(Self {
             name,
             seed,
             press: press?,
-            scanner: scanner?,
+            scanner,
+            scan_window: scan_window.unwrap_or(default.scan_window),
             frame: frame?,
             plates: folder.join(plates?),
             flattening: flattening?.unwrap_or(default.flattening),

@@ -21,14 +21,23 @@ impl PluginUse {
         Self { plugin: plugin.to_owned(), options: RawOptions::none(plugin), template: None }
     }
 
-    pub(super) fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+    pub(super) fn read(table: Table<'_>) -> Result<Self, Reported> {
+        Self::read_with(table, |_| Ok(())).map(|(plugin, ())| plugin)
+    }
+
+    /// A plugin in a table that holds further keys, which `more` reads.
+    pub(super) fn read_with<T>(
+        mut table: Table<'_>,
+        more: impl FnOnce(&mut Table<'_>) -> Result<T, Reported>,
+    ) -> Result<(Self, T), Reported> {
         let plugin = table.name("plugin").located().required();
         let options = table.options("options");
         let document = table.document();
+        let more = more(&mut table);
         table.finish();
         let Located { value: plugin, place } = plugin?;
         let template = Some(document.source().fault(&place, String::new()));
-        Ok(Self { plugin, options: options?, template })
+        Ok((Self { plugin, options: options?, template }, more?))
     }
 
     /// A fault of this choice of plugin, at its place in the plant file: it is not installed, or refuses.

@@ -234,7 +234,7 @@ impl Connection<'_> {
         match self.plan(wanted) {
             Ok(plan) => {
                 let w = plan.wanted;
-                let duration_s = self.shared.config.time_scale * plan.duration_s;
+                let duration_s = (self.shared.config.time_scale * plan.duration_s).max(plan.computing_s);
                 self.say(frame::CONFIGURED, 0, &json!({
                     "divisor": w.divisor, "rate_kpts": w.rate_kpts, "compression": w.compression, "window": w.window,
                     "duration_s": duration_s, "altered": plan.altered,

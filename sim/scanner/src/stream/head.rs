@@ -29,6 +29,8 @@ pub struct Plan {
     pub wanted: Wanted,
     /// From the command to a scan that no longer changes, seconds.
     pub duration_s: f64,
+    /// What the computer takes by itself, however fast the scanner's time runs, seconds.
+    pub computing_s: f64,
     /// What is not as asked for, and why.
     pub altered: Vec<String>,
 }
@@ -70,7 +72,7 @@ impl Recording {
 impl Head for Recording {
     fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
         let altered = vec![format!("a recording is replayed: {}", self.path.display())];
-        Ok(Plan { wanted: *wanted, duration_s: self.duration_s, altered })
+        Ok(Plan { wanted: *wanted, duration_s: self.duration_s, computing_s: 0.0, altered })
     }
 
     fn scan(&self, plan: &Plan, _: u32, out: &mut dyn Receiver) -> Result<u32, String> {

@@ -17,6 +17,9 @@ use super::payload::column_payload;
 /// Seeds of consecutive scans lie this far apart, so that no two bridges with neighbouring seeds share a scan.
 const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 
+/// Seconds that one core takes to cast one cell.
+const SECONDS_PER_CELL: f64 = 2e-6;
+
 /// Columns of each face that are cast before the other face's turn.
 const TURNS: u32 = 64;
 
@@ -110,13 +113,13 @@ fn device(wanted: &Wanted) -> Result<Device, String> {
     Device::new(wanted.divisor, wanted.rate_kpts, wanted.compression).map_err(|error| error.to_string())
 }
 
-/// Width of what is scanned, radians: of the window, or of a plate's surroundings, or all of it.
-fn width(wanted: &Wanted, margin: Option<f64>) -> f64 {
+/// Width and height of what is scanned, radians: of the window, or of a plate's surroundings, or all of it.
+fn extent(wanted: &Wanted, margin: Option<f64>) -> (f64, f64) {
     match (wanted.window, margin) {
-        (Some(window), _) => window.azimuth_width,
+        (Some(window), _) => (window.azimuth_width, window.elevation_max - window.elevation_min),
         // A plate of 5 m at 5 m distance.
-        (None, Some(margin)) => 1.0 + 2.0 * margin,
-        (None, None) => TAU,
+        (None, Some(margin)) => (1.0 + 2.0 * margin, 0.6 + 2.0 * margin),
+        (None, None) => (TAU, FRAC_PI_2 - LOWEST_DEG.to_radians()),
     }
 }
 
@@ -129,8 +132,10 @@ impl Head for Shop {
                 return Err("the window lies outside of what the scanner reaches, -62.5 to 90 degrees".into());
             }
         }
-        let duration_s = device.duration_s(width(wanted, self.margin));
-        Ok(Plan { wanted: *wanted, duration_s, altered: Vec::new() })
+        let (width, height) = extent(wanted, self.margin);
+        let computing_s = width * height / device.step().powi(2) * SECONDS_PER_CELL;
+        let duration_s = device.duration_s(width);
+        Ok(Plan { wanted: *wanted, duration_s, computing_s, altered: Vec::new() })
     }
 
     fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<u32, String> {
