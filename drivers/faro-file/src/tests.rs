@@ -2,6 +2,7 @@
 
 mod collect;
 mod damage;
+mod faults;
 mod formats;
 mod samples;
 mod speed;

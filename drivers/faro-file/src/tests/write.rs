@@ -98,17 +98,26 @@ fn value(record: &Record, value: f64) -> RecordValue {
 
 /// The lattice as an E57 file; `clouds` copies of it.
 pub(super) fn e57(style: E57Style, clouds: usize) -> Vec<u8> {
+    file_of(|writer| (0..clouds).for_each(|number| add_cloud(writer, style, number, None)))
+}
+
+/// The lattice as an E57 file whose point cloud has a description.
+pub(super) fn described(style: E57Style, description: &str) -> Vec<u8> {
+    file_of(|writer| add_cloud(writer, style, 0, Some(description.to_owned())))
+}
+
+type Writer<'a> = E57Writer<&'a mut Cursor<Vec<u8>>>;
+
+fn file_of(fill: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut file, "file").unwrap();
-    for number in 0..clouds {
-        add_cloud(&mut writer, style, number);
-    }
+    fill(&mut writer);
     writer.finalize().unwrap();
     drop(writer);
     file.into_inner()
 }
 
-fn add_cloud(writer: &mut E57Writer<&mut Cursor<Vec<u8>>>, style: E57Style, number: usize) {
+fn add_cloud(writer: &mut Writer<'_>, style: E57Style, number: usize, description: Option<String>) {
     use RecordName::*;
     let (names, state) = if style.spherical {
         ([SphericalRange, SphericalAzimuth, SphericalElevation], SphericalInvalidState)
@@ -125,6 +134,7 @@ fn add_cloud(writer: &mut E57Writer<&mut Cursor<Vec<u8>>>, style: E57Style, numb
         intensity_min: Some(RecordValue::Integer(0)),
         intensity_max: Some(RecordValue::Integer(2047)),
     }));
+    cloud.set_description(description);
     if style.posed {
         cloud.set_transform(Some(Transform {
             rotation: Quaternion { w: 0.5, x: 0.5, y: 0.5, z: 0.5 },

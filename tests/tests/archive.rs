@@ -1,0 +1,96 @@
+//! Scans that the host keeps: measured again they give the same result, and they go when they are old.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+mod cell;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use cell::{Host, Press, plant};
+use serde_json::Value as Json;
+
+fn runs(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder.join("results")).unwrap().flatten().map(|entry| entry.path());
+    let mut runs: Vec<PathBuf> = entries.filter(|path| path.is_dir()).collect();
+    runs.sort();
+    runs
+}
+
+fn load(path: &Path) -> Json {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+fn measured(scan: &Path, plant: &Path, more: &[(&str, &Path)]) -> Json {
+    let plate = platen_tests::repository().join("config/plates/plate-009.toml");
+    let mut command = platen_tests::program("platen");
+    command.arg("measure").arg(scan).arg("--plate").arg(plate).arg("--plant").arg(plant).arg("--json");
+    more.iter().for_each(|(flag, path)| {
+        command.arg(flag).arg(path);
+    });
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Takes away what another run cannot share: times, and the stroke's number.
+fn comparable(mut result: Json) -> Json {
+    let object = result.as_object_mut().unwrap();
+    object.remove("timings_ms").unwrap();
+    object.remove("stroke").unwrap();
+    result
+}
+
+#[test]
+fn a_kept_scan_measured_again_gives_the_same_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 2");
+    let plant =
+        plant(folder.path(), &press.modbus, &format!("cell = \"{}\"\nwarm_up_columns = 10", press.plate));
+    let mut host = Host::start(&plant);
+    press.wait_done();
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    let runs = runs(folder.path());
+    assert_eq!(runs.len(), 3, "the blank and two strokes");
+    let scan = |k: usize| runs[k].join("scan.e57");
+    let (blank, first) = (scan(0), scan(1));
+    for (k, more) in [
+        (0, vec![]),
+        (1, vec![("--before", blank.as_path()), ("--baseline", &blank)]),
+        (2, vec![("--before", first.as_path()), ("--baseline", &blank)]),
+    ] {
+        let then = comparable(load(&runs[k].join("result.json")));
+        let now = comparable(measured(&scan(k), &plant, &more));
+        for (name, value) in then.as_object().unwrap() {
+            assert_eq!(value, &now[name], "run {k}: {name}");
+        }
+    }
+
+    // The next host removes what is too old, and no other file.
+    let old = SystemTime::now() - Duration::from_secs(61 * 86_400);
+    for path in [&first, &runs[1].join("result.json")] {
+        std::fs::File::options().write(true).open(path).unwrap().set_modified(old).unwrap();
+    }
+    let text = std::fs::read_to_string(&plant).unwrap();
+    std::fs::write(&plant, format!("{text}keep_scans = \"60 d\"\n")).unwrap();
+    let mut host = Host::start(&plant);
+    cell::until("the old scan to go", || (!first.exists()).then_some(()));
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    assert!(blank.exists() && scan(2).exists() && runs[1].join("result.json").exists());
+}
+
+#[test]
+fn nothing_is_kept_when_the_plant_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 1");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let text = std::fs::read_to_string(&plant).unwrap();
+    std::fs::write(&plant, format!("{text}keep_scans = 0\n")).unwrap();
+    let mut host = Host::start(&plant);
+    press.wait_done();
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    assert!(
+        runs(folder.path())
+            .iter()
+            .all(|run| run.join("result.json").exists() && !run.join("scan.e57").exists())
+    );
+}
