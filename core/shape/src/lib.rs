@@ -7,9 +7,11 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+mod checks;
 pub mod evaluate;
 pub mod extract;
 pub mod flatten;
+mod forming;
 mod kernels;
 pub mod measure;
 pub mod mesh;
@@ -21,7 +23,9 @@ pub mod surface;
 mod target;
 pub mod task;
 
+pub use checks::{Check, EdgeCheck, ShapeChecks};
 pub use flatten::{Chart, Flatten, FlattenError};
+pub use forming::Forming;
 pub use measure::{MeasureError, Measurement, measure};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, Outline, OutlineError};

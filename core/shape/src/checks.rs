@@ -1,0 +1,315 @@
+//! What the shop measures with tape, square and sight line: edge lengths, diagonals, corner angles, twist.
+//!
+//! From the outline as it was seen, not from the rectangle it is mapped to: a cut blank is a few millimetres off its
+//! order, and these figures show it. Standard deviations follow from those of the corners, in the surface from the
+//! outline and across it from the fit; errors of different corners count as independent.
+
+use crate::outline::{Corner, EdgeCurve};
+use crate::{Outline, Surface, Vec3};
+
+/// Length of a square's arm, metres, or half the edge where that is shorter: corner angles are those between the lines
+/// that fit the edges there.
+const ARM: f64 = 1.0;
+
+/// The shop's figures of one plate. Edges in the order v = 0, u = W, v = H, u = 0; corners (0,0), (W,0), (W,H), (0,H).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeChecks {
+    /// The four edges.
+    pub edges: [EdgeCheck; 4],
+    /// Straight from corner to corner, as a stretched string: from (0,0) to (W,H), from (W,0) to (0,H). Metres.
+    pub diagonals: [Check; 2],
+    /// The first diagonal less the second, metres: 0 on a plate that is square.
+    pub diagonal_difference: Check,
+    /// Inner angles between the edges in the plate's own surface, radians.
+    pub angles: [Check; 4],
+    /// Looking along u, from u = 0 to u = W, and along v: how far the far edge is turned clockwise against the near one,
+    /// radians; 0 on a plate that lies flat on two winding sticks.
+    pub twist: [Check; 2],
+}
+
+/// A figure and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Check {
+    /// Metres or radians.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// False when it rests on a corner that was extrapolated.
+    pub seen: bool,
+}
+
+/// One edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeCheck {
+    /// A tape laid along the edge of the scanned face, metres.
+    pub face: Check,
+    /// The same on the mid-surface, which bending does not stretch: to be held against the cut size, metres.
+    pub mid: Check,
+    /// Straight from corner to corner, metres.
+    pub chord: Check,
+}
+
+impl ShapeChecks {
+    /// The figures of an outline; the surface tells normals and thickness.
+    #[must_use]
+    pub fn new(outline: &Outline, surface: &Surface) -> Self {
+        let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
+        let sigma = |u: f64, v: f64| surface.sigma_point(u * surface.width(), v * surface.height());
+        Self::with(outline, 0.5 * surface.thickness(), &normal, &sigma)
+    }
+
+    /// `normal` and `sigma`, the standard deviation along it, at shares of the plate's sides.
+    fn with(
+        outline: &Outline,
+        half_thickness: f64,
+        normal: &dyn Fn(f64, f64) -> Vec3,
+        sigma: &dyn Fn(f64, f64) -> f64,
+    ) -> Self {
+        let corners = [0, 1, 2, 3].map(|k| {
+            let [u, v] = CORNERS[k];
+            Known::new(outline, k, normal(u, v), sigma(u, v))
+        });
+        let straight = |from: usize, to: usize| {
+            let way = corners[to].at - corners[from].at;
+            let variance = corners[from].variance(way) + corners[to].variance(way);
+            check(way.norm(), variance, &[&corners[from], &corners[to]])
+        };
+        let edges = [0, 1, 2, 3].map(|k| {
+            let next = (k + 1) % 4;
+            let along = |share: f64| {
+                let ([u0, v0], [u1, v1]) = (CORNERS[k], CORNERS[next]);
+                normal(u0 + share * (u1 - u0), v0 + share * (v1 - v0))
+            };
+            let curve = &outline.edges[k];
+            let chord = straight(k, next);
+            let length = |depth: f64| Check { value: arc(curve, &along, depth), ..chord };
+            EdgeCheck { face: length(0.0), mid: length(half_thickness), chord }
+        });
+        let diagonals = [straight(0, 2), straight(1, 3)];
+        let [first, second] = diagonals;
+        Self {
+            edges,
+            diagonals,
+            diagonal_difference: Check {
+                value: first.value - second.value,
+                sigma: first.sigma.hypot(second.sigma),
+                seen: first.seen && second.seen,
+            },
+            angles: corners.each_ref().map(angle),
+            twist: [twist(&corners, [0, 3], [1, 2]), twist(&corners, [0, 1], [3, 2])],
+        }
+    }
+}
+
+/// Places of the corners in shares of the plate's sides.
+const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+/// A corner with what its place is known to.
+struct Known {
+    at: Vec3,
+    /// Unit directions of the leaving edge, of the arriving edge, of the normal.
+    axes: [Vec3; 3],
+    /// Standard deviations along them.
+    sigma: [f64; 3],
+    /// Standard deviations of the two edges' directions, radians.
+    tilt: [f64; 2],
+    seen: bool,
+}
+
+impl Known {
+    fn new(outline: &Outline, k: usize, normal: Vec3, sigma: f64) -> Self {
+        let Corner { point, sigma: [leaving, arriving], seen } = outline.corners[k];
+        let arms = [
+            Arm::new(&outline.edges[k], false, point, normal),
+            Arm::new(&outline.edges[(k + 3) % 4], true, point, normal),
+        ];
+        let axes = [arms[0].direction, arms[1].direction, normal];
+        Self { at: point, axes, sigma: [leaving, arriving, sigma], tilt: arms.map(|arm| arm.tilt), seen }
+    }
+
+    /// Variance of the place along a direction of any length.
+    fn variance(&self, way: Vec3) -> f64 {
+        let unit = way / way.norm().max(f64::MIN_POSITIVE);
+        (0..3).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
+    }
+}
+
+fn check(value: f64, variance: f64, corners: &[&Known]) -> Check {
+    Check { value, sigma: variance.sqrt(), seen: corners.iter().all(|corner| corner.seen) }
+}
+
+/// Length of an edge, `depth` below the face.
+fn arc(curve: &EdgeCurve, normal: &dyn Fn(f64) -> Vec3, depth: f64) -> f64 {
+    let last = (curve.points.len().max(2) - 1) as f64;
+    let below: Vec<Vec3> =
+        curve.points.iter().enumerate().map(|(i, p)| p - normal(i as f64 / last) * depth).collect();
+    below.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
+}
+
+/// How an edge leaves a corner, in the plane that touches the plate there.
+struct Arm {
+    /// The line of least squares through the edge's points within a square's arm; zero where there are none.
+    direction: Vec3,
+    /// Standard deviation of that direction, radians: both ends of the arm may be off, in opposite senses, by as much as the
+    /// edge is uncertain and its points scatter about the line.
+    tilt: f64,
+}
+
+impl Arm {
+    fn new(curve: &EdgeCurve, from_end: bool, corner: Vec3, normal: Vec3) -> Self {
+        let n = curve.points.len();
+        let point = |i: usize| curve.points[if from_end { n - 1 - i } else { i }];
+        let reach = ARM.min(0.5 * (curve.points[n - 1] - curve.points[0]).norm());
+        let near: Vec<Vec3> = (0..n)
+            .map(|i| point(i) - corner)
+            .take_while(|way| way.norm() <= reach)
+            .map(|way| way - normal * way.dot(&normal))
+            .collect();
+        let count = near.len().max(1) as f64;
+        let mean = near.iter().sum::<Vec3>() / count;
+        // Regression on the distance from the corner, which orders the points.
+        let sum: Vec3 = near.iter().map(|p| (p - mean) * (p.norm() - mean.norm())).sum();
+        let direction = if sum.norm() > 0.0 { sum.normalize() } else { Vec3::zeros() };
+        let aside = |p: &Vec3| (p - mean).cross(&direction).norm_squared();
+        let scatter = near.iter().map(aside).sum::<f64>() / count;
+        Self { direction, tilt: (2.0 * (curve.sigma.powi(2) + scatter)).sqrt() / reach }
+    }
+}
+
+/// Angle between the edges of a corner.
+fn angle(corner: &Known) -> Check {
+    let ([leaving, arriving, _], [a, b]) = (corner.axes, corner.tilt);
+    check(leaving.angle(&arriving), a * a + b * b, &[corner])
+}
+
+/// Turn from the near edge to the far one about the line from middle to middle, clockwise as seen along it.
+fn twist(corners: &[Known; 4], near: [usize; 2], far: [usize; 2]) -> Check {
+    let middle = |[a, b]: [usize; 2]| (corners[a].at + corners[b].at) * 0.5;
+    let sight = (middle(far) - middle(near)).normalize();
+    let across = |[a, b]: [usize; 2]| {
+        let way = corners[b].at - corners[a].at;
+        way - sight * way.dot(&sight)
+    };
+    let (a, b) = (across(near), across(far));
+    let value = a.cross(&b).dot(&sight).atan2(a.dot(&b));
+    let tilt = |[from, to]: [usize; 2], way: Vec3| {
+        let aside = sight.cross(&way);
+        (corners[from].variance(aside) + corners[to].variance(aside)) / way.norm_squared()
+    };
+    check(value, tilt(near, a) + tilt(far, b), &[&corners[0], &corners[1], &corners[2], &corners[3]])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    const W: f64 = 3.0;
+    const H: f64 = 2.5;
+    const HALF: f64 = 0.02;
+
+    /// The outline of a face over shares of the sides, and its normals by differences.
+    fn checks(face: impl Fn(f64, f64) -> Vec3, sigma: f64) -> ShapeChecks {
+        let corner = |k: usize| Corner {
+            point: face(CORNERS[k][0], CORNERS[k][1]),
+            sigma: [sigma, 2.0 * sigma],
+            seen: k != 2,
+        };
+        let edge = |k: usize| {
+            let ([u0, v0], [u1, v1]) = (CORNERS[k], CORNERS[(k + 1) % 4]);
+            let at = |i: usize| i as f64 / 300.0;
+            let points: Vec<Vec3> =
+                (0..=300).map(|i| face(u0 + at(i) * (u1 - u0), v0 + at(i) * (v1 - v0))).collect();
+            EdgeCurve { seen: vec![true; points.len()], points, sigma }
+        };
+        let outline = Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(edge) };
+        let normal = |u: f64, v: f64| {
+            let d = 1e-5;
+            let along_u = face(u + d, v) - face(u - d, v);
+            let along_v = face(u, v + d) - face(u, v - d);
+            along_u.cross(&along_v).normalize()
+        };
+        ShapeChecks::with(&outline, HALF, &normal, &|_, _| 3.0 * sigma)
+    }
+
+    fn near(found: f64, expected: f64, within: f64) {
+        assert!((found - expected).abs() < within, "found {found}, expected {expected}");
+    }
+
+    #[test]
+    fn a_flat_plate_has_its_own_measures() {
+        let flat = checks(|u, v| Vec3::new(u * W, v * H, 0.0), 1e-4);
+        for (edge, length) in flat.edges.iter().zip([W, H, W, H]) {
+            near(edge.face.value, length, 1e-12);
+            near(edge.mid.value, length, 1e-12);
+            near(edge.chord.value, length, 1e-12);
+        }
+        near(flat.diagonals[0].value, W.hypot(H), 1e-12);
+        near(flat.diagonal_difference.value, 0.0, 1e-12);
+        for angle in flat.angles {
+            near(angle.value, FRAC_PI_2, 1e-9);
+        }
+        near(flat.twist[0].value, 0.0, 1e-12);
+        near(flat.twist[1].value, 0.0, 1e-12);
+    }
+
+    #[test]
+    fn uncertainties_follow_from_the_corners() {
+        let flat = checks(|u, v| Vec3::new(u * W, v * H, 0.0), 1e-4);
+        // An edge: along the leaving edge at one corner (1), along the arriving edge at the other (2).
+        near(flat.edges[0].chord.sigma, 1e-4 * 5.0_f64.sqrt(), 1e-9);
+        // Normals 3 at four corners, over the two edges that are sighted.
+        near(flat.twist[0].sigma, 1e-4 * 3.0 * 2.0 / H, 1e-9);
+        near(flat.twist[1].sigma, 1e-4 * 3.0 * 2.0 / W, 1e-9);
+        // Two edges, each off at both ends of its arm.
+        near(flat.angles[0].sigma, 1e-4 * 2.0 / ARM, 1e-9);
+        assert!(flat.edges[3].chord.seen && !flat.edges[1].chord.seen && !flat.diagonals[0].seen);
+        assert!(flat.diagonals[1].seen && !flat.twist[0].seen);
+    }
+
+    #[test]
+    fn a_cylinder_keeps_its_size_on_the_mid_surface_alone() {
+        let radius = 5.0;
+        let face = |u: f64, v: f64| {
+            let (sin, cos) = ((u - 0.5) * W / radius).sin_cos();
+            let inside = radius - HALF;
+            Vec3::new(inside * sin, v * H, radius - inside * cos)
+        };
+        let bent = checks(face, 0.0);
+        near(bent.edges[0].mid.value, W, 2e-6);
+        near(bent.edges[0].face.value, W * (radius - HALF) / radius, 2e-6);
+        let chord = 2.0 * (radius - HALF) * (0.5 * W / radius).sin();
+        near(bent.edges[0].chord.value, chord, 1e-12);
+        near(bent.edges[1].face.value, H, 1e-12);
+        near(bent.diagonals[0].value, chord.hypot(H), 1e-12);
+        for angle in bent.angles {
+            near(angle.value, FRAC_PI_2, 1e-6);
+        }
+        near(bent.twist[0].value, 0.0, 1e-12);
+    }
+
+    #[test]
+    fn a_plate_out_of_square_shows_in_angles_and_diagonals() {
+        let shear = 0.004_f64;
+        let leaning = checks(|u, v| Vec3::new(u * W + shear * v * H, v * H, 0.0), 0.0);
+        near(leaning.angles[0].value, FRAC_PI_2 - shear.atan(), 1e-9);
+        near(leaning.angles[1].value, FRAC_PI_2 + shear.atan(), 1e-9);
+        let expected = (W + shear * H).hypot(H) - (W - shear * H).hypot(H);
+        near(leaning.diagonal_difference.value, expected, 1e-12);
+    }
+
+    #[test]
+    fn a_screw_is_twisted_by_its_pitch_in_its_own_sense() {
+        let turn = 0.03_f64;
+        // Seen along +u, y turns towards z: clockwise for an observer who looks along x.
+        let screw = |u: f64, v: f64| {
+            let (sin, cos) = (turn * (u - 0.5)).sin_cos();
+            Vec3::new(u * W, (v - 0.5) * H * cos, (v - 0.5) * H * sin)
+        };
+        near(checks(screw, 0.0).twist[0].value, turn, 1e-9);
+        near(checks(|u, v| screw(1.0 - u, 1.0 - v), 0.0).twist[0].value, turn, 1e-9);
+        // Along v the same plate winds the other way, by the turn of a hyperbolic paraboloid.
+        assert!(checks(screw, 0.0).twist[1].value < -0.5 * turn);
+    }
+}
