@@ -68,6 +68,9 @@ pub enum Error {
     /// An export could not be written.
     #[error("the export cannot be written: {0}")]
     Export(#[from] std::io::Error),
+    /// An export could not be written as Parquet.
+    #[error("the export cannot be written: {0}; write CSV instead, and report this")]
+    Parquet(#[from] parquet::errors::ParquetError),
 }
 
 impl Error {

@@ -11,6 +11,7 @@
 //! This crate knows nothing of Modbus, plugins or geometry, and reads no clock: its caller says what time it is.
 
 mod archive;
+mod compare;
 mod error;
 mod export;
 mod history;
@@ -19,7 +20,8 @@ mod schema;
 mod stroke;
 
 pub use archive::{Archive, Filter};
+pub use compare::{Difference, compare};
 pub use error::Error;
-pub use export::{Difference, compare, write_csv};
+pub use export::StrokeTable;
 pub use history::{Accepted, Finished, History, Recalled};
 pub use stroke::{Event, PlateRecord, Stage, Stroke, StrokeKey, Verdict};

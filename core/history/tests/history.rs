@@ -3,12 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
 use std::collections::BTreeMap;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use jiff::{SignedDuration, Timestamp};
 use platen_history::{
-    Accepted, Archive, Difference, Error, Filter, Finished, History, Stage, StrokeKey, Verdict, compare,
-    write_csv,
+    Accepted, Archive, Difference, Error, Filter, Finished, History, Stage, StrokeKey, StrokeTable, Verdict,
+    compare,
 };
 
 const PRESS: u16 = 3;
@@ -351,7 +352,7 @@ fn raw_scans_are_found_by_age_until_they_are_forgotten() {
 }
 
 #[test]
-fn two_strokes_compare_figure_by_figure_and_all_export_as_csv() {
+fn two_strokes_compare_figure_by_figure_and_all_export_as_one_table() {
     let mut bench = Bench::new();
     let first = bench.measure(1, 1, Some(700), Verdict::Fail);
     let second = bench.accept(1, 2, Some(700));
@@ -366,15 +367,65 @@ fn two_strokes_compare_figure_by_figure_and_all_export_as_csv() {
         compare(&strokes[0], &strokes[1]),
         [difference("deviation.max", None, Some(0.01)), difference("gap.max", Some(0.001), Some(0.002)),]
     );
+    let table = StrokeTable::new(&strokes);
     let mut csv = Vec::new();
-    write_csv(&strokes, &mut csv).unwrap();
+    table.write_csv(&mut csv).unwrap();
     let expected = "run_id,press,session,stroke,attempt,plate,recipe,baseline,dry_run,accepted,scanned,finished,acked,\
-        verdict,reason,deviation.max,gap.max\r\n\
-        1,3,1,1,0,1,17,false,false,2026-03-02T06:00:01.000Z,2026-03-02T06:00:02.000Z,2026-03-02T06:00:03.000Z,,fail,,,0.001\r\n\
+        verdict,reason,press.die_id,deviation.max,gap.max\r\n\
+        1,3,1,1,0,1,17,false,false,2026-03-02T06:00:01.000Z,2026-03-02T06:00:02.000Z,2026-03-02T06:00:03.000Z,,fail,,4,,0.001\r\n\
         2,3,1,2,0,1,17,false,false,2026-03-02T06:00:04.000Z,,2026-03-02T06:00:05.000Z,,not_measured,\
-        \"two loops, \"\"chain\"\"\",0.01,0.002\r\n";
+        \"two loops, \"\"chain\"\"\",4,0.01,0.002\r\n";
     assert_eq!(String::from_utf8(csv).unwrap(), expected);
     assert_eq!(first, 1);
+    let mut parquet = Vec::new();
+    table.write_parquet(&mut parquet).unwrap();
+    assert_eq!(
+        rows(parquet),
+        [
+            "run_id: 1, press: 3, session: 1, stroke: 1, attempt: 0, plate: 1, recipe: 17, baseline: false, dry_run: false, \
+         accepted: 2026-03-02 06:00:01.000 +00:00, scanned: 2026-03-02 06:00:02.000 +00:00, finished: 2026-03-02 06:00:03.000 +00:00, \
+         acked: null, verdict: \"fail\", reason: null, press.die_id: 4.0, deviation.max: null, gap.max: 0.001",
+            "run_id: 2, press: 3, session: 1, stroke: 2, attempt: 0, plate: 1, recipe: 17, baseline: false, dry_run: false, \
+         accepted: 2026-03-02 06:00:04.000 +00:00, scanned: null, finished: 2026-03-02 06:00:05.000 +00:00, acked: null, \
+         verdict: \"not_measured\", reason: \"two loops, \"chain\"\", press.die_id: 4.0, deviation.max: 0.01, gap.max: 0.002",
+        ]
+    );
+}
+
+/// The rows of a Parquet file as its own reader shows them.
+fn rows(file: Vec<u8>) -> Vec<String> {
+    use parquet::file::reader::{FileReader as _, SerializedFileReader};
+    let mut disk = tempfile::tempfile().unwrap();
+    disk.write_all(&file).unwrap();
+    let reader = SerializedFileReader::new(disk).unwrap();
+    reader
+        .get_row_iter(None)
+        .unwrap()
+        .map(|row| {
+            let row = row.unwrap();
+            let cells = row.get_column_iter().map(|(name, cell)| format!("{name}: {cell}"));
+            cells.collect::<Vec<_>>().join(", ")
+        })
+        .collect()
+}
+
+#[test]
+fn what_the_press_said_is_exported_in_its_own_types() {
+    let mut bench = Bench::new();
+    let told = r#"{"die_id":4,"force":1.5e6,"part_name":"a,b","plc_time":{"unix_s":1},"temperature":null}"#;
+    bench.accept_as(1, 1, 0, None, |stroke| stroke.data = told.to_owned());
+    bench.accept_as(1, 2, 0, None, |stroke| stroke.data = r#"{"die_id":null}"#.to_owned());
+    let strokes = bench.archive().strokes(&Filter::default()).unwrap();
+    let mut csv = Vec::new();
+    StrokeTable::new(&strokes).write_csv(&mut csv).unwrap();
+    let csv = String::from_utf8(csv).unwrap();
+    let lines: Vec<&str> = csv.lines().collect();
+    assert!(lines[0].ends_with(",verdict,reason,press.die_id,press.force,press.part_name"), "{csv}");
+    assert!(lines[1].ends_with("Z,,,,,,4,1500000,\"a,b\""), "{csv}");
+    assert!(lines[2].ends_with("Z,,,,,,,,"), "nothing said is nothing written: {csv}");
+    let mut parquet = Vec::new();
+    StrokeTable::new(&strokes).write_parquet(&mut parquet).unwrap();
+    assert!(rows(parquet)[1].ends_with("press.die_id: null, press.force: null, press.part_name: null"));
 }
 
 #[test]
