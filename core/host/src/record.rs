@@ -3,18 +3,23 @@
 //! Inside everything is metres and radians; here lengths that a person reads are millimetres, named `_mm`, positions
 //! are metres, named `_m`. Grids are row-major, v outer, u inner. What is not known is null, never 0.
 
+mod checks;
 mod grid;
 mod lines;
+mod plate;
 
+pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
 pub use grid::GridRecord;
-pub use lines::{LineRecord, TemplateRecord};
+pub use lines::{LineRecord, PointRecord, TemplateRecord};
+pub use plate::PlateRecord;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json, json};
 
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::task::{Figure, Verdict};
+use platen_shape::task::{Figure, Task, Verdict};
+use platen_shape::{ShapeChecks, Vec3};
 
 use crate::plugin::{PluginError, Report};
 use crate::stroke::{Measured, Scanned};
@@ -26,10 +31,12 @@ pub const SCHEMA: &str = "platen.result/1";
 const EXPANDED: f64 = 1.96;
 
 /// One measurement.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ResultRecord {
     /// [`SCHEMA`].
-    pub schema: &'static str,
+    pub schema: String,
+    /// Program and version that measured.
+    pub software: String,
     /// Name of the plate.
     pub plate: String,
     /// Stroke, where there is one.
@@ -40,6 +47,10 @@ pub struct ResultRecord {
     pub says: Vec<String>,
     /// Where the plate rested.
     pub supports: Option<String>,
+    /// The plate as its file had it at this stroke.
+    pub plate_file: PlateRecord,
+    /// How far the scanner was calibrated.
+    pub calibration: CalibrationRecord,
     /// The scan.
     pub scan: ScanRecord,
     /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
@@ -48,6 +59,8 @@ pub struct ResultRecord {
     pub corners_seen: [bool; 4],
     /// Marked places.
     pub markers: Vec<MarkerRecord>,
+    /// What tape, square and sight line would show.
+    pub shape_checks: ShapeChecksRecord,
     /// Lines and the templates on them.
     pub reference_lines: Vec<LineRecord>,
     /// Places on an even grid.
@@ -62,8 +75,17 @@ pub struct ResultRecord {
     pub timings_ms: TimingsRecord,
 }
 
+/// How far the scanner was calibrated when this was measured.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct CalibrationRecord {
+    /// Correlated part of the level of detection, one sigma; 0 when no null pairs were taken.
+    pub sigma_correlated_mm: f64,
+    /// Systematic uncertainty against a known artefact, one sigma; null when none was measured.
+    pub sigma_true_mm: Option<f64>,
+}
+
 /// The scan.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ScanRecord {
     /// Rows of the lattice.
     pub rows: u32,
@@ -82,7 +104,7 @@ pub struct ScanRecord {
 }
 
 /// A marked place.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MarkerRecord {
     /// Name.
     pub name: String,
@@ -99,7 +121,7 @@ pub struct MarkerRecord {
 }
 
 /// S(u, v).
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SurfaceRecord {
     /// Of the spline.
     pub degree: u32,
@@ -114,7 +136,7 @@ pub struct SurfaceRecord {
 }
 
 /// How good the measurement is.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct QualityRecord {
     /// Share of the plate that was seen.
     pub coverage: f64,
@@ -125,7 +147,7 @@ pub struct QualityRecord {
 }
 
 /// Milliseconds of each stage.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TimingsRecord {
     /// From the start to the last column; extraction runs beside it.
     pub acquire: f64,
@@ -150,6 +172,10 @@ pub struct TimingsRecord {
 pub struct Context<'a> {
     /// Its plate file.
     pub plate: &'a PlateFile,
+    /// What the comparisons were asked.
+    pub task: &'a Task,
+    /// Where the press stands, scanner frame, when the plant file says so.
+    pub press: Option<Vec3>,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
     /// Judgement.
@@ -166,12 +192,18 @@ impl ResultRecord {
         let Measured { outline, measurement, .. } = measured;
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
         Self {
-            schema: SCHEMA,
+            schema: SCHEMA.to_owned(),
+            software: concat!("platen ", env!("CARGO_PKG_VERSION")).to_owned(),
             plate: context.plate.plate.id.clone(),
             stroke: context.stroke,
             verdict: context.verdict,
             says: sentences(context.reports),
             supports: context.plate.plate.supports.clone(),
+            plate_file: PlateRecord::new(context.plate, &measurement.surface, context.press),
+            calibration: CalibrationRecord {
+                sigma_correlated_mm: mm(context.task.sigma_correlated),
+                sigma_true_mm: context.task.sigma_true.map(mm),
+            },
             scan: ScanRecord {
                 rows: scanned.header.n_rows,
                 columns: scanned.header.n_columns,
@@ -183,6 +215,7 @@ impl ResultRecord {
             },
             corners_m: measurement.corners.map(Into::into),
             corners_seen: outline.corners.each_ref().map(|corner| corner.seen),
+            shape_checks: ShapeChecksRecord::new(&ShapeChecks::new(outline, &measurement.surface)),
             markers: markers(measured, context.plate),
             reference_lines: lines::record(measurement, context.plate, &sound),
             grid: GridRecord::new(measurement, &sound),

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use platen_plant::plant::RigidTransform;
 use platen_plant::plate::{self, PlateFile};
 use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, check_options};
 use platen_shape::task::{self, Task};
@@ -10,7 +11,7 @@ use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
 
 /// Time that a flattening or a comparison may take; the press waits at most 10 s for both.
-const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
+pub(crate) const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
 
 /// The plugins of a plant, ready to measure.
 #[derive(Debug)]
@@ -21,6 +22,8 @@ pub struct Rig {
     pub comparisons: Vec<Comparison>,
     /// Rough direction of growing u, scanner frame.
     pub u_axis: Option<Vec3>,
+    /// Where the press stands, scanner frame, when the plant file says so.
+    pub press: Option<Vec3>,
     /// Where the plate can be, scanner frame.
     pub region: Option<RegionOfInterest>,
 }
@@ -66,6 +69,7 @@ impl Rig {
             flattening,
             comparisons,
             u_axis: plant.frame.u_axis.map(Vec3::from),
+            press: press_origin(&plant.frame.press_from_scanner),
             region: plant
                 .frame
                 .region_of_interest
@@ -84,6 +88,13 @@ impl Rig {
             region: self.region,
         }
     }
+}
+
+/// The press's origin in the scanner frame; none where the plant file leaves the scanner in the press's frame.
+fn press_origin(press_from_scanner: &RigidTransform) -> Option<Vec3> {
+    let RigidTransform { rotation, translation } = *press_from_scanner;
+    let back = |axis: usize| -(0..3).map(|row| rotation[row][axis] * translation[row]).sum::<f64>();
+    (*press_from_scanner != RigidTransform::default()).then(|| Vec3::new(back(0), back(1), back(2)))
 }
 
 /// The driver that a plant file names, or `faro-file` where it names none.

@@ -1,5 +1,10 @@
 //! `platen history`: what is on record.
 
+mod compare;
+mod export;
+mod pick;
+mod sequence;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -8,10 +13,18 @@ use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
+use crate::report::{self, ReportError};
+use pick::RunRef;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \
-                        platen history show config/plant-north.toml 1042")]
+                        platen history show config/plant-north.toml 1042\n  \
+                        platen history compare config/plant-north.toml 12:3 14:3 --out compared\n  \
+                        platen history sequence config/plant-north.toml 12\n  \
+                        platen history export config/plant-north.toml --out strokes.parquet\n  \
+                        platen history report config/plant-north.toml 12\n\n\
+                        A stroke is named by its run id (1042) or as plate:stroke (12:3, 12:blank); plates have the numbers of the list.\n\
+                        All of it only reads, also while a host runs.")]
 pub(super) struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -34,8 +47,24 @@ enum Verb {
     Show {
         /// Plant file
         plant: PathBuf,
-        /// Run id, as in the list and in the press's registers
-        run_id: u32,
+        /// Run id, as in the list and in the press's registers, or plate:stroke
+        run: RunRef,
+    },
+    /// What differs from one stroke to another, of the same plate or of two
+    Compare(compare::Command),
+    /// The sequence of a plate as numbers: bends, overshoot, re-hits, energy left
+    Sequence(sequence::Command),
+    /// All strokes as a table for other programs
+    Export(export::Command),
+    /// The report of one plate, HTML that prints on A4
+    Report {
+        /// Plant file
+        plant: PathBuf,
+        /// The plate's number in the history
+        plate: u32,
+        /// Folder for plate-N.html instead of the plant's output folder
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
     },
 }
 
@@ -45,23 +74,49 @@ impl From<HistoryError> for CliError {
     }
 }
 
+impl From<ReportError> for CliError {
+    fn from(error: ReportError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     match &command.verb {
         Verb::List { plant, plate, newest } => {
-            let archive = Archive::open(&PlantFile::load(plant)?.output.history)?;
+            let (_, archive) = open(plant)?;
             let filter = Filter { plate: *plate, newest: Some(*newest), ..Filter::default() };
             let strokes = archive.strokes(&filter)?;
             if common.json { output::json(&strokes)? } else { list(&strokes)? }
         }
-        Verb::Show { plant, run_id } => {
-            let archive = Archive::open(&PlantFile::load(plant)?.output.history)?;
-            let stroke = archive.stroke(*run_id)?;
+        Verb::Show { plant, run } => {
+            let (_, archive) = open(plant)?;
+            let stroke = run.find(&archive)?;
             if common.json { output::json(&stroke)? } else { show(&stroke)? }
+        }
+        Verb::Compare(command) => compare::run(common, command)?,
+        Verb::Sequence(command) => sequence::run(common, command)?,
+        Verb::Export(command) => export::run(common, command)?,
+        Verb::Report { plant, plate, out } => {
+            let (plant, archive) = open(plant)?;
+            let folder = out.as_ref().unwrap_or(&plant.output.folder);
+            std::fs::create_dir_all(folder)?;
+            let path = report::write(&archive, &plant.name, *plate, folder)?;
+            if common.json {
+                output::json(&serde_json::json!({ "report": path }))?;
+            } else {
+                output::line(&format!("wrote {}", path.display()))?;
+            }
         }
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// The plant and its history for reading.
+fn open(plant: &std::path::Path) -> Result<(PlantFile, Archive), CliError> {
+    let plant = PlantFile::load(plant)?;
+    let archive = Archive::open(&plant.output.history)?;
+    Ok((plant, archive))
+}
 fn verdict(stroke: &Stroke) -> String {
     match (stroke.verdict, &stroke.reason) {
         (Some(verdict), Some(reason)) => format!("{} ({reason})", verdict.as_str()),

@@ -42,7 +42,7 @@ pub(super) struct Command {
     /// Rough direction of growing u in the scanner frame, instead of the plant file's
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
     u_axis: Option<[f64; 3]>,
-    /// New folder for result.json, reference_lines.csv and pictures
+    /// New folder for result.json, tables (CSV), the plate as a mesh (PLY) and pictures (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -71,20 +71,34 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let surfaces =
         Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
     let start = Instant::now();
-    let reports = stroke::compare(&rig, &rig::task(&plate, false), surfaces);
+    let task = rig::task(&plate, false);
+    let reports = stroke::compare(&rig, &task, surfaces);
     let compare = start.elapsed();
     let verdict = stroke::verdict(&reports);
-    let context = Context { plate: &plate, stroke: None, verdict, reports: &reports, compare };
+    let context = Context {
+        plate: &plate,
+        task: &task,
+        press: rig.press,
+        stroke: None,
+        verdict,
+        reports: &reports,
+        compare,
+    };
     let record = ResultRecord::new(&scanned, &now, context);
     progress::done();
 
     let sound: Vec<_> = reports.iter().flatten().collect();
-    let written = command.out.as_ref().map(|out| files::write(out, &record, &sound)).transpose()?;
+    let mut written = Vec::new();
+    if let Some(out) = &command.out {
+        let surface = &now.measurement.surface;
+        written = files::write(out, &record, surface)?;
+        written.extend(files::illustrate(out, &record, surface, &sound, &[])?);
+    }
     if common.json {
         output::json(&record)?;
     } else {
         print(&record)?;
-        for file in written.iter().flatten() {
+        for file in &written {
             output::line(&format!("wrote {}", file.display()))?;
         }
     }
@@ -155,6 +169,15 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
             Some(marker.uncertainty_mm),
         ));
     }
+    output::table(&rows)?;
+    let checks = record.shape_checks.rows();
+    let mut rows = vec![["check", "value", "+- (95 %)", "unit", "seen"].map(str::to_owned).to_vec()];
+    rows.extend(checks.iter().map(|(name, check, unit)| {
+        let digits = if *unit == "mm" { 1 } else { 3 };
+        let number = |value: f64| format!("{value:.digits$}");
+        let seen = if check.seen { "yes" } else { "corner not seen" };
+        vec![name.clone(), number(check.value), number(check.uncertainty), (*unit).into(), seen.into()]
+    }));
     output::table(&rows)?;
     let t = &record.timings_ms;
     output::line(&format!(

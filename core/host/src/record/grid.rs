@@ -1,6 +1,6 @@
 //! The grid of the record: curvature of S and the comparisons' fields at 21 x 21 places.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use platen_shape::evaluate::{self, GRID};
 use platen_shape::measure::Measurement;
@@ -9,7 +9,7 @@ use super::mm;
 use crate::plugin::{Field, NodeState, Report};
 
 /// Places on an even grid over the plate; null where nothing is known.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct GridRecord {
     /// Places along u.
     pub nu: usize,
@@ -24,13 +24,13 @@ pub struct GridRecord {
     /// On the scanned face, scanner frame.
     pub position_m: Vec<[f64; 3]>,
     /// Displacement against the stroke before, when there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement_mm: Option<Vec<Option<[f64; 3]>>>,
     /// Measured minus target along the target's normal, when there is a target.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deviation_mm: Option<Vec<Option<f64>>>,
     /// Whether the displacement is below the level of detection.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unchanged: Option<Vec<Option<bool>>>,
 }
 

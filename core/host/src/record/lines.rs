@@ -1,8 +1,9 @@
 //! Reference lines and the boards that lie on them.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use platen_plant::PlateFile;
+use platen_shape::Surface;
 use platen_shape::evaluate;
 use platen_shape::measure::Measurement;
 use platen_shape::task::{Seat, TemplateFinding, Verdict};
@@ -11,7 +12,7 @@ use super::{mm, mm_pair};
 use crate::plugin::Report;
 
 /// One reference line.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LineRecord {
     /// Name.
     pub name: String,
@@ -22,7 +23,7 @@ pub struct LineRecord {
 }
 
 /// One point of a line.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PointRecord {
     /// Along u.
     pub u_mm: f64,
@@ -35,7 +36,7 @@ pub struct PointRecord {
 }
 
 /// How one board lies.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TemplateRecord {
     /// Name.
     pub name: String,
@@ -51,8 +52,16 @@ pub struct TemplateRecord {
     pub max_gap_at_mm: [f64; 2],
     /// Where the board touches.
     pub contacts_mm: Vec<[f64; 2]>,
+    /// Place of the board's first end along the line.
+    pub start_mm: f64,
+    /// Length of the board.
+    pub chord_mm: f64,
     /// At equal steps from the board's first end to its last.
     pub gap_mm: Vec<f64>,
+    /// Height of the face at these steps over the straight line between the board's ends on it, towards the scanner.
+    pub height_mm: Vec<f64>,
+    /// Whether the plate was seen at these steps.
+    pub seen: Vec<bool>,
     /// Largest gap that passes.
     pub limit_mm: f64,
     /// -1 not bent enough, 0 within, 1 bent too far.
@@ -79,13 +88,23 @@ pub(super) fn record(measurement: &Measurement, plate: &PlateFile, reports: &[&R
                     seen: p.seen,
                 })
                 .collect(),
-            templates: templates.filter(|t| t.line == line.name).map(template).collect(),
+            templates: templates
+                .filter(|t| t.line == line.name)
+                .map(|t| template(t, line, plate, &measurement.surface))
+                .collect(),
         }
     };
     plate.reference_lines.iter().map(line).collect()
 }
 
-fn template(finding: &TemplateFinding) -> TemplateRecord {
+fn template(
+    finding: &TemplateFinding,
+    line: &platen_plant::plate::ReferenceLine,
+    plate: &PlateFile,
+    surface: &Surface,
+) -> TemplateRecord {
+    let chord = plate.templates.iter().find(|t| t.name == finding.name).map_or(0.0, |t| t.chord);
+    let places = places(finding, line, chord);
     TemplateRecord {
         name: finding.name.clone(),
         seat: finding.seat,
@@ -94,10 +113,41 @@ fn template(finding: &TemplateFinding) -> TemplateRecord {
         uncertainty_mm: mm(finding.uncertainty),
         max_gap_at_mm: mm_pair(finding.max_gap_at),
         contacts_mm: finding.contacts.iter().map(|contact| mm_pair(contact.at)).collect(),
+        start_mm: mm(finding.start),
+        chord_mm: mm(chord),
         gap_mm: finding.gap.iter().copied().map(mm).collect(),
+        height_mm: heights(surface, &places),
+        seen: places.iter().map(|[u, v]| surface.mask().seen(*u, *v)).collect(),
         limit_mm: mm(finding.limit),
         sense: finding.sense,
         verdict: finding.verdict,
         says: finding.says.clone(),
     }
+}
+
+/// The places on the plate of a board's gaps.
+fn places(finding: &TemplateFinding, line: &platen_plant::plate::ReferenceLine, chord: f64) -> Vec<[f64; 2]> {
+    let length = line.length();
+    let last = finding.gap.len().saturating_sub(1).max(1) as f64;
+    let at = |k: usize| (finding.start + chord * k as f64 / last) / length;
+    let on_line = |share: f64| [0, 1].map(|i| line.from[i] + share * (line.to[i] - line.from[i]));
+    (0..finding.gap.len()).map(|k| on_line(at(k))).collect()
+}
+
+/// Heights of the face over the straight line from the first place to the last, millimetres.
+fn heights(surface: &Surface, places: &[[f64; 2]]) -> Vec<f64> {
+    let [Some(first), Some(last), Some(middle)] =
+        [places.first(), places.last(), places.get(places.len() / 2)]
+    else {
+        return Vec::new();
+    };
+    let face = |[u, v]: &[f64; 2]| surface.face(*u, *v);
+    let chord = face(last) - face(first);
+    if chord.norm() == 0.0 {
+        return Vec::new();
+    }
+    let along = chord.normalize();
+    let normal = surface.normal(middle[0], middle[1]);
+    let up = (normal - along * normal.dot(&along)).normalize();
+    places.iter().map(|place| mm((face(place) - face(first)).dot(&up))).collect()
 }

@@ -1,6 +1,6 @@
 //! The bench: scans and measures one stroke at a time, on a thread of its own.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -16,11 +16,11 @@ use tokio::sync::mpsc::UnboundedSender;
 use super::archive::Archive;
 use super::region::{self, Region};
 use super::{Watcher, figures, surface_file};
-use crate::files;
-use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
+use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Report, Scanner, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
 use crate::stroke::{self, NotMeasured, Scanned, Tape};
+use crate::{files, past, report};
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -66,6 +66,16 @@ struct InHand {
     tape: Option<Tape>,
     started: Instant,
     scanned_at: jiff::Timestamp,
+}
+
+/// A stroke with all that was found out about it.
+struct Judged {
+    answer: Measurement,
+    record: ResultRecord,
+    surface: Surface,
+    reports: Vec<Result<Report, PluginError>>,
+    /// Folder of its files, where they could be written.
+    folder: Option<PathBuf>,
 }
 
 /// Scans and measures.
@@ -271,9 +281,13 @@ impl Bench {
         let (baseline, started) = (stroke.data.baseline, stroke.started);
         let (folder, tape) = (self.folder(stroke.run_id), stroke.tape.take());
         let hung = match self.measure(&stroke, start) {
-            Ok((measurement, record, folder)) => {
-                self.say(Answer::Result(key, Box::new(measurement)));
+            Ok(Judged { answer, record, surface, reports, folder }) => {
+                self.say(Answer::Result(key, Box::new(answer)));
                 let elapsed = started.elapsed();
+                // The press waits for its answer, not for pictures.
+                if let Some(folder) = &folder {
+                    self.illustrate(&stroke, folder, &record, &surface, &reports);
+                }
                 self.report(StrokeReport { key, baseline, result: Ok(Box::new(record)), folder, elapsed });
                 false
             }
@@ -293,11 +307,7 @@ impl Bench {
     }
 
     /// From the plate's face to the result and its files.
-    fn measure(
-        &mut self,
-        stroke: &InHand,
-        start: Instant,
-    ) -> Result<(Measurement, ResultRecord, Option<PathBuf>), NotMeasured> {
+    fn measure(&mut self, stroke: &InHand, start: Instant) -> Result<Judged, NotMeasured> {
         let spec = self.rig.spec(&stroke.plate);
         let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec)?;
         self.region.saw(&measured.outline);
@@ -308,23 +318,30 @@ impl Bench {
             baseline: baseline.as_ref(),
         };
         let comparing = Instant::now();
-        let reports = stroke::compare(&self.rig, &rig::task(&stroke.plate, false), surfaces);
+        let task = rig::task(&stroke.plate, false);
+        let reports = stroke::compare(&self.rig, &task, surfaces);
         let compare = comparing.elapsed();
         let verdict = stroke::verdict(&reports);
-        let number = Some(u64::from(stroke.key.stroke));
-        let context = Context { plate: &stroke.plate, stroke: number, verdict, reports: &reports, compare };
+        let context = Context {
+            plate: &stroke.plate,
+            task: &task,
+            press: self.rig.press,
+            stroke: Some(u64::from(stroke.key.stroke)),
+            verdict,
+            reports: &reports,
+            compare,
+        };
         let record = ResultRecord::new(&stroke.scanned, &measured, context);
-        let folder = self.keep(stroke, &record, &reports, &measured.measurement.surface);
+        let folder = self.keep(stroke, &record, &measured.measurement.surface);
         let times = [
             (Measure::ScanTime, stroke.scanned.acquire + stroke.scanned.extract),
             (Measure::EvaluateTime, start.elapsed()),
             (Measure::StrokeToResultTime, stroke.started.elapsed()),
         ];
-        let mut measurement =
-            figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
+        let mut answer = figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
         // A result whose files are lost still goes to the press, and says so.
-        measurement.warning = folder.is_none().then_some(Code::StorageDegraded);
-        Ok((measurement, record, folder))
+        answer.warning = folder.is_none().then_some(Code::StorageDegraded);
+        Ok(Judged { answer, record, surface: measured.measurement.surface, reports, folder })
     }
 
     fn history(&self) -> MutexGuard<'_, History> {
@@ -346,18 +363,10 @@ impl Bench {
         (load(history.archive().before(run_id)), load(history.archive().baseline(run_id)))
     }
 
-    /// Writes the files and notes where they lie. A full disk costs the record, not the result.
-    fn keep(
-        &mut self,
-        stroke: &InHand,
-        record: &ResultRecord,
-        reports: &[Result<crate::plugin::Report, PluginError>],
-        surface: &Surface,
-    ) -> Option<PathBuf> {
+    /// Writes the documents and notes where they lie. A full disk costs the record, not the result.
+    fn keep(&mut self, stroke: &InHand, record: &ResultRecord, surface: &Surface) -> Option<PathBuf> {
         let folder = self.folder(stroke.run_id);
-        let sound: Vec<_> = reports.iter().flatten().collect();
-        let written = files::write(&folder, record, &sound).map_err(|e| e.to_string()).and_then(|_| {
-            surface_file::write(&folder, surface).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let written = files::write(&folder, record, surface).map_err(|e| e.to_string()).and_then(|_| {
             let document = folder.join("result.json");
             self.history().attach_document(stroke.run_id, &document).map_err(|e| e.to_string())
         });
@@ -367,6 +376,31 @@ impl Bench {
                 tracing::error!(key = %stroke.key, "the record is lost: {why}");
                 None
             }
+        }
+    }
+
+    /// Pictures, table and mesh beside the documents, and the plate's report. All can be made again: losing them is no
+    /// fault of the stroke.
+    fn illustrate(
+        &self,
+        stroke: &InHand,
+        folder: &Path,
+        record: &ResultRecord,
+        surface: &Surface,
+        reports: &[Result<Report, PluginError>],
+    ) {
+        let sound: Vec<&Report> = reports.iter().flatten().collect();
+        let draw = || -> Result<(), Box<dyn std::error::Error>> {
+            // A reader of its own: the journal must never wait for a picture.
+            let archive = platen_history::Archive::open(&self.plant.output.history)?;
+            let strokes = past::strokes_until(&archive, stroke.run_id, record)?;
+            files::illustrate(folder, record, surface, &sound, &strokes)?;
+            let plate = archive.stroke(stroke.run_id)?.plate;
+            report::write(&archive, &self.plant.name, plate, &self.plant.output.folder)?;
+            Ok(())
+        };
+        if let Err(why) = draw() {
+            tracing::warn!(key = %stroke.key, "pictures or report are missing: {why}");
         }
     }
 }

@@ -1,0 +1,138 @@
+//! `platen history compare`: two strokes side by side in (u, v).
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use platen_history::Stroke;
+use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_shape::Surface;
+use platen_shape::task::Verdict;
+use serde_json::json;
+
+use super::{RunRef, open};
+use crate::cli::{CliError, Common, output};
+use crate::picture::{Caption, map};
+use crate::plugin::{Catalogue, Comparison, Report, Surfaces};
+use crate::record::{PlateRecord, figure};
+use crate::table::PlateTable;
+use crate::{files, past, progress, rig, sequence};
+
+/// The comparisons that need two surfaces.
+const COMPARISONS: [&str; 2] = ["displacement", "curvature"];
+
+#[derive(Debug, Args)]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+    /// The first stroke: run id or plate:stroke
+    first: RunRef,
+    /// The second stroke: run id or plate:stroke
+    second: RunRef,
+    /// New folder for maps (SVG), the table (CSV) and the mesh (PLY) of the difference
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
+    if let Some(out) = command.out.as_ref().filter(|out| out.exists()) {
+        return Err(CliError::Usage(files::FilesError::Exists(out.clone()).to_string()));
+    }
+    let (plant, archive) = open(&command.plant)?;
+    let (first, second) = (command.first.find(&archive)?, command.second.find(&archive)?);
+    let (before, now) = (surface(&first)?, surface(&second)?);
+    let plate = plate_file(&plant, &second)?;
+    let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
+    let task = rig::task(&plate, false);
+    let mut reports = Vec::new();
+    for name in COMPARISONS {
+        progress::phase(&format!("comparing: {name}"));
+        reports.push(comparison(&plant, &common.catalogue(), name)?.compare(&task, surfaces)?);
+    }
+    progress::done();
+    let written = match &command.out {
+        Some(out) => write(out, &[&first, &second], &plate, &now, &reports)?,
+        None => Vec::new(),
+    };
+    let figures = platen_history::compare(&first, &second);
+    if common.json {
+        let found = reports.iter().map(|report| {
+            let figures: Vec<_> = report.findings.figures.iter().map(figure).collect();
+            json!({ "plugin": report.comparison, "says": report.findings.says, "figures": figures })
+        });
+        return output::json(&json!({
+            "first": first.run_id, "second": second.run_id, "comparisons": found.collect::<Vec<_>>(),
+            "figures": figures, "files": written,
+        }));
+    }
+    output::line(&format!("from {} to {}", name(&first), name(&second)))?;
+    for sentence in reports.iter().flat_map(|report| &report.findings.says) {
+        output::line(&format!("  {sentence}"))?;
+    }
+    let mut rows = vec![["figure", "first", "second", "change"].map(str::to_owned).to_vec()];
+    for difference in figures {
+        let number = |value: Option<f64>| value.map(|value| format!("{value:.5}")).unwrap_or_default();
+        let change = difference.first.zip(difference.second).map(|(a, b)| b - a);
+        rows.push(vec![
+            difference.name.clone(),
+            number(difference.first),
+            number(difference.second),
+            number(change),
+        ]);
+    }
+    output::table(&rows)?;
+    for file in &written {
+        output::line(&format!("wrote {}", file.display()))?;
+    }
+    Ok(())
+}
+
+fn name(stroke: &Stroke) -> String {
+    format!("run {} (plate {}, stroke {})", stroke.run_id, stroke.plate, past::label(stroke))
+}
+
+/// The comparison as the plant configures it, else with its defaults.
+fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Comparison, CliError> {
+    let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
+    let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
+    let (library, values) = rig::load(catalogue, &wanted)?;
+    Ok(Comparison::create(&library, &values, rig::EVALUATION_LIMIT)?)
+}
+
+fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
+    let gone = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
+    let document = stroke.document.as_deref().ok_or_else(|| gone("was not measured"))?;
+    sequence::surface_beside(document).ok_or_else(|| gone("its surface is not kept any more"))
+}
+
+fn plate_file(plant: &PlantFile, stroke: &Stroke) -> Result<PlateFile, CliError> {
+    let recipe =
+        stroke.recipe.ok_or_else(|| CliError::Failed(format!("{}: no recipe on record", name(stroke))))?;
+    Ok(PlateFile::load(&plant.plate_path(recipe))?)
+}
+
+fn write(
+    out: &Path,
+    strokes: &[&Stroke; 2],
+    plate: &PlateFile,
+    now: &Surface,
+    reports: &[Report],
+) -> Result<Vec<PathBuf>, CliError> {
+    std::fs::create_dir_all(out)?;
+    let reports: Vec<&Report> = reports.iter().collect();
+    let table = PlateTable::new(now, &reports);
+    let mut written = vec![
+        files::put(out, "grid.csv", table.csv().as_bytes())?,
+        files::put(out, "plate.ply", &table.ply().map_err(files::FilesError::Mesh)?)?,
+    ];
+    let record = PlateRecord::new(plate, now, None);
+    let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);
+    // Two strokes side by side are judged by nobody: the verdict is that of the second.
+    let verdict: Verdict = past::verdict(strokes[1]);
+    let caption = Caption { plate: &title, stroke: None, verdict };
+    for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
+        let svg = map(field, &record, &caption, &record.scale)
+            .map_err(|e| files::FilesError::Picture { name: field.name.clone(), why: e.to_string() })?;
+        written.push(files::put(out, &format!("{}.svg", files::file_name(&field.name)), svg.as_bytes())?);
+    }
+    Ok(written)
+}

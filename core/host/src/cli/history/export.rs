@@ -1,0 +1,60 @@
+//! `platen history export`: all strokes as a table.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use platen_history::{Filter, StrokeTable};
+
+use super::open;
+use crate::cli::{CliError, Common, output};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "One row a stroke: identity, times, verdict, what the press told (press.die_id, press.force, ...; newtons, metres, radians)\n\
+                        and every figure (gap.max, deviation.rms, ...; metres, radians, seconds, shares of one). What is not known is empty."
+)]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+    /// File to write; without it, to the terminal or the pipe
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Format; by default what the file's name ends with, else CSV
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// Strokes of this plate only, by its number in the history
+    #[arg(long)]
+    plate: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Csv,
+    Parquet,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
+    let (_, archive) = open(&command.plant)?;
+    let strokes = archive.strokes(&Filter { plate: command.plate, ..Filter::default() })?;
+    let table = StrokeTable::new(&strokes);
+    let by_name = command.out.as_ref().and_then(|out| out.extension()).is_some_and(|end| end == "parquet");
+    let format = command.format.unwrap_or(if by_name { Format::Parquet } else { Format::Csv });
+    let mut bytes = Vec::new();
+    match format {
+        Format::Csv => table.write_csv(&mut bytes)?,
+        Format::Parquet => table.write_parquet(&mut bytes)?,
+    }
+    let Some(out) = &command.out else {
+        return match std::io::stdout().write_all(&bytes) {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            other => Ok(other?),
+        };
+    };
+    std::fs::write(out, &bytes).map_err(|e| CliError::Failed(format!("{}: {e}", out.display())))?;
+    if common.json {
+        output::json(&serde_json::json!({ "file": out, "strokes": strokes.len() }))
+    } else {
+        output::line(&format!("wrote {} strokes to {}", strokes.len(), out.display()))
+    }
+}

@@ -1,0 +1,66 @@
+//! How a stroke on record is named on the command line.
+
+use std::str::FromStr;
+
+use platen_history::{Archive, Filter, Stroke};
+
+use crate::cli::CliError;
+use crate::past;
+
+/// A run id, or plate:stroke.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum RunRef {
+    /// Key of the record.
+    Run(u32),
+    /// Number of the plate in the history, and the stroke as the list and the report name it.
+    OfPlate(u32, String),
+}
+
+impl FromStr for RunRef {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("found {text}, expected a run id (1042) or plate:stroke (12:3, 12:blank)");
+        match text.split_once(':') {
+            None => text.parse().map(Self::Run).map_err(|_| wrong()),
+            Some((_, "")) => Err(wrong()),
+            Some((plate, stroke)) => {
+                plate.parse().map(|plate| Self::OfPlate(plate, stroke.to_owned())).map_err(|_| wrong())
+            }
+        }
+    }
+}
+
+impl RunRef {
+    /// The stroke, the newest where a plate has several of this name.
+    pub(super) fn find(&self, archive: &Archive) -> Result<Stroke, CliError> {
+        match self {
+            Self::Run(run_id) => Ok(archive.stroke(*run_id)?),
+            Self::OfPlate(plate, name) => {
+                let strokes = archive.strokes(&Filter { plate: Some(*plate), ..Filter::default() })?;
+                let names: Vec<String> = strokes.iter().map(past::label).collect();
+                let found = strokes.into_iter().rev().find(|stroke| past::label(stroke) == *name);
+                found.ok_or_else(|| {
+                    let known = if names.is_empty() { "no strokes".to_owned() } else { names.join(", ") };
+                    CliError::Usage(format!("plate {plate} has no stroke {name}; it has {known}"))
+                })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RunRef;
+
+    #[test]
+    fn a_stroke_is_named_by_run_or_by_plate_and_stroke() {
+        assert_eq!("1042".parse(), Ok(RunRef::Run(1042)));
+        assert_eq!("12:3".parse(), Ok(RunRef::OfPlate(12, "3".into())));
+        assert_eq!("12:blank".parse(), Ok(RunRef::OfPlate(12, "blank".into())));
+        for wrong in ["", "x", "-1", "12:", ":3", "a:3"] {
+            let error = wrong.parse::<RunRef>().unwrap_err();
+            assert!(error.ends_with("expected a run id (1042) or plate:stroke (12:3, 12:blank)"), "{error}");
+        }
+    }
+}

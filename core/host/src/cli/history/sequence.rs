@@ -1,0 +1,125 @@
+//! `platen history sequence`: how a plate was bent, as numbers.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::open;
+use crate::cli::{CliError, Common, output};
+use crate::progress;
+use crate::sequence::{Bend, Sequence, SequenceError, SequenceStroke, Summary};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "feed: across the straight lines, from the strongest bend of the stroke before. re-hit: a bend that lies on an earlier one.\n\
+                        overshoot: the gap where the board says \"bent too far\". energy left: elastic energy from the measured to the\n\
+                        target's curvature, as a share of the first stroke's. Formulas: documentation of platen_host::sequence."
+)]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+    /// The plate's number in the history
+    plate: u32,
+}
+
+impl From<SequenceError> for CliError {
+    fn from(error: SequenceError) -> Self {
+        match error {
+            SequenceError::Rig(error) => error.into(),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
+    let (plant, archive) = open(&command.plant)?;
+    let say = |what: &str| progress::phase(what);
+    let sequence = Sequence::of(&archive, &plant, &common.catalogue(), command.plate, &say)?;
+    progress::done();
+    if common.json {
+        return output::json(&sequence);
+    }
+    let head = [
+        "stroke",
+        "die",
+        "force kN",
+        "ram mm",
+        "gap mm",
+        "overshoot mm",
+        "energy left",
+        "beyond",
+        "bend deg",
+        "at u, v mm",
+        "direction",
+        "feed mm",
+        "note",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for stroke in &sequence.strokes {
+        let bends = stroke.bends.as_deref().unwrap_or_default();
+        rows.push(row(stroke, bends.first()));
+        for bend in bends.iter().skip(1) {
+            let mut more = vec![String::new(); 8];
+            more.extend(bend_cells(bend));
+            rows.push(more);
+        }
+    }
+    output::table(&rows)?;
+    summary(&sequence.summary)
+}
+
+fn row(stroke: &SequenceStroke, bend: Option<&Bend>) -> Vec<String> {
+    let number =
+        |value: Option<f64>, digits: usize| value.map(|v| format!("{v:.digits$}")).unwrap_or_default();
+    let percent = |share: Option<f64>| share.map(|s| format!("{:.1} %", 100.0 * s)).unwrap_or_default();
+    let mut cells = vec![
+        stroke.stroke.clone(),
+        stroke.die_set.map(|die| die.to_string()).unwrap_or_default(),
+        number(stroke.force_kn, 0),
+        number(stroke.ram_depth_mm, 1),
+        number(stroke.gap_mm, 1),
+        number(stroke.overshoot_mm, 1),
+        percent(stroke.energy_left_share),
+        percent(stroke.beyond_share),
+    ];
+    match bend {
+        Some(bend) => cells.extend(bend_cells(bend)),
+        None => {
+            let why =
+                if stroke.bends.is_some() { "no bend beyond doubt" } else { "no two surfaces to compare" };
+            cells.extend(["", "", "", "", why].map(str::to_owned));
+        }
+    }
+    cells
+}
+
+fn bend_cells(bend: &Bend) -> [String; 5] {
+    let uncertainty = bend.uncertainty_deg.map(|deg| format!(" +- {deg:.2}")).unwrap_or_default();
+    let rehit = bend.rehit_of.as_ref().map(|stroke| format!("re-hit of {stroke}"));
+    let back = (bend.bent_back == Some(true)).then(|| "bent back".to_owned());
+    [
+        format!("{:+.2}{uncertainty}", bend.angle_deg),
+        format!("{:.0}, {:.0}", bend.at_mm[0], bend.at_mm[1]),
+        format!("{:.0}", bend.direction_deg),
+        bend.feed_mm.map(|mm| format!("{mm:.0}")).unwrap_or_default(),
+        [rehit, back].into_iter().flatten().collect::<Vec<_>>().join(", "),
+    ]
+}
+
+fn summary(summary: &Summary) -> Result<(), CliError> {
+    let Summary { strokes, not_measured, bends, rehits, bent_back, overshoots, minutes, .. } = summary;
+    let passed = match summary.strokes_to_pass {
+        Some(count) => format!("passed after {count}"),
+        None => "has not passed".to_owned(),
+    };
+    output::line(&format!(
+        "{strokes} strokes in {minutes:.1} min ({not_measured} not measured), {passed}; {bends} bends, {rehits} re-hits, {bent_back} bent back"
+    ))?;
+    let most = summary.overshoot_max_mm.map(|mm| format!(", at most {mm:.1} mm")).unwrap_or_default();
+    let feed = summary.feed_mean_mm.map(|mm| format!("; mean feed {mm:.0} mm")).unwrap_or_default();
+    let left =
+        summary.energy_left_share.map(|s| format!("; energy left {:.1} %", 100.0 * s)).unwrap_or_default();
+    let dies: Vec<String> = summary.die_sets.iter().map(u16::to_string).collect();
+    let dies = if dies.is_empty() { "not told".to_owned() } else { dies.join(", ") };
+    output::line(&format!("bent too far after {overshoots} strokes{most}{feed}{left}; die sets: {dies}"))
+}

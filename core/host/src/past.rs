@@ -1,0 +1,72 @@
+//! What the history holds of a plate's strokes, as pictures and reports want it.
+
+use platen_history::{Archive, Error, Filter, Stroke};
+use platen_shape::task::Verdict;
+
+use crate::picture::StripPoint;
+use crate::record::{ResultRecord, TemplateRecord};
+
+/// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
+///
+/// # Errors
+/// The history's.
+pub fn strokes_until(
+    archive: &Archive,
+    run_id: u32,
+    record: &ResultRecord,
+) -> Result<Vec<StripPoint>, Error> {
+    let this = archive.stroke(run_id)?;
+    let all = archive.strokes(&Filter { plate: Some(this.plate), ..Filter::default() })?;
+    let earlier = all.iter().filter(|stroke| stroke.run_id < run_id).map(of_stroke);
+    Ok(earlier.chain([of_record(&this, record)]).collect())
+}
+
+/// What stands below a stroke in the strip and in tables.
+pub fn label(stroke: &Stroke) -> String {
+    let number = if stroke.baseline { "blank".to_owned() } else { stroke.key.stroke.to_string() };
+    let again = if stroke.key.attempt > 0 { format!(".{}", stroke.key.attempt) } else { String::new() };
+    let trial = if stroke.dry_run { " trial" } else { "" };
+    format!("{number}{again}{trial}")
+}
+
+/// A stroke of the strip, from its figures on record.
+pub fn of_stroke(stroke: &Stroke) -> StripPoint {
+    let figure = |name: &str| stroke.figures.get(name).copied();
+    StripPoint {
+        label: label(stroke),
+        gap_mm: figure("gap.max").map(|metres| metres * 1000.0),
+        uncertainty_mm: figure("gap.uncertainty").map(|metres| metres * 1000.0),
+        sense: figure("sense").map_or(0, |sense| sense.clamp(-1.0, 1.0).round() as i8),
+        verdict: verdict(stroke),
+    }
+}
+
+/// The judgement on record; none is no measurement.
+pub fn verdict(stroke: &Stroke) -> Verdict {
+    use platen_history::Verdict as Kept;
+    match stroke.verdict {
+        Some(Kept::Pass) => Verdict::Pass,
+        Some(Kept::Fail) => Verdict::Fail,
+        Some(Kept::CannotTell) => Verdict::CannotTell,
+        Some(Kept::NotMeasured) | None => Verdict::NotMeasured,
+    }
+}
+
+/// A stroke of the strip, from its document.
+pub fn of_record(stroke: &Stroke, record: &ResultRecord) -> StripPoint {
+    let worst = worst_board(record);
+    StripPoint {
+        label: label(stroke),
+        gap_mm: worst.map(|board| board.max_gap_mm),
+        uncertainty_mm: worst.map(|board| board.uncertainty_mm),
+        sense: worst.map_or(0, |board| board.sense),
+        verdict: record.verdict,
+    }
+}
+
+/// The board with the most gap per limit, as in the press's registers.
+pub fn worst_board(record: &ResultRecord) -> Option<&TemplateRecord> {
+    let share = |board: &TemplateRecord| board.max_gap_mm.abs() / board.limit_mm.max(f64::MIN_POSITIVE);
+    let boards = record.reference_lines.iter().flat_map(|line| &line.templates);
+    boards.max_by(|a, b| share(a).total_cmp(&share(b)))
+}

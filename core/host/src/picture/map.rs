@@ -1,0 +1,415 @@
+//! A field over the plate's own rectangle.
+
+use std::collections::BTreeMap;
+
+use platen_shape::task::Verdict;
+
+use super::colour::{self, INK, PALE, PAPER};
+use super::page::{At, Page, Text, draw};
+use super::scale::{Scale, nice_ceiling};
+use super::{Caption, PictureError, Yardstick};
+use crate::plugin::{Field, NodeState};
+use crate::record::PlateRecord;
+
+/// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
+const WIDTH: u32 = 1200;
+const PLATE: (f64, f64) = (810.0, 760.0);
+/// Where the plate's upper left corner lies.
+const LEFT: f64 = 110.0;
+const TOP: f64 = 128.0;
+/// Below the plate: ticks and their title.
+const BELOW: f64 = 92.0;
+/// Least height of the plate, for the legend beside it.
+const LEAST_HEIGHT: f64 = 420.0;
+/// Side of the squares that the field is drawn with, pixels.
+const SQUARE: f64 = 4.0;
+/// Neighbouring rectangles overlap by this much, so that no seam shows between them, pixels.
+const OVERLAP: f64 = 0.5;
+/// Shades from one anchor of the scale to the next.
+const SHADES: i32 = 4;
+/// Distance of the hatching's lines, squares.
+const HATCH: usize = 4;
+/// Numbers written on the plate, along u and v.
+const CODES: [usize; 2] = [5, 4];
+
+/// A map of one field over the plate.
+///
+/// # Errors
+/// When the drawing library fails.
+pub fn map(
+    field: &Field,
+    plate: &PlateRecord,
+    caption: &Caption<'_>,
+    yardstick: &Yardstick,
+) -> Result<String, PictureError> {
+    let largest = (0..field.state.len())
+        .filter(|&node| field.state[node] != NodeState::Unseen)
+        .map(|node| field.values[node].abs())
+        .fold(0.0, f64::max);
+    let (what, scale) = yardstick.field(&field.name, &field.unit, largest);
+    let by_width = PLATE.0 / plate.width_mm;
+    let pixel_per_mm = by_width.min(PLATE.1 / plate.height_mm);
+    let sheet = Sheet { plate, pixel_per_mm, scale };
+    let height = (plate.height_mm * pixel_per_mm).max(LEAST_HEIGHT) + TOP + BELOW;
+    draw((WIDTH, height as u32), |page| {
+        page.head(caption, &what)?;
+        let shades = Shades::of(field, &sheet);
+        shades.paint(page, &sheet)?;
+        sheet.axes(page)?;
+        codes(field, &sheet, page, caption.verdict == Verdict::Pass)?;
+        sheet.legend(page, field)
+    })
+}
+
+/// Where everything lies.
+struct Sheet<'a> {
+    plate: &'a PlateRecord,
+    pixel_per_mm: f64,
+    scale: Scale,
+}
+
+impl Sheet<'_> {
+    fn at(&self, u_mm: f64, v_mm: f64) -> At {
+        (LEFT + u_mm * self.pixel_per_mm, TOP + (self.plate.height_mm - v_mm) * self.pixel_per_mm)
+    }
+
+    fn axes(&self, page: &Page<'_>) -> Result<(), PictureError> {
+        let (w, h) = (self.plate.width_mm, self.plate.height_mm);
+        page.frame(self.at(0.0, h), self.at(w, 0.0), INK, 3)?;
+        let step = nice_ceiling(w.max(h) / 7.0);
+        let tick = Text::new(22.0).coloured(INK);
+        for k in 1..=(w / step) as u32 {
+            let (x, y) = self.at(f64::from(k) * step, 0.0);
+            page.line(&[(x, y), (x, y + 8.0)], INK, 2)?;
+            page.text(&format!("{}", f64::from(k) * step), (x, y + 24.0), tick.centred())?;
+        }
+        for k in 1..=(h / step) as u32 {
+            let (x, y) = self.at(0.0, f64::from(k) * step);
+            page.line(&[(x, y), (x - 8.0, y)], INK, 2)?;
+            page.text(&format!("{}", f64::from(k) * step), (x - 14.0, y), tick.from_right())?;
+        }
+        let (x, y) = self.at(w, 0.0);
+        page.text("u, mm \u{2192}", (x, y + 56.0), tick.from_right())?;
+        let (x, y) = self.at(0.0, h);
+        page.text("v, mm \u{2191}", (x - 14.0, y - 16.0), tick.from_right())?;
+        self.corner(page)?;
+        self.press(page)
+    }
+
+    /// The corner where u and v begin, as it is marked on the plate.
+    fn corner(&self, page: &Page<'_>) -> Result<(), PictureError> {
+        let (x, y) = self.at(0.0, 0.0);
+        page.area(&[(x, y), (x + 34.0, y), (x, y - 34.0)], INK)?;
+        page.text("(0, 0)", (x - 14.0, y + 24.0), Text::new(22.0).bold().from_right())
+    }
+
+    /// A bar along the side that faces the press.
+    fn press(&self, page: &Page<'_>) -> Result<(), PictureError> {
+        const BAR: f64 = 12.0;
+        let (w, h) = (self.plate.width_mm, self.plate.height_mm);
+        let (from, to, label) = match self.plate.press_side {
+            None => return Ok(()),
+            Some([_, v]) if v < 0 => {
+                let ((x0, y), (x1, _)) = (self.at(0.0, 0.0), self.at(w, 0.0));
+                ((x0, y), (x1, y + BAR), (0.5 * (x0 + x1), y + 56.0))
+            }
+            Some([_, v]) if v > 0 => {
+                let ((x0, y), (x1, _)) = (self.at(0.0, h), self.at(w, h));
+                ((x0, y - BAR), (x1, y), (0.5 * (x0 + x1), y - 26.0))
+            }
+            Some([u, _]) => {
+                let ((x, y0), (_, y1)) = if u < 0 {
+                    (self.at(0.0, h), self.at(0.0, 0.0))
+                } else {
+                    (self.at(w, h), self.at(w, 0.0))
+                };
+                let (a, b) = if u < 0 { (x - BAR, x) } else { (x, x + BAR) };
+                ((a, y0), (b, y1), (0.5 * (a + b), y0 - 26.0))
+            }
+        };
+        page.fill(from, to, INK)?;
+        page.text("press", label, Text::new(22.0).bold().centred())
+    }
+
+    fn legend(&self, page: &Page<'_>, field: &Field) -> Result<(), PictureError> {
+        let (left, wide) = (LEFT + PLATE.0 + 44.0, 46.0);
+        let steps = SHADES * self.scale.anchors.len() as i32;
+        let (top, tall) = (TOP + 64.0, LEAST_HEIGHT - 130.0);
+        let y = |position: f64| top + (1.0 - position) / 2.0 * tall;
+        for shade in -steps..steps {
+            let position = (f64::from(shade) + 0.5) / f64::from(steps);
+            let middle = self.scale.turn(place(shade_of(position, steps), steps));
+            let (low, high) = (f64::from(shade) / f64::from(steps), f64::from(shade + 1) / f64::from(steps));
+            page.fill((left, y(high)), (left + wide, y(low) + OVERLAP), colour::diverging(middle))?;
+        }
+        page.frame((left, top), (left + wide, top + tall), INK, 2)?;
+        let text = Text::new(22.0);
+        let n = self.scale.anchors.len() as f64;
+        let ends = self.scale.anchors.iter().enumerate().map(|(k, value)| ((k + 1) as f64 / n, *value));
+        let both = ends.flat_map(|(position, value)| [(position, value), (-position, -value)]);
+        for (position, value) in both.chain([(0.0, 0.0)]) {
+            page.line(&[(left + wide, y(position)), (left + wide + 8.0, y(position))], INK, 2)?;
+            page.text(&self.scale.number(value), (left + wide + 14.0, y(position)), text)?;
+        }
+        page.text(self.scale.unit, (left, TOP + 10.0), text.bold())?;
+        let [less, more] = self.scale.words.unwrap_or(["", ""]);
+        page.text(more, (left, top - 22.0), text.bold())?;
+        page.text(less, (left, top + tall + 20.0), text.bold())?;
+        self.keys(page, field, (left, top + tall + 58.0))
+    }
+
+    /// What gray and hatching mean, where the map has them.
+    fn keys(&self, page: &Page<'_>, field: &Field, (left, mut y): At) -> Result<(), PictureError> {
+        let has = |state: NodeState| field.state.contains(&state);
+        let side = 26.0;
+        if has(NodeState::Unchanged) {
+            page.fill((left, y - side / 2.0), (left + side, y + side / 2.0), colour::diverging(0.0))?;
+            page.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
+            let word = if self.scale.words.is_some() { "enough" } else { "no change" };
+            page.text(word, (left + side + 10.0, y), Text::new(22.0))?;
+            y += 36.0;
+        }
+        if has(NodeState::Unseen) {
+            for k in 0..3 {
+                let s = 6.0 + 10.0 * f64::from(k);
+                page.line(&[(left, y - side / 2.0 + s), (left + s, y - side / 2.0)], PALE, 2)?;
+            }
+            page.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
+            page.text("no data", (left + side + 10.0, y), Text::new(22.0))?;
+        }
+        Ok(())
+    }
+}
+
+/// Place of a shade's colour.
+fn place(shade: i32, steps: i32) -> f64 {
+    f64::from(shade) / f64::from(steps)
+}
+
+/// The shade of a position: away from zero, so that only zero's own shade is neutral.
+fn shade_of(position: f64, steps: i32) -> i32 {
+    let size = (position.abs() * f64::from(steps)).ceil().min(f64::from(steps)) as i32;
+    if position < 0.0 { -size } else { size }
+}
+
+/// The field as squares of few shades, v outer from the top, u inner; `None` where nothing was seen.
+struct Shades {
+    n_x: usize,
+    n_y: usize,
+    shade: Vec<Option<i32>>,
+    steps: i32,
+}
+
+impl Shades {
+    fn of(field: &Field, sheet: &Sheet<'_>) -> Self {
+        let count = |mm: f64| ((mm * sheet.pixel_per_mm / SQUARE).round() as usize).max(1);
+        let (n_x, n_y) = (count(sheet.plate.width_mm), count(sheet.plate.height_mm));
+        let steps = SHADES * sheet.scale.anchors.len() as i32;
+        let shade = |x: usize, y: usize| {
+            let (u, v) = ((x as f64 + 0.5) / n_x as f64, 1.0 - (y as f64 + 0.5) / n_y as f64);
+            let (state, value) = field.sample(u, v, 0);
+            match state {
+                NodeState::Unseen => None,
+                NodeState::Unchanged => Some(0),
+                NodeState::Seen => {
+                    Some(shade_of(sheet.scale.colour_position(value * sheet.scale.factor), steps))
+                }
+            }
+        };
+        let shade = (0..n_x * n_y).map(|k| shade(k % n_x, k / n_x)).collect();
+        Self { n_x, n_y, shade, steps }
+    }
+
+    /// Rectangles as large as they come: runs of one shade, and rows that repeat the run above.
+    fn paint(&self, page: &Page<'_>, sheet: &Sheet<'_>) -> Result<(), PictureError> {
+        let (left, top) = sheet.at(0.0, sheet.plate.height_mm);
+        let (right, bottom) = sheet.at(sheet.plate.width_mm, 0.0);
+        let x = |k: usize| left + (right - left) * k as f64 / self.n_x as f64;
+        let y = |k: usize| top + (bottom - top) * k as f64 / self.n_y as f64;
+        for ((from, to, shade), rows) in self.rectangles() {
+            let colour = match shade {
+                Some(shade) => colour::diverging(place(shade, self.steps)),
+                None => PAPER,
+            };
+            page.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
+        }
+        for [from, to] in self.hatching() {
+            let corner = |[column, row]: [usize; 2]| (x(column), y(row));
+            page.line(&[corner(from), corner(to)], PALE, 2)?;
+        }
+        Ok(())
+    }
+
+    /// Runs (from, to, shade) with the rows they span, in a fixed order.
+    fn rectangles(&self) -> Vec<((usize, usize, Option<i32>), [usize; 2])> {
+        let mut done = Vec::new();
+        let mut open: BTreeMap<(usize, usize, Option<i32>), usize> = BTreeMap::new();
+        for row in 0..self.n_y {
+            let cells = &self.shade[row * self.n_x..(row + 1) * self.n_x];
+            let mut runs = BTreeMap::new();
+            let mut from = 0;
+            for run in cells.chunk_by(|a, b| a == b) {
+                let key = (from, from + run.len(), run[0]);
+                runs.insert(key, open.remove(&key).unwrap_or(row));
+                from += run.len();
+            }
+            done.extend(open.iter().map(|(key, first)| (*key, [*first, row])));
+            open = runs;
+        }
+        done.extend(open.iter().map(|(key, first)| (*key, [*first, self.n_y])));
+        done
+    }
+
+    /// Pieces of the diagonals that lie where nothing was seen, as corners of squares (column, row).
+    fn hatching(&self) -> Vec<[[usize; 2]; 2]> {
+        let mut lines = Vec::new();
+        let unseen = |x: usize, y: usize| self.shade[y * self.n_x + x].is_none();
+        for sum in (0..self.n_x + self.n_y).step_by(HATCH) {
+            let mut start = None;
+            for x in sum.saturating_sub(self.n_y - 1)..=sum.min(self.n_x - 1) {
+                let y = sum - x;
+                match (unseen(x, y), start) {
+                    (true, None) => start = Some([x, y + 1]),
+                    (false, Some(from)) => {
+                        lines.push([from, [x, y + 1]]);
+                        start = None;
+                    }
+                    _ => {}
+                }
+            }
+            if let Some(from) = start {
+                let x = sum.min(self.n_x - 1);
+                lines.push([from, [x + 1, sum - x]]);
+            }
+        }
+        lines
+    }
+}
+
+/// The field's mean over each part of the plate, in digits. Unless the plate is done, the part that is farthest from it is
+/// framed and named: what passes under its boards may still be a little off beyond their ends, and asks for nothing.
+fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Result<(), PictureError> {
+    let (w, h) = (sheet.plate.width_mm / CODES[0] as f64, sheet.plate.height_mm / CODES[1] as f64);
+    let parts: Vec<(usize, usize, f64)> = (0..CODES[0] * CODES[1])
+        .map(|k| (k % CODES[0], k / CODES[0]))
+        .filter_map(|(i, k)| Some((i, k, mean(field, i, k)? * sheet.scale.factor)))
+        .collect();
+    for (i, k, value) in &parts {
+        let at = sheet.at((*i as f64 + 0.5) * w, (*k as f64 + 0.5) * h);
+        let colour = colour::text_on(sheet.scale.position(*value));
+        page.text(&sheet.scale.number(*value), at, Text::new(27.0).bold().centred().coloured(colour))?;
+    }
+    let Some(words) = sheet.scale.words.filter(|_| !done) else { return Ok(()) };
+    let worst = parts.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
+    let Some((i, k, value)) = worst.filter(|(_, _, value)| value.abs() > sheet.scale.anchors[0]) else {
+        return Ok(());
+    };
+    let inset = 3.0 / sheet.pixel_per_mm;
+    let (i, k) = (*i as f64, *k as f64);
+    let (from, to) =
+        (sheet.at(i * w + inset, (k + 1.0) * h - inset), sheet.at((i + 1.0) * w - inset, k * h + inset));
+    page.frame(from, to, INK, 4)?;
+    let below = (0.5 * (from.0 + to.0), to.1 - 20.0);
+    let look = Text::new(22.0).bold().centred().coloured(colour::text_on(sheet.scale.position(*value)));
+    page.text(words[usize::from(*value > 0.0)], below, look)
+}
+
+/// Mean over the known nodes of a part of the plate; `None` when fewer than half were seen, or most show no change.
+fn mean(field: &Field, i: usize, k: usize) -> Option<f64> {
+    let [n_u, n_v] = field.nodes;
+    let range = |part: usize, parts: usize, n: usize| part * n / parts..(part + 1) * n / parts;
+    let (mut all, mut seen, mut gray, mut sum) = (0, 0, 0, 0.0);
+    for row in range(k, CODES[1], n_v) {
+        for column in range(i, CODES[0], n_u) {
+            let node = row * n_u + column;
+            all += 1;
+            if field.state[node] != NodeState::Unseen {
+                seen += 1;
+                gray += i32::from(field.state[node] == NodeState::Unchanged);
+                sum += field.values[node];
+            }
+        }
+    }
+    (2 * seen >= all && seen > 2 * gray).then(|| sum / f64::from(seen))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: usize = 21;
+
+    fn field(name: &str, unit: &str, value: impl Fn(f64, f64) -> f64, hole: bool) -> Field {
+        let at = |k: usize| ((k % SIDE) as f64 / (SIDE - 1) as f64, (k / SIDE) as f64 / (SIDE - 1) as f64);
+        let state = |(u, v): (f64, f64)| match hole && (u - 0.5).hypot(v - 0.5) < 0.2 {
+            true => NodeState::Unseen,
+            false => NodeState::Seen,
+        };
+        Field {
+            name: name.into(),
+            unit: unit.into(),
+            nodes: [SIDE, SIDE],
+            components: 1,
+            values: (0..SIDE * SIDE).map(at).map(|(u, v)| value(u, v)).collect(),
+            state: (0..SIDE * SIDE).map(at).map(state).collect(),
+        }
+    }
+
+    fn drawn(field: &Field) -> String {
+        let plate = PlateRecord { width_mm: 3000.0, height_mm: 2500.0, ..PlateRecord::default() };
+        let caption = Caption { plate: "A<7>", stroke: Some(7), verdict: Verdict::Fail };
+        let yardstick = Yardstick { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
+        map(field, &plate, &caption, &yardstick).unwrap()
+    }
+
+    /// The part of the picture that is the legend's numbers.
+    fn legend(svg: &str) -> Vec<&str> {
+        svg.lines().filter(|line| line.contains('+') || line.contains('\u{2212}')).collect()
+    }
+
+    #[test]
+    fn the_plates_name_cannot_break_the_picture() {
+        assert!(drawn(&field("deviation", "m", |u, _| u, false)).contains("A&lt;7&gt;"));
+    }
+
+    #[test]
+    fn small_and_large_strokes_have_the_same_legend() {
+        let [small, large] = [1e-3, 1e-1].map(|size| drawn(&field("deviation", "m", |u, _| -size * u, true)));
+        for number in ["+3.0", "+150", "\u{2212}150"] {
+            assert!(legend(&small).contains(&number) && legend(&large).contains(&number), "{number}");
+        }
+    }
+
+    #[test]
+    fn what_was_not_seen_is_hatched_and_named() {
+        let whole = drawn(&field("deviation", "m", |u, _| u, false));
+        let holed = drawn(&field("deviation", "m", |u, _| u, true));
+        assert!(!whole.contains("no data") && holed.contains("no data"));
+        let hatches = |svg: &str| svg.matches("#6E7278").count();
+        assert!(hatches(&holed) > hatches(&whole) + 20, "{} {}", hatches(&holed), hatches(&whole));
+    }
+
+    #[test]
+    fn the_worst_part_is_told_in_words_and_only_beyond_the_limit() {
+        let per_mm = 0.006 / 3.0;
+        let much = drawn(&field("curvature_deficit", "1/m", |u, _| 40.0 * per_mm * u, false));
+        assert!(much.matches("bend more").count() == 2, "legend and plate");
+        let done = drawn(&field("curvature_deficit", "1/m", |u, _| 2.0 * per_mm * u, false));
+        assert!(done.matches("bend more").count() == 1, "legend alone");
+    }
+
+    #[test]
+    fn rectangles_cover_every_square_once() {
+        let shade: Vec<Option<i32>> =
+            (0..30 * 20).map(|k| (k % 7 != 0).then_some((k % 30 / 10) * (k / 30 / 5))).collect();
+        let shades = Shades { n_x: 30, n_y: 20, shade, steps: 8 };
+        let mut covered = vec![0; 600];
+        for ((from, to, shade), [first, last]) in shades.rectangles() {
+            for cell in (first..last).flat_map(|row| (from..to).map(move |x| row * 30 + x)) {
+                covered[cell] += 1;
+                assert_eq!(shades.shade[cell], shade);
+            }
+        }
+        assert!(covered.iter().all(|n| *n == 1));
+    }
+}

@@ -1,0 +1,95 @@
+//! Shape checks in the units of the shop.
+
+use serde::{Deserialize, Serialize};
+
+use platen_shape::{Check, EdgeCheck, ShapeChecks};
+
+use super::{EXPANDED, mm};
+
+/// What tape, square and sight line would show.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ShapeChecksRecord {
+    /// Edges v = 0, u = W, v = H, u = 0.
+    pub edges: [EdgeRecord; 4],
+    /// Straight from (0,0) to (W,H) and from (W,0) to (0,H).
+    pub diagonals_mm: [CheckRecord; 2],
+    /// The first diagonal less the second.
+    pub diagonal_difference_mm: CheckRecord,
+    /// Inner angles in the plate's surface, corners (0,0), (W,0), (W,H), (0,H).
+    pub angles_deg: [CheckRecord; 4],
+    /// Looking along u and along v: how far the far edge is turned clockwise against the near one.
+    pub twist_deg: [CheckRecord; 2],
+}
+
+/// One edge.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct EdgeRecord {
+    /// A tape along the edge of the scanned face.
+    pub face_mm: CheckRecord,
+    /// The same on the mid-surface, to be held against the cut size.
+    pub mid_mm: CheckRecord,
+    /// Straight from corner to corner.
+    pub chord_mm: CheckRecord,
+}
+
+/// A figure with its expanded uncertainty (95 %), in the unit of its name.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct CheckRecord {
+    /// Value.
+    pub value: f64,
+    /// Expanded uncertainty (95 %).
+    pub uncertainty: f64,
+    /// False when it rests on a corner that was extrapolated.
+    pub seen: bool,
+}
+
+impl ShapeChecksRecord {
+    pub(super) fn new(checks: &ShapeChecks) -> Self {
+        let edge = |edge: EdgeCheck| EdgeRecord {
+            face_mm: length(edge.face),
+            mid_mm: length(edge.mid),
+            chord_mm: length(edge.chord),
+        };
+        Self {
+            edges: checks.edges.map(edge),
+            diagonals_mm: checks.diagonals.map(length),
+            diagonal_difference_mm: length(checks.diagonal_difference),
+            angles_deg: checks.angles.map(turn),
+            twist_deg: checks.twist.map(turn),
+        }
+    }
+
+    /// Every check in words, in a fixed order: name, figure, unit.
+    pub fn rows(&self) -> Vec<(String, CheckRecord, &'static str)> {
+        let edges = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
+        let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];
+        let mut rows = Vec::new();
+        for (name, edge) in edges.iter().zip(&self.edges) {
+            rows.push((format!("{name}, along the mid-surface"), edge.mid_mm, "mm"));
+        }
+        for (name, edge) in edges.iter().zip(&self.edges) {
+            rows.push((format!("{name}, tape on the face"), edge.face_mm, "mm"));
+        }
+        for (name, edge) in edges.iter().zip(&self.edges) {
+            rows.push((format!("{name}, straight"), edge.chord_mm, "mm"));
+        }
+        rows.push(("diagonal (0, 0) to (W, H)".into(), self.diagonals_mm[0], "mm"));
+        rows.push(("diagonal (W, 0) to (0, H)".into(), self.diagonals_mm[1], "mm"));
+        rows.push(("difference of the diagonals".into(), self.diagonal_difference_mm, "mm"));
+        for (name, angle) in corners.iter().zip(&self.angles_deg) {
+            rows.push((format!("angle at {name}"), *angle, "deg"));
+        }
+        rows.push(("twist, sighted along u".into(), self.twist_deg[0], "deg"));
+        rows.push(("twist, sighted along v".into(), self.twist_deg[1], "deg"));
+        rows
+    }
+}
+
+fn length(check: Check) -> CheckRecord {
+    CheckRecord { value: mm(check.value), uncertainty: mm(EXPANDED * check.sigma), seen: check.seen }
+}
+
+fn turn(check: Check) -> CheckRecord {
+    let [value, uncertainty] = [check.value, EXPANDED * check.sigma].map(f64::to_degrees);
+    CheckRecord { value, uncertainty, seen: check.seen }
+}

@@ -1,0 +1,291 @@
+//! The plate as a table: even nodes with all that the comparisons found there, for spreadsheets and mesh viewers.
+
+use std::fmt::Write as _;
+
+use ply_rs_bw::ply::{
+    Addable as _, DefaultElement, ElementDef, Encoding, Ply, Property, PropertyDef, PropertyType, ScalarType,
+};
+use ply_rs_bw::writer::Writer;
+
+use platen_shape::Surface;
+
+use crate::plugin::{Field, NodeState, Report};
+
+/// Nodes along u and v: those at which our comparisons give their fields.
+const NODES: [usize; 2] = [101, 101];
+
+/// Even nodes over the whole plate, v outer, u inner, edges included.
+#[derive(Debug, Clone)]
+pub struct PlateTable {
+    nodes: Vec<Node>,
+    columns: Vec<Column>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Metres.
+    uv: [f64; 2],
+    /// On the scanned face, scanner frame, metres.
+    face: [f64; 3],
+    seen: bool,
+}
+
+/// One number a node.
+#[derive(Debug, Clone)]
+struct Column {
+    /// With its unit, e.g. `deviation_mm`.
+    name: String,
+    values: Vec<Option<f64>>,
+}
+
+impl PlateTable {
+    /// The table of a measured surface with its comparisons' fields. A field on other nodes is interpolated.
+    pub fn new(surface: &Surface, reports: &[&Report]) -> Self {
+        let along = |k: usize, n: usize, length: f64| length * k as f64 / (n - 1) as f64;
+        let node = |k: usize| {
+            let u = along(k % NODES[0], NODES[0], surface.width());
+            let v = along(k / NODES[0], NODES[1], surface.height());
+            Node { uv: [u, v], face: surface.face(u, v).into(), seen: surface.mask().seen(u, v) }
+        };
+        let fields = reports.iter().flat_map(|report| &report.fields);
+        Self {
+            nodes: (0..NODES[0] * NODES[1]).map(node).collect(),
+            columns: fields.flat_map(columns).collect(),
+        }
+    }
+
+    /// As CSV: u_mm, v_mm, x_m, y_m, z_m, seen, then a column for each field; empty where nothing is known.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("u_mm,v_mm,x_m,y_m,z_m,seen");
+        for column in &self.columns {
+            text.push(',');
+            text.push_str(&super::files::csv_cell(&column.name));
+        }
+        text.push('\n');
+        for (k, Node { uv: [u, v], face: [x, y, z], seen }) in self.nodes.iter().enumerate() {
+            let seen = u8::from(*seen);
+            // Writing to a string does not fail.
+            let _ = write!(text, "{:.3},{:.3},{x:.6},{y:.6},{z:.6},{seen}", u * 1e3, v * 1e3);
+            for column in &self.columns {
+                text.push(',');
+                if let Some(value) = column.values[k] {
+                    let _ = write!(text, "{value:.6}");
+                }
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// As a triangle mesh, PLY, binary little-endian: positions in metres, every column as a scalar field named as
+    /// CloudCompare names its own (`scalar_deviation_mm`), NaN where nothing is known. Triangles of nodes that were not
+    /// seen are left out: a hole in the data is a hole in the mesh.
+    ///
+    /// # Errors
+    /// The writer's refusal, in words.
+    pub fn ply(&self) -> Result<Vec<u8>, String> {
+        let scalar = |name: &str, kind: ScalarType| PropertyDef::new(name.into(), PropertyType::Scalar(kind));
+        let mut vertex = ElementDef::new("vertex".into());
+        for axis in AXES {
+            vertex.properties.add(scalar(axis, ScalarType::Double));
+        }
+        for name in self.scalars() {
+            vertex.properties.add(scalar(&name, ScalarType::Float));
+        }
+        let mut face = ElementDef::new("face".into());
+        let list = PropertyType::List(ScalarType::UChar, ScalarType::Int);
+        face.properties.add(PropertyDef::new(FACE.into(), list));
+
+        let mut ply = Ply::<DefaultElement>::new();
+        ply.header.encoding = Encoding::BinaryLittleEndian;
+        ply.header
+            .comments
+            .push(concat!("platen ", env!("CARGO_PKG_VERSION"), ", scanned face, metres").into());
+        ply.header.elements.add(vertex);
+        ply.header.elements.add(face);
+        ply.payload.insert("vertex".into(), (0..self.nodes.len()).map(|k| self.vertex(k)).collect());
+        let triangle = |corners: [usize; 3]| {
+            let mut element = DefaultElement::new();
+            element.insert(FACE.into(), Property::ListInt(corners.map(|k| k as i32).to_vec()));
+            element
+        };
+        ply.payload.insert("face".into(), self.triangles().into_iter().map(triangle).collect());
+        let mut bytes = Vec::new();
+        Writer::new().write_ply(&mut bytes, &mut ply).map_err(|e| e.to_string())?;
+        Ok(bytes)
+    }
+
+    fn scalars(&self) -> impl Iterator<Item = String> {
+        let own = ["u_mm", "v_mm"].into_iter();
+        own.chain(self.columns.iter().map(|column| column.name.as_str())).map(|name| format!("scalar_{name}"))
+    }
+
+    fn vertex(&self, k: usize) -> DefaultElement {
+        let Node { uv, face, .. } = self.nodes[k];
+        let mut element = DefaultElement::new();
+        for (axis, value) in AXES.iter().zip(face) {
+            element.insert((*axis).into(), Property::Double(value));
+        }
+        let own = uv.map(|metres| Some(metres * 1e3)).into_iter();
+        let values = own.chain(self.columns.iter().map(|column| column.values[k]));
+        for (name, value) in self.scalars().zip(values) {
+            element.insert(name, Property::Float(value.map_or(f32::NAN, |value| value as f32)));
+        }
+        element
+    }
+
+    /// Two triangles for each four nodes that were all seen, counter-clockwise from the scanner.
+    fn triangles(&self) -> Vec<[usize; 3]> {
+        let [n_u, n_v] = NODES;
+        let squares = (0..(n_u - 1) * (n_v - 1)).map(|k| k / (n_u - 1) * n_u + k % (n_u - 1));
+        let seen = |corner: usize| {
+            [corner, corner + 1, corner + n_u, corner + n_u + 1].iter().all(|k| self.nodes[*k].seen)
+        };
+        squares
+            .filter(|corner| seen(*corner))
+            .flat_map(|k| [[k, k + 1, k + n_u + 1], [k, k + n_u + 1, k + n_u]])
+            .collect()
+    }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// The usual name of a face's corners in PLY.
+const FACE: &str = "vertex_indices";
+
+/// One column for each component of a field, in the unit that people read.
+fn columns(field: &Field) -> Vec<Column> {
+    let (suffix, factor) = match field.unit.as_str() {
+        "m" => ("_mm", 1000.0),
+        "rad" => ("_deg", 1.0_f64.to_degrees()),
+        "1/m" => ("_per_m", 1.0),
+        "1/m2" => ("_per_m2", 1.0),
+        _ => ("", 1.0),
+    };
+    let one = |component: usize| {
+        let part = match field.components {
+            1 => String::new(),
+            3 => format!("_{}", AXES[component]),
+            _ => format!("_{component}"),
+        };
+        let value = |k: usize| {
+            let share = |k: usize, n: usize| k as f64 / (n - 1) as f64;
+            let (u, v) = (share(k % NODES[0], NODES[0]), share(k / NODES[0], NODES[1]));
+            let (state, value) = field.sample(u, v, component);
+            (state != NodeState::Unseen).then_some(value * factor)
+        };
+        Column {
+            name: format!("{}{part}{suffix}", field.name),
+            values: (0..NODES[0] * NODES[1]).map(value).collect(),
+        }
+    };
+    (0..field.components).map(one).collect()
+}
+
+impl Field {
+    /// One component at a share of the plate's sides: interpolated between seen nodes, in the state of the nearest.
+    pub fn sample(&self, u: f64, v: f64, component: usize) -> (NodeState, f64) {
+        let [n_u, n_v] = self.nodes;
+        let place = |share: f64, n: usize| {
+            let at = share.clamp(0.0, 1.0) * n.saturating_sub(1) as f64;
+            let from = (at as usize).min(n.saturating_sub(2));
+            (from, (from + 1).min(n.saturating_sub(1)), at - from as f64)
+        };
+        let ((i0, i1, f), (k0, k1, g)) = (place(u, n_u), place(v, n_v));
+        let nearest = (if g >= 0.5 { k1 } else { k0 }) * n_u + if f >= 0.5 { i1 } else { i0 };
+        let (mut weights, mut sum) = (0.0, 0.0);
+        for (node, weight) in [
+            (k0 * n_u + i0, (1.0 - f) * (1.0 - g)),
+            (k0 * n_u + i1, f * (1.0 - g)),
+            (k1 * n_u + i0, (1.0 - f) * g),
+            (k1 * n_u + i1, f * g),
+        ] {
+            if self.state[node] != NodeState::Unseen {
+                weights += weight;
+                sum += weight * self.values[node * self.components + component];
+            }
+        }
+        (self.state[nearest], if weights > 0.0 { sum / weights } else { 0.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(seen: impl Fn(usize) -> bool) -> PlateTable {
+        let node = |k: usize| {
+            let (u, v) = ((k % 101) as f64 * 0.03, (k / 101) as f64 * 0.025);
+            Node { uv: [u, v], face: [u, v, 0.1 * u], seen: seen(k) }
+        };
+        let field = Field {
+            name: "deviation".into(),
+            unit: "m".into(),
+            nodes: [101, 101],
+            components: 1,
+            values: (0..101 * 101).map(|k| k as f64 * 1e-6).collect(),
+            state: (0..101 * 101)
+                .map(|k| if seen(k) { NodeState::Seen } else { NodeState::Unseen })
+                .collect(),
+        };
+        PlateTable { nodes: (0..101 * 101).map(node).collect(), columns: columns(&field) }
+    }
+
+    #[test]
+    fn a_node_without_data_is_an_empty_cell() {
+        let csv = table(|k| k != 1).csv();
+        let mut lines = csv.lines();
+        assert_eq!(lines.next(), Some("u_mm,v_mm,x_m,y_m,z_m,seen,deviation_mm"));
+        assert_eq!(lines.next(), Some("0.000,0.000,0.000000,0.000000,0.000000,1,0.000000"));
+        assert_eq!(lines.next(), Some("30.000,0.000,0.030000,0.000000,0.003000,0,"));
+        assert_eq!(lines.next(), Some("60.000,0.000,0.060000,0.000000,0.006000,1,0.002000"));
+        assert_eq!(csv.lines().count(), 1 + 101 * 101);
+    }
+
+    #[test]
+    fn the_mesh_has_the_plates_area_and_a_hole_where_nothing_was_seen() {
+        let area = |table: &PlateTable| -> f64 {
+            let corner = |k: usize| table.nodes[k].uv;
+            let twice = |[a, b, c]: [usize; 3]| {
+                let ([x0, y0], [x1, y1], [x2, y2]) = (corner(a), corner(b), corner(c));
+                (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+            };
+            table.triangles().into_iter().map(|triangle| 0.5 * twice(triangle)).sum()
+        };
+        assert!(
+            (area(&table(|_| true)) - 3.0 * 2.5).abs() < 1e-9,
+            "counter-clockwise triangles have positive area"
+        );
+        // One unseen node inside takes the four squares round it.
+        assert!((area(&table(|k| k != 50 * 101 + 50)) - (7.5 - 4.0 * 0.03 * 0.025)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_file_is_read_back_as_written() {
+        let table = table(|k| k != 1);
+        let bytes = table.ply().unwrap();
+        let parser = ply_rs_bw::parser::Parser::<DefaultElement>::new();
+        let read = parser.read_ply(&mut bytes.as_slice()).unwrap();
+        assert_eq!(read.header.encoding, Encoding::BinaryLittleEndian);
+        assert_eq!(read.payload["vertex"].len(), 101 * 101);
+        assert_eq!(read.payload["face"].len(), table.triangles().len());
+        let vertex = &read.payload["vertex"][2];
+        assert_eq!(vertex["z"], Property::Double(0.1 * 0.06));
+        assert_eq!(vertex["scalar_deviation_mm"], Property::Float(0.002));
+        assert!(matches!(read.payload["vertex"][1]["scalar_deviation_mm"], Property::Float(x) if x.is_nan()));
+    }
+
+    #[test]
+    fn vectors_get_a_column_each() {
+        let field = Field {
+            name: "displacement".into(),
+            unit: "m".into(),
+            nodes: [2, 2],
+            components: 3,
+            values: (0..12).map(f64::from).collect(),
+            state: vec![NodeState::Seen; 4],
+        };
+        let names: Vec<String> = columns(&field).into_iter().map(|column| column.name).collect();
+        assert_eq!(names, ["displacement_x_mm", "displacement_y_mm", "displacement_z_mm"]);
+        assert_eq!(field.sample(0.5, 0.5, 1), (NodeState::Seen, 5.5), "the mean of 1, 4, 7 and 10");
+    }
+}
