@@ -1,6 +1,9 @@
 //! What the history holds of a plate's strokes, as pictures and reports want it.
 
+use std::path::Path;
+
 use platen_history::{Archive, Error, Filter, Stroke};
+use platen_plant::PlateFile;
 use platen_shape::task::Verdict;
 
 use crate::picture::StripPoint;
@@ -69,4 +72,47 @@ pub fn worst_board(record: &ResultRecord) -> Option<&TemplateRecord> {
     let share = |board: &TemplateRecord| board.max_gap_mm.abs() / board.limit_mm.max(f64::MIN_POSITIVE);
     let boards = record.reference_lines.iter().flat_map(|line| &line.templates);
     boards.max_by(|a, b| share(a).total_cmp(&share(b)))
+}
+
+/// Where the plate rested, as a result document has it.
+pub fn supports(document: &Path) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Supports {
+        supports: Option<String>,
+    }
+    let text = std::fs::read(document).ok()?;
+    serde_json::from_slice::<Supports>(&text).ok()?.supports
+}
+
+/// Whether the plate rests on other supports than it did `before`; what is not known is not called a change.
+pub fn moved(before: Option<&str>, plate: &PlateFile) -> bool {
+    before.zip(plate.plate.supports.as_deref()).is_some_and(|(before, now)| before != now)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plate_on_other_supports_is_flagged_and_only_then() {
+        let plate = |supports: &str| {
+            let text = format!(
+                "[plate]\nid = \"A\"\nwidth_mm = 3000.0\nheight_mm = 2000.0\nthickness_mm = 30.0\n{supports}"
+            );
+            PlateFile::parse("plate.toml", &text).unwrap()
+        };
+        let trestles = plate("supports = \"trestles\"");
+        assert!(moved(Some("bed"), &trestles));
+        assert!(!moved(Some("trestles"), &trestles));
+        assert!(!moved(None, &trestles) && !moved(Some("bed"), &plate("")));
+    }
+
+    #[test]
+    fn the_supports_are_read_from_the_document_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.json");
+        std::fs::write(&path, r#"{"schema": "platen.result/1", "supports": "bed", "grid": [1, 2]}"#).unwrap();
+        assert_eq!(supports(&path).as_deref(), Some("bed"));
+        assert_eq!(supports(&folder.path().join("gone.json")), None);
+    }
 }

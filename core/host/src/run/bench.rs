@@ -68,6 +68,14 @@ struct InHand {
     scanned_at: jiff::Timestamp,
 }
 
+/// What a stroke is compared with.
+struct Earlier {
+    before: Option<Surface>,
+    baseline: Option<Surface>,
+    /// Where the plate rested at the stroke before.
+    supports: Option<String>,
+}
+
 /// A stroke with all that was found out about it.
 struct Judged {
     answer: Measurement,
@@ -311,14 +319,14 @@ impl Bench {
         let spec = self.rig.spec(&stroke.plate);
         let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec)?;
         self.region.saw(&measured.outline);
-        let (before, baseline) = self.earlier(stroke.run_id);
+        let Earlier { before, baseline, supports } = self.earlier(stroke.run_id);
         let surfaces = Surfaces {
             now: &measured.measurement.surface,
             before: before.as_ref(),
             baseline: baseline.as_ref(),
         };
         let comparing = Instant::now();
-        let task = rig::task(&stroke.plate, false);
+        let task = rig::task(&stroke.plate, past::moved(supports.as_deref(), &stroke.plate));
         let reports = stroke::compare(&self.rig, &task, surfaces);
         let compare = comparing.elapsed();
         let verdict = stroke::verdict(&reports);
@@ -348,19 +356,24 @@ impl Bench {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Surfaces of the stroke before and of the blank, where they are on record.
-    fn earlier(&self, run_id: u32) -> (Option<Surface>, Option<Surface>) {
-        let history = self.history();
-        let load = |found: Result<Option<platen_history::Stroke>, platen_history::Error>| match found {
-            Ok(stroke) => {
-                stroke.and_then(|s| s.document).and_then(|document| surface_file::beside(&document))
-            }
+    /// The stroke before and the blank, where they are on record.
+    fn earlier(&self, run_id: u32) -> Earlier {
+        let document = |found: Result<Option<platen_history::Stroke>, platen_history::Error>| match found {
+            Ok(stroke) => stroke.and_then(|stroke| stroke.document),
             Err(error) => {
                 tracing::warn!("{error}; this stroke is compared with none");
                 None
             }
         };
-        (load(history.archive().before(run_id)), load(history.archive().baseline(run_id)))
+        let (before, baseline) = {
+            let history = self.history();
+            (document(history.archive().before(run_id)), document(history.archive().baseline(run_id)))
+        };
+        Earlier {
+            supports: before.as_deref().and_then(past::supports),
+            before: before.as_deref().and_then(surface_file::beside),
+            baseline: baseline.as_deref().and_then(surface_file::beside),
+        }
     }
 
     /// Writes the documents and notes where they lie. A full disk costs the record, not the result.

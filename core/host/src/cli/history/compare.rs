@@ -42,7 +42,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (before, now) = (surface(&first)?, surface(&second)?);
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
-    let task = rig::task(&plate, false);
+    let rested = first.document.as_deref().and_then(past::supports);
+    let task = rig::task(&plate, past::moved(rested.as_deref(), &plate));
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));
