@@ -9,6 +9,7 @@ mod map;
 mod page;
 mod scale;
 mod section;
+mod shades;
 mod strip;
 
 pub use map::map;

@@ -221,7 +221,7 @@ fn table(pages: &[Page<'_>]) -> Markup {
             } }
             @for page in pages { tr {
                 td { (page.point.label) }
-                td { (page.stroke.accepted.strftime("%m-%d %H:%M").to_string()) }
+                td.t { (page.stroke.accepted.strftime("%m-%d %H:%M").to_string()) }
                 td { (chip(page.point.verdict)) }
                 td.n { (gap(&page.point)) }
                 @match &page.document {

@@ -1,12 +1,11 @@
 //! A field over the plate's own rectangle.
 
-use std::collections::BTreeMap;
-
 use platen_shape::task::Verdict;
 
-use super::colour::{self, INK, PALE, PAPER};
+use super::colour::{self, INK, PALE};
 use super::page::{At, Page, Text, draw};
 use super::scale::{Scale, nice_ceiling};
+use super::shades::{self, Shades};
 use super::{Caption, PictureError, Yardstick};
 use crate::plugin::{Field, NodeState};
 use crate::record::PlateRecord;
@@ -23,12 +22,6 @@ const BELOW: f64 = 92.0;
 const LEAST_HEIGHT: f64 = 420.0;
 /// Side of the squares that the field is drawn with, pixels.
 const SQUARE: f64 = 4.0;
-/// Neighbouring rectangles overlap by this much, so that no seam shows between them, pixels.
-const OVERLAP: f64 = 0.5;
-/// Shades from one anchor of the scale to the next.
-const SHADES: i32 = 4;
-/// Distance of the hatching's lines, squares.
-const HATCH: usize = 4;
 /// Numbers written on the plate, along u and v.
 const CODES: [usize; 2] = [5, 4];
 
@@ -53,8 +46,9 @@ pub fn map(
     let height = (plate.height_mm * pixel_per_mm).max(LEAST_HEIGHT) + TOP + BELOW;
     draw((WIDTH, height as u32), |page| {
         page.head(caption, &what)?;
-        let shades = Shades::of(field, &sheet);
-        shades.paint(page, &sheet)?;
+        let squares = [plate.width_mm, plate.height_mm].map(|mm| sheet.squares(mm));
+        let corners = [sheet.at(0.0, plate.height_mm), sheet.at(plate.width_mm, 0.0)];
+        Shades::of(field, &sheet.scale, squares).paint(page, corners[0], corners[1])?;
         sheet.axes(page)?;
         codes(field, &sheet, page, caption.verdict == Verdict::Pass)?;
         sheet.legend(page, field)
@@ -73,6 +67,10 @@ impl Sheet<'_> {
         (LEFT + u_mm * self.pixel_per_mm, TOP + (self.plate.height_mm - v_mm) * self.pixel_per_mm)
     }
 
+    fn squares(&self, mm: f64) -> usize {
+        ((mm * self.pixel_per_mm / SQUARE).round() as usize).max(1)
+    }
+
     fn axes(&self, page: &Page<'_>) -> Result<(), PictureError> {
         let (w, h) = (self.plate.width_mm, self.plate.height_mm);
         page.frame(self.at(0.0, h), self.at(w, 0.0), INK, 3)?;
@@ -86,12 +84,12 @@ impl Sheet<'_> {
         for k in 1..=(h / step) as u32 {
             let (x, y) = self.at(0.0, f64::from(k) * step);
             page.line(&[(x, y), (x - 8.0, y)], INK, 2)?;
-            page.text(&format!("{}", f64::from(k) * step), (x - 14.0, y), tick.from_right())?;
+            page.text(&format!("{}", f64::from(k) * step), (x - 14.0, y), tick.right())?;
         }
         let (x, y) = self.at(w, 0.0);
-        page.text("u, mm \u{2192}", (x, y + 56.0), tick.from_right())?;
+        page.text("u, mm \u{2192}", (x, y + 56.0), tick.right())?;
         let (x, y) = self.at(0.0, h);
-        page.text("v, mm \u{2191}", (x - 14.0, y - 16.0), tick.from_right())?;
+        page.text("v, mm \u{2191}", (x - 14.0, y - 16.0), tick.right())?;
         self.corner(page)?;
         self.press(page)
     }
@@ -100,7 +98,7 @@ impl Sheet<'_> {
     fn corner(&self, page: &Page<'_>) -> Result<(), PictureError> {
         let (x, y) = self.at(0.0, 0.0);
         page.area(&[(x, y), (x + 34.0, y), (x, y - 34.0)], INK)?;
-        page.text("(0, 0)", (x - 14.0, y + 24.0), Text::new(22.0).bold().from_right())
+        page.text("(0, 0)", (x - 14.0, y + 24.0), Text::new(22.0).bold().right())
     }
 
     /// A bar along the side that faces the press.
@@ -133,14 +131,14 @@ impl Sheet<'_> {
 
     fn legend(&self, page: &Page<'_>, field: &Field) -> Result<(), PictureError> {
         let (left, wide) = (LEFT + PLATE.0 + 44.0, 46.0);
-        let steps = SHADES * self.scale.anchors.len() as i32;
+        let steps = shades::count(&self.scale);
         let (top, tall) = (TOP + 64.0, LEAST_HEIGHT - 130.0);
         let y = |position: f64| top + (1.0 - position) / 2.0 * tall;
         for shade in -steps..steps {
             let position = (f64::from(shade) + 0.5) / f64::from(steps);
-            let middle = self.scale.turn(place(shade_of(position, steps), steps));
+            let colour = shades::colour_of(shades::shade_of(self.scale.turn(position), steps), steps);
             let (low, high) = (f64::from(shade) / f64::from(steps), f64::from(shade + 1) / f64::from(steps));
-            page.fill((left, y(high)), (left + wide, y(low) + OVERLAP), colour::diverging(middle))?;
+            page.fill((left, y(high)), (left + wide, y(low) + shades::OVERLAP), colour)?;
         }
         page.frame((left, top), (left + wide, top + tall), INK, 2)?;
         let text = Text::new(22.0);
@@ -181,117 +179,13 @@ impl Sheet<'_> {
     }
 }
 
-/// Place of a shade's colour.
-fn place(shade: i32, steps: i32) -> f64 {
-    f64::from(shade) / f64::from(steps)
-}
-
-/// The shade of a position: away from zero, so that only zero's own shade is neutral.
-fn shade_of(position: f64, steps: i32) -> i32 {
-    let size = (position.abs() * f64::from(steps)).ceil().min(f64::from(steps)) as i32;
-    if position < 0.0 { -size } else { size }
-}
-
-/// The field as squares of few shades, v outer from the top, u inner; `None` where nothing was seen.
-struct Shades {
-    n_x: usize,
-    n_y: usize,
-    shade: Vec<Option<i32>>,
-    steps: i32,
-}
-
-impl Shades {
-    fn of(field: &Field, sheet: &Sheet<'_>) -> Self {
-        let count = |mm: f64| ((mm * sheet.pixel_per_mm / SQUARE).round() as usize).max(1);
-        let (n_x, n_y) = (count(sheet.plate.width_mm), count(sheet.plate.height_mm));
-        let steps = SHADES * sheet.scale.anchors.len() as i32;
-        let shade = |x: usize, y: usize| {
-            let (u, v) = ((x as f64 + 0.5) / n_x as f64, 1.0 - (y as f64 + 0.5) / n_y as f64);
-            let (state, value) = field.sample(u, v, 0);
-            match state {
-                NodeState::Unseen => None,
-                NodeState::Unchanged => Some(0),
-                NodeState::Seen => {
-                    Some(shade_of(sheet.scale.colour_position(value * sheet.scale.factor), steps))
-                }
-            }
-        };
-        let shade = (0..n_x * n_y).map(|k| shade(k % n_x, k / n_x)).collect();
-        Self { n_x, n_y, shade, steps }
-    }
-
-    /// Rectangles as large as they come: runs of one shade, and rows that repeat the run above.
-    fn paint(&self, page: &Page<'_>, sheet: &Sheet<'_>) -> Result<(), PictureError> {
-        let (left, top) = sheet.at(0.0, sheet.plate.height_mm);
-        let (right, bottom) = sheet.at(sheet.plate.width_mm, 0.0);
-        let x = |k: usize| left + (right - left) * k as f64 / self.n_x as f64;
-        let y = |k: usize| top + (bottom - top) * k as f64 / self.n_y as f64;
-        for ((from, to, shade), rows) in self.rectangles() {
-            let colour = match shade {
-                Some(shade) => colour::diverging(place(shade, self.steps)),
-                None => PAPER,
-            };
-            page.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
-        }
-        for [from, to] in self.hatching() {
-            let corner = |[column, row]: [usize; 2]| (x(column), y(row));
-            page.line(&[corner(from), corner(to)], PALE, 2)?;
-        }
-        Ok(())
-    }
-
-    /// Runs (from, to, shade) with the rows they span, in a fixed order.
-    fn rectangles(&self) -> Vec<((usize, usize, Option<i32>), [usize; 2])> {
-        let mut done = Vec::new();
-        let mut open: BTreeMap<(usize, usize, Option<i32>), usize> = BTreeMap::new();
-        for row in 0..self.n_y {
-            let cells = &self.shade[row * self.n_x..(row + 1) * self.n_x];
-            let mut runs = BTreeMap::new();
-            let mut from = 0;
-            for run in cells.chunk_by(|a, b| a == b) {
-                let key = (from, from + run.len(), run[0]);
-                runs.insert(key, open.remove(&key).unwrap_or(row));
-                from += run.len();
-            }
-            done.extend(open.iter().map(|(key, first)| (*key, [*first, row])));
-            open = runs;
-        }
-        done.extend(open.iter().map(|(key, first)| (*key, [*first, self.n_y])));
-        done
-    }
-
-    /// Pieces of the diagonals that lie where nothing was seen, as corners of squares (column, row).
-    fn hatching(&self) -> Vec<[[usize; 2]; 2]> {
-        let mut lines = Vec::new();
-        let unseen = |x: usize, y: usize| self.shade[y * self.n_x + x].is_none();
-        for sum in (0..self.n_x + self.n_y).step_by(HATCH) {
-            let mut start = None;
-            for x in sum.saturating_sub(self.n_y - 1)..=sum.min(self.n_x - 1) {
-                let y = sum - x;
-                match (unseen(x, y), start) {
-                    (true, None) => start = Some([x, y + 1]),
-                    (false, Some(from)) => {
-                        lines.push([from, [x, y + 1]]);
-                        start = None;
-                    }
-                    _ => {}
-                }
-            }
-            if let Some(from) = start {
-                let x = sum.min(self.n_x - 1);
-                lines.push([from, [x + 1, sum - x]]);
-            }
-        }
-        lines
-    }
-}
-
 /// The field's mean over each part of the plate, in digits. Unless the plate is done, the part that is farthest from it is
 /// framed and named: what passes under its boards may still be a little off beyond their ends, and asks for nothing.
 fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Result<(), PictureError> {
     let (w, h) = (sheet.plate.width_mm / CODES[0] as f64, sheet.plate.height_mm / CODES[1] as f64);
     let parts: Vec<(usize, usize, f64)> = (0..CODES[0] * CODES[1])
         .map(|k| (k % CODES[0], k / CODES[0]))
+        .filter(|(i, k)| middle(field, *i, *k) != NodeState::Unseen)
         .filter_map(|(i, k)| Some((i, k, mean(field, i, k)? * sheet.scale.factor)))
         .collect();
     for (i, k, value) in &parts {
@@ -312,6 +206,12 @@ fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Resul
     let below = (0.5 * (from.0 + to.0), to.1 - 20.0);
     let look = Text::new(22.0).bold().centred().coloured(colour::text_on(sheet.scale.position(*value)));
     page.text(words[usize::from(*value > 0.0)], below, look)
+}
+
+/// What is known in the middle of a part of the plate, where its number stands.
+fn middle(field: &Field, i: usize, k: usize) -> NodeState {
+    let share = |part: usize, parts: usize| (part as f64 + 0.5) / parts as f64;
+    field.sample(share(i, CODES[0]), share(k, CODES[1]), 0).0
 }
 
 /// Mean over the known nodes of a part of the plate; `None` when fewer than half were seen, or most show no change.
@@ -396,20 +296,5 @@ mod tests {
         assert!(much.matches("bend more").count() == 2, "legend and plate");
         let done = drawn(&field("curvature_deficit", "1/m", |u, _| 2.0 * per_mm * u, false));
         assert!(done.matches("bend more").count() == 1, "legend alone");
-    }
-
-    #[test]
-    fn rectangles_cover_every_square_once() {
-        let shade: Vec<Option<i32>> =
-            (0..30 * 20).map(|k| (k % 7 != 0).then_some((k % 30 / 10) * (k / 30 / 5))).collect();
-        let shades = Shades { n_x: 30, n_y: 20, shade, steps: 8 };
-        let mut covered = vec![0; 600];
-        for ((from, to, shade), [first, last]) in shades.rectangles() {
-            for cell in (first..last).flat_map(|row| (from..to).map(move |x| row * 30 + x)) {
-                covered[cell] += 1;
-                assert_eq!(shades.shade[cell], shade);
-            }
-        }
-        assert!(covered.iter().all(|n| *n == 1));
     }
 }

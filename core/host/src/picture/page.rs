@@ -49,7 +49,7 @@ impl Text {
         Self { across: HPos::Center, ..self }
     }
 
-    pub(super) const fn from_right(self) -> Self {
+    pub(super) const fn right(self) -> Self {
         Self { across: HPos::Right, ..self }
     }
 }

@@ -132,7 +132,7 @@ impl Sheet<'_> {
         page.text("board", (LEFT + 12.0, top + 20.0), Text::new(20.0).coloured(WOOD_EDGE))?;
         let scale = pixel_per_mm / ((RIGHT - LEFT) / template.chord_mm);
         let note = format!("heights {scale:.0} times enlarged; triangles: contacts");
-        page.text(&note, (RIGHT, PROFILE[1] + 26.0), Text::new(20.0).coloured(PALE).from_right())
+        page.text(&note, (RIGHT, PROFILE[1] + 26.0), Text::new(20.0).coloured(PALE).right())
     }
 
     fn gap(&self, page: &Page<'_>) -> Result<(), PictureError> {
@@ -159,10 +159,12 @@ impl Sheet<'_> {
         page.ring((x, height), 10, INK, 4)?;
         let words = format!("{} mm", with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm)));
         let look = Text::new(30.0).bold();
-        let above = if height - 32.0 > GAP[0] - 20.0 { height - 32.0 } else { height + 34.0 };
+        let above = height - 32.0;
+        let clear = above > GAP[0] - 20.0 && (above - y(template.limit_mm)).abs() > 22.0;
+        let above = if clear { above } else { height + 34.0 };
         match at {
             at if at < 0.2 => page.text(&words, (x + 16.0, above), look),
-            at if at > 0.8 => page.text(&words, (x - 16.0, above), look.from_right()),
+            at if at > 0.8 => page.text(&words, (x - 16.0, above), look.right()),
             _ => page.text(&words, (x, above), look.centred()),
         }
     }
@@ -173,7 +175,7 @@ impl Sheet<'_> {
         page.line(&[(LEFT, y(0.0)), (RIGHT, y(0.0))], INK, 2)?;
         for mm in [low_mm, 0.0, 0.5 * self.top_mm, self.top_mm] {
             page.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-            page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.from_right())?;
+            page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
         }
         page.text("gap, mm", (LEFT - 86.0, GAP[0] - 30.0), text)?;
         let (start, chord) = (self.template.start_mm, self.template.chord_mm);
@@ -185,7 +187,7 @@ impl Sheet<'_> {
             page.line(&[(x, GAP[1]), (x, GAP[1] + 8.0)], INK, 2)?;
             page.text(&format!("{}", k as f64 * step), (x, GAP[1] + 24.0), text.centred())?;
         }
-        page.text("along the line, mm \u{2192}", (RIGHT, GAP[1] + 58.0), text.from_right())
+        page.text("along the line, mm \u{2192}", (RIGHT, GAP[1] + 58.0), text.right())
     }
 
     /// Hatches where the plate was not seen.

@@ -56,11 +56,11 @@ pub fn strip(
             draw_point(page, point, x(k), &y, k + 1 == points.len())?;
             // Labels stay apart however many strokes there are.
             let every = (34.0 / step).ceil() as usize;
-            if (points.len() - 1 - k) % every == 0 {
+            if (points.len() - 1 - k).is_multiple_of(every) {
                 page.text(&point.label, (x(k), BOTTOM + 24.0), Text::new(22.0).centred())?;
             }
         }
-        page.text("stroke \u{2192}", (RIGHT, BOTTOM + 58.0), Text::new(22.0).from_right())
+        page.text("stroke \u{2192}", (RIGHT, BOTTOM + 58.0), Text::new(22.0).right())
     })
 }
 
@@ -69,11 +69,11 @@ fn axes(page: &Page<'_>, y: &dyn Fn(f64) -> f64, yardstick: &Yardstick) -> Resul
     page.line(&[(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], INK, 2)?;
     for mm in std::iter::once(0.0).chain(yardstick.gaps().anchors) {
         page.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-        page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.from_right())?;
+        page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
     }
     let limit = y(yardstick.limit_mm);
     page.dashed((LEFT, limit), (RIGHT, limit), INK, 2)?;
-    page.text("limit", (RIGHT - 8.0, limit - 15.0), text.bold().from_right())
+    page.text("limit", (RIGHT - 8.0, limit - 15.0), text.bold().right())
 }
 
 fn draw_point(
@@ -106,13 +106,9 @@ fn draw_point(
         return Ok(());
     }
     let words = format!("{} mm, {}", with_uncertainty(gap, point.uncertainty_mm), mark(point.verdict));
-    let look = Text::new(28.0).bold();
-    let at = (y(gap) - 34.0).max(TOP - 10.0);
-    if x > 0.6 * RIGHT {
-        page.text(&words, (x + 14.0, at), look.from_right())
-    } else {
-        page.text(&words, (x - 14.0, at), look)
-    }
+    // Gaps fall: the upper right corner stays free.
+    page.ring((x, y(gap)), 17, INK, 3)?;
+    page.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())
 }
 
 #[cfg(test)]

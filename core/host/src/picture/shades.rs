@@ -1,0 +1,151 @@
+//! A field as few rectangles of few colours, and hatching where nothing was seen.
+
+use std::collections::BTreeMap;
+
+use plotters::style::RGBColor;
+
+use super::PictureError;
+use super::colour::{self, PALE, PAPER};
+use super::page::{At, Page};
+use super::scale::Scale;
+use crate::plugin::{Field, NodeState};
+
+/// Shades from one anchor of the scale to the next.
+const PER_STEP: i32 = 4;
+/// Distance of the hatching's lines, squares.
+const HATCH: usize = 4;
+/// Neighbouring rectangles overlap by this much, so that no seam shows between them, pixels.
+pub(super) const OVERLAP: f64 = 0.5;
+
+/// Shades on each side of zero.
+pub(super) fn count(scale: &Scale) -> i32 {
+    PER_STEP * scale.anchors.len() as i32
+}
+
+/// The colour of a shade, `n` on each side of zero.
+pub(super) fn colour_of(shade: i32, n: i32) -> RGBColor {
+    colour::diverging(f64::from(shade) / f64::from(n))
+}
+
+/// The shade of a position: away from zero, so that only zero's own shade is neutral.
+pub(super) fn shade_of(position: f64, n: i32) -> i32 {
+    let size = (position.abs() * f64::from(n)).ceil().min(f64::from(n)) as i32;
+    if position < 0.0 { -size } else { size }
+}
+
+/// The field as squares of few shades, v outer from the top, u inner; `None` where nothing was seen.
+pub(super) struct Shades {
+    n_x: usize,
+    n_y: usize,
+    shade: Vec<Option<i32>>,
+    n_shades: i32,
+}
+
+/// Squares of one row that share a shade: from, to, shade.
+type Run = (usize, usize, Option<i32>);
+
+impl Shades {
+    /// A field of one component in `n_x` times `n_y` squares.
+    pub(super) fn of(field: &Field, scale: &Scale, [n_x, n_y]: [usize; 2]) -> Self {
+        let n_shades = count(scale);
+        let shade = |x: usize, y: usize| {
+            let (u, v) = ((x as f64 + 0.5) / n_x as f64, 1.0 - (y as f64 + 0.5) / n_y as f64);
+            let (state, value) = field.sample(u, v, 0);
+            match state {
+                NodeState::Unseen => None,
+                NodeState::Unchanged => Some(0),
+                NodeState::Seen => Some(shade_of(scale.colour_position(value * scale.factor), n_shades)),
+            }
+        };
+        let shade = (0..n_x * n_y).map(|k| shade(k % n_x, k / n_x)).collect();
+        Self { n_x, n_y, shade, n_shades }
+    }
+
+    /// Draws between the upper left and the lower right corner.
+    pub(super) fn paint(
+        &self,
+        page: &Page<'_>,
+        (left, top): At,
+        (right, bottom): At,
+    ) -> Result<(), PictureError> {
+        let x = |k: usize| left + (right - left) * k as f64 / self.n_x as f64;
+        let y = |k: usize| top + (bottom - top) * k as f64 / self.n_y as f64;
+        for ((from, to, shade), rows) in self.rectangles() {
+            let colour = match shade {
+                Some(shade) => colour_of(shade, self.n_shades),
+                None => PAPER,
+            };
+            page.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
+        }
+        for [from, to] in self.hatching() {
+            let corner = |[column, row]: [usize; 2]| (x(column), y(row));
+            page.line(&[corner(from), corner(to)], PALE, 2)?;
+        }
+        Ok(())
+    }
+
+    /// Rectangles as large as they come, in a fixed order: runs (from, to, shade) with the rows that repeat them.
+    fn rectangles(&self) -> Vec<(Run, [usize; 2])> {
+        let mut done = Vec::new();
+        let mut open: BTreeMap<Run, usize> = BTreeMap::new();
+        for row in 0..self.n_y {
+            let cells = &self.shade[row * self.n_x..(row + 1) * self.n_x];
+            let mut runs = BTreeMap::new();
+            let mut from = 0;
+            for run in cells.chunk_by(|a, b| a == b) {
+                let key = (from, from + run.len(), run[0]);
+                runs.insert(key, open.remove(&key).unwrap_or(row));
+                from += run.len();
+            }
+            done.extend(open.iter().map(|(key, first)| (*key, [*first, row])));
+            open = runs;
+        }
+        done.extend(open.iter().map(|(key, first)| (*key, [*first, self.n_y])));
+        done
+    }
+
+    /// Pieces of the diagonals that lie where nothing was seen, as corners of squares (column, row).
+    fn hatching(&self) -> Vec<[[usize; 2]; 2]> {
+        let mut lines = Vec::new();
+        let unseen = |x: usize, y: usize| self.shade[y * self.n_x + x].is_none();
+        for sum in (0..self.n_x + self.n_y).step_by(HATCH) {
+            let mut start = None;
+            for x in sum.saturating_sub(self.n_y - 1)..=sum.min(self.n_x - 1) {
+                let y = sum - x;
+                match (unseen(x, y), start) {
+                    (true, None) => start = Some([x, y + 1]),
+                    (false, Some(from)) => {
+                        lines.push([from, [x, y + 1]]);
+                        start = None;
+                    }
+                    _ => {}
+                }
+            }
+            if let Some(from) = start {
+                let x = sum.min(self.n_x - 1);
+                lines.push([from, [x + 1, sum - x]]);
+            }
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rectangles_cover_every_square_once() {
+        let shade: Vec<Option<i32>> =
+            (0..30 * 20).map(|k| (k % 7 != 0).then_some((k % 30 / 10) * (k / 30 / 5))).collect();
+        let shades = Shades { n_x: 30, n_y: 20, shade, n_shades: 8 };
+        let mut covered = vec![0; 600];
+        for ((from, to, shade), [first, last]) in shades.rectangles() {
+            for cell in (first..last).flat_map(|row| (from..to).map(move |x| row * 30 + x)) {
+                covered[cell] += 1;
+                assert_eq!(shades.shade[cell], shade);
+            }
+        }
+        assert!(covered.iter().all(|n| *n == 1));
+    }
+}
