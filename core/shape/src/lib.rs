@@ -32,7 +32,7 @@ pub use outline::{Corner, EdgeCurve, Outline, OutlineError};
 pub use patch::{Beyond, Crossing, Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
 pub use surface::{Surface, SurfaceParts};
-pub use target::{TargetError, TargetSurface};
+pub use target::{Placement, TargetError, TargetSurface};
 
 /// A point or vector in space, metres, scanner frame unless said.
 pub type Vec3 = nalgebra::Vector3<f64>;

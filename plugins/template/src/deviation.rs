@@ -5,9 +5,9 @@
 //! of the plate without going through the plate anywhere. A plate not bent enough leaves its tilt open, as under a
 //! board: a target that rocks keeps the tilt of the best fit.
 
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
-use platen_shape::{Surface, TargetSurface, Vec3};
+use platen_shape::{Placement, Surface, TargetSurface, Vec3};
 
 use crate::programme;
 
@@ -16,8 +16,11 @@ use crate::programme;
 pub(crate) struct Deviation {
     /// Places, v outer, u inner.
     pub(crate) uv: Vec<[f64; 2]>,
-    /// Measured minus target along the target's normal, metres, positive towards the scanner.
+    /// Measured minus target along the target's normal, metres, positive towards the scanner: none above zero where the
+    /// plate was seen.
     pub(crate) value: Vec<f64>,
+    /// The same before the target is lowered: in the best fit of all material points, of both signs.
+    pub(crate) fitted: Vec<f64>,
     /// The plate was seen there.
     pub(crate) seen: Vec<bool>,
     /// The target rocks on the plate.
@@ -29,8 +32,7 @@ pub(crate) struct Deviation {
 /// From the scanner's frame to the target's, and the target's own last movement.
 #[derive(Debug)]
 struct Rest {
-    rotation: Rotation3<f64>,
-    translation: Vec3,
+    placement: Placement,
     /// Rise of the target, and its tilts about x and y.
     movement: Vec3,
 }
@@ -43,11 +45,11 @@ impl Deviation {
     pub(crate) fn new(now: &Surface, target: &TargetSurface, check: &dyn Fn() -> Result<()>) -> Result<Self> {
         let uv = PlateGrid::new(now).map(|u, v| [u, v]);
         let seen: Vec<bool> = uv.iter().map(|&[u, v]| now.mask().seen(u, v)).collect();
-        let (rotation, translation) = fit(now, target, &uv, &seen);
-        let mut rest = Rest { rotation, translation, movement: Vec3::zeros() };
+        let of_seen = uv.iter().zip(&seen).filter(|(_, seen)| **seen).map(|(at, _)| *at);
+        let mut rest = Rest { placement: Placement::best(now, target, of_seen), movement: Vec3::zeros() };
         check()?;
 
-        let fitted: Vec<f64> = uv.iter().map(|&at| rest.deviation(now, target, at)).collect();
+        let fitted: Vec<f64> = uv.iter().map(|&at| rest.placement.deviation(now, target, at)).collect();
         let (mut rows, mut heights, mut index) = (Vec::new(), Vec::new(), Vec::new());
         for i in (0..uv.len()).filter(|&i| seen[i]) {
             rows.push(row(target, uv[i]));
@@ -75,12 +77,12 @@ impl Deviation {
         };
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&rest.movement)).collect();
         let contacts = held_by.into_iter().map(|i| index[i]).collect();
-        Ok(Self { uv, value, seen, rocks, contacts, rest })
+        Ok(Self { uv, value, fitted, seen, rocks, contacts, rest })
     }
 
     /// Measured minus target at one place.
     pub(crate) fn at(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
-        self.rest.deviation(now, target, at) - row(target, at).dot(&self.rest.movement)
+        self.rest.placement.deviation(now, target, at) - row(target, at).dot(&self.rest.movement)
     }
 
     /// One sigma of the deviation at a place: the fit's noise there and where the target touches.
@@ -98,41 +100,11 @@ impl Deviation {
     }
 }
 
-impl Rest {
-    fn deviation(&self, now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> f64 {
-        let here = self.rotation * now.face(u, v) + self.translation;
-        (here - target.face(u, v)).dot(&target.normal(u, v))
-    }
-}
-
 /// How the deviation at a place falls when the target rises and tilts.
 fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {
     let (p, n) = (target.face(u, v), target.normal(u, v));
     let turn = p.cross(&n);
     Vec3::new(n.z, turn.x, turn.y)
-}
-
-/// The rigid motion that brings the seen material points closest to the target's (Kabsch, by the singular vectors of
-/// the covariance).
-fn fit(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]], seen: &[bool]) -> (Rotation3<f64>, Vec3) {
-    let pairs: Vec<(Vec3, Vec3)> = uv
-        .iter()
-        .zip(seen)
-        .filter(|(_, seen)| **seen)
-        .map(|(&[u, v], _)| (now.face(u, v), target.face(u, v)))
-        .collect();
-    let n = pairs.len().max(1) as f64;
-    let from = pairs.iter().map(|(p, _)| p).sum::<Vec3>() / n;
-    let to = pairs.iter().map(|(_, q)| q).sum::<Vec3>() / n;
-    let covariance: Matrix3<f64> = pairs.iter().map(|(p, q)| (q - to) * (p - from).transpose()).sum();
-    let svd = covariance.svd(true, true);
-    let (Some(left), Some(right)) = (svd.u, svd.v_t) else {
-        return (Rotation3::identity(), to - from);
-    };
-    let handed = (left * right).determinant().signum();
-    let rotation = left * Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, handed)) * right;
-    let rotation = Rotation3::from_matrix_unchecked(rotation);
-    (rotation, to - rotation * from)
 }
 
 /// Smallest altitude of a triangle.

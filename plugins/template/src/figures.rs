@@ -9,7 +9,8 @@ use crate::judge::{EXPANDED, Judged};
 /// Nodes along each side for the mean curvature: the result's grid.
 const GRID: usize = 21;
 
-/// Deviation of the whole plate from the target laid on it.
+/// Deviation of the whole plate: from the best-fitting target, whose two extremes say how far the shapes differ, and from
+/// the target laid on the plate, above which nothing stands.
 pub(crate) fn of_deviation(
     deviation: &Deviation,
     now: &Surface,
@@ -17,7 +18,7 @@ pub(crate) fn of_deviation(
     tolerance: Option<f64>,
 ) -> Vec<Figure> {
     let seen: Vec<usize> = (0..deviation.uv.len()).filter(|&i| deviation.seen[i]).collect();
-    let value = |i: &usize| deviation.value[*i];
+    let value = |i: &usize| deviation.fitted[*i];
     let extreme =
         |sign: f64| seen.iter().copied().max_by(|a, b| (sign * value(a)).total_cmp(&(sign * value(b))));
     let (Some(max), Some(min)) = (extreme(1.0), extreme(-1.0)) else { return Vec::new() };
@@ -27,9 +28,15 @@ pub(crate) fn of_deviation(
     sizes.sort_by(f64::total_cmp);
     let p95 = sizes[(0.95 * (n - 1.0)).round() as usize];
 
+    let deepest = seen
+        .iter()
+        .copied()
+        .fold(min, |deepest, i| if deviation.value[i] < deviation.value[deepest] { i } else { deepest });
+
+    // The best fit is held by all places: its own uncertainty is small beside that of one.
     let placed = |name: &str, i: usize| Figure {
-        uncertainty: Some(EXPANDED * deviation.sigma(now, target, deviation.uv[i])),
-        ..at(name, deviation.value[i], "m", deviation.uv[i])
+        uncertainty: Some(EXPANDED * now.sigma_point(deviation.uv[i][0], deviation.uv[i][1])),
+        ..at(name, deviation.fitted[i], "m", deviation.uv[i])
     };
     let mut figures = vec![
         placed("deviation.max", max),
@@ -40,10 +47,14 @@ pub(crate) fn of_deviation(
         plain("deviation.max_v", deviation.uv[max][1], "m"),
         plain("deviation.min_u", deviation.uv[min][0], "m"),
         plain("deviation.min_v", deviation.uv[min][1], "m"),
+        Figure {
+            uncertainty: Some(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest])),
+            ..at("deviation.gap", -deviation.value[deepest], "m", deviation.uv[deepest])
+        },
         plain("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
     ];
     if let Some(tolerance) = tolerance {
-        let within = sizes.partition_point(|size| *size <= tolerance) as f64 / n;
+        let within = seen.iter().filter(|&&i| -deviation.value[i] <= tolerance).count() as f64 / n;
         figures.extend([plain("tolerance", tolerance, "m"), plain("in_tolerance", within, "1")]);
     }
     figures

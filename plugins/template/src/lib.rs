@@ -15,8 +15,11 @@
 //! plate was not seen cannot be judged. With several boards, the figures `gap.*` are those of the one with the most gap
 //! per limit.
 //!
-//! The target as a whole is laid on the plate too, rigid and from the scanner's side; the field `deviation` and the
-//! figures `deviation.*` are measured minus target along the target's normal in that seat, so none is above zero.
+//! The target as a whole is laid on the plate too, rigid and from the scanner's side; the field `deviation` is measured minus
+//! target along the target's normal in that seat, so none is above zero; `deviation.gap` is the most that is open under
+//! it, `in_tolerance` the share of the plate where no more than the tolerance is. As one sign is missing there, the
+//! press's pair `deviation.max` and `.min`, with `.rms` and `.p95`, is that of the best fit instead, in which
+//! the places of the plate lie above and below the target.
 //!
 //! ```toml
 //! [[comparison]]

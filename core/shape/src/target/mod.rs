@@ -6,6 +6,7 @@
 //! stretches differs from these by millimetres within the surface, which the deviation along the normal does not see.
 
 mod cone;
+mod placement;
 
 use std::f64::consts::TAU;
 
@@ -13,6 +14,8 @@ use crate::Vec3;
 use crate::surface::Curvature;
 use crate::task::{Facing, RadiusOf, Target, TargetShape};
 use cone::Cone;
+
+pub use placement::Placement;
 
 /// The target's mid-surface over the plate, with its scanned face.
 #[derive(Debug, Clone)]

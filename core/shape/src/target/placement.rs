@@ -1,0 +1,43 @@
+//! Where a plate lies against its target.
+
+use nalgebra::{Matrix3, Rotation3};
+
+use super::TargetSurface;
+use crate::{Surface, Vec3};
+
+/// A rigid motion from the scanner's frame to the target's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    rotation: Rotation3<f64>,
+    translation: Vec3,
+}
+
+impl Placement {
+    /// The motion that brings the material points of the places (u, v) closest to the target's, on the scanned face
+    /// (Kabsch, by the singular vectors of the covariance).
+    #[must_use]
+    pub fn best(now: &Surface, target: &TargetSurface, places: impl Iterator<Item = [f64; 2]>) -> Self {
+        let pairs: Vec<(Vec3, Vec3)> = places.map(|[u, v]| (now.face(u, v), target.face(u, v))).collect();
+        let n = pairs.len().max(1) as f64;
+        let from = pairs.iter().map(|(p, _)| p).sum::<Vec3>() / n;
+        let to = pairs.iter().map(|(_, q)| q).sum::<Vec3>() / n;
+        let covariance: Matrix3<f64> = pairs.iter().map(|(p, q)| (q - to) * (p - from).transpose()).sum();
+        let svd = covariance.svd(true, true);
+        let rotation = match (svd.u, svd.v_t) {
+            (Some(left), Some(right)) => {
+                let handed = (left * right).determinant().signum();
+                let upright = Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, handed));
+                Rotation3::from_matrix_unchecked(left * upright * right)
+            }
+            _ => Rotation3::identity(),
+        };
+        Self { rotation, translation: to - rotation * from }
+    }
+
+    /// Measured minus target along the target's normal at a place (u, v), metres, positive towards the scanner.
+    #[must_use]
+    pub fn deviation(&self, now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> f64 {
+        let here = self.rotation * now.face(u, v) + self.translation;
+        (here - target.face(u, v)).dot(&target.normal(u, v))
+    }
+}
