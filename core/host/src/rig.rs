@@ -128,6 +128,7 @@ pub fn task(plate: &PlateFile, supports_changed: bool) -> Task {
             .collect(),
         sigma_correlated: 0.0,
         sigma_true: None,
+        supports: plate.supports.iter().map(|support| support.at).collect(),
         supports_changed,
     }
 }

@@ -53,7 +53,7 @@ fn the_plate_schema_has_the_keys_that_the_reader_allows() {
     let faults = plate_faults(&format!("[plate]\n{stranger}"));
     assert_eq!(allowed(&faults, &format!("plate.{STRANGER}")), keys(plate));
     assert_eq!(missing(&faults), strings(&plate["required"]));
-    for array in ["marker", "reference_line", "template", "station"] {
+    for array in ["marker", "reference_line", "support", "template", "station"] {
         let items = &schema["properties"][array]["items"];
         let faults = plate_faults(&format!("[[{array}]]\n{stranger}"));
         assert_eq!(allowed(&faults, &format!("{array}[1].{STRANGER}")), keys(items), "{array}");

@@ -33,6 +33,8 @@ pub struct Task {
     pub sigma_correlated: f64,
     /// The scanner's systematic uncertainty against a known artefact, one sigma; `None` when never calibrated.
     pub sigma_true: Option<f64>,
+    /// Places that rest on the press's supports while the plate is scanned.
+    pub supports: Vec<[f64; 2]>,
     /// The plate rests on other supports than in the scan before.
     pub supports_changed: bool,
 }

@@ -57,6 +57,7 @@ fn inputs(now: Surface, before: Option<Surface>, target: Option<(TargetShape, Fa
         stations: Vec::new(),
         sigma_correlated: 0.0,
         sigma_true: None,
+        supports: Vec::new(),
         supports_changed: false,
     };
     Inputs { task, now, before, baseline: None }

@@ -77,10 +77,18 @@ fn jacobian_row(arm: &Vec3, direction: &Vec3) -> Vector6<f64> {
 /// The four corners fit best.
 pub(crate) fn corners(nodes: &Nodes) -> Motion {
     let last = NODES - 1;
-    let corners = [0, last, NODES * last, NODES * last + last];
+    these(nodes, &[0, last, NODES * last, NODES * last + last])
+}
+
+/// The places of a short list fit best.
+pub(crate) fn places(nodes: &Nodes) -> Motion {
+    these(nodes, &(0..nodes.now.len()).collect::<Vec<_>>())
+}
+
+fn these(nodes: &Nodes, places: &[usize]) -> Motion {
     let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
     for _ in 0..8 {
-        step(nodes, &mut motion, corners.into_iter().map(|i| (i, 1.0)), 1.0);
+        step(nodes, &mut motion, places.iter().map(|i| (*i, 1.0)), 1.0);
     }
     motion
 }

@@ -16,10 +16,14 @@ pub(crate) struct Changes {
     pub(crate) vectors: Vec<Vec3>,
     /// Along the normal, towards the scanner, metres.
     pub(crate) normal: Vec<f64>,
+    /// One sigma of the displacement along the normal, metres.
+    pub(crate) sigma: Vec<f64>,
     /// Level of detection, metres.
     pub(crate) lod: Vec<f64>,
     /// Its median over what was seen.
     pub(crate) median_lod: f64,
+    /// Share of what was seen that lies above it, before small patches are dropped.
+    pub(crate) above_lod: f64,
     /// What is known.
     pub(crate) state: Vec<NodeState>,
 }
@@ -42,11 +46,14 @@ pub(crate) fn changes(nodes: &Nodes, motion: &Motion, sigma_correlated: f64, min
             (true, false) => NodeState::Seen,
         })
         .collect();
+    let count = |wanted: NodeState| state.iter().filter(|state| **state == wanted).count();
+    let (above, below) = (count(NodeState::Seen), count(NodeState::Unchanged));
+    let above_lod = above as f64 / (above + below).max(1) as f64;
     drop_small_patches(&mut state, &normal, (min_patch / nodes.grid.cell()) as usize);
     let mut of_seen: Vec<f64> = (0..PlateGrid::NODES).filter(|&i| nodes.seen[i]).map(|i| lod[i]).collect();
     of_seen.sort_by(f64::total_cmp);
     let median_lod = of_seen.get(of_seen.len() / 2).copied().unwrap_or(0.0);
-    Changes { vectors, normal, lod, median_lod, state }
+    Changes { vectors, normal, sigma, lod, median_lod, above_lod, state }
 }
 
 /// Connected places of change in one sense that number fewer than `least` become unchanged.

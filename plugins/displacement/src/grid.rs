@@ -21,20 +21,28 @@ pub(crate) struct Nodes {
 }
 
 impl Nodes {
+    /// Every place of the grid.
     pub(crate) fn new(now: &Surface, before: &Surface) -> Self {
         let grid = PlateGrid::new(now);
+        Self::at(now, before, &grid.map(|u, v| [u, v]))
+    }
+
+    /// These places.
+    pub(crate) fn at(now: &Surface, before: &Surface, places: &[[f64; 2]]) -> Self {
+        let places = || places.iter().copied();
+        let seen = |[u, v]: [f64; 2]| now.mask().seen(u, v) && before.mask().seen(u, v);
         Self {
-            now: grid.map(|u, v| now.face(u, v)),
-            before: grid.map(|u, v| before.face(u, v)),
-            normal: grid.map(|u, v| now.normal(u, v)),
-            sigma: grid.map(|u, v| now.sigma_point(u, v).hypot(before.sigma_point(u, v))),
-            seen: grid.map(|u, v| now.mask().seen(u, v) && before.mask().seen(u, v)),
-            grid,
+            grid: PlateGrid::new(now),
+            now: places().map(|[u, v]| now.face(u, v)).collect(),
+            before: places().map(|[u, v]| before.face(u, v)).collect(),
+            normal: places().map(|[u, v]| now.normal(u, v)).collect(),
+            sigma: places().map(|[u, v]| now.sigma_point(u, v).hypot(before.sigma_point(u, v))).collect(),
+            seen: places().map(seen).collect(),
         }
     }
 
-    /// Middle of the plate before.
+    /// The place in the middle of the list, before: that of the plate for the whole grid.
     pub(crate) fn centre(&self) -> Vec3 {
-        self.before[PlateGrid::NODES / 2]
+        self.before[self.before.len() / 2]
     }
 }

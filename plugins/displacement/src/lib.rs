@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `unchanged` | the largest part that kept its shape lies where it lay: many local fits vote, the best is refined by iterated reweighting (Tukey) |
 //! | `corners` | the four corners fit best |
+//! | `supports` | the places that rest on the press's supports, `[[support]]` of the plate file, fit best |
 //! | `none` | nothing: for a plate on fixed supports under a fixed scanner |
 //!
 //! A place is *unchanged* when its displacement along the normal is below the level of detection,
@@ -29,6 +30,11 @@
 //! | `alignment` | see above |
 //! | `min_patch` | smallest patch of change, square metres; a bend band covers far more, chance patches of a null pair 0.03 to 0.04 |
 //!
+//! Figures: `displacement.rms` along the normal and `displacement.sigma`, the root mean square of its stated deviation, whose
+//! difference on null pairs is what a calibration is about; `displacement.lod`, the median over the plate, and
+//! `displacement.above_lod`, the share above it before small patches are dropped; `displacement.changed_share`, `displacement.max` with its place; `displacement.plate_rotation` and
+//! `displacement.plate_translation` that the alignment took away.
+//!
 //! Fields: `displacement` (3 components, scanner frame) and `displacement_normal` (towards the scanner), metres.
 
 mod align;
@@ -48,7 +54,7 @@ platen_sdk::options! {
         /// Which earlier scan to compare with.
         against: String = "before", choices ["before", "baseline"];
         /// How the plate's own movement is taken away.
-        alignment: String = "unchanged", choices ["unchanged", "corners", "none"];
+        alignment: String = "unchanged", choices ["unchanged", "corners", "supports", "none"];
         /// Smallest connected area that counts as changed, square metres.
         min_patch: f64 = 0.1, unit "m2", min 0.0, max 10.0;
     }
@@ -88,12 +94,27 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let nodes = Nodes::new(&inputs.now, earlier);
     let motion = match options.alignment.as_str() {
         "corners" => align::corners(&nodes),
+        "supports" => on_supports(inputs, earlier)?,
         "none" => Motion::none(),
         _ => align::unchanged(check, &nodes)?,
     };
     let alignment = Alignment { motion, name: &options.alignment };
     let changes = detect::changes(&nodes, &alignment.motion, inputs.task.sigma_correlated, options.min_patch);
     Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &options.against))
+}
+
+/// The plate lies on its supports as it lay.
+fn on_supports(inputs: &Inputs, earlier: &Surface) -> Result<Motion> {
+    let nodes = Nodes::at(&inputs.now, earlier, &inputs.task.supports);
+    let in_sight = nodes.seen.iter().filter(|seen| **seen).count();
+    if in_sight < 3 {
+        let given = nodes.seen.len();
+        let message = format!(
+            "alignment supports: {in_sight} of the {given} supports given are in sight, 3 are needed"
+        );
+        return Err(Error::new(ErrorKind::Config, message).hint("add [[support]] to the plate file"));
+    }
+    Ok(align::places(&nodes))
 }
 
 fn same_plate(now: &Surface, earlier: &Surface) -> Result<()> {
@@ -146,7 +167,14 @@ fn report(
         uncertainty: None,
         at: None,
     };
+    let mean_square = |square: &dyn Fn(usize) -> f64| {
+        let of_seen = (0..PlateGrid::NODES).filter(|&i| changes.state[i] != NodeState::Unseen);
+        of_seen.map(square).sum::<f64>() / seen.max(1) as f64
+    };
     let mut figures = vec![
+        figure("displacement.rms", mean_square(&|i| changes.normal[i].powi(2)).sqrt(), "m"),
+        figure("displacement.sigma", mean_square(&|i| changes.sigma[i].powi(2)).sqrt(), "m"),
+        figure("displacement.above_lod", changes.above_lod, "1"),
         figure("displacement.changed_share", share, "1"),
         figure("displacement.lod", changes.median_lod, "m"),
         figure("displacement.plate_rotation", alignment.motion.angle(), "rad"),

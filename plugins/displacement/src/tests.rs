@@ -69,8 +69,8 @@ fn moved(surface: &Surface, turn: Rotation3<f64>, away: Vec3) -> Surface {
     Surface::from_parts(parts).expect("sound")
 }
 
-fn run(now: Surface, before: Surface, alignment: &str, sigma_correlated: f64, min_patch: f64) -> Report {
-    let task = Task {
+fn task(sigma_correlated: f64) -> Task {
+    Task {
         plate: "P".into(),
         width: WIDTH,
         height: HEIGHT,
@@ -81,11 +81,45 @@ fn run(now: Surface, before: Surface, alignment: &str, sigma_correlated: f64, mi
         stations: Vec::new(),
         sigma_correlated,
         sigma_true: None,
+        supports: Vec::new(),
         supports_changed: false,
-    };
-    let inputs = Inputs { task, now, before: Some(before), baseline: None };
+    }
+}
+
+fn run(now: Surface, before: Surface, alignment: &str, sigma_correlated: f64, min_patch: f64) -> Report {
+    let inputs = Inputs { task: task(sigma_correlated), now, before: Some(before), baseline: None };
     let options = Options { against: "before".into(), alignment: alignment.into(), min_patch };
     compare(&options, &inputs, &|| Ok(())).expect("sound")
+}
+
+#[test]
+fn a_plate_on_its_supports_is_aligned_by_them() {
+    let before = plate(SIGMA, 11, 0.0, none);
+    let turn = Rotation3::from_euler_angles(0.01, -0.02, 0.1);
+    let now = moved(&plate(SIGMA, 12, 0.02, none), turn, Vec3::new(0.2, 0.1, 0.05));
+    let task = |supports: &[[f64; 2]]| {
+        let task = Task { supports: supports.to_vec(), ..task(0.0) };
+        Inputs { task, now: now.clone(), before: Some(before.clone()), baseline: None }
+    };
+    let options = Options { against: "before".into(), alignment: "supports".into(), min_patch: 0.02 };
+    // Supports on both sides of the new bend: neither side lies where it lay, but the supports do.
+    let places = [[0.3, 0.3], [0.3, 1.7], [2.7, 0.3], [2.7, 1.7]];
+    let report = compare(&options, &task(&places), &|| Ok(())).expect("sound");
+    let normal = &report.fields[1].values;
+    for [u, v] in places {
+        let node = (50.0 * v).round() as usize * PlateGrid::SIDE + (u * 100.0 / 3.0).round() as usize;
+        assert!(normal[node].abs() < 0.1e-3, "{u} {v}: {}", normal[node]);
+    }
+    // 0.02 rad round u = 2, held at 0.3 and 2.7: it sinks by 0.02 * 1.7 * 0.7 / 2.4 there.
+    let bend = normal[50 * PlateGrid::SIDE + 67];
+    assert!((bend + 0.02 * 1.7 * 0.7 / 2.4).abs() < 0.5e-3, "{bend}");
+    assert!(report.findings.says[0].contains("aligned by supports"), "{:?}", report.findings.says);
+    let error = compare(&options, &task(&places[..2]), &|| Ok(())).expect_err("refused");
+    assert!(
+        error
+            .to_string()
+            .starts_with("alignment supports: 2 of the 2 supports given are in sight, 3 are needed")
+    );
 }
 
 fn value(report: &Report, name: &str) -> f64 {

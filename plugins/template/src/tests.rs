@@ -74,6 +74,7 @@ fn task(shape: TargetShape, scanned_face: Facing, seat: Seat) -> Task {
         stations: Vec::new(),
         sigma_correlated: 0.0,
         sigma_true: None,
+        supports: Vec::new(),
         supports_changed: false,
     }
 }

@@ -29,6 +29,8 @@ pub struct PlateFile {
     pub markers: Vec<Marker>,
     /// Lines to be reported, and for templates to lie on.
     pub reference_lines: Vec<ReferenceLine>,
+    /// Places that rest on the press's supports while the plate is scanned.
+    pub supports: Vec<Support>,
     /// Boards to be laid on the plate.
     pub templates: Vec<Template>,
     /// Figures for the press's station registers, in their order.
@@ -77,6 +79,13 @@ pub struct ReferenceLine {
 struct NamedLine {
     name: Result<String, Reported>,
     line: Result<ReferenceLine, Reported>,
+}
+
+/// A place of the plate that rests on a support of the press.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Support {
+    /// Place, metres.
+    pub at: [f64; 2],
 }
 
 /// A place of which one figure goes to the press.
@@ -134,6 +143,7 @@ impl PlateFile {
         });
         let known = lines.as_deref().map_err(|reported| *reported);
         let templates = read_all(&mut root, "template", |table, names| Template::read(table, names, known));
+        let supports = read_all(&mut root, "support", |table, _| Support::read(table, rectangle));
         let stations = read_all(&mut root, "station", |table, names| Station::read(table, names, rectangle));
         root.finish();
         Ok(Self {
@@ -141,6 +151,7 @@ impl PlateFile {
             target: target?,
             markers: markers?.into_iter().collect::<Result<_, _>>()?,
             reference_lines: lines?.into_iter().map(|line| line.line).collect::<Result<_, _>>()?,
+            supports: supports?.into_iter().collect::<Result<_, _>>()?,
             templates: templates?.into_iter().collect::<Result<_, _>>()?,
             stations: stations?.into_iter().collect::<Result<_, _>>()?,
         })
@@ -210,6 +221,14 @@ impl Marker {
         let at = place::point(&mut table, "at_mm", plate);
         table.finish();
         Ok(Self { name: name?, at: at? })
+    }
+}
+
+impl Support {
+    fn read(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Self, Reported> {
+        let at = place::point(&mut table, "at_mm", plate);
+        table.finish();
+        Ok(Self { at: at? })
     }
 }
 

@@ -211,6 +211,7 @@ fn task() -> Task {
         stations: Vec::new(),
         sigma_correlated: 0.0,
         sigma_true: None,
+        supports: Vec::new(),
         supports_changed: false,
     }
 }
