@@ -48,17 +48,32 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
 /// to stretch for it.
 fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let grid = nodes.grid;
-    let goal = grid.map(|u, v| target.curvature(u, v).gaussian);
-    // 1e-9 1/m^2: a sphere of 30 km.
-    if goal.iter().all(|goal| goal.abs() < 1e-9) {
+    if !is_doubly_curved(nodes, target) {
         return;
     }
+    let goal = grid.map(|u, v| target.curvature(u, v).gaussian);
     let value: Vec<f64> = goal.iter().zip(&nodes.curvature).map(|(goal, k)| goal - k.gaussian).collect();
     let known = |i: &usize| nodes.known[*i];
-    let total = |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>();
-    report.findings.figures.push(figure("gaussian.missing_share", total(&value) / total(&goal), "1"));
+    // Places on the edges stand for as much as others: a hundredth of the plate at most is counted twice.
+    let total =
+        |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>() * grid.cell();
+    let (missing, wanted) = (total(&value), total(&goal));
+    let figures = &mut report.findings.figures;
+    figures.push(figure("gaussian.missing", missing, "1"));
+    figures.push(figure("gaussian.wanted", wanted, "1"));
+    figures.push(figure("gaussian.missing_share", missing / wanted, "1"));
+    report.findings.says.push(format!(
+        "still to stretch: {:.0} % of the target's Gaussian curvature is missing ({missing:.4} of {wanted:.4} sr)",
+        100.0 * missing / wanted
+    ));
     let state = nodes.known.iter().map(|known| if *known { NodeState::Seen } else { NodeState::Unseen });
     report.fields.push(grid.scalar("gaussian_missing", "1/m2", value, state.collect()));
+}
+
+/// Whether bending alone cannot make the target.
+pub(crate) fn is_doubly_curved(nodes: &Nodes, target: &TargetSurface) -> bool {
+    // 1e-9 1/m^2: a sphere of 30 km.
+    nodes.grid.map(|u, v| target.curvature(u, v).gaussian).iter().any(|goal| goal.abs() >= 1e-9)
 }
 
 /// One sigma of the deficit at a node.

@@ -33,16 +33,18 @@
 //! `kappa_max`, `kappa_min` (principal), `gaussian` (1/m2); with an earlier scan `curvature_change`, the
 //! change in the direction in which it is strongest; with a target `curvature_deficit`, positive where the plate has to
 //! bend more, neutral where it is enough; with a sphere or torus `gaussian_missing` (1/m2), for which the plate still has to
-//! stretch.
+//! stretch, and what it stretched already, the membrane strain of the mid-surface (`strain_u`, `strain_v`, `strain_uv`).
 //!
 //! Figures: `curvature.lod`, the shares `curvature.above_lod` and `curvature.changed_share`; `bend.N.angle` with its place,
 //! `bend.N.direction` of the straight lines, `bend.N.length` and `bend.N.width`; `curvature.deficit_max`,
-//! `curvature.deficit_min` and `curvature.enough`, the share that is done; `gaussian.missing_share` of the target's
-//! Gaussian curvature, 1 for any plate that only bent.
+//! `curvature.deficit_min` and `curvature.enough`, the share that is done; `gaussian.missing` and `gaussian.wanted`, the
+//! Gaussian curvature integrated over what was seen (steradians), and `gaussian.missing_share`, 1 for any plate that only
+//! bent; `strain.max` and `strain.min`, the largest stretch and squeeze in any direction.
 
 mod bands;
 mod change;
 mod deficit;
+mod strain;
 
 use platen_sdk::{
     Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, PlateGrid, Report, Result,
@@ -140,6 +142,9 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         let target = TargetSurface::new(target, task.width, task.height, task.thickness)
             .map_err(|e| Error::new(ErrorKind::Config, e.to_string()))?;
         deficit::add(&mut report, &nodes, &target);
+        if deficit::is_doubly_curved(&nodes, &target) {
+            strain::add(&mut report, &nodes, now);
+        }
     }
     check()?;
     let earlier = if options.against == "before" { &inputs.before } else { &inputs.baseline };

@@ -183,6 +183,36 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
     let missing = field(&report, "gaussian_missing").values[PlateGrid::NODES / 2];
     assert!((missing - 1.0 / 64.0).abs() < 5e-4, "{missing}");
     assert!((found(&report, "gaussian.missing_share").expect("known").value - 1.0).abs() < 0.02);
+    let wanted = found(&report, "gaussian.wanted").expect("known").value;
+    assert!((wanted - WIDTH * HEIGHT / 64.0).abs() < 0.03 * wanted, "{wanted}");
+    assert!(
+        report.findings.says.iter().any(|s| s.starts_with("still to stretch: 10")),
+        "{:?}",
+        report.findings.says
+    );
+    // A plate that only bent has no membrane strain.
+    for name in ["strain.max", "strain.min"] {
+        let strain = found(&report, name).expect("known").value;
+        assert!(strain.abs() < 5e-4, "{name} {strain}");
+    }
+}
+
+#[test]
+fn the_strain_is_that_of_the_material_map() {
+    // Stretched by 2 in a thousand along u, squeezed by 1 along v, and sheared.
+    let surface = plate(1e-6, 7, |_| 0.0);
+    let mut parts = surface.to_parts();
+    for p in &mut parts.control {
+        *p = [1.002 * p[0] + 0.003 * p[1], 0.999 * p[1], p[2]];
+    }
+    let stretched = Surface::from_parts(parts).expect("sound");
+    let report = run(&inputs(stretched, None, Some((TargetShape::Sphere { radius: 8.0 }, Facing::Inside))));
+    for (name, truth) in [("strain_u", 2.002e-3), ("strain_v", -0.995e-3), ("strain_uv", 1.503e-3)] {
+        let middle = field(&report, name).values[PlateGrid::NODES / 2];
+        assert!((middle - truth).abs() < 1e-5, "{name} {middle}");
+    }
+    let most = found(&report, "strain.max").expect("known").value;
+    assert!((most - (0.5035e-3 + (1.4985e-3_f64).hypot(1.503e-3))).abs() < 2e-5, "{most}");
 }
 
 #[test]

@@ -1,0 +1,36 @@
+//! What the plate stretched.
+
+use platen_sdk::{NodeState, PlateGrid, Report};
+use platen_shape::Surface;
+use platen_shape::task::Figure;
+
+use crate::{Nodes, figure};
+
+/// Adds the membrane strain of the mid-surface: Green's strain of S(u, v) against the flat rectangle,
+/// (|S_u|^2 - 1) / 2, (|S_v|^2 - 1) / 2 and S_u . S_v / 2.
+///
+/// It is that of the material map which the flattening chose: with `elastic` the one of least energy, with `harmonic` the
+/// map's own error as well.
+pub(crate) fn add(report: &mut Report, nodes: &Nodes, now: &Surface) {
+    let strain = nodes.grid.map(|u, v| {
+        let d = now.derivatives(u, v);
+        [0.5 * (d.u.norm_squared() - 1.0), 0.5 * (d.v.norm_squared() - 1.0), 0.5 * d.u.dot(&d.v)]
+    });
+    let principal = |i: usize, sign: f64| {
+        let [along, across, shear] = strain[i];
+        0.5 * (along + across) + sign * (0.5 * (along - across)).hypot(shear)
+    };
+    let seen: Vec<bool> = nodes.grid.map(|u, v| now.mask().seen(u, v));
+    for (name, sign) in [("strain.max", 1.0), ("strain.min", -1.0)] {
+        let of_seen = (0..PlateGrid::NODES).filter(|i| seen[*i]).map(|i| (i, principal(i, sign)));
+        let most = of_seen.max_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1)));
+        let placed = most.map(|(i, value)| Figure { at: Some(nodes.grid.at(i)), ..figure(name, value, "1") });
+        report.findings.figures.extend(placed);
+    }
+    let state: Vec<NodeState> =
+        seen.iter().map(|seen| if *seen { NodeState::Seen } else { NodeState::Unseen }).collect();
+    for (k, name) in ["strain_u", "strain_v", "strain_uv"].into_iter().enumerate() {
+        let values = strain.iter().map(|strain| strain[k]).collect();
+        report.fields.push(nodes.grid.scalar(name, "1", values, state.clone()));
+    }
+}
