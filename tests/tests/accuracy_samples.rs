@@ -113,7 +113,7 @@ impl Lab {
         let scanner = Scanner::create(&library, &values).unwrap();
         scanner.instance().open(LIMIT).unwrap();
         let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec, None).unwrap();
-        stroke::measure_scanned(&mut self.rig, &scanned, spec).unwrap()
+        stroke::measure_scanned(&mut self.rig, &scanned, spec, None).unwrap()
     }
 
     /// Corners rms and markers mean of the sample itself, millimetres.

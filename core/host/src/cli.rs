@@ -1,6 +1,7 @@
 //! The command line: one module for each verb. Results go to stdout, the log to stderr.
 
 mod bench;
+mod calibrate;
 mod check;
 mod convert;
 mod demo;
@@ -70,6 +71,8 @@ enum Verb {
     Scan(scan::Command),
     /// A scan file in another format
     Convert(convert::Command),
+    /// What a scanner's errors are beyond noise, from scans of a plate left alone
+    Calibrate(calibrate::Command),
     /// What is in a scan file, and how it was oriented
     Inspect(inspect::Command),
     /// Check plant and plate files, all faults at once
@@ -161,6 +164,7 @@ pub fn main() -> ExitCode {
         Verb::Press(command) => press::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
         Verb::History(command) => history::run(&cli.common, command),
+        Verb::Calibrate(command) => calibrate::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
         Verb::Bench(command) => bench::run(&cli.common, command),

@@ -1,6 +1,7 @@
 //! The host: loads plugins, measures plates, runs strokes, answers on the command line.
 
 pub mod accuracy;
+pub mod calibration;
 pub mod cli;
 pub mod files;
 pub mod past;

@@ -8,6 +8,7 @@ use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUs
 use platen_shape::task::{self, Task};
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 
+use crate::calibration::Calibration;
 use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
 
 /// Time that a flattening or a comparison may take; the press waits at most 10 s for both.
@@ -20,10 +21,12 @@ pub struct Rig {
     pub flattening: Flattening,
     /// What is compared, in this order.
     pub comparisons: Vec<Comparison>,
-    /// Rough direction of growing u, scanner frame.
+    /// Rough direction of growing u at a plate's first scan, scanner frame.
     pub u_axis: Option<Vec3>,
     /// Where the press stands, scanner frame, when the plant file says so.
     pub press: Option<Vec3>,
+    /// The axis about which the press turns a plate, scanner frame.
+    pub press_z: Vec3,
     /// Where the plate can be, scanner frame.
     pub region: Option<RegionOfInterest>,
 }
@@ -70,6 +73,8 @@ impl Rig {
             comparisons,
             u_axis: plant.frame.u_axis.map(Vec3::from),
             press: press_origin(&plant.frame.press_from_scanner),
+            // The rotation's last row: what the press frame's z is in the scanner frame.
+            press_z: plant.frame.press_from_scanner.rotation[2].into(),
             region: plant
                 .frame
                 .region_of_interest
@@ -107,8 +112,8 @@ pub fn scanner(plant: &PlantFile, catalogue: &Catalogue) -> Result<Scanner, RigE
     Ok(Scanner::create(&library, &values)?)
 }
 
-/// What is asked of the comparisons for this plate.
-pub fn task(plate: &PlateFile, supports_changed: bool) -> Task {
+/// What is asked of the comparisons for this plate, by a scanner with this calibration, if any.
+pub fn task(plate: &PlateFile, calibration: Option<&Calibration>, supports_changed: bool) -> Task {
     Task {
         plate: plate.plate.id.clone(),
         width: plate.plate.width,
@@ -126,8 +131,8 @@ pub fn task(plate: &PlateFile, supports_changed: bool) -> Task {
             .iter()
             .map(|s| task::Station { name: s.name.clone(), at: s.at, quantity: quantity(s.quantity) })
             .collect(),
-        sigma_correlated: 0.0,
-        sigma_true: None,
+        sigma_correlated: calibration.map_or(0.0, |calibration| calibration.sigma_correlated),
+        sigma_true: calibration.and_then(|calibration| calibration.sigma_true),
         supports: plate.supports.iter().map(|support| support.at).collect(),
         supports_changed,
     }

@@ -7,6 +7,7 @@
 
 mod archive;
 mod bench;
+mod earlier;
 mod figures;
 mod journal;
 mod region;

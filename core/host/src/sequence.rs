@@ -172,7 +172,7 @@ impl Sequence {
             if let (Some(now), Some(file)) = (&now, &file) {
                 row.add_forming(now, file);
                 if let Some(before) = &before {
-                    let task = rig::task(file, false);
+                    let task = rig::task(file, None, false);
                     let surfaces = Surfaces { now, before: Some(before), baseline: None };
                     let report = curvature.compare(&task, surfaces)?;
                     row.bends = Some(bends(&report.findings.figures, file, &strokes));
@@ -219,7 +219,7 @@ impl SequenceStroke {
     }
 
     fn add_forming(&mut self, surface: &Surface, file: &PlateFile) {
-        let task = rig::task(file, false);
+        let task = rig::task(file, None, false);
         let target = task.target.and_then(|target| {
             TargetSurface::new(&target, surface.width(), surface.height(), surface.thickness()).ok()
         });
@@ -270,7 +270,7 @@ fn last_bend(earlier: &[SequenceStroke]) -> Option<&Bend> {
 
 /// Whether a bend turns against the target there; `None` where the target is straight across it.
 fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> Option<bool> {
-    let task = rig::task(file, false);
+    let task = rig::task(file, None, false);
     let target = TargetSurface::new(&task.target?, task.width, task.height, task.thickness).ok()?;
     let (sin, cos) = direction.sin_cos();
     let wanted = target.curvature(u, v).along([-sin, cos]);

@@ -8,12 +8,13 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use nalgebra::Rotation3;
 use platen_scan::{Column, ColumnError, ScanEnd, ScanHeader, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, Measurement, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
 use platen_shape::task::{Task, Verdict};
-use platen_shape::{Patch, PlateSpec};
+use platen_shape::{Patch, PlateSpec, Surface, Turned, Vec3, turned};
 
 use crate::plugin::{JobSpec, PluginError, Report, ScanEvent, Scanner, Surfaces};
 use crate::rig::Rig;
@@ -36,6 +37,20 @@ pub enum NotMeasured {
     /// The plate's outline was not found.
     #[error("plate: {0}")]
     Outline(#[from] OutlineError),
+    /// The plate lies another way than at the scan before.
+    #[error(
+        "plate: its nearest edge lies {angle_deg:.0} degrees from where u ran at the scan before; turn it back, or let the \
+         press send plate_rot"
+    )]
+    Askew {
+        /// Degrees.
+        angle_deg: f64,
+    },
+    /// Its corners would be mistaken.
+    #[error(
+        "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
+    )]
+    Turned(Turned),
     /// The plate could not be flattened or fitted.
     #[error("plate: {0}")]
     Shape(#[from] MeasureError),
@@ -165,16 +180,52 @@ pub struct Measured {
     pub outline_time: Duration,
 }
 
-/// From the plate's face to its shape.
+/// The plate at its last scan, from which (0, 0) goes on.
+#[derive(Debug, Clone, Copy)]
+pub struct Last<'a> {
+    /// Its shape and place then.
+    pub surface: &'a Surface,
+    /// How far the press says that it turned the plate since, radians.
+    pub fed_by: Option<f64>,
+}
+
+impl Last<'_> {
+    /// Direction of growing u now, scanner frame: as it was, turned by what the press says about its own z.
+    fn u_axis(&self, press_z: Vec3) -> Vec3 {
+        let (width, middle) = (self.surface.width(), 0.5 * self.surface.height());
+        let along_u = self.surface.point(width, middle) - self.surface.point(0.0, middle);
+        Rotation3::new(press_z * self.fed_by.unwrap_or(0.0)) * along_u
+    }
+}
+
+/// From the plate's face to its shape. At its first scan the hint of `spec` tells its corners apart, later the way
+/// that it lay at the `last` one.
 ///
 /// # Errors
 /// Why the plate was not measured.
-pub fn measure_scanned(rig: &mut Rig, scanned: &Scanned, spec: &PlateSpec) -> Result<Measured, NotMeasured> {
+pub fn measure_scanned(
+    rig: &mut Rig,
+    scanned: &Scanned,
+    spec: &PlateSpec,
+    last: Option<Last<'_>>,
+) -> Result<Measured, NotMeasured> {
     let start = Instant::now();
-    let outline = outline(&scanned.patch, spec)?;
+    let outline = match last {
+        None => outline(&scanned.patch, spec)?,
+        Some(last) => {
+            let spec = PlateSpec { u_axis: Some(last.u_axis(rig.press_z)), ..spec.clone() };
+            outline(&scanned.patch, &spec).map_err(|error| match error {
+                OutlineError::Hint { angle_deg } => NotMeasured::Askew { angle_deg },
+                other => other.into(),
+            })?
+        }
+    };
     let outline_time = start.elapsed();
     let measurement = measure(&scanned.patch, &outline, spec, &mut rig.flattening, &mut || start.elapsed())?;
-    Ok(Measured { outline, measurement, outline_time })
+    match last.and_then(|last| turned(&measurement.surface, last.surface)) {
+        Some(turned) => Err(NotMeasured::Turned(turned)),
+        None => Ok(Measured { outline, measurement, outline_time }),
+    }
 }
 
 /// What the comparisons found, in the plant's order. One that fails says so in its place and judges nothing.
@@ -190,4 +241,29 @@ pub fn verdict(reports: &[Result<Report, PluginError>]) -> Verdict {
         Err(_) => Some(Verdict::CannotTell),
     });
     given.max().unwrap_or(Verdict::CannotTell)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+mod tests {
+    use platen_shape::surface::{Axis, Fit, Mask};
+
+    use super::*;
+
+    #[test]
+    fn u_goes_on_from_the_last_scan_and_turns_with_the_press() {
+        let mut fit = Fit::new(Axis::new(0.0, 2.0, 4), Axis::new(0.0, 1.0, 4));
+        for i in 0..400 {
+            let (u, v) = (0.1 * (f64::from(i % 20) + 0.5), 0.05 * (f64::from(i / 20) + 0.5));
+            fit.add(u, v, [5.0 + u, v, -3.0], 1e6);
+        }
+        let mask = Mask::unseen(2.0, 1.0, 1.0);
+        let surface = Surface::new(fit.solve([0.0, 0.0, 1.0]).unwrap(), 0.04, mask);
+        let u_axis = |fed_by, press_z| Last { surface: &surface, fed_by }.u_axis(press_z).normalize();
+        assert!((u_axis(None, Vec3::z()) - Vec3::x()).norm() < 1e-9);
+        let quarter = Some(std::f64::consts::FRAC_PI_2);
+        assert!((u_axis(quarter, Vec3::z()) - Vec3::y()).norm() < 1e-9);
+        // A scanner that hangs upside down sees the press turn the other way.
+        assert!((u_axis(quarter, -Vec3::z()) + Vec3::y()).norm() < 1e-9);
+    }
 }

@@ -63,6 +63,8 @@ const UNITS: &[Unit] = &[
 impl Unit {
     /// Seconds.
     pub const SECOND: Self = unit("s", "time", 1.0, 1.0);
+    /// Minutes.
+    pub const MINUTE: Self = unit("min", "time", 60.0, 1.0);
     /// Days.
     pub const DAY: Self = unit("d", "time", 86_400.0, 1.0);
     /// The unit of what measures nothing.

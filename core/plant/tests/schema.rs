@@ -131,6 +131,7 @@ fn the_plant_schema_has_the_keys_that_the_reader_allows() {
         ("frame", "frame", frame),
         ("frame.press_from_scanner", "frame.press_from_scanner", &frame["properties"]["press_from_scanner"]),
         ("frame.region_of_interest", "frame.region_of_interest", &frame["properties"]["region_of_interest"]),
+        ("calibration", "calibration", &properties["calibration"]),
         ("plates", "plates", &properties["plates"]),
         ("flattening", "flattening", plugin),
         ("[comparison]", "comparison[1]", plugin),

@@ -128,6 +128,8 @@ alarms! {
         "プレスのレシピに対応する板ファイルがありません" "このレシピ番号の plate-NNN.toml を追加するか、レシピを修正してください"
     Saturated = 306 Warning "a figure is larger than its register can hold" "read the full figure in the history; look for the wrong plate or recipe"
         "値がレジスタの範囲を超えました" "履歴で実際の値を確認し、板とレシピを確認してください"
+    PlateTurned = 307 Error "the plate lies turned against the stroke before" "turn it back, or let the press send plate_rot; end the part when it is another plate"
+        "板が前回のストロークと異なる向きに置かれています" "板の向きを戻すか、プレスから plate_rot を送ってください。別の板なら部品終了を送ってください"
     StorageFailed = 401 Error "the journal cannot be written" "make room on the disk or repair it, then reset"
         "記録を書き込めません" "ディスクの空きを確保するか修理し、リセットしてください"
     StorageDegraded = 402 Warning "results go to the press but are not being recorded" "make room on the disk or repair it"

@@ -7,6 +7,7 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+pub mod calibration;
 mod checks;
 pub mod evaluate;
 pub mod extract;
@@ -22,6 +23,7 @@ pub mod sparse;
 pub mod surface;
 mod target;
 pub mod task;
+mod turned;
 
 pub use checks::{Check, EdgeCheck, ShapeChecks};
 pub use flatten::{Chart, Flatten, FlattenError};
@@ -33,6 +35,7 @@ pub use patch::{Beyond, Crossing, Patch, Sample};
 pub use plate::{PlateSpec, RegionOfInterest};
 pub use surface::{Surface, SurfaceParts};
 pub use target::{Placement, TargetError, TargetSurface};
+pub use turned::{Turned, turned};
 
 /// A point or vector in space, metres, scanner frame unless said.
 pub type Vec3 = nalgebra::Vector3<f64>;

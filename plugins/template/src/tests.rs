@@ -1,5 +1,6 @@
 //! Whole comparisons on plates of closed form.
 
+mod calibrated;
 mod contact;
 mod malformed;
 mod noise;

@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
+use jiff::Timestamp;
 use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_shape::Surface;
 use platen_shape::task::Verdict;
 
 use super::scan_source::{self, READ_LIMIT};
@@ -13,8 +15,8 @@ use super::{CliError, Common, output};
 use crate::plugin::{Catalogue, JobSpec, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
-use crate::stroke::{self, Measured, Scanned};
-use crate::{files, progress};
+use crate::stroke::{self, Last, Measured, Scanned};
+use crate::{calibration, files, progress};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
@@ -58,20 +60,28 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         plant.flattening = PluginUse::by_default(name);
     }
     plant.frame.u_axis = command.u_axis.or(plant.frame.u_axis);
+    let calibration = plant.calibration.as_ref().and_then(|wanted| {
+        // Whether the scanner was warm, a file does not tell.
+        let found = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
+        found.map_err(|why| tracing::warn!("{why}; only noise is in the uncertainties")).ok()
+    });
     let mut rig = Rig::of(&plant, &catalogue)?;
-    let mut measure = |scan: &Path| measure_file(&catalogue, &mut rig, scan, &plate);
-    let before = command.before.as_deref().map(&mut measure).transpose()?;
-    let baseline = command.baseline.as_deref().map(&mut measure).transpose()?;
-    let (scanned, now) = measure(&command.scan)?;
+    // In the order in which they were taken: which corner is (0, 0) goes on from one to the next.
+    let mut measure =
+        |scan: &Path, last: Option<&Surface>| measure_file(&catalogue, &mut rig, scan, &plate, last);
+    let mut earlier = |scan: &Option<PathBuf>, last: Option<&Surface>| {
+        let measured = scan.as_deref().map(|scan| measure(scan, last)).transpose()?;
+        Ok::<_, CliError>(measured.map(|(_, measured)| measured.measurement.surface))
+    };
+    let baseline = earlier(&command.baseline, None)?;
+    let before = earlier(&command.before, baseline.as_ref())?;
+    let (scanned, now) = measure(&command.scan, before.as_ref().or(baseline.as_ref()))?;
 
     progress::phase("comparing");
-    let surface =
-        |earlier: &Option<(Scanned, Measured)>| earlier.as_ref().map(|(_, m)| m.measurement.surface.clone());
-    let (before, baseline) = (surface(&before), surface(&baseline));
     let surfaces =
         Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
     let start = Instant::now();
-    let task = rig::task(&plate, false);
+    let task = rig::task(&plate, calibration.as_ref(), false);
     let reports = stroke::compare(&rig, &task, surfaces);
     let compare = start.elapsed();
     let verdict = stroke::verdict(&reports);
@@ -105,7 +115,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-fn direction(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     let direction: [f64; 3] =
         numbers.try_into().map_err(|_| "give three numbers, e.g. 0.84,0.54,0".to_owned())?;
@@ -113,12 +123,13 @@ fn direction(text: &str) -> Result<[f64; 3], String> {
     sound.then_some(direction).ok_or_else(|| "give a direction that is not 0,0,0".to_owned())
 }
 
-/// Measures one scan file with the file driver.
-fn measure_file(
+/// Measures one scan file with the file driver; `last` is the plate at the scan before.
+pub(super) fn measure_file(
     catalogue: &Catalogue,
     rig: &mut Rig,
     scan: &Path,
     plate: &PlateFile,
+    last: Option<&Surface>,
 ) -> Result<(Scanned, Measured), CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
     let scanner = scan_source::open(catalogue, scan, None)?;
@@ -126,7 +137,8 @@ fn measure_file(
     let spec = rig.spec(plate);
     let job = JobSpec::untriggered(READ_LIMIT);
     let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
-    let measured = stroke::measure_scanned(rig, &scanned, &spec).map_err(|e| failed(&e))?;
+    let last = last.map(|surface| Last { surface, fed_by: None });
+    let measured = stroke::measure_scanned(rig, &scanned, &spec, last).map_err(|e| failed(&e))?;
     Ok((scanned, measured))
 }
 

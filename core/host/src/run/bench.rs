@@ -14,12 +14,14 @@ use platen_shape::{PlateSpec, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::archive::Archive;
+use super::earlier::EarlierScans;
 use super::region::{self, Region};
-use super::{Watcher, figures, surface_file};
+use super::{Watcher, figures};
+use crate::calibration::{self, Calibration};
 use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Report, Scanner, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
-use crate::stroke::{self, NotMeasured, Scanned, Tape};
+use crate::stroke::{self, Last, NotMeasured, Scanned, Tape};
 use crate::{files, past, report};
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
@@ -68,14 +70,6 @@ struct InHand {
     scanned_at: jiff::Timestamp,
 }
 
-/// What a stroke is compared with.
-struct Earlier {
-    before: Option<Surface>,
-    baseline: Option<Surface>,
-    /// Where the plate rested at the stroke before.
-    supports: Option<String>,
-}
-
 /// A stroke with all that was found out about it.
 struct Judged {
     answer: Measurement,
@@ -96,6 +90,10 @@ pub(super) struct Bench {
     region: Region,
     /// How long a scan of the base window takes; `None` for a driver that does not plan its scans.
     estimate: Option<Duration>,
+    /// Since when the scanner has been in reach.
+    in_reach: Option<Instant>,
+    /// What the press side was told last about being ready to scan.
+    told: Option<Result<(), Code>>,
     scan_limit: Option<Duration>,
     history: Arc<Mutex<History>>,
     archive: Archive,
@@ -121,6 +119,8 @@ impl Bench {
             estimate: None,
             rig,
             scanner: None,
+            in_reach: None,
+            told: None,
             scan_limit: press.timeouts.scan,
             history,
             archive: Archive::start(&plant.output),
@@ -136,6 +136,7 @@ impl Bench {
             if self.scanner.is_none() {
                 self.connect();
             }
+            self.tell_ready();
             let task = match (&self.scanner, tasks.recv_timeout(RETRY)) {
                 (_, Ok(task)) => task,
                 (_, Err(std::sync::mpsc::RecvTimeoutError::Timeout)) => continue,
@@ -165,18 +166,46 @@ impl Bench {
             });
         match scanner {
             Ok((scanner, estimate)) => {
-                tracing::info!(?estimate, window = ?self.region.base(), "scanner ready");
+                tracing::info!(?estimate, window = ?self.region.base(), "scanner in reach");
                 self.scanner = Some(scanner);
                 self.estimate = estimate;
-                // A plate that has moved out of its window is scanned twice.
-                let longest = estimate.map(|estimate| (2 * estimate).max(LEAST_ESTIMATE));
-                self.say(Answer::Scanner { ready: Ok(()), estimate: longest });
+                self.in_reach.get_or_insert_with(Instant::now);
             }
             Err(why) => {
                 tracing::error!("scanner: {why}");
+                self.in_reach = None;
+                self.told = Some(Err(Code::ScannerNotReady));
                 self.say(Answer::Scanner { ready: Err(Code::ScannerNotReady), estimate: None });
             }
         }
+    }
+
+    /// What is known of the scanner; `None` where the plant names no calibration.
+    fn calibration(&self) -> Result<Option<Calibration>, calibration::Invalid> {
+        let in_reach = self.in_reach.map_or(Duration::ZERO, |since| since.elapsed());
+        let wanted = self.plant.calibration.as_ref();
+        wanted.map(|wanted| calibration::in_force(wanted, jiff::Timestamp::now(), in_reach)).transpose()
+    }
+
+    /// Tells the press side whether strokes can be measured, when that changed: a scanner in reach whose calibration
+    /// does not hold measures nothing that could be judged.
+    fn tell_ready(&mut self) {
+        if self.in_reach.is_none() {
+            return;
+        }
+        let found = self.calibration();
+        let ready = found.as_ref().map(|_| ()).map_err(|_| Code::CalibrationInvalid);
+        if self.told == Some(ready) {
+            return;
+        }
+        match found {
+            Ok(_) => tracing::info!("scanner ready"),
+            Err(why) => tracing::error!("{why}"),
+        }
+        self.told = Some(ready);
+        // A plate that has moved out of its window is scanned twice.
+        let estimate = self.estimate.map(|estimate| (2 * estimate).max(LEAST_ESTIMATE));
+        self.say(Answer::Scanner { ready, estimate });
     }
 
     /// True when a plugin hangs.
@@ -317,16 +346,22 @@ impl Bench {
     /// From the plate's face to the result and its files.
     fn measure(&mut self, stroke: &InHand, start: Instant) -> Result<Judged, NotMeasured> {
         let spec = self.rig.spec(&stroke.plate);
-        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec)?;
+        let earlier = EarlierScans::of(self.history().archive(), stroke.run_id);
+        let last = earlier.last().map(|last| Last {
+            surface: &last.surface,
+            fed_by: last.plate_rot.zip(stroke.data.plate_rot).map(|(then, now)| now - then),
+        });
+        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last)?;
         self.region.saw(&measured.outline);
-        let Earlier { before, baseline, supports } = self.earlier(stroke.run_id);
         let surfaces = Surfaces {
             now: &measured.measurement.surface,
-            before: before.as_ref(),
-            baseline: baseline.as_ref(),
+            before: earlier.before.as_ref().map(|before| &before.surface),
+            baseline: earlier.baseline.as_ref().map(|baseline| &baseline.surface),
         };
         let comparing = Instant::now();
-        let task = rig::task(&stroke.plate, past::moved(supports.as_deref(), &stroke.plate));
+        let calibration = self.calibration().ok().flatten();
+        let supports = earlier.last().and_then(|last| last.supports.as_deref());
+        let task = rig::task(&stroke.plate, calibration.as_ref(), past::moved(supports, &stroke.plate));
         let reports = stroke::compare(&self.rig, &task, surfaces);
         let compare = comparing.elapsed();
         let verdict = stroke::verdict(&reports);
@@ -354,26 +389,6 @@ impl Bench {
 
     fn history(&self) -> MutexGuard<'_, History> {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The stroke before and the blank, where they are on record.
-    fn earlier(&self, run_id: u32) -> Earlier {
-        let document = |found: Result<Option<platen_history::Stroke>, platen_history::Error>| match found {
-            Ok(stroke) => stroke.and_then(|stroke| stroke.document),
-            Err(error) => {
-                tracing::warn!("{error}; this stroke is compared with none");
-                None
-            }
-        };
-        let (before, baseline) = {
-            let history = self.history();
-            (document(history.archive().before(run_id)), document(history.archive().baseline(run_id)))
-        };
-        Earlier {
-            supports: before.as_deref().and_then(past::supports),
-            before: before.as_deref().and_then(surface_file::beside),
-            baseline: baseline.as_deref().and_then(surface_file::beside),
-        }
     }
 
     /// Writes the documents and notes where they lie. A full disk costs the record, not the result.
@@ -425,6 +440,7 @@ fn refusal(error: &NotMeasured) -> (Code, String, bool) {
         NotMeasured::Scanner(PluginError::Stopped { .. }) => Code::ScanTimeout,
         NotMeasured::Scanner(_) | NotMeasured::Column(_) | NotMeasured::NoHeader => Code::ScanFailed,
         NotMeasured::Plate(_) => Code::PlateNotFound,
+        NotMeasured::Askew { .. } | NotMeasured::Turned(_) => Code::PlateTurned,
         NotMeasured::Outline(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
     };
     (code, error.to_string(), hung)

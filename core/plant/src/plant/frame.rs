@@ -9,7 +9,8 @@ const ROTATION_SLACK: f64 = 2e-3;
 /// How the scanner stands to the press and the plate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
-    /// Where a point of the scanner frame is in the press's.
+    /// Where a point of the scanner frame is in the press's. The press turns plates about its z, by which `plate_rot` carries
+    /// (0, 0) from stroke to stroke.
     pub press_from_scanner: RigidTransform,
     /// Rough direction of growing u, scanner frame, any length; decides which corner is (0, 0).
     pub u_axis: Option<[f64; 3]>,

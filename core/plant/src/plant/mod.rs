@@ -3,10 +3,12 @@
 //! Everything but `[scanner]` and `[press]` has a default, so that a scan can be measured without a plant file.
 //! Relative paths start at the folder of the plant file.
 
+mod calibration;
 mod frame;
 mod output;
 mod plugin_use;
 
+pub use calibration::CalibrationUse;
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
 pub use plugin_use::PluginUse;
@@ -54,6 +56,8 @@ pub struct PlantFile {
     pub scan_window: ScanWindow,
     /// How the scanner stands to the press and the plate.
     pub frame: Frame,
+    /// What is known of the scanner; without it only its noise is in the uncertainties.
+    pub calibration: Option<CalibrationUse>,
     /// Folder of the plate files.
     pub plates: PathBuf,
     /// Turns the mesh into (u, v).
@@ -74,6 +78,7 @@ impl Default for PlantFile {
             scanner: None,
             scan_window: ScanWindow::default(),
             frame: Frame::default(),
+            calibration: None,
             plates: PathBuf::from("plates"),
             flattening: PluginUse::by_default(FLATTENING),
             comparisons: COMPARISONS.map(PluginUse::by_default).to_vec(),
@@ -145,6 +150,9 @@ impl PlantFile {
         let press = root.table("press").optional();
         let press = press.and_then(|table| table.map(Press::read).transpose());
         let frame = root.section("frame").and_then(Frame::read);
+        let calibration = root.table("calibration").optional();
+        let calibration =
+            calibration.and_then(|table| table.map(|table| CalibrationUse::read(table, folder)).transpose());
         let plates = root.section("plates").and_then(|mut table| {
             let plates = table.name("folder").map(PathBuf::from).or(default.plates);
             table.finish();
@@ -169,6 +177,7 @@ impl PlantFile {
             scanner,
             scan_window: scan_window.unwrap_or(default.scan_window),
             frame: frame?,
+            calibration: calibration?,
             plates: folder.join(plates?),
             flattening: flattening?.unwrap_or(default.flattening),
             comparisons: if listed { comparisons? } else { default.comparisons },

@@ -10,6 +10,7 @@ use platen_shape::task::Verdict;
 use serde_json::json;
 
 use super::{RunRef, open};
+use crate::calibration::Calibration;
 use crate::cli::{CliError, Common, output};
 use crate::picture::{Caption, map};
 use crate::plugin::{Catalogue, Comparison, Report, Surfaces};
@@ -43,7 +44,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
     let rested = first.document.as_deref().and_then(past::supports);
-    let task = rig::task(&plate, past::moved(rested.as_deref(), &plate));
+    // What the record is compared by today, however old it is.
+    let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
+    let task = rig::task(&plate, calibration.as_ref(), past::moved(rested.as_deref(), &plate));
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));

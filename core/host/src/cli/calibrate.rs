@@ -1,0 +1,251 @@
+//! `platen calibrate`: what a scanner's errors are beyond noise, from repeated scans of one plate.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use jiff::Timestamp;
+use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_shape::calibration::{ArtefactGap, Pooled, artefact_gaps, covering};
+use platen_shape::{Surface, TargetSurface};
+use serde::Serialize;
+
+use super::{CliError, Common, measure, output};
+use crate::calibration::{Calibration, CalibrationRecord};
+use crate::plugin::{PluginError, Surfaces};
+use crate::progress;
+use crate::record::mm;
+use crate::rig::{self, Rig};
+
+/// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
+/// supports, metres.
+const NULL_LIMIT: f64 = 2e-3;
+
+/// Pairs below which the estimate itself scatters by a quarter or more.
+const FEW_PAIRS: usize = 6;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate plates/plate-017.toml\n  \
+                        platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate granite.toml --artefact\n\n\
+                        Scan one plate several times and leave it alone in between. What the scans differ by beyond their noise is the \
+                        correlated error in every level of detection. With --artefact the plate has exactly the [target] of its \
+                        file: gaps under boards on it are the scanner's own, and go into every template's uncertainty. Writes the \
+                        file that [calibration] of the plant file names."
+)]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+    /// Scans of the same plate, nothing changed in between; at least two
+    #[arg(required = true, num_args = 2..)]
+    scans: Vec<PathBuf>,
+    /// Plate file of the plate that was scanned
+    #[arg(long, value_name = "PLATE.toml")]
+    plate: PathBuf,
+    /// The plate is an artefact that has exactly the shape of its [target]
+    #[arg(long)]
+    artefact: bool,
+    /// File to write instead of the plant file's
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// What was found.
+#[derive(Debug, Serialize)]
+struct Found {
+    #[serde(flatten)]
+    calibration: CalibrationRecord,
+    pairs: Vec<PairRecord>,
+    /// Gaps under boards on the artefact.
+    artefact: Vec<GapRecord>,
+    file: PathBuf,
+}
+
+/// Two scans of the plate.
+#[derive(Debug, Serialize)]
+struct PairRecord {
+    scans: [usize; 2],
+    difference_mm: f64,
+    stated_mm: f64,
+}
+
+/// Boards of one length on the artefact.
+#[derive(Debug, Serialize)]
+struct GapRecord {
+    chord_mm: f64,
+    boards: usize,
+    gap_rms_mm: f64,
+    /// Systematic error with which the uncertainty covers 95 % of the gaps, one sigma.
+    systematic_mm: f64,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let mut plant = PlantFile::load(&command.plant)?;
+    let plate = PlateFile::load(&command.plate)?;
+    let file = command.out.clone().or_else(|| plant.calibration.as_ref().map(|c| c.file.clone()));
+    let file = file.ok_or_else(|| {
+        let plant = command.plant.display();
+        CliError::Usage(format!("{plant}: names no calibration; add [calibration] with file, or give --out"))
+    })?;
+    let shape = artefact_shape(command, &plate)?;
+    plant.comparisons = vec![PluginUse::by_default("displacement")];
+    let catalogue = common.catalogue();
+    let mut rig = Rig::of(&plant, &catalogue)?;
+
+    let mut surfaces: Vec<Surface> = Vec::new();
+    let mut instrument = String::new();
+    for scan in &command.scans {
+        let last = surfaces.last();
+        let (scanned, measured) = measure::measure_file(&catalogue, &mut rig, scan, &plate, last)?;
+        instrument = scanned.header.instrument;
+        surfaces.push(measured.measurement.surface);
+    }
+    progress::phase("comparing");
+    let (pairs, pooled) = null_pairs(&rig, &plate, &surfaces)?;
+    let sigma_correlated = pooled.excess();
+    let artefact =
+        shape.map(|shape| artefact(&surfaces, &shape, &chords(&plate), sigma_correlated)).transpose()?;
+    progress::done();
+
+    if sigma_correlated > NULL_LIMIT {
+        return Err(CliError::Failed(format!(
+            "the scans differ by {:.1} mm beyond their noise: the plate was bent between them, or is not the same; scan one \
+             plate and leave it alone",
+            mm(sigma_correlated)
+        )));
+    }
+    let (gaps, sigma_true) = artefact.map_or((Vec::new(), None), |(gaps, sigma)| (gaps, Some(sigma)));
+    let calibration = Calibration {
+        made: Timestamp::now(),
+        instrument,
+        plate: plate.plate.id.clone(),
+        scans: surfaces.len(),
+        sigma_correlated,
+        sigma_true,
+    };
+    std::fs::write(&file, calibration.to_toml())
+        .map_err(|e| CliError::Failed(format!("{}: cannot be written: {e}", file.display())))?;
+    let found = Found { calibration: calibration.record(), pairs, artefact: gaps, file };
+    if common.json {
+        output::json(&found)?
+    } else {
+        print(&found)?
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The known shape of an artefact.
+fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetSurface>, CliError> {
+    if !command.artefact {
+        return Ok(None);
+    }
+    let usage = |why: String| CliError::Usage(format!("{}: {why}", command.plate.display()));
+    let task = rig::task(plate, None, false);
+    let target =
+        task.target.ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))?;
+    let shape = TargetSurface::new(&target, task.width, task.height, task.thickness);
+    shape.map(Some).map_err(|e| usage(e.to_string()))
+}
+
+/// What every two of the scans differ by, along the normal, the plate's own movement taken away.
+fn null_pairs(
+    rig: &Rig,
+    plate: &PlateFile,
+    surfaces: &[Surface],
+) -> Result<(Vec<PairRecord>, Pooled), CliError> {
+    let task = rig::task(plate, None, false);
+    let (mut pairs, mut pooled) = (Vec::new(), Pooled::default());
+    for (i, now) in surfaces.iter().enumerate() {
+        for (k, before) in surfaces[..i].iter().enumerate() {
+            let surfaces = Surfaces { now, before: Some(before), baseline: None };
+            let reports = rig.comparisons.iter().map(|comparison| comparison.compare(&task, surfaces));
+            let reports = reports.collect::<Result<Vec<_>, PluginError>>()?;
+            let figure = |name: &str| {
+                let found = reports.iter().flat_map(|r| &r.findings.figures).find(|f| f.name == name);
+                found.map(|f| f.value).ok_or_else(|| {
+                    CliError::Failed(format!(
+                        "displacement gives no figure {name}; install the plugin of this version"
+                    ))
+                })
+            };
+            let (difference, stated) = (figure("displacement.rms")?, figure("displacement.sigma")?);
+            pooled.add(difference, stated);
+            pairs.push(PairRecord {
+                scans: [k + 1, i + 1],
+                difference_mm: mm(difference),
+                stated_mm: mm(stated),
+            });
+        }
+    }
+    Ok((pairs, pooled))
+}
+
+/// Lengths of the boards that the plate file asks for; half its shorter side where it asks for none.
+fn chords(plate: &PlateFile) -> Vec<f64> {
+    let mut chords: Vec<f64> = plate.templates.iter().map(|template| template.chord).collect();
+    chords.sort_by(f64::total_cmp);
+    chords.dedup();
+    if chords.is_empty() { vec![0.5 * plate.plate.width.min(plate.plate.height)] } else { chords }
+}
+
+/// Gaps on the artefact, and the worst board's systematic error, one sigma.
+fn artefact(
+    surfaces: &[Surface],
+    shape: &TargetSurface,
+    chords: &[f64],
+    sigma_correlated: f64,
+) -> Result<(Vec<GapRecord>, f64), CliError> {
+    let mut gaps = Vec::new();
+    let mut worst: f64 = 0.0;
+    for &chord in chords {
+        let found: Vec<ArtefactGap> =
+            surfaces.iter().flat_map(|now| artefact_gaps(now, shape, chord, sigma_correlated)).collect();
+        if found.is_empty() {
+            return Err(CliError::Failed(format!(
+                "no board of {:.0} mm fits the part of the artefact that was seen",
+                mm(chord)
+            )));
+        }
+        let square: f64 = found.iter().map(|g| g.gap * g.gap).sum();
+        let systematic = covering(&found);
+        worst = worst.max(systematic);
+        gaps.push(GapRecord {
+            chord_mm: mm(chord),
+            boards: found.len(),
+            gap_rms_mm: mm((square / found.len() as f64).sqrt()),
+            systematic_mm: mm(systematic),
+        });
+    }
+    Ok((gaps, worst))
+}
+
+fn print(found: &Found) -> Result<(), CliError> {
+    let mut rows = vec![["scans", "differ by mm", "stated mm"].map(str::to_owned).to_vec()];
+    for pair in &found.pairs {
+        let [a, b] = pair.scans;
+        rows.push(vec![
+            format!("{a} and {b}"),
+            format!("{:.3}", pair.difference_mm),
+            format!("{:.3}", pair.stated_mm),
+        ]);
+    }
+    output::table(&rows)?;
+    if found.pairs.len() < FEW_PAIRS {
+        output::line(&format!(
+            "only {} pairs: four scans or more make the estimate steady",
+            found.pairs.len()
+        ))?;
+    }
+    output::line(&format!("correlated error of a pair: {:.3} mm", found.calibration.sigma_correlated_mm))?;
+    for gap in &found.artefact {
+        output::line(&format!(
+            "boards of {:.0} mm on the artefact: {} gaps of {:.3} mm rms, of which {:.3} mm (one sigma) are systematic",
+            gap.chord_mm, gap.boards, gap.gap_rms_mm, gap.systematic_mm
+        ))?;
+    }
+    match found.calibration.sigma_true_mm {
+        Some(sigma) => output::line(&format!("systematic error of a gap: {sigma:.3} mm"))?,
+        None => output::line("systematic error of a gap: not known, for want of an artefact (--artefact)")?,
+    }
+    output::line(&format!("wrote {}", found.file.display()))
+}

@@ -1,0 +1,52 @@
+//! What is on record of earlier scans of the plate in hand.
+
+use platen_history::{Archive, Error, Stroke};
+use platen_press::StrokeData;
+use platen_shape::Surface;
+
+use super::surface_file;
+use crate::past;
+
+/// An earlier scan of the plate.
+#[derive(Debug)]
+pub(super) struct Earlier {
+    pub(super) surface: Surface,
+    /// Where the plate rested.
+    pub(super) supports: Option<String>,
+    /// Feed rotation that the press told, radians.
+    pub(super) plate_rot: Option<f64>,
+}
+
+/// The stroke before a run, and the scan of the blank.
+#[derive(Debug, Default)]
+pub(super) struct EarlierScans {
+    pub(super) before: Option<Earlier>,
+    pub(super) baseline: Option<Earlier>,
+}
+
+impl EarlierScans {
+    /// Those on record whose files are still there; the log tells of others.
+    pub(super) fn of(archive: &Archive, run_id: u32) -> Self {
+        Self { before: load(archive.before(run_id)), baseline: load(archive.baseline(run_id)) }
+    }
+
+    /// The last scan of the plate, whatever it was.
+    pub(super) fn last(&self) -> Option<&Earlier> {
+        self.before.as_ref().or(self.baseline.as_ref())
+    }
+}
+
+fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
+    let stroke = found
+        .inspect_err(|error| tracing::warn!("{error}; this stroke is compared with none"))
+        .ok()
+        .flatten()?;
+    let document = stroke.document?;
+    // Written by this program as JSON; what cannot be read any more is as good as nothing said.
+    let data: StrokeData = serde_json::from_str(&stroke.data).unwrap_or_default();
+    Some(Earlier {
+        surface: surface_file::beside(&document)?,
+        supports: past::supports(&document),
+        plate_rot: data.plate_rot,
+    })
+}

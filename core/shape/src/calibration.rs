@@ -1,0 +1,131 @@
+//! What a scanner's errors are beyond the noise that a fit knows of: estimators for calibrations.
+//!
+//! Errors that go together over decimetres (range bias, lattice, pose) do not average out in a fit and are not in its
+//! covariance. Scans of a plate that stayed as it was differ by more than their stated deviations: the excess, pooled over the plate
+//! and over pairs, is the correlated part of the level of detection. What repeats in every scan cancels in such pairs; it shows
+//! on an artefact of known shape only, as gaps under boards that ought to fit.
+
+use crate::target::Placement;
+use crate::{Surface, TargetSurface};
+
+/// Differences that ought to be zero, with what was stated of them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Pooled {
+    shown: f64,
+    stated: f64,
+    n: usize,
+}
+
+impl Pooled {
+    /// Takes one difference and its stated standard deviation.
+    pub fn add(&mut self, difference: f64, sigma: f64) {
+        self.shown += difference * difference;
+        self.stated += sigma * sigma;
+        self.n += 1;
+    }
+
+    /// One sigma of what the differences show beyond what was stated, 0 where they show less.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        ((self.shown - self.stated).max(0.0) / self.n.max(1) as f64).sqrt()
+    }
+}
+
+/// A gap that ought to be zero, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArtefactGap {
+    /// As measured, signed.
+    pub gap: f64,
+    /// Its stated standard deviation.
+    pub sigma: f64,
+}
+
+/// Share of the gaps that their expanded uncertainty is to cover, and that uncertainty in standard deviations.
+const COVERED: f64 = 0.95;
+const EXPANDED: f64 = 1.96;
+
+/// The systematic error, one sigma, with which the expanded uncertainty covers 95 % of the gaps. A scanner's range error
+/// swings: under boards of half a wave it shows twice, under those of a whole one not at all, and gaps scatter far less like normal
+/// errors than their root mean square says.
+#[must_use]
+pub fn covering(gaps: &[ArtefactGap]) -> f64 {
+    let mut lacking: Vec<f64> =
+        gaps.iter().map(|g| ((g.gap / EXPANDED).powi(2) - g.sigma * g.sigma).max(0.0).sqrt()).collect();
+    lacking.sort_by(f64::total_cmp);
+    let last = (COVERED * lacking.len() as f64).ceil() as usize;
+    last.checked_sub(1).map_or(0.0, |last| lacking[last])
+}
+
+/// Lines in each direction, and boards on each.
+const BOARDS: usize = 9;
+
+/// Places along each side that the artefact is fitted by.
+const PLACES: usize = 41;
+
+/// Gaps in the middle of boards of length `chord`, balanced on their ends, on an artefact that has its target's shape: they ought
+/// to be zero. `sigma_correlated` is that of a pair of scans, of which a single one has its share, as in a template's own
+/// uncertainty. Boards lie along u and along v all over the plate, where it was seen.
+#[must_use]
+pub fn artefact_gaps(
+    artefact: &Surface,
+    shape: &TargetSurface,
+    chord: f64,
+    sigma_correlated: f64,
+) -> Vec<ArtefactGap> {
+    let (w, h) = (artefact.width(), artefact.height());
+    let seen = |[u, v]: [f64; 2]| artefact.mask().seen(u, v);
+    let at = |k: usize| [(k % PLACES) as f64, (k / PLACES) as f64].map(|x| x / (PLACES - 1) as f64);
+    let places = (0..PLACES * PLACES).map(at).map(|[x, y]| [w * x, h * y]).filter(|place| seen(*place));
+    let placement = Placement::best(artefact, shape, places);
+
+    let between = |k: usize, from: f64, to: f64| from + (to - from) * (k as f64 + 0.5) / BOARDS as f64;
+    let mut gaps = Vec::new();
+    for (length, across, along_u) in [(w, h, true), (h, w, false)] {
+        for k in (0..BOARDS * BOARDS).filter(|_| chord <= length) {
+            let centre = between(k % BOARDS, 0.5 * chord, length - 0.5 * chord);
+            let line = between(k / BOARDS, 0.0, across);
+            let place = |s: f64| if along_u { [s, line] } else { [line, s] };
+            let terms = [(centre - 0.5 * chord, 0.5), (centre, -1.0), (centre + 0.5 * chord, 0.5)]
+                .map(|(s, w)| (place(s), w));
+            if !terms.iter().all(|(at, _)| seen(*at)) {
+                continue;
+            }
+            let gap: f64 = terms.iter().map(|(at, w)| w * placement.deviation(artefact, shape, *at)).sum();
+            let squares: f64 = terms.iter().map(|(_, w)| w * w).sum();
+            let correlated = sigma_correlated * (0.5 * squares).sqrt();
+            let sigma = artefact.sigma_of_heights(&terms).hypot(correlated);
+            gaps.push(ArtefactGap { gap, sigma });
+        }
+    }
+    gaps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_excess_is_what_was_not_stated() {
+        let mut pooled = Pooled::default();
+        for k in 0..1000 {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            pooled.add(sign * 5e-3, 3e-3);
+        }
+        assert!((pooled.excess() - 4e-3).abs() < 1e-12);
+        let mut quiet = Pooled::default();
+        quiet.add(1e-3, 3e-3);
+        assert_eq!(quiet.excess(), 0.0);
+    }
+
+    #[test]
+    fn nineteen_of_twenty_gaps_are_covered() {
+        let gaps: Vec<ArtefactGap> =
+            (1..=100).map(|k| ArtefactGap { gap: 1e-5 * f64::from(k), sigma: 1e-4 }).collect();
+        let sigma = covering(&gaps);
+        let covered = |g: &&ArtefactGap| g.gap <= EXPANDED * g.sigma.hypot(sigma) * (1.0 + 1e-12);
+        assert_eq!(gaps.iter().filter(covered).count(), 95);
+        // What noise explains is no systematic error.
+        assert_eq!(covering(&gaps[..19]), 0.0);
+        assert_eq!(covering(&[]), 0.0);
+    }
+}
