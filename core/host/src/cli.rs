@@ -15,6 +15,7 @@ mod run;
 mod scan;
 mod scan_source;
 mod status;
+mod verify;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -73,6 +74,8 @@ enum Verb {
     Convert(convert::Command),
     /// What a scanner's errors are beyond noise, from scans of a plate left alone
     Calibrate(calibrate::Command),
+    /// Painted markers in a scan against the virtual ones
+    Verify(verify::Command),
     /// What is in a scan file, and how it was oriented
     Inspect(inspect::Command),
     /// Check plant and plate files, all faults at once
@@ -165,6 +168,7 @@ pub fn main() -> ExitCode {
         Verb::Status(command) => status::run(&cli.common, command),
         Verb::History(command) => history::run(&cli.common, command),
         Verb::Calibrate(command) => calibrate::run(&cli.common, command),
+        Verb::Verify(command) => verify::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
         Verb::Bench(command) => bench::run(&cli.common, command),

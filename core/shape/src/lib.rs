@@ -9,6 +9,7 @@
 
 pub mod calibration;
 mod checks;
+pub mod discs;
 pub mod evaluate;
 pub mod extract;
 pub mod flatten;
