@@ -5,10 +5,13 @@ use crate::{bridge, document, press};
 use clap::{Args, ValueEnum};
 use platen_sim_plate::{Plate, PlateError, PlateState};
 use platen_sim_scanner::{
-    CellCounts, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings, scan_all,
+    CellCounts, Cyclic, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings, scan_all,
     truth_document,
 };
 use std::path::{Path, PathBuf};
+
+/// Period of the cyclic range error, metres.
+const CYCLIC_PERIOD: f64 = 1.2;
 
 /// What stands before the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,6 +34,9 @@ pub(crate) struct Device {
     /// Standard deviation of a range at 10 m, millimetres; 0.5 in files, in streams that of the rate asked for
     #[arg(long)]
     pub(crate) noise_mm: Option<f64>,
+    /// Amplitude of the cyclic range error of period 1.2 m, millimetres
+    #[arg(long, default_value_t = 0.0)]
+    cyclic_mm: f64,
     /// Seed of all errors
     #[arg(long, default_value_t = 1)]
     pub(crate) scan_seed: u64,
@@ -86,6 +92,11 @@ impl Device {
             SimLattice::of_plate(plate.as_ref(), self.margin_deg.to_radians(), self.step_deg.to_radians());
         let instrument = Instrument {
             range_sigma: self.noise_mm.unwrap_or(0.5) * 1e-3,
+            cyclic: (self.cyclic_mm > 0.0).then_some(Cyclic {
+                amplitude: self.cyclic_mm * 1e-3,
+                period: CYCLIC_PERIOD,
+                phase: 0.0,
+            }),
             seed: self.scan_seed.wrapping_add(number << 32),
             ..Instrument::default()
         };
