@@ -133,7 +133,7 @@ names! {
         MinX "min_x" Length "place of dev_min in the plate frame, u"
         MinY "min_y" Length "place of dev_min in the plate frame, v"
         RadiusDev "radius_dev" Share "deviation of the curvature from the target's"
-        Station "station" Length "figures at the configured stations"
+        Station "station" Length "figures at the stations of the plate file, in its order: deviation under the target laid on the plate, gap, or curvature deficit (then 1/km where it says mm)"
         ScanTime "scan_time" Time "duration of the scan"
         EvalTime "eval_time" Time "duration of the evaluation"
         StrokeToResultTime "stroke_to_result_time" Time "from the trigger to the result"
