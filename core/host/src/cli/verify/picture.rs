@@ -11,8 +11,11 @@ use platen_shape::{Measurement, Patch, Vec3};
 /// Largest width of the picture, pixels.
 const WIDTH: f64 = 1600.0;
 
-/// Intensities between these shares of all become black to white.
-const GRAYS: [f64; 2] = [0.01, 0.99];
+/// Intensities between these shares of the median become black to white: paint shows dark, glare at edges takes nothing.
+const GRAYS: [f64; 2] = [0.25, 1.5];
+
+/// Room round the plate, pixels.
+const MARGIN: f64 = 40.0;
 
 /// From directions to pixels. Seen from the scanner, azimuths grow to the left.
 struct View {
@@ -68,10 +71,10 @@ impl View {
     /// The intensities as a PNG, one pixel a cell, clear where the plate was not seen.
     fn intensities(&self, patch: &Patch) -> Result<Vec<u8>, png::EncodingError> {
         let (n_x, n_y) = (self.columns[1] - self.columns[0] + 1, self.rows[1] - self.rows[0] + 1);
-        let mut sorted: Vec<u16> = patch.samples.iter().map(|s| s.intensity).collect();
-        sorted.sort_unstable();
-        let [black, white] =
-            GRAYS.map(|share| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]));
+        let mut intensities: Vec<u16> = patch.samples.iter().map(|s| s.intensity).collect();
+        let middle = intensities.len() / 2;
+        let median = f64::from(*intensities.select_nth_unstable(middle).1);
+        let [black, white] = GRAYS.map(|share| share * median);
         let mut pixels = vec![0_u8; 2 * n_x as usize * n_y as usize];
         for s in &patch.samples {
             let at = (s.row - self.rows[0]) as usize * n_x as usize + (self.columns[1] - s.column) as usize;
@@ -111,10 +114,14 @@ pub(super) fn draw(
     let [width, height] = view.size();
     let image = base64::engine::general_purpose::STANDARD.encode(view.intensities(patch)?);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" \
-         font-size=\"20\">\n<rect width=\"100%\" height=\"100%\" fill=\"#203040\"/>\n<image width=\"{width:.1}\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{start} {start} {:.0} {:.0}\" \
+         font-family=\"sans-serif\" font-size=\"22\">\n<rect x=\"{start}\" y=\"{start}\" width=\"100%\" height=\"100%\" \
+         fill=\"#203040\"/>\n<image width=\"{width:.1}\" \
          height=\"{height:.1}\" preserveAspectRatio=\"none\" image-rendering=\"pixelated\" \
-         href=\"data:image/png;base64,{image}\"/>\n"
+         href=\"data:image/png;base64,{image}\"/>\n",
+        width + 2.0 * MARGIN,
+        height + 2.0 * MARGIN,
+        start = -MARGIN,
     );
     let line = |svg: &mut String, from: [f64; 2], to: [f64; 2], colour: &str| {
         let places = evaluate::reference_line(&measurement.surface, &measurement.location, from, to);
@@ -131,7 +138,7 @@ pub(super) fn draw(
     let label = |svg: &mut String, [x, y]: [f64; 2], colour: &str, text: &str| {
         let text = text.replace('&', "&amp;").replace('<', "&lt;");
         *svg +=
-            &format!("<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{colour}\">{text}</text>\n", x + 10.0, y - 10.0);
+            &format!("<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{colour}\">{text}</text>\n", x + 22.0, y - 14.0);
     };
     let (w, h) = (plate.plate.width, plate.plate.height);
     let corners = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
@@ -146,17 +153,15 @@ pub(super) fn draw(
     for (marker, disc) in plate.markers.iter().zip(discs) {
         let [x, y] = view.pixel(measurement.surface.face(marker.at[0], marker.at[1]));
         svg += &format!(
-            "<path d=\"M{:.1} {y:.1}H{:.1}M{x:.1} {:.1}V{:.1}\" stroke=\"#ffd800\" stroke-width=\"2\"/>\n",
-            x - 9.0,
-            x + 9.0,
-            y - 9.0,
-            y + 9.0
+            "<path d=\"M{:.1} {y:.1}h14m12 0h14M{x:.1} {:.1}v14m0 12v14\" stroke=\"#ffd800\" stroke-width=\"2\"/>\n",
+            x - 20.0,
+            y - 20.0
         );
         label(&mut svg, [x, y], "#ffd800", &marker.name);
         if let Ok(disc) = disc {
             let [x, y] = view.pixel(disc.centre);
             svg += &format!(
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"12\" fill=\"none\" stroke=\"#e02020\" stroke-width=\"2\"/>\n"
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"20\" fill=\"none\" stroke=\"#ff5030\" stroke-width=\"2\"/>\n"
             );
         }
     }
