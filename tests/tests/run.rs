@@ -132,3 +132,40 @@ fn a_scanner_that_fails_is_reported_to_the_press() {
     });
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
+
+#[test]
+fn a_missing_calibration_takes_ready_off_until_it_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 2\nbaseline = false");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let text = std::fs::read_to_string(&plant).unwrap();
+    std::fs::write(&plant, format!("{text}\n[calibration]\nfile = \"cal.toml\"\nmax_age = \"10 d\"\n"))
+        .unwrap();
+    let mut host = Host::start(&plant);
+    until("the code in the registers", || {
+        let registers = press.ask(r#"{"get":"registers"}"#);
+        (registers["registers"]["h"][6] == 207).then_some(())
+    });
+    // Bit 11 says that the calibration is not valid, bit 0 would say ready.
+    assert_eq!(press.host_status() & (1 << 11 | 1), 1 << 11);
+    assert!(press.stats()["taken"].as_array().unwrap().is_empty());
+
+    let now = std::process::Command::new("date").args(["-u", "+%FT%TZ"]).output().unwrap();
+    let now = String::from_utf8(now.stdout).unwrap();
+    let calibration = format!(
+        "[calibration]\nmade = \"{}\"\ninstrument = \"\"\nplate = \"A\"\nscans = 4\nsigma_correlated_mm = 0.02\n\
+         sigma_true_mm = 0.1\n",
+        now.trim()
+    );
+    std::fs::write(folder.path().join("cal.toml"), calibration).unwrap();
+    let stats = press.wait_done();
+    assert_clean(&stats, &host.log());
+    assert_eq!(press.host_status() & 1 << 11, 0);
+    let history = Host::history(&plant);
+    assert_eq!(history.len(), 2);
+    let document = std::path::Path::new(history[1]["document"].as_str().unwrap());
+    let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();
+    assert_eq!(result["calibration"]["sigma_true_mm"], 0.1);
+    assert_eq!(result["supports_changed"], false);
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}

@@ -5,8 +5,8 @@ use crate::{bridge, document, press};
 use clap::{Args, ValueEnum};
 use platen_sim_plate::{Plate, PlateError, PlateState};
 use platen_sim_scanner::{
-    CellCounts, Cyclic, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings, scan_all,
-    truth_document,
+    CellCounts, Cyclic, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, Surroundings,
+    scan_all, truth_document,
 };
 use std::path::{Path, PathBuf};
 
