@@ -166,6 +166,5 @@ fn a_missing_calibration_takes_ready_off_until_it_is_there() {
     let document = std::path::Path::new(history[1]["document"].as_str().unwrap());
     let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();
     assert_eq!(result["calibration"]["sigma_true_mm"], 0.1);
-    assert_eq!(result["supports_changed"], false);
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
