@@ -16,7 +16,8 @@ use crate::mesh::DiskMesh;
 /// A flattening's result: the place of every mesh vertex on the original rectangle.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
-    /// Per vertex: (u, v) in `[0, W] x [0, H]`, metres.
+    /// Per vertex: (u, v), metres, on the rectangle `[0, W] x [0, H]`. A method that holds the edges only as firmly as
+    /// they are known may place vertices of the boundary outside of it by about `edge_sigma` of the mesh.
     pub uv: Vec<[f64; 2]>,
     /// Per vertex, where the method knows it: membrane strain of the mid-surface against the rectangle,
     /// `[e_uu, e_vv, e_uv]` (tensor component, half the engineering shear), positive when stretched.
