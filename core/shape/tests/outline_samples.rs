@@ -6,6 +6,7 @@ use platen_shape::outline::{OutlineError, outline};
 
 #[test]
 fn corners_are_where_the_truth_has_them() {
+    let mut ratios = Vec::new();
     for folder in support::plate_folders() {
         let sample = support::read(&folder);
         let patch = support::extract(&sample, 0..sample.columns.len()).unwrap();
@@ -14,6 +15,24 @@ fn corners_are_where_the_truth_has_them() {
         let rms_mm = ((0..4).map(|k| off(k).powi(2)).sum::<f64>() / 4.0).sqrt() * 1000.0;
         println!("{}: corners {rms_mm:.2} mm rms", folder.display());
         assert!(rms_mm < 0.9, "{rms_mm}");
+        for k in 0..4 {
+            let truth = |k: usize| support::vec3(&sample.truth["corners_m"][k % 4]);
+            let corner = &outline.corners[k];
+            let error = corner.point - truth(k);
+            // Along the edge that leaves and against the one that arrives: both into the plate.
+            let inwards =
+                [truth(k + 1) - truth(k), truth(k + 3) - truth(k)].map(|v| v.normalize().dot(&error));
+            let parts = [0, 1].map(|d| inwards[d] / corner.sigma[d]);
+            println!("    inwards {:.2?} mm, {:.1?} standard deviations", inwards.map(|x| 1e3 * x), parts);
+            ratios.extend(parts);
+        }
+    }
+    if !ratios.is_empty() {
+        let (n, sum) = (ratios.len() as f64, ratios.iter().sum::<f64>());
+        let scatter = (ratios.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
+        println!("errors over stated deviations: mean {:.2}, rms {scatter:.2}", sum / n);
+        // What is left is what the lattice leaves open: no part of it is common to all edges, none is left out.
+        assert!((0.6..1.6).contains(&scatter) && (sum / n).abs() < 0.5);
     }
 }
 

@@ -73,6 +73,102 @@ fn flat_concave_and_convex() {
 }
 
 #[test]
+fn strong_bends_along_the_line_of_sight() {
+    let along = |radius: f64| Plate { radius: Some(radius), turn: 0.0, ..plate() };
+    check("towards the scanner", &Scene::of(along(5.0)), 1e-3);
+    // Seen at up to 80 degrees off the normal: at the far end rows are 43 mm apart on the plate.
+    check("away from it", &Scene::of(along(-5.0)), 2e-3);
+}
+
+#[test]
+fn an_edge_along_a_column_of_the_lattice() {
+    // The edge v = 0 in the plane through the mirror's axis: all of it between the same two columns.
+    let plate = Plate { turn: 0.0, centre: Vec3::new(6.0, 1.25, -3.6), ..plate() };
+    check("edge along a column", &Scene::of(plate), 1.5e-3);
+}
+
+#[test]
+fn coarse_lattices() {
+    // Samples 15 to 21 mm apart.
+    for step_deg in [0.12_f64, 0.15, 0.17] {
+        for radius in [None, Some(9.0), Some(-9.0)] {
+            let scene = Scene { step: step_deg.to_radians(), ..Scene::of(Plate { radius, ..plate() }) };
+            check(&format!("{step_deg} degrees, {radius:?}"), &scene, 4e-3);
+        }
+    }
+}
+
+#[test]
+fn a_plate_on_its_bed() {
+    // The floor is the bed: it touches the plate all around.
+    let plate = Plate { radius: None, ..plate() };
+    let scene = Scene { floor: plate.centre.z - 0.5 * plate.thickness, ..Scene::of(plate) };
+    check("on its bed", &scene, 1.5e-3);
+}
+
+#[test]
+fn a_mirroring_patch_on_an_edge() {
+    let scene = Scene { specular: Some([[1.0, -1.0], [1.6, 0.3]]), ..Scene::of(plate()) };
+    let (_, outline) = measure(&scene);
+    let off = corners_off(&scene, &outline);
+    let unseen =
+        outline.edges[0].seen.iter().filter(|s| !**s).count() as f64 / outline.edges[0].seen.len() as f64;
+    println!("corners {:.2?} mm, {:.2} of the edge not seen", off.map(|d| d * 1e3), unseen);
+    assert!(rms(off) < 1.2e-3);
+    // 0.6 m of 3 m, less what lies within reach of what was seen.
+    assert!((0.1..0.22).contains(&unseen), "{unseen}");
+}
+
+#[test]
+fn a_chain_before_a_corner() {
+    let corner = plate().face(0.0, 0.0);
+    let chain = [0.93 * corner.x, 0.93 * corner.y, 0.02, -4.5, 0.0];
+    let scene = Scene { people: vec![chain], ..Scene::of(plate()) };
+    let (_, outline) = measure(&scene);
+    let off = corners_off(&scene, &outline);
+    println!("corners {:.2?} mm, seen {:?}", off.map(|d| d * 1e3), outline.corners.map(|c| c.seen));
+    assert!(rms(off) < 2e-3);
+}
+
+#[test]
+fn what_is_held_while_columns_stream_is_bounded_by_the_plate() {
+    // A whole turn of 9.4 million cells: a room of 12 m around a plate, both as seen from the middle of a sphere.
+    let (n_rows, n_columns, step) = (1500, 6283, 1e-3);
+    let header = ScanHeader {
+        n_rows,
+        n_columns,
+        azimuth_start: -std::f64::consts::PI,
+        azimuth_step: step,
+        elevation_start: 0.4,
+        elevation_step: step,
+        ..ScanHeader::default()
+    };
+    let spec = PlateSpec { u_axis: None, ..Scene::of(plate()).spec() };
+    let plate = |column: u32, row: u32| (3000..3450).contains(&column) && (800..1200).contains(&row);
+    let mut extractor = Extractor::new(&header, &spec);
+    let (mut most, mut last) = (0, 0);
+    for index in 0..n_columns {
+        let azimuth = header.azimuth_start + step * f64::from(index);
+        let column = Column {
+            index,
+            range_m: (0..n_rows).map(|row| if plate(index, row) { 6.0 } else { 12.0 }).collect(),
+            azimuth: vec![azimuth; n_rows as usize],
+            elevation: (0..n_rows).map(|row| header.elevation_start - step * f64::from(row)).collect(),
+            intensity: vec![0; n_rows as usize],
+            state: vec![platen_scan::State::Valid; n_rows as usize],
+            ..Column::default()
+        };
+        extractor.push(&column).unwrap();
+        last = extractor.cells_held();
+        most = most.max(last);
+    }
+    println!("{} cells: at most {most} held, {last} at the end", n_rows * n_columns);
+    // The plate, once as columns and once with its surroundings, and a million cells between sweeps.
+    let on_plate = 450 * 400;
+    assert!(last > on_plate && most < 4 * on_plate + 2 * (1 << 20), "{most}");
+}
+
+#[test]
 fn noise_of_two_millimetres_with_heavy_tails() {
     let scene = Scene { sigma: 2e-3, tails: 0.05, dropouts: 0.02, ..Scene::of(plate()) };
     check("noise", &scene, 2.5e-3);

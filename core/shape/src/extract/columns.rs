@@ -113,6 +113,10 @@ impl Columns {
         self.kept.len() as u32
     }
 
+    pub(super) fn n_cells(&self) -> usize {
+        self.n_cells
+    }
+
     pub(super) fn get(&self, index: u32) -> Option<&Kept> {
         self.kept.get(index as usize)?.as_ref()
     }

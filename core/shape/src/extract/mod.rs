@@ -53,6 +53,10 @@ const LEAST_PART: f64 = 0.005;
 /// the plate. Larger ones are looked at only when no plate is found among these.
 const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
 
+/// A component of at least this part of the plate's area is looked at as soon as it has ended. Smaller ones wait: looked
+/// at, every piece of furniture in a dome would hold memory until the end.
+const CLOSED_PART: f64 = 0.3;
+
 /// A plate that reaches out of the region of interest over less than this is not cut by it, metres.
 const CUT_TOLERANCE: f64 = 0.05;
 
@@ -144,11 +148,19 @@ impl Extractor {
         let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
         for root in roots {
             let extent = self.regions.extent(root);
-            if extent.columns.1 == last && self.may_be_plate(extent) && self.is_near_size(root) {
+            let large = extent.area_mm2 >= self.plate_mm2(CLOSED_PART);
+            if extent.columns.1 == last && large && self.is_near_size(root) {
                 let surface = self.surface(&[root]);
                 self.closed.insert(root, surface);
             }
         }
+    }
+
+    /// Cells that are held now: those of the columns, as far as the plate may lie in them, and those around the
+    /// components that have been looked at already. What a scan needs of memory follows from it.
+    #[must_use]
+    pub fn cells_held(&self) -> usize {
+        self.columns.n_cells() + self.closed.values().map(|s| s.window.cells.len()).sum::<usize>()
     }
 
     /// The plate's face, once all columns have come.
@@ -324,7 +336,7 @@ impl Extractor {
         for cell in (0..face.len()).filter(|&cell| face[cell]) {
             number[cell] = samples.len() as u32;
             samples.push(Sample {
-                point: window.point(cell),
+                point: window.points[cell],
                 column: window.first_column + (cell / window.n_rows) as u32,
                 row: window.first_row + (cell % window.n_rows) as u32,
                 sigma: noise.at(cell),

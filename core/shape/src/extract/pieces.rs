@@ -100,7 +100,7 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Vector3<f32>], 
             let hidden = beside.clone().all(|cell| !cell.valid)
                 || beside.any(|cell| cell.valid && cell.range_m < near);
             let normal = normals[index(line, inner)];
-            End { place: offset + place as u32, point: window.point(at), normal: normal.cast(), hidden }
+            End { place: offset + place as u32, point: window.points[at], normal: normal.cast(), hidden }
         };
         Some([end(low, -1), end(high, 1)])
     });

@@ -166,7 +166,7 @@ fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) 
         let predicted = fit.at(window, x, y)?;
         let sigma = f64::from(noise.at(cell));
         let residual = (f64::from(window.cells[cell].range_m) - predicted.range) / sigma;
-        let known = fit.leverage(x, y).min(MOST_LEVERAGE);
+        let known = fit.leverage(&predicted).min(MOST_LEVERAGE);
         let within = residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt();
         within.then_some((cell, residual, known))
     });

@@ -19,6 +19,8 @@ pub(super) struct Window {
     /// Inverse range, 1/m; 0 where a cell is not valid. Along rows and columns of the lattice that of a plane is
     /// a sine of the angle, straight to within the square of the step, at any incidence.
     pub(super) inverse: Vec<f32>,
+    /// Positions of the valid cells, metres.
+    pub(super) points: Vec<Vec3>,
     /// Cells of the component.
     pub(super) own: Vec<bool>,
     pub(super) header: ScanHeader,
@@ -46,6 +48,7 @@ impl Window {
             n_rows,
             cells: vec![Cell::default(); n],
             inverse: vec![0.0; n],
+            points: vec![Vec3::zeros(); n],
             own: vec![false; n],
             header: header.clone(),
             per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
@@ -97,6 +100,7 @@ impl Window {
                     self.cells[at] = cell;
                     if cell.valid {
                         self.inverse[at] = 1.0 / cell.range_m;
+                        self.points[at] = self.point(at);
                     }
                 }
             }
@@ -135,7 +139,7 @@ impl Window {
     }
 
     /// Position of a valid cell, metres.
-    pub(super) fn point(&self, index: usize) -> Vec3 {
+    fn point(&self, index: usize) -> Vec3 {
         let cell = &self.cells[index];
         let nominal = self.nominal(index / self.n_rows, index % self.n_rows);
         let sight = Sight {

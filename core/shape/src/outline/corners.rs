@@ -21,6 +21,9 @@ const SUPPORT_STEPS: f64 = 1.5;
 const PAIR_SUPPORTS: f64 = 4.0;
 const PAIR_PART: f64 = 0.4;
 
+/// Points to either side over which the loop is levelled before its length is measured.
+const LEVELLED: usize = 4;
+
 /// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
 /// by a few degrees only.
 const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
@@ -134,10 +137,15 @@ struct Loop<'a> {
 
 impl<'a> Loop<'a> {
     fn new(points: &'a [Vec2]) -> Self {
+        let n = points.len();
+        // Points lie up to half a step to either side of the edge: from one to the next is farther than along it.
+        let mean = |i: usize| {
+            let around = (0..=2 * LEVELLED).map(|k| points[(i + k + LEVELLED * (n - 1)) % n]);
+            around.sum::<Vec2>() / (2 * LEVELLED + 1) as f64
+        };
         let mut length = vec![0.0];
-        for i in 0..points.len() {
-            let next = points[(i + 1) % points.len()];
-            length.push(length[i] + (next - points[i]).norm());
+        for i in 0..n {
+            length.push(length[i] + (mean(i + 1) - mean(i)).norm());
         }
         Self { points, length }
     }

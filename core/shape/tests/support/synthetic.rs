@@ -59,6 +59,13 @@ impl Plate {
         Vec3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
     }
 
+    /// Material coordinates (u, v) of a point on or in the plate, scanner frame.
+    fn material(&self, point: Vec3) -> [f64; 2] {
+        let p = self.to_local(point - self.centre);
+        let x = self.radius.map_or(p.x, |r| r * (p.x / r).atan2(-(p.z - r) / r));
+        [x + 0.5 * self.width, p.y + 0.5 * self.height]
+    }
+
     /// The upper face's point above (u, v) of the mid-surface, scanner frame.
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
         let (x, y) = (u - 0.5 * self.width, v - 0.5 * self.height);
@@ -136,6 +143,8 @@ pub struct Scene {
     /// Part of the samples with four times that.
     pub tails: f64,
     pub dropouts: f64,
+    /// Material rectangle of the first plate, from (u, v) to (u, v), that mirrors the beam away.
+    pub specular: Option<[[f64; 2]; 2]>,
     pub seed: u64,
 }
 
@@ -150,6 +159,7 @@ impl Scene {
             sigma: 5e-4,
             tails: 0.0,
             dropouts: 0.01,
+            specular: None,
             seed: 1,
         }
     }
@@ -215,6 +225,15 @@ impl Scene {
         (header, columns)
     }
 
+    fn is_specular(&self, azimuth: f64, elevation: f64, range: f64) -> bool {
+        let point = Vec3::from(Direction { azimuth, elevation }.unit()) * range;
+        let on_plate = |d: [f64; 2], [from, to]: [[f64; 2]; 2]| {
+            (0..2).all(|k| (from[k]..to[k]).contains(&d[k]))
+                && self.plates[0].hit(point / range) == Some(range)
+        };
+        self.specular.is_some_and(|patch| on_plate(self.plates[0].material(point), patch))
+    }
+
     fn column(&self, header: &ScanHeader, index: u32) -> Column {
         let mut random =
             Random::new(self.seed.wrapping_mul(0x1_0000_0001).wrapping_add(u64::from(index) << 20));
@@ -245,7 +264,7 @@ impl Scene {
             let range = other.filter(|_| told).map_or(centre, |other| share * centre + (1.0 - share) * other);
             let spread = if random.uniform() < self.tails { 4.0 } else { 1.0 };
             column.range_m[row] = range + self.sigma * spread * random.normal();
-            if random.uniform() >= self.dropouts {
+            if random.uniform() >= self.dropouts && !self.is_specular(azimuth, elevation, centre) {
                 column.state[row] = State::Valid;
             }
         }
