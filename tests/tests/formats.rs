@@ -14,6 +14,9 @@ use platen_host::rig;
 use platen_plant::{OptionValue, PluginUse, Value};
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
+use platen_sim_scanner::stream::{
+    Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Values, Wanted, column_payload,
+};
 use platen_sim_scanner::{
     E57Encoding, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, SimState, Surroundings,
     scan_all,
@@ -81,7 +84,12 @@ impl Bench {
 }
 
 /// Every way of storing the scene, with half a step of its coordinates.
-fn written() -> Vec<(PathBuf, f64)> {
+fn written() -> &'static [(PathBuf, f64)] {
+    static WRITTEN: OnceLock<Vec<(PathBuf, f64)>> = OnceLock::new();
+    WRITTEN.get_or_init(write_all)
+}
+
+fn write_all() -> Vec<(PathBuf, f64)> {
     let bench = bench();
     // Between 8 and 16 m a coordinate's last bit as f32 is a micrometre.
     let (scaled, single, exact, decimals) = (5e-6, 5e-7, 0.0, 5e-7);
@@ -111,7 +119,59 @@ fn written() -> Vec<(PathBuf, f64)> {
         files.push((bench.written(name, format, order), quantum));
     }
     files.push((mirrored(&files[6].0), decimals));
+    // Ranges in micrometres, angles in nanoradians.
+    files.push((streamed(), decimals + 2e-8));
     files
+}
+
+/// A scanner that delivers the scene once more.
+struct Again(SimScan);
+
+impl Head for Again {
+    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
+        Ok(Plan { wanted: *wanted, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
+    }
+
+    fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<u32, String> {
+        let lattice = &self.0.lattice;
+        let begin = Begin {
+            rows: lattice.n_rows,
+            columns: lattice.n_columns,
+            azimuth_start: lattice.azimuth_start,
+            azimuth_step: lattice.azimuth_step,
+            elevation_start: lattice.elevation_start,
+            elevation_step: -lattice.elevation_step,
+            values: Values::Polar,
+            range_unit_m: 1e-6,
+            intensity: [0, 2047],
+            seam_column: None,
+            order: "azimuth".to_owned(),
+            instrument: "again".to_owned(),
+            acquired_unix_s: None,
+            simulated: true,
+            altered: Vec::new(),
+        };
+        let _ = out.begin(begin.clone());
+        for (number, column) in self.0.columns.iter().enumerate() {
+            let _ = out.column(column_payload(column, number as u32, &begin, 0.0));
+        }
+        Ok(0)
+    }
+}
+
+/// The scene through the stream's driver and `platen scan` into a file.
+fn streamed() -> PathBuf {
+    let bench = bench();
+    let bridge = Bridge::start(BridgeConfig::default(), Box::new(Again(bench.scan.clone()))).unwrap();
+    let (plant, out) = (bench.file("stream.toml"), bench.file("streamed.e57"));
+    let text = format!(
+        "[plant]\nname = \"test\"\n[scanner]\nplugin = \"faro-stream\"\n[scanner.options]\naddress = \"{}\"\n",
+        bridge.address()
+    );
+    std::fs::write(&plant, text).unwrap();
+    let said = run(&["scan".as_ref(), plant.as_ref(), out.as_ref()]);
+    assert_eq!(said["columns"].as_u64().unwrap(), u64::from(bench.scan.lattice.n_columns), "{said}");
+    out
 }
 
 /// The PTX with a left-handed frame: y mirrored in the points, and in the matrix that says so.
@@ -181,7 +241,7 @@ fn check_cells(path: &Path, quantum: f64) {
 #[test]
 fn one_scene_gives_the_same_cells_in_every_format_and_order() {
     for (path, quantum) in written() {
-        check_cells(&path, quantum);
+        check_cells(path, *quantum);
     }
 }
 
@@ -207,7 +267,7 @@ fn measured(scan: &Path) -> serde_json::Value {
 fn one_scene_gives_the_same_verdict_in_every_format() {
     let mut first: Option<serde_json::Value> = None;
     for (path, _) in written() {
-        let result = measured(&path);
+        let result = measured(path);
         let first = first.get_or_insert_with(|| result.clone());
         let name = path.display();
         assert_eq!(result["verdict"], first["verdict"], "{name}");
