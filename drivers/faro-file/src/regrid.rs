@@ -75,6 +75,12 @@ impl Steps {
         let single: Vec<(usize, f64)> = single.map(|(i, e)| (i, *e)).collect();
         let elevation = single.iter().map(|(_, e)| e).sum::<f64>() / single.len() as f64;
         let (low, high) = ends(hits.iter().map(|d| d.elevation / elevation));
+        let within_a_column = high - low < MAX_COLUMN as f64;
+        if !within_a_column {
+            return Err(format!(
+                "one step of the elevation is {elevation:e} rad: no scanner has so many rows"
+            ));
+        }
         let mut steps = Self { start: low * elevation, elevation, rows: Vec::new(), azimuth: 0.0 };
         steps.rows = steps.stretches(hits, &single, high - low);
         steps.azimuth = steps.azimuth_step(hits, &elevations)?;
@@ -229,7 +235,7 @@ impl<T: Copy> Placer<T> {
 
     /// How far the nearest row that was seen lately is from the even lattice.
     fn nearest(&self, even: f64) -> Option<f64> {
-        let here = even.max(0.0) as usize;
+        let here = (even.max(0.0) as usize).min(MAX_COLUMN);
         let off = |row: usize| Some(self.lately(row)?.off);
         (0..self.rows.len().max(here))
             .find_map(|away| here.checked_sub(away).and_then(off).or_else(|| off(here + away)))

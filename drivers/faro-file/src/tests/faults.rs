@@ -148,3 +148,14 @@ fn a_header_that_does_not_fit_its_cells_is_not_believed() {
     assert_eq!(lattice.header(), &own);
     assert_eq!(lattice.point(lattice.cell(3, 5)).map(|p| (p[0] - point(5, 3)[0]).abs() < 1e-6), Some(true));
 }
+
+/// Found by fuzzing: nearly equal elevations would have asked for more rows than there is memory.
+#[test]
+fn steps_of_no_scanner_are_refused_before_memory_runs_out() {
+    let mut file = b"# SCENE XYZ binary format v1.0\nRows 0\nCols 0\n\0\0\0\0".to_vec();
+    for z in [0.0, 1e-300, 2e-300, 3e-300, 1e-300, 2e-300, 3e-300, 5.0] {
+        [1.0, 0.0, z].iter().for_each(|c: &f64| file.extend(c.to_le_bytes()));
+        file.extend([0, 0]);
+    }
+    refused(&file, "scan.xyb", "no scanner has so many rows");
+}
