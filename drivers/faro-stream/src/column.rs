@@ -81,6 +81,19 @@ impl Layout {
         }
     }
 
+    /// Warm-up columns that the host is to leave out at the start of each face.
+    pub(crate) fn warm_up_columns(&self) -> u32 {
+        if self.columns_flipped() { 0 } else { self.begin.warm_up_columns }
+    }
+
+    /// Empties a warm-up column that the host cannot leave out, because it comes last in its order.
+    pub(crate) fn leave_out_warm_up(&self, number: u32, column: &mut Column) {
+        let start = self.begin.seam_column.filter(|seam| number >= *seam).unwrap_or(0);
+        if self.columns_flipped() && number - start < self.begin.warm_up_columns {
+            column.state.fill(State::NoReturn);
+        }
+    }
+
     /// Number of a column at the bridge, and the column in our order.
     pub(crate) fn column(&self, payload: &[u8]) -> Result<(u32, Column)> {
         let fault = |what: &str| Error::Bridge(format!("a column of {} bytes {what}", payload.len()));

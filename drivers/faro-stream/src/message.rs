@@ -121,6 +121,8 @@ pub(crate) struct ScanBegin {
     pub(crate) intensity: (u16, u16),
     pub(crate) seam_column: Option<u32>,
     #[serde(default)]
+    pub(crate) warm_up_columns: u32,
+    #[serde(default)]
     pub(crate) instrument: String,
     pub(crate) acquired_unix_s: Option<f64>,
     #[serde(default)]
@@ -136,7 +138,5 @@ pub(crate) struct ScanEnd {
     pub(crate) reason: String,
     pub(crate) columns: u32,
     pub(crate) points: u64,
-    #[serde(default)]
-    pub(crate) warm_up_columns: u32,
     pub(crate) digest: u32,
 }

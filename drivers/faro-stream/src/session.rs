@@ -51,7 +51,10 @@ struct Scan {
     layout: Layout,
     /// Payload checksum of every column that came, by its number at the bridge.
     columns: Vec<Option<u32>>,
+    /// Records that came.
     points: u64,
+    /// Cells delivered as valid.
+    delivered: u64,
     /// Columns that were missing at the end before.
     missed: usize,
     fruitless: u32,
@@ -161,8 +164,15 @@ impl Session {
             None => {
                 self.actions.push_back(Action::Begin(Box::new(layout.header(&self.scanner))));
                 let columns = vec![None; layout.begin().columns as usize];
-                self.scan =
-                    Some(Scan { number, layout, columns, points: 0, missed: usize::MAX, fruitless: 0 });
+                self.scan = Some(Scan {
+                    number,
+                    layout,
+                    columns,
+                    points: 0,
+                    delivered: 0,
+                    missed: usize::MAX,
+                    fruitless: 0,
+                });
                 Ok(())
             }
             Some(scan) if scan.number == number && scan.layout == layout => Ok(()),
@@ -180,13 +190,15 @@ impl Session {
         if !frame.sound() {
             return Ok(()); // Missing, and asked for at the end.
         }
-        let (number, column) = scan.layout.column(&frame.payload)?;
+        let (number, mut column) = scan.layout.column(&frame.payload)?;
         match &mut scan.columns[number as usize] {
             Some(before) if *before == frame.crc => Ok(()),
             Some(_) => Err(Error::Bridge(format!("column {number} came twice with different content"))),
             slot => {
                 *slot = Some(frame.crc);
-                scan.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
+                scan.points += valid(&column);
+                scan.layout.leave_out_warm_up(number, &mut column);
+                scan.delivered += valid(&column);
                 self.actions.push_back(Action::Column(Box::new(column)));
                 Ok(())
             }
@@ -243,11 +255,15 @@ impl Scan {
         }
         Ok(ScanEnd {
             columns,
-            points: self.points,
-            warm_up_columns: end.warm_up_columns,
+            points: self.delivered,
+            warm_up_columns: self.layout.warm_up_columns(),
             outcome: Outcome::Complete,
         })
     }
+}
+
+fn valid(column: &Column) -> u64 {
+    column.state.iter().filter(|state| **state == State::Valid).count() as u64
 }
 
 /// The scanner that answers must be the one of the plant file.

@@ -22,7 +22,7 @@ pub struct Instrument {
     pub specular_lobe: Option<f64>,
     /// Two faces of the mirror turn.
     pub faces: Option<Faces>,
-    /// Columns at the start, in time, before the laser is warm: their ranges scatter by centimetres.
+    /// Columns at the start of each face before the laser is warm: their ranges scatter by centimetres.
     pub warm_up_columns: u32,
     /// Nothing nearer and nothing farther is measured.
     pub reach: [f64; 2],

@@ -55,6 +55,13 @@ impl View<'_> {
         self.instrument.faces.is_some_and(|faces| column >= faces.seam_column)
     }
 
+    /// True for the first columns of either face: both are measured when the laser has just been switched on.
+    fn is_warm_up(&self, column: u32) -> bool {
+        let back =
+            self.instrument.faces.filter(|_| self.is_back(column)).map_or(0, |faces| faces.seam_column);
+        column - back < self.instrument.warm_up_columns
+    }
+
     /// Casts the middle ray of every cell of a column.
     pub(crate) fn trace(&self, column: u32) -> Trace {
         let mut rng = self.rng(column, Purpose::Angles);
@@ -180,7 +187,7 @@ impl View<'_> {
             return (SimState::NoEcho, 0.0, 0);
         }
         let mut sigma = self.instrument.sigma_at(hit.range, strength);
-        if column < self.instrument.warm_up_columns {
+        if self.is_warm_up(column) {
             sigma = sigma.max(WARM_UP_SIGMA);
         }
         let range = hit.range + self.instrument.bias(hit.range) + sigma * error;

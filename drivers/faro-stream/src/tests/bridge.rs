@@ -39,7 +39,7 @@ impl Bridge {
             "job": "job", "rows": self.rows, "columns": self.columns, "azimuth_start": 3.1,
             "azimuth_step": self.azimuth_step, "elevation_start": 0.1, "elevation_step": self.elevation_step,
             "values": if self.polar { "polar" } else { "range" }, "range_unit_m": 1e-6, "intensity": [0, 2047],
-            "seam_column": null, "order": "azimuth", "something_new": [1, 2], "altered": ["rate lowered"],
+            "seam_column": null, "warm_up_columns": 3, "order": "azimuth", "something_new": [1, 2], "altered": ["rate lowered"],
         })
     }
 
@@ -76,7 +76,7 @@ impl Bridge {
         let crcs: Vec<u8> =
             (0..self.columns).flat_map(|c| crc32c::crc32c(&self.column(c)).to_le_bytes()).collect();
         json!({
-            "outcome": "complete", "columns": self.columns, "points": self.points(), "warm_up_columns": 3,
+            "outcome": "complete", "columns": self.columns, "points": self.points(),
             "digest": crc32c::crc32c(&crcs),
         })
     }
@@ -189,16 +189,20 @@ pub(super) fn run(
 pub(super) fn check(bridge: &Bridge, got: &Got) {
     let lattice = &got.lattice;
     assert_eq!(got.columns.len() as u32, bridge.columns);
-    assert_eq!(
-        (got.end.columns, got.end.points, got.end.warm_up_columns),
-        (bridge.columns, bridge.points(), 3)
-    );
+    // Where columns run clockwise, those of the warm-up come last in the host's order: they come empty.
+    let clockwise = bridge.azimuth_step < 0.0;
+    let empty = |column: u32| clockwise && column < 3;
+    let seen = |row: u32, column: u32| row >= 2 && !missing(row, column) && !empty(column);
+    let cells = (0..bridge.columns).flat_map(|column| (0..bridge.rows).map(move |row| (row, column)));
+    let points = cells.filter(|(row, column)| seen(*row, *column)).count() as u64;
+    let warm_up = if clockwise { 0 } else { 3 };
+    assert_eq!((got.end.columns, got.end.points, got.end.warm_up_columns), (bridge.columns, points, warm_up));
     for column in 0..bridge.columns {
         for row in 0..bridge.rows {
-            let c = if bridge.azimuth_step < 0.0 { bridge.columns - 1 - column } else { column };
+            let c = if clockwise { bridge.columns - 1 - column } else { column };
             let r = if bridge.elevation_step > 0.0 { bridge.rows - 1 - row } else { row };
             let cell = lattice.cell(c as usize, r as usize);
-            if row < 2 || missing(row, column) {
+            if !seen(row, column) {
                 assert_eq!(lattice.state(cell), State::NoReturn, "({row}, {column})");
                 continue;
             }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
@@ -119,6 +119,8 @@ pub(super) struct Shared {
     pub(super) counts: Counts,
     pub(super) disturb: Mutex<Disturb>,
     pub(super) begun: Instant,
+    /// Scans are numbered from here on: numbers never return, even when a bridge starts again.
+    first_number: u32,
     ending: AtomicBool,
     state: Mutex<State>,
 }
@@ -190,6 +192,7 @@ impl Bridge {
             counts: Counts::default(),
             disturb,
             begun: Instant::now(),
+            first_number: tenths_since_1970(),
             ending: AtomicBool::new(false),
             state: Mutex::default(),
         });
@@ -332,9 +335,10 @@ impl Shared {
         let failed = |error: std::io::Error| Refusal::new("scanner", format!("the bridge's disk: {error}"));
         let mut state = self.state();
         state.scans_begun += 1;
+        let nth = state.scans_begun;
         // Leaves a number free, so that frames of another scan have one that this bridge never used.
-        let number = 2 * state.scans_begun;
-        let file = self.config.record.as_ref().map(|folder| folder.join(format!("scan-{number:05}.psb")));
+        let number = self.first_number.wrapping_add(2 * nth);
+        let file = self.config.record.as_ref().map(|folder| folder.join(format!("scan-{nth:05}.psb")));
         let spool = Spool::new(job, number, file.as_deref(), !self.config.live).map_err(failed)?;
         let scan = Arc::new(Scan::new(spool));
         state.scans.push_back(Arc::clone(&scan));
@@ -343,7 +347,7 @@ impl Shared {
         }
         drop(state);
         let (shared, running) = (Arc::clone(self), Arc::clone(&scan));
-        std::thread::spawn(move || shared.run(&plan, &running));
+        std::thread::spawn(move || shared.run(&plan, &running, nth));
         Ok(scan)
     }
 
@@ -367,21 +371,21 @@ impl Shared {
     }
 
     /// Takes a scan to its end, which takes as long as with a real scanner.
-    fn run(&self, plan: &Plan, scan: &Scan) {
+    fn run(&self, plan: &Plan, scan: &Scan, nth: u32) {
         let spool = &scan.spool;
         count(&self.counts.scans);
         let mut due = Due { shared: self, scan, started: Instant::now(), taken: 0, why: None };
         let taken = match due.spin_up() {
-            ControlFlow::Continue(()) => self.head.scan(plan, spool.number, &mut due),
-            ControlFlow::Break(()) => Ok(0),
+            ControlFlow::Continue(()) => self.head.scan(plan, nth, &mut due),
+            ControlFlow::Break(()) => Ok(()),
         };
         let settled = due.wait_until(plan.duration_s);
         let why = due.why.take();
         if spool.has_begun() {
             let ended = match (taken, why, settled) {
-                (Err(why), _, _) | (Ok(_), Some(why), _) => spool.end(Outcome::Failed, Some(why), 0),
-                (Ok(_), None, ControlFlow::Break(())) => spool.end(Outcome::Aborted, None, 0),
-                (Ok(warm_up), None, ControlFlow::Continue(())) => spool.end(Outcome::Complete, None, warm_up),
+                (Err(why), _, _) | (Ok(()), Some(why), _) => spool.end(Outcome::Failed, Some(why)),
+                (Ok(()), None, ControlFlow::Break(())) => spool.end(Outcome::Aborted, None),
+                (Ok(()), None, ControlFlow::Continue(())) => spool.end(Outcome::Complete, None),
             };
             if let Err(error) = ended {
                 spool.refuse(format!("the bridge's disk: {error}"));
@@ -390,6 +394,11 @@ impl Shared {
             spool.refuse(taken.err().or(why).unwrap_or_else(|| "aborted".to_owned()));
         }
     }
+}
+
+fn tenths_since_1970() -> u32 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| (since.as_millis() / 100) as u32)
 }
 
 fn busy(holder: &str, left: Duration) -> Refusal {

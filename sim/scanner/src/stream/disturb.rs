@@ -135,7 +135,7 @@ impl Disturb {
         }
         if self.lasting(FaultKind::LateFrames).is_some() && sent.is_multiple_of(5) {
             let scan = frame.scan - 1;
-            let end = r#"{"outcome":"aborted","columns":0,"points":0,"warm_up_columns":0,"digest":0}"#;
+            let end = r#"{"outcome":"aborted","columns":0,"points":0,"digest":0}"#;
             steps.push(Step::Send(Frame { scan, ..torn(frame) }));
             steps.push(Step::Send(Frame { kind: frame::SCAN_END, scan, payload: end.into() }));
         }

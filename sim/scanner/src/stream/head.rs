@@ -15,11 +15,11 @@ pub trait Head: Send + Sync {
     fn plan(&self, wanted: &Wanted) -> Result<Plan, String>;
 
     /// Takes a planned scan, the `number`-th of the bridge: first `out.begin`, then columns in the order of their
-    /// time. Gives the number of warm-up columns.
+    /// time.
     ///
     /// # Errors
     /// Why there is no scan, or why it stopped.
-    fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<u32, String>;
+    fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<(), String>;
 }
 
 /// What will be done.
@@ -75,7 +75,7 @@ impl Head for Recording {
         Ok(Plan { wanted: *wanted, duration_s: self.duration_s, computing_s: 0.0, altered })
     }
 
-    fn scan(&self, plan: &Plan, _: u32, out: &mut dyn Receiver) -> Result<u32, String> {
+    fn scan(&self, plan: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let receiver = std::cell::RefCell::new(out);
         let begun = |mut begin: Begin| {
             begin.altered.extend_from_slice(&plan.altered);

@@ -67,6 +67,8 @@ pub struct Begin {
     pub intensity: [u16; 2],
     /// First column of the back face.
     pub seam_column: Option<u32>,
+    /// So many columns of each face, from its first on, are not to be used.
+    pub warm_up_columns: u32,
     /// `azimuth` or `time`.
     pub order: String,
     /// Maker, model, serial number.
@@ -96,7 +98,6 @@ pub(super) struct ScanEnd {
     pub(super) reason: Option<String>,
     pub(super) columns: u32,
     pub(super) points: u64,
-    pub(super) warm_up_columns: u32,
     pub(super) digest: u32,
 }
 

@@ -43,7 +43,7 @@ pub struct Shop {
     pub margin: Option<f64>,
     /// What records hold.
     pub values: Values,
-    /// Columns clockwise and row 0 at the bottom, as some scanners count.
+    /// Columns clockwise and row 0 at the bottom, as some scanners count. Such a one is warm from the start.
     pub mirrored: bool,
     /// Threads.
     pub threads: usize,
@@ -103,6 +103,7 @@ impl Shop {
         Instrument {
             range_sigma: self.noise.unwrap_or_else(|| device.range_sigma()),
             faces: faces.filter(|_| half < lattice.n_columns),
+            warm_up_columns: if self.mirrored { 0 } else { self.instrument.warm_up_columns },
             seed: self.instrument.seed.wrapping_add(u64::from(number).wrapping_mul(SEED_STRIDE)),
             ..self.instrument
         }
@@ -138,7 +139,7 @@ impl Head for Shop {
         Ok(Plan { wanted: *wanted, duration_s, computing_s, altered: Vec::new() })
     }
 
-    fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<u32, String> {
+    fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let device = device(&plan.wanted)?;
         let plate = (self.plate)()?.map(|state| Plate::new(&state)).transpose().map_err(|e| e.to_string())?;
         let lattice = self.lattice(&device, plan.wanted.window.as_ref(), plate.as_ref());
@@ -152,7 +153,7 @@ impl Head for Shop {
         let shot = Shot { shop: self, device, scene, lattice, instrument, begin };
         // Who broke off knows why.
         let _ = shot.take(out);
-        Ok(instrument.warm_up_columns)
+        Ok(())
     }
 }
 
@@ -169,6 +170,7 @@ fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> Begin
         range_unit_m: 1e-6,
         intensity: [0, INTENSITY_MAX],
         seam_column: instrument.faces.map(|faces| faces.seam_column),
+        warm_up_columns: instrument.warm_up_columns,
         order: order.to_owned(),
         instrument: "platen simulated scanner".to_owned(),
         acquired_unix_s: None,

@@ -91,17 +91,12 @@ impl Spool {
     }
 
     /// The scan has ended.
-    pub(super) fn end(
-        &self,
-        outcome: Outcome,
-        reason: Option<String>,
-        warm_up_columns: u32,
-    ) -> std::io::Result<()> {
+    pub(super) fn end(&self, outcome: Outcome, reason: Option<String>) -> std::io::Result<()> {
         let mut inner = self.inner();
         let sound = inner.places.iter().flatten();
         let digest = sound.clone().fold(0, |sum, place| crc32c::crc32c_append(sum, &place.crc.to_le_bytes()));
         let (columns, points) = (sound.clone().count() as u32, sound.map(|place| place.points).sum());
-        let end = ScanEnd { outcome, reason, columns, points, warm_up_columns, digest };
+        let end = ScanEnd { outcome, reason, columns, points, digest };
         inner.append(&self.file, frame::SCAN_END, self.number, serde_json::to_vec(&end)?)?;
         inner.end = Some(end);
         inner.tell();
@@ -185,7 +180,7 @@ impl Inner {
     }
 }
 
-/// Reads a recording: what was announced, then every column to `column`, then how many warm-up columns it has.
+/// Reads a recording: what was announced, then every column to `column`.
 ///
 /// # Errors
 /// The file is not there or holds no whole scan.
@@ -193,7 +188,7 @@ pub(super) fn read_recording(
     path: &Path,
     mut begun: impl FnMut(Begin) -> bool,
     mut column: impl FnMut(Vec<u8>) -> bool,
-) -> std::io::Result<u32> {
+) -> std::io::Result<()> {
     let broken = |what: String| std::io::Error::other(format!("{}: {what}", path.display()));
     let mut file = BufReader::new(File::open(path).map_err(|error| broken(error.to_string()))?);
     file.rewind()?;
@@ -203,12 +198,12 @@ pub(super) fn read_recording(
         let going_on = match frame.kind {
             frame::SCAN_BEGIN => begun(serde_json::from_slice::<ScanBegin>(&frame.payload)?.begin),
             frame::COLUMN => column(frame.payload),
-            frame::SCAN_END => return Ok(serde_json::from_slice::<ScanEnd>(&frame.payload)?.warm_up_columns),
+            frame::SCAN_END => return Ok(()),
             _ => true,
         };
         if !going_on {
-            return Ok(0);
+            return Ok(());
         }
     }
-    Ok(0)
+    Ok(())
 }
