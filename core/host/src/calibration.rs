@@ -166,7 +166,6 @@ pub fn in_force(wanted: &CalibrationUse, now: Timestamp, in_reach: Duration) -> 
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 mod tests {
     use super::*;
 

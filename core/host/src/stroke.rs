@@ -244,7 +244,6 @@ pub fn verdict(reports: &[Result<Report, PluginError>]) -> Verdict {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 mod tests {
     use platen_shape::surface::{Axis, Fit, Mask};
 
