@@ -160,7 +160,7 @@ impl View<'_> {
             let received = weight * echo.strength / (hit.range * hit.range);
             power += received;
             range += received * hit.range;
-            strength += weight * echo.strength;
+            strength += weight / SPOT_WEIGHT * echo.strength;
             if hit.range < nearest {
                 (nearest, nearest_hit) = (hit.range, Some(hit));
             }
@@ -243,6 +243,16 @@ const SPOT: [(f64, f64, f64); 19] = {
         (0.5, -H, OUTER),
         (H, -0.5, OUTER),
     ]
+};
+
+/// Sum of their weights.
+const SPOT_WEIGHT: f64 = {
+    let (mut sum, mut k) = (0.0, 0);
+    while k < SPOT.len() {
+        sum += SPOT[k].2;
+        k += 1;
+    }
+    sum
 };
 
 /// True when one of the eight neighbours lies on another object or across a fold.
