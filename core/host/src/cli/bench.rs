@@ -45,8 +45,8 @@ enum Part {
 #[command(after_help = "Examples:\n  platen bench\n  platen bench --flattening harmonic --repeat 11\n  \
                         platen bench --json | jq .tables.table_2\n  platen bench accuracy --seeds 50 --noise-mm 0.5,2 --threads 2\n  \
                         platen bench scale --cells dome\n\n\
-                        Scans come from the `simulated` driver library, with noise and the truth written beside them into --out. A measurement \
-                        runs on one thread: times are processor time of one measurement, whatever --threads says.")]
+                        Scans come from the `simulated` driver library; what a measurement should find is written beside them into --out. \
+                        A measurement runs on one thread by design: times are processor time of one measurement, whatever --threads says.")]
 pub(super) struct Command {
     /// What to find out
     #[arg(value_enum, default_value = "tables")]

@@ -14,6 +14,7 @@ use crate::accuracy::Accuracy;
 use crate::cli::{CliError, output};
 use crate::plugin::{Catalogue, Flattening};
 use crate::progress;
+use crate::stroke::NotMeasured;
 
 /// Angle between cells: 6 mm at 7 m.
 pub(super) const STEP_DEG: f64 = 0.05;
@@ -88,11 +89,12 @@ pub(super) fn accuracy(
         progress::phase(&format!("{} at {noise_mm} mm, seed {seed}", scene.name));
         let setting = setting(*noise_mm, *seed);
         let shot = scene.scan(catalogue, folder, setting)?;
+        let failed =
+            |e: NotMeasured| CliError::Failed(format!("{} at {noise_mm} mm, seed {seed}: {e}", scene.name));
+        let seen = stages::see(&shot).map_err(failed)?;
         let of = |flattening: &mut Flattening| {
-            let run = stages::run(&shot, flattening).map_err(|e| {
-                CliError::Failed(format!("{} at {noise_mm} mm, seed {seed}: {e}", scene.name))
-            })?;
-            Ok(Accuracy::of(&run.measurement, &shot.truth))
+            let measurement = stages::shape(&shot, &seen, flattening).map_err(failed)?;
+            Ok(Accuracy::of(&measurement, &shot.truth))
         };
         flattenings.iter_mut().map(of).collect::<Result<Vec<_>, CliError>>()
     })?;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use platen_shape::Patch;
-use platen_shape::measure::{Measurement, measure};
+use platen_shape::measure::{Measurement, Timings, measure};
 use platen_shape::outline::{Outline, outline};
 
 use super::machine::cpu_time;
@@ -33,30 +33,47 @@ impl Stages {
     }
 }
 
-/// What came out, and after how long.
-pub(super) struct Run {
+/// The plate as seen, and the time until then.
+pub(super) struct Seen {
     pub(super) patch: Patch,
     pub(super) outline: Outline,
+    times: [Duration; 2],
+}
+
+/// What came out, and after how long.
+pub(super) struct Run {
+    pub(super) seen: Seen,
     pub(super) measurement: Measurement,
     pub(super) stages: Stages,
 }
 
-/// Measures a scan.
-pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMeasured> {
+/// Finds the plate in a scan.
+pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
     let start = cpu_time();
     let patch = shot.extract()?;
     let extracted = cpu_time();
     let outline = outline(&patch, &shot.spec)?;
-    let outlined = cpu_time();
-    let measurement = measure(&patch, &outline, &shot.spec, flattening, &mut cpu_time)?;
-    let stages = Stages {
-        extract: extracted.saturating_sub(start),
-        outline: outlined.saturating_sub(extracted),
-        mesh: measurement.timings.mesh,
-        flatten: measurement.timings.flatten,
-        surface: measurement.timings.surface,
-    };
-    Ok(Run { patch, outline, measurement, stages })
+    let times = [extracted.saturating_sub(start), cpu_time().saturating_sub(extracted)];
+    Ok(Seen { patch, outline, times })
+}
+
+/// Measures a plate that was found.
+pub(super) fn shape(
+    shot: &Shot,
+    seen: &Seen,
+    flattening: &mut Flattening,
+) -> Result<Measurement, NotMeasured> {
+    Ok(measure(&seen.patch, &seen.outline, &shot.spec, flattening, &mut cpu_time)?)
+}
+
+/// Finds and measures.
+pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMeasured> {
+    let seen = see(shot)?;
+    let measurement = shape(shot, &seen, flattening)?;
+    let [extract, outline] = seen.times;
+    let Timings { mesh, flatten, surface } = measurement.timings;
+    let stages = Stages { extract, outline, mesh, flatten, surface };
+    Ok(Run { seen, measurement, stages })
 }
 
 /// The middle of several times; of an even number, the smaller of the two in the middle.

@@ -28,9 +28,9 @@ const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
 /// Middles of the bands, millimetres from the plate's middle, before and after the stroke.
 const BEFORE: &[f64] = &[-800.0, 0.0];
 pub(super) const AFTER: &[f64] = &[-800.0, 0.0, 700.0];
-/// Width of a band and angle by which it bends.
+/// Width of a band and angle by which it bends: 0.16 1/m at its middle, as press strokes leave.
 const BAND_MM: f64 = 300.0;
-const BAND_DEG: f64 = 2.5;
+const BAND_DEG: f64 = 1.4;
 
 /// Radius of the plate under the template and that of the template, mid-surface, metres; length of the board.
 const ROLLED: f64 = 9.0;

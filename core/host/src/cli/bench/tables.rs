@@ -52,7 +52,7 @@ pub(super) fn scene() -> Scene {
         name: "rolled".into(),
         size_mm: [4000.0, 2755.0, 36.0],
         shape: "shape = \"cylinder\"\nradius_mm = 12000.0\naxis_deg = 110.0".into(),
-        centre_mm: [6860.0, 0.0, -3600.0],
+        centre_mm: [6770.0, 0.0, -3600.0],
         yaw_deg: 30.0,
     }
 }
@@ -127,11 +127,11 @@ fn meshes(
     command: &Command,
 ) -> Result<Vec<MeshRow>, CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(e.to_string());
-    let face = Face::fit(&one.patch, &one.outline, &shot.spec).map_err(|e| failed(&e))?;
+    let face = Face::fit(&one.seen.patch, &one.seen.outline, &shot.spec).map_err(|e| failed(&e))?;
     let mut rows = Vec::new();
     for n in &command.meshes {
         progress::phase(&format!("flattening {n} vertices"));
-        let (mesh, _) = face.mesh(&one.outline, &shot.spec, *n).map_err(|e| failed(&e))?;
+        let (mesh, _) = face.mesh(&one.seen.outline, &shot.spec, *n).map_err(|e| failed(&e))?;
         let repeat = if *n > LARGE_MESH { command.repeat.min(3) } else { command.repeat };
         let times = flattenings.iter_mut().map(|flattening| time(flattening, &mesh, repeat)).collect();
         rows.push((mesh.vertices.len(), times));
@@ -182,7 +182,7 @@ fn print(
     let sized = |name: &str, here: String, paper: String| vec![name.to_owned(), here, paper];
     output::table(&[
         sized("", "here".into(), "paper".into()),
-        sized("points on the plate", one.patch.samples.len().to_string(), PAPER_POINTS.to_string()),
+        sized("points on the plate", one.seen.patch.samples.len().to_string(), PAPER_POINTS.to_string()),
         sized(
             "vertices of the mesh",
             one.measurement.mesh.vertices.len().to_string(),
@@ -264,7 +264,7 @@ fn document(shot: &Shot, one: &Run, found: &[Found], meshes: &[MeshRow]) -> Json
         "cells": shot.n_cells(),
         "table_1": {
             "here": {
-                "plate_points": one.patch.samples.len(),
+                "plate_points": one.seen.patch.samples.len(),
                 "vertices": one.measurement.mesh.vertices.len(),
                 "pitch_mm": mm(one.measurement.quality.lattice_step),
             },
