@@ -58,6 +58,7 @@ fn write(folder: &Path, name: &str, n_points: usize, spans: usize, noise: f64) -
     let places = || (0..PLACES * PLACES).map(|k| [share(k % PLACES) * SIZE[0], share(k / PLACES) * SIZE[1]]);
     let content = serde_json::json!({
         "size_m": SIZE,
+        "radius_m": RADIUS,
         "spans": spans,
         "noise_m": noise,
         "uv_m": uv,
