@@ -1,12 +1,14 @@
-//! Every fault of the line, one by one and mixed, on TCP and on RTU through TCP. Serial lines are tried in `core/press`.
+//! Every fault of the line, one by one and mixed, on TCP, on RTU through TCP and on a serial line.
 //!
 //! After each run the press has all its results, each under its own stroke, each scanned once.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod rig;
 
 use std::time::Duration;
 
-use platen_plant::press::{Link, Press};
+use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::{Code, LinkState};
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
@@ -14,6 +16,9 @@ use platen_sim_press::{Command, Config, SimPress, Tally};
 use rig::{Host, LIMIT, Memory, assert_clean, done, quick, tcp};
 
 const SCAN: Duration = Duration::from_millis(5);
+
+/// On a serial line late answers reach whoever has it open next: the host must be quiet for longer than that.
+const LATE_MS: [u64; 2] = [120, 300];
 
 type Set = fn(&mut LineFaults);
 
@@ -81,6 +86,76 @@ async fn late_answers_and_resets_on_many_strokes() {
     host.stop().await;
 }
 
+/// A press on a pseudo terminal, and what the product is told of it.
+async fn serial(config: Config) -> (SimPress, Press, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let device = folder.path().join("adapter");
+    let config = Config { link: LinkConfig::Pty { device: device.clone() }, ..config };
+    let press = SimPress::start(config).await.unwrap();
+    let mut plant = Press::pph1("Press 3", 3, Link::rtu(Serial::new(device, 115_200), 1));
+    if let Transport::Rtu(_, quiet) = &mut plant.link.transport {
+        *quiet = Quiet(Duration::from_millis(LATE_MS[1] + 100));
+    }
+    (press, plant, folder)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_fault_on_a_serial_line() {
+    for (name, set) in FAULTS.into_iter().filter(|(name, _)| *name != "wrong transaction") {
+        let mut line_faults = LineFaults { late_ms: LATE_MS, ..LineFaults::default() };
+        set(&mut line_faults);
+        let (press, plant, _folder) = serial(Config { strokes: 4, line_faults, ..quick() }).await;
+        let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+        let tally = done(&press, &host).await;
+        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &tally, 4);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn fifty_strokes_on_a_serial_line_with_late_answers_and_pulled_adapters() {
+    let line_faults = LineFaults { late: 0.01, late_ms: LATE_MS, reset: 0.005, ..LineFaults::default() };
+    let (press, mut plant, _folder) = serial(Config { strokes: 50, line_faults, ..quick() }).await;
+    plant.link.poll = Duration::from_millis(10);
+    let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+    let tally = done(&press, &host).await;
+    assert_all("serial line", &tally, 50);
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_adapter_that_hears_itself() {
+    let line_faults = LineFaults { echo: true, ..LineFaults::default() };
+    let (press, mut plant, _folder) = serial(Config { strokes: 5, line_faults, ..quick() }).await;
+    if let Transport::Rtu(serial, _) = &mut plant.link.transport {
+        serial.echo = true;
+    }
+    let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+    let tally = done(&press, &host).await;
+    assert_clean(&tally);
+    assert_eq!((tally.taken.len(), tally.plates_served), (5, 5));
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_adapter_that_is_pulled_is_found_under_its_name() {
+    let (press, plant, _folder) = serial(Config { automatic: false, ..quick() }).await;
+    let mut host = Host::start(plant, Memory::new(7), press.control(), SCAN);
+    for n in 1..=3 {
+        host.until("ready", |status| status.host.ready).await;
+        press.command(Command::Stroke).unwrap();
+        press.until("the scan", LIMIT, |tally| tally.plates_served == n).await.unwrap();
+        press.command(Command::PullMs(500)).unwrap();
+        press.until("the result", LIMIT, |tally| tally.taken.len() as u64 == n).await.unwrap();
+    }
+    let tally = press.tally();
+    assert_all("pulled", &tally, 3);
+    assert!(tally.connections > 3, "{} connections", tally.connections);
+    assert!(host.heard.alarmed(Code::LinkBroken));
+    host.stop().await;
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_lasting_exception_is_a_fault_until_reset() {
     for (exception_code, code) in [
@@ -103,6 +178,18 @@ async fn a_lasting_exception_is_a_fault_until_reset() {
         press.command(Command::Automatic(true)).unwrap();
         let tally = done(&press, &host).await;
         assert_all(&code.to_string(), &tally, 4);
+        host.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn exceptions_that_pass_cost_no_stroke() {
+    for exception_code in [4, 5, 6, 7, 8, 9, 10, 11] {
+        let line_faults = LineFaults { exception: 0.05, exception_code, ..LineFaults::default() };
+        let (_press, host, tally) = rig::run(Config { strokes: 6, line_faults, ..quick() }, SCAN).await;
+        assert!(!tally.line_faults.is_empty(), "{exception_code}: the seed hits nothing");
+        assert_all(&format!("exception {exception_code:02X}"), &tally, 6);
+        assert_eq!(tally.connections, 1, "{exception_code:02X}: an exception keeps the connection");
         host.stop().await;
     }
 }

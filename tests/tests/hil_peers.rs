@@ -11,7 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
-use rig::{Host, Memory, tcp};
+use platen_plant::press::{Link, Parity, Press, Serial};
+use platen_sim_press::config::LinkConfig;
+use platen_sim_press::{Command as Order, Config, SimPress};
+use rig::{Host, Memory, assert_clean, done, quick, tcp};
 use serde_json::Value;
 
 const STROKES: usize = 20;
@@ -44,7 +47,8 @@ impl Peer {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let first: Value = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
-        let port = first["port"].as_u64().unwrap().try_into().unwrap();
+        // A press on a serial line has none.
+        let port = first["port"].as_u64().unwrap_or(0).try_into().unwrap();
         Self { child, lines, port }
     }
 
@@ -57,12 +61,53 @@ impl Peer {
     }
 }
 
+/// A line or a gateway of socat's, gone when dropped.
+struct Socat(Child);
+
+impl Socat {
+    /// Two pseudo terminals with their lines joined, linked as `a` and `b` in `folder`.
+    fn line(folder: &Path) -> Self {
+        let end = |name: &str| format!("pty,raw,echo=0,link={}", folder.join(name).display());
+        Self::start(&[end("a"), end("b")], "starting data transfer").0
+    }
+
+    /// A port that passes what comes to a serial device; one connection at a time opens it.
+    fn gateway(device: &Path) -> (Self, u16) {
+        let device = format!("{},raw,echo=0", device.display());
+        let listen = "TCP-LISTEN:0,bind=127.0.0.1,reuseaddr,fork,nodelay".to_owned();
+        let (socat, line) = Self::start(&[listen, device], "listening on");
+        (socat, line.rsplit(':').next().unwrap().trim().parse().unwrap())
+    }
+
+    /// Waits for a line of its log.
+    fn start(ends: &[String; 2], wanted: &str) -> (Self, String) {
+        let mut child =
+            Command::new("socat").args(["-d", "-d"]).args(ends).stderr(Stdio::piped()).spawn().unwrap();
+        let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
+        let line = log.find_map(|line| line.ok().filter(|line| line.contains(wanted))).unwrap();
+        // Its log must not fill the pipe.
+        std::thread::spawn(move || log.for_each(drop));
+        (Self(child), line)
+    }
+}
+
+impl Drop for Socat {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// Serves `peer` until it has all its strokes; the scanner looks at a plate that is never bent.
 async fn serve(peer: Peer) -> Value {
+    let address = ([127, 0, 0, 1], peer.port).into();
+    serve_on(peer, tcp(address)).await
+}
+
+async fn serve_on(peer: Peer, plant: Press) -> Value {
     let cell = platen_sim_press::Config { automatic: false, ..rig::quick() };
     let cell = platen_sim_press::SimPress::start(cell).await.unwrap();
-    let address = ([127, 0, 0, 1], peer.port).into();
-    let host = Host::start(tcp(address), Memory::new(7), cell.control(), Duration::from_millis(10));
+    let host = Host::start(plant, Memory::new(7), cell.control(), Duration::from_millis(10));
     let Ok(summary) = tokio::task::spawn_blocking(|| peer.summary()).await else {
         panic!("{:?}, alarms {:?}", host.status.borrow(), host.heard.alarms.lock().unwrap());
     };
@@ -117,5 +162,61 @@ async fn mbpoll_reads_the_words_of_the_result() {
     // Heartbeat, status and host state go on after the result was taken; the warning and its check sum may.
     let stable = |words: &[u16]| [&words[3..7], &words[8..52], &words[53..54], &words[55..64]].concat();
     assert_eq!(stable(&words), stable(last));
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_press_on_pymodbus_on_a_serial_line() {
+    let socat = installed("socat", &["-V"]);
+    if !socat || !installed("python3", &["-c", "import pymodbus.simulator, serial"]) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let _line = Socat::line(folder.path());
+    let mut command = Command::new("python3");
+    command.arg(peers().join("pymodbus_press.py")).args(["--strokes", &STROKES.to_string()]);
+    command.arg("--serial").arg(folder.path().join("a")).args(["--baud", "115200", "--parity", "N"]);
+    let serial = Serial { parity: Parity::None, ..Serial::new(folder.path().join("b"), 115_200) };
+    let plant = Press::pph1("Press 3", 3, Link::rtu(serial, 1));
+    serve_on(Peer::start(&mut command), plant).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_serial_line_that_is_pulled_and_put_back() {
+    if !installed("socat", &["-V"]) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let line = Socat::line(folder.path());
+    let link = LinkConfig::Rtu { device: folder.path().join("a"), baud: 115_200 };
+    let press = SimPress::start(Config { strokes: 10, link, automatic: false, ..quick() }).await.unwrap();
+    let plant = Press::pph1("Press 3", 3, Link::rtu(Serial::new(folder.path().join("b"), 115_200), 1));
+    let mut host = Host::start(plant, Memory::new(7), press.control(), Duration::from_millis(10));
+    host.until("ready", |status| status.host.ready).await;
+    drop(line);
+    host.until("loss", |status| status.state.link == platen_press::LinkState::Offline).await;
+    let _line = Socat::line(folder.path());
+    press.command(Order::Automatic(true)).unwrap();
+    let tally = done(&press, &host).await;
+    assert_clean(&tally);
+    assert_eq!((tally.taken.len(), tally.plates_served), (10, 10));
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_serial_line_behind_a_gateway() {
+    if !installed("socat", &["-V"]) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let device = folder.path().join("adapter");
+    let link = LinkConfig::Pty { device: device.clone() };
+    let press = SimPress::start(Config { strokes: 20, link, ..quick() }).await.unwrap();
+    let (_gateway, port) = Socat::gateway(&device);
+    let plant = Press::pph1("Press 3", 3, Link::rtu_over_tcp("127.0.0.1", port, 1));
+    let host = Host::start(plant, Memory::new(7), press.control(), Duration::from_millis(10));
+    let tally = done(&press, &host).await;
+    assert_clean(&tally);
+    assert_eq!((tally.taken.len(), tally.plates_served), (20, 20));
     host.stop().await;
 }

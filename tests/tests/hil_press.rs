@@ -112,6 +112,17 @@ async fn bad_habits_of_a_press_lose_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_number_left_out_before_the_first_stroke_is_missed() {
+    let stroke_faults = StrokeFaults { skip: 1.0, ..StrokeFaults::default() };
+    let (_press, host, tally) = run(Config { strokes: 3, stroke_faults, ..quick() }, ms(5)).await;
+    assert_clean(&tally);
+    assert_eq!((tally.taken[0].stroke_id, tally.taken.len()), (2, 3));
+    assert_eq!((tally.missed_reported, tally.skipped), (3, 3));
+    assert_eq!(tally.taken[0].words[9], 1, "missed_count with the first result");
+    host.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_counter_wraps() {
     let (_press, host, tally) = run(Config { strokes: 10, stroke_id: 65_530, ..quick() }, ms(5)).await;
     assert_clean(&tally);
@@ -160,8 +171,10 @@ async fn nothing_is_written_to_the_wrong_press() {
 async fn nothing_is_written_at_the_wrong_offset() {
     let config = Config { p_base: 1, h_base: 101, wait_ready: false, ..quick() };
     let press = SimPress::start(config).await.unwrap();
-    let host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), ms(5));
-    press.until("many reads", LIMIT, |tally| tally.reads > 100).await.unwrap();
+    let mut host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), ms(5));
+    host.until("refusal", |status| status.link_error == Some(Code::MapVersion)).await;
+    press.until("many reads", LIMIT, |tally| tally.reads > 20).await.unwrap();
+    assert!(!host.heard.alarmed(Code::TornBlock), "a shifted map is no torn block");
     assert_eq!(press.tally().writes, 0);
     host.stop().await;
     assert_eq!(press.tally().writes, 0, "at the stop");

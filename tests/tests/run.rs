@@ -5,6 +5,9 @@ mod cell;
 
 use cell::{Host, Press, assert_clean, plant, until};
 
+/// More than the journal of one stroke writes, less than its result files.
+const RESULT_BLOCKS: u32 = 400;
+
 #[test]
 fn strokes_are_measured_recorded_and_answered() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,4 +170,44 @@ fn a_missing_calibration_takes_ready_off_until_it_is_there() {
     let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();
     assert_eq!(result["calibration"]["sigma_true_mm"], 0.1);
     assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
+
+/// Words of the newest result that the press took.
+fn newest_words(stats: &serde_json::Value) -> Vec<u64> {
+    let words = stats["taken"].as_array().unwrap().last().unwrap()["words"].as_array().unwrap();
+    words.iter().map(|word| word.as_u64().unwrap()).collect()
+}
+
+/// The largest file that this host may write, in blocks of 512 bytes, stands in for a full disk.
+fn starved_run(blocks: u32, wanted: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 2\nautomatic = false");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    // The history must exist: a host that cannot open it does not start at all.
+    let mut first = Host::start(&plant);
+    until("ready", || (press.host_status() & 1 == 1).then_some(()));
+    assert_eq!(first.stop(), Some(0), "{}", first.log());
+
+    let mut host = Host::starved(&plant, blocks);
+    until("ready", || (press.host_status() & 1 == 1).then_some(()));
+    assert_eq!(press.ask(r#"{"do":"stroke"}"#)["ok"], true);
+    let stats = press.wait_taken(1);
+    assert_clean(&stats, &host.log());
+    let words = newest_words(&stats);
+    assert_eq!(words[7], 402, "warning_code: {words:?}\n{}", host.log());
+    assert_ne!(words[55], 0xFFFF, "measured and delivered all the same\n{}", host.log());
+    let says = |text: &serde_json::Value| text.as_str().is_some_and(|text| text.starts_with("402 "));
+    until("the warning in the status", || host.status().filter(|it| says(&it["status"]["warning"])));
+    assert!(host.log().contains(wanted), "{}", host.log());
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
+
+#[test]
+fn a_full_journal_costs_the_record_and_not_the_result() {
+    starved_run(64, "the journal cannot be written");
+}
+
+#[test]
+fn a_lost_result_file_is_told_to_the_press() {
+    starved_run(RESULT_BLOCKS, "the record is lost");
 }

@@ -2,6 +2,7 @@
 
 mod bench;
 mod calibrate;
+mod cell;
 mod check;
 mod convert;
 mod demo;

@@ -10,6 +10,7 @@ mod bench;
 mod earlier;
 mod figures;
 mod journal;
+mod prometheus;
 mod region;
 mod status;
 mod surface_file;
@@ -25,7 +26,7 @@ use platen_press::{Language, Order, PressLink, RunError, StrokeKey, channels, ru
 use tokio::sync::watch;
 
 pub use bench::StrokeReport;
-pub use status::StatusRecord;
+pub use status::{LinkRecord, StatusRecord, reset_request};
 
 use crate::plugin::{CancelToken, Catalogue};
 use crate::rig::{Rig, RigError};
@@ -89,6 +90,7 @@ pub async fn run(
         press.clone(),
         host.status.clone(),
         Arc::clone(&alarm),
+        host.answers.clone(),
     ));
     let mut press_side = tokio::spawn(run_press(press, link, journal::Adapter(Arc::clone(&history)), side));
     let mut scanning: Option<(StrokeKey, CancelToken)> = None;

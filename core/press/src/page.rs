@@ -142,7 +142,11 @@ pub fn map_markdown(press: &Press) -> String {
     let by = if press.role == Role::Server { "function 16" } else { functions(read.table) };
     section(
         &mut page,
-        &format!("Press to host: {to_host} {} registers with {by}", read.count),
+        &format!(
+            "Press to host: {to_host} {} register{} with {by}",
+            read.count,
+            if read.count == 1 { "" } else { "s" }
+        ),
         read,
         &inputs(press),
     );

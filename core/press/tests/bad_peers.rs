@@ -119,6 +119,24 @@ async fn an_exception_keeps_the_connection() {
     assert!(client.connected());
 }
 
+/// The example of the Modbus Application Protocol V1.1b3, 6.21: function 43, type 14, basic, three objects.
+#[tokio::test]
+async fn a_controller_says_who_it_is() {
+    let who = |_, request: &[u8]| {
+        assert_eq!(request[7..], [0x2B, 0x0E, 1, 0]);
+        let objects: [&[u8]; 3] = [b"ACME", b"PC-7", b"V2.1"];
+        let mut pdu = vec![request[6], 0x2B, 0x0E, 1, 1, 0, 0, 3];
+        for (id, text) in (0..).zip(objects) {
+            pdu.extend([id, text.len() as u8]);
+            pdu.extend(text);
+        }
+        [&request[..4], &(pdu.len() as u16).to_be_bytes(), &pdu].concat()
+    };
+    let mut client = peer(who).await;
+    client.connect().await.unwrap();
+    assert_eq!(client.identify().await.unwrap(), ["ACME", "PC-7", "V2.1"]);
+}
+
 #[tokio::test]
 async fn a_write_outside_the_allow_list_is_never_sent() {
     let mut client = peer(|_, _| panic!("nothing may be sent")).await;

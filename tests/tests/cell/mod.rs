@@ -91,7 +91,8 @@ impl Drop for Press {
     }
 }
 
-const PLATE: &str = "\n[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\n\
+/// A host that was killed may take long to come back on a busy machine: the press waits for it.
+const PLATE: &str = "\n[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\nhost_ms = 60000\n\
     [plate]\ntarget = { shape = \"cylinder\", radius_mm = 9018.0, axis_deg = 90.0 }\n\
     [plate.blank]\nwidth_mm = 3000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n";
 
@@ -120,16 +121,23 @@ pub(crate) struct Host {
 
 impl Host {
     pub(crate) fn start(plant: &Path) -> Self {
+        Self::run(platen_tests::program("platen"), plant)
+    }
+
+    /// A host that cannot write any file beyond so many blocks of 512 bytes.
+    pub(crate) fn starved(plant: &Path, blocks: u32) -> Self {
+        let platen = platen_tests::program("platen");
+        let mut shell = Command::new("sh");
+        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+        shell.arg("-c").arg(script).arg(platen.get_program()).env_remove("PLATEN_LOG");
+        Self::run(shell, plant)
+    }
+
+    fn run(mut program: Command, plant: &Path) -> Self {
         let log =
             std::fs::File::options().create(true).append(true).open(plant.with_extension("log")).unwrap();
-        let child = platen_tests::program("platen")
-            .arg("run")
-            .arg(plant)
-            .arg("--json")
-            .stdout(Stdio::null())
-            .stderr(log)
-            .spawn()
-            .unwrap();
+        let child =
+            program.arg("run").arg(plant).arg("--json").stdout(Stdio::null()).stderr(log).spawn().unwrap();
         Self { child, plant: plant.to_path_buf() }
     }
 
@@ -168,7 +176,7 @@ impl Host {
     /// `platen history list --json`.
     pub(crate) fn history(plant: &Path) -> Vec<Json> {
         let output = platen_tests::program("platen")
-            .args(["history", "list", "--newest", "1000", "--json"])
+            .args(["history", "list", "--newest", "100000", "--json"])
             .arg(plant)
             .output()
             .unwrap();

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use platen_plant::press::{Link, Measure, Press};
 use platen_press::{
-    Answer, Code, Figures, Journal, Measurement, ModbusLink, Order, Recalled, Record, Status, StrokeKey,
+    Answer, Code, Figures, Journal, Measurement, Order, PressLink, Recalled, Record, Status, StrokeKey,
     Verdict, channels, run_press,
 };
 use platen_sim_plate::Plan;
@@ -121,7 +121,7 @@ impl Host {
     /// Starts on `press` with a scan of `scan`; the plate is asked for at `cell`.
     pub(crate) fn start(press: Press, journal: Memory, cell: SocketAddr, scan: Duration) -> Self {
         let (host, side) = channels();
-        let link = ModbusLink::new(&press.link);
+        let link = PressLink::new(&press);
         let run = tokio::spawn(async move { run_press(press, link, journal, side).await.unwrap() });
         let heard = Heard::default();
         let answers = host.answers;

@@ -1,6 +1,5 @@
 //! `platen demo`: a simulated press bends a plate, the host measures it, all over real sockets and libraries.
 
-mod cell;
 mod files;
 
 use std::path::PathBuf;
@@ -11,11 +10,11 @@ use clap::Args;
 use platen_plant::PlantFile;
 use tokio::sync::{mpsc, watch};
 
+use super::cell::{Cell, Taken};
 use super::run::{runtime, stop_signal, verdict_words};
 use super::{CliError, Common, output};
 use crate::progress;
 use crate::run::{self, StrokeReport, Watcher};
-use cell::{Cell, Taken};
 
 /// A demo that takes longer than this is stuck.
 const LIMIT: Duration = Duration::from_secs(300);
@@ -33,14 +32,17 @@ pub(super) struct Command {
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let start = Instant::now();
     files::prepare(&command.out)?;
-    let mut cell = Cell::start(&files::press_file(&command.out)?)?;
-    let plant_file = files::plant_file(&command.out, &cell)?;
+    let mut cell = Cell::start(&files::press_file(&command.out)?, &["--modbus-port", "0"])?;
+    let Some(modbus) = cell.modbus else {
+        return Err(CliError::Failed("the demo's press serves no Modbus TCP".into()));
+    };
+    let plant_file = files::plant_file(&command.out, modbus, cell.plate)?;
     let plant = PlantFile::load(&plant_file)?;
     let Some(press) = plant.press.clone() else {
         return Err(CliError::Failed("the demo's plant file has no [press]".into()));
     };
     if !common.json {
-        output::line(&format!("simulated press on {}, plate on {}", cell.modbus, cell.plate))?;
+        output::line(&format!("simulated press on {modbus}, plate on {}", cell.plate))?;
     }
     let mut reports = Vec::new();
     let (ended, registers) = runtime()?.block_on(async {

@@ -13,11 +13,15 @@ use crate::run::StatusRecord;
 const STALE_S: f64 = 5.0;
 
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  platen status config/plant-north.toml\n\n\
+#[command(after_help = "Examples:\n  platen status config/plant-north.toml\n  \
+                        platen status config/plant-north.toml --prometheus > /var/lib/node_exporter/platen.prom\n\n\
                         The exit code is 0 when the host runs, 1 when it does not.")]
 pub(super) struct Command {
     /// Plant file of the host
     plant: PathBuf,
+    /// Print the figures as Prometheus reads them, for a textfile collector
+    #[arg(long, conflicts_with = "json")]
+    prometheus: bool,
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
@@ -28,7 +32,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     })?;
     let age_s = jiff::Timestamp::now().duration_since(status.at).as_secs_f64();
     let running = age_s < STALE_S;
-    if common.json {
+    if command.prometheus {
+        output::line(status.prometheus(running).trim_end())?;
+    } else if common.json {
         output::json(&serde_json::json!({ "running": running, "age_s": age_s, "status": status }))?;
     } else {
         let alive = if running { "running" } else { "not running" };
@@ -50,9 +56,16 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             "strokes {}, measured {}, not measured {}, missed {}",
             status.strokes, status.measured, status.not_measured, status.missed
         ))?;
-        for (what, [median, worst]) in
-            [("trigger to busy", status.trigger_to_busy_ms), ("stroke to result", status.stroke_to_result_ms)]
-        {
+        output::line(&format!(
+            "link: {} connections, {} dropped for an error, out of step for {:.1} s",
+            status.link.connections, status.link.poisoned, status.link_down_s
+        ))?;
+        for (what, [median, worst]) in [
+            ("trigger to busy", status.trigger_to_busy_ms),
+            ("stroke to result", status.stroke_to_result_ms),
+            ("result to acknowledge", status.result_to_ack_ms),
+            ("journal", status.journal_ms),
+        ] {
             if let (Some(median), Some(worst)) = (median, worst) {
                 output::line(&format!("{what}: median {median:.0} ms, 99 % within {worst:.0} ms"))?;
             }

@@ -1,16 +1,26 @@
 //! What `platen status` shows: a small file that the running host keeps up to date.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use platen_plant::press::Press;
-use platen_press::{Code, Durations, Language, Status};
+use platen_press::{Answer, Code, Durations, Language, Status};
 use serde::{Deserialize, Serialize};
-use tokio::sync::watch;
+use tokio::sync::{mpsc, watch};
 
 /// The newest alarm, as the dispatcher hears it.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
+
+/// From a reset until the press side has told how it stands after it.
+const RESET_SHOWS: Duration = Duration::from_millis(400);
+
+/// The file by which `platen press reset` asks the running host for a reset: whoever may write into its output folder
+/// may reset it.
+pub fn reset_request(folder: &Path) -> PathBuf {
+    folder.join("reset.request")
+}
 
 /// How things stand on one press.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -43,10 +53,47 @@ pub struct StatusRecord {
     pub trigger_to_busy_ms: [Option<f64>; 2],
     /// Median and 99 % of stroke to result, milliseconds.
     pub stroke_to_result_ms: [Option<f64>; 2],
+    /// Median and 99 % of result to acknowledge, milliseconds.
+    pub result_to_ack_ms: [Option<f64>; 2],
+    /// Median and 99 % of a record of the journal until it would survive a power cut, milliseconds.
+    pub journal_ms: [Option<f64>; 2],
+    /// Results that the press did not acknowledge in time.
+    pub ack_timeouts: u64,
+    /// Reads that found the press writing its block.
+    pub torn_reads: u64,
+    /// Reads that found the host's own block changed by the press.
+    pub rewrites: u64,
+    /// Seconds without being in step with the press, the present loss apart.
+    pub link_down_s: f64,
+    /// What happened on the link.
+    pub link: LinkRecord,
+    /// When faults were reset by hand last.
+    pub reset_at: Option<jiff::Timestamp>,
+}
+
+/// What happened on the link since the start.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LinkRecord {
+    /// Requests sent.
+    pub requests: u64,
+    /// Write requests sent.
+    pub writes: u64,
+    /// Writes that were never sent because they are not allowed.
+    pub writes_refused: u64,
+    /// Connections built.
+    pub connections: u64,
+    /// Connections dropped because of an error, a timeout or a wrong answer.
+    pub poisoned: u64,
+    /// Requests without an answer in time.
+    pub timeouts: u64,
+    /// Refusals by Modbus exception code.
+    pub exceptions: BTreeMap<u8, u64>,
+    /// Round trips by time: how many up to 1, 2, 5, 10, 20, 50, 100, 200, 500 ms, and longer.
+    pub round_trips: Vec<u64>,
 }
 
 impl StatusRecord {
-    fn of(press: &Press, status: &Status, alarm: &NewestAlarm) -> Self {
+    fn of(press: &Press, status: &Status, alarm: &NewestAlarm, reset_at: Option<jiff::Timestamp>) -> Self {
         let percentiles = |durations: &Durations| {
             [50.0, 99.0].map(|percent| durations.percentile(percent).map(|d| d.as_secs_f64() * 1000.0))
         };
@@ -69,6 +116,23 @@ impl StatusRecord {
             missed: status.metrics.missed,
             trigger_to_busy_ms: percentiles(&status.metrics.trigger_to_busy),
             stroke_to_result_ms: percentiles(&status.metrics.stroke_to_result),
+            result_to_ack_ms: percentiles(&status.metrics.result_to_ack),
+            journal_ms: percentiles(&status.metrics.journal),
+            ack_timeouts: status.metrics.ack_timeouts,
+            torn_reads: status.metrics.torn_reads,
+            rewrites: status.metrics.rewrites,
+            link_down_s: status.metrics.link_down.as_secs_f64(),
+            link: LinkRecord {
+                requests: status.counts.requests,
+                writes: status.counts.writes,
+                writes_refused: status.counts.writes_refused,
+                connections: status.counts.connects,
+                poisoned: status.counts.poisoned,
+                timeouts: status.counts.timeouts,
+                exceptions: status.counts.exceptions.clone(),
+                round_trips: status.counts.round_trips.to_vec(),
+            },
+            reset_at,
         }
     }
 
@@ -81,16 +145,26 @@ impl StatusRecord {
     }
 }
 
-/// Keeps the file up to date, at most once a second but at once when the state changes.
+/// Keeps the file up to date, at most once a second but at once when the state changes; hands on requests for a reset.
 pub(super) async fn keep(
     path: PathBuf,
     press: Press,
     mut status: watch::Receiver<Status>,
     alarm: NewestAlarm,
+    answers: mpsc::UnboundedSender<Answer>,
 ) {
+    let request = reset_request(path.parent().unwrap_or(Path::new(".")));
+    let mut reset_at = None;
     let mut reported = false;
     loop {
-        let record = StatusRecord::of(&press, &status.borrow_and_update(), &alarm);
+        if std::fs::remove_file(&request).is_ok() {
+            tracing::warn!("faults are reset by `platen press reset`");
+            reset_at = Some(jiff::Timestamp::now());
+            // A press side that has ended has no faults any more.
+            let _ = answers.send(Answer::Reset);
+            tokio::time::sleep(RESET_SHOWS).await;
+        }
+        let record = StatusRecord::of(&press, &status.borrow_and_update(), &alarm, reset_at);
         let written = write(&path, &record);
         if let Err(error) = written.as_ref().map_err(|e| format!("{}: {e}", path.display()))
             && !std::mem::replace(&mut reported, true)

@@ -148,6 +148,17 @@ impl<L: Link> Client<L> {
         }
     }
 
+    /// Asks the press's controller who made it: maker, product, revision. Few controllers answer.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read).
+    pub async fn identify(&mut self) -> Result<Vec<String>, LinkError> {
+        match self.exchange(&Request::Identify).await? {
+            Response::Identity(texts) => Ok(texts),
+            other => Err(self.mismatch(Request::Identify, &other)),
+        }
+    }
+
     /// One request and its answer within the time limit. Everything but an answer drops the connection.
     async fn exchange(&mut self, request: &Request) -> Result<Response, LinkError> {
         if let Some(moment) = self.not_before {
@@ -193,6 +204,7 @@ impl<L: Link> Client<L> {
         let answer = match answer {
             Response::Words(words) => format!("{} registers", words.len()),
             Response::Written { start, count } => format!("{count} registers written from {start} on"),
+            Response::Identity(_) => "an identity".into(),
             Response::Exception(code) => format!("exception {code:02X}"),
         };
         LinkError::Mismatch { peer: self.peer(), request, answer }

@@ -23,7 +23,7 @@ use std::fmt;
 use platen_plant::press::Table;
 use rtu::DRAIN_MAX;
 
-/// One Modbus request. Nothing else is ever sent: functions 3, 4 and 16.
+/// One Modbus request. Nothing else is ever sent: functions 3, 4 and 16, and 43 by people's tools.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Read consecutive registers.
@@ -42,11 +42,14 @@ pub enum Request {
         /// What to write.
         words: Vec<u16>,
     },
+    /// Ask the device who made it (function 43, type 14).
+    Identify,
 }
 
 impl fmt::Display for Request {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (verb, table, start, count) = match self {
+            Self::Identify => return f.write_str("asking who it is"),
             Self::Read { table, start, count } => ("reading", *table, *start, usize::from(*count)),
             Self::Write { start, words } => ("writing", Table::Holding, *start, words.len()),
         };
@@ -67,6 +70,8 @@ pub enum Response {
         /// How many.
         count: u16,
     },
+    /// Who made it, product and revision, as far as they are text.
+    Identity(Vec<String>),
     /// The peer refused, with a Modbus exception code.
     Exception(u8),
 }

@@ -4,6 +4,7 @@ use platen_plant::press::{self, Quiet, Table, Transport};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::AbortHandle;
 use tokio_modbus::client::{self, Client as _, Context};
+use tokio_modbus::prelude::ReadCode;
 use tokio_modbus::{ExceptionCode, Slave};
 
 use super::rtu::EchoFree;
@@ -100,12 +101,17 @@ async fn call(context: &mut Context, request: Request) -> Result<Response, Trans
         Request::Read { table: Table::Holding, start, count } => Wire::ReadHoldingRegisters(start, count),
         Request::Read { table: Table::Input, start, count } => Wire::ReadInputRegisters(start, count),
         Request::Write { start, words } => Wire::WriteMultipleRegisters(start, words.into()),
+        Request::Identify => Wire::ReadDeviceIdentification(ReadCode::Basic, 0),
     };
     match context.call(wire).await {
         Ok(Ok(WireResponse::ReadHoldingRegisters(words) | WireResponse::ReadInputRegisters(words))) => {
             Ok(Response::Words(words))
         }
         Ok(Ok(WireResponse::WriteMultipleRegisters(start, count))) => Ok(Response::Written { start, count }),
+        Ok(Ok(WireResponse::ReadDeviceIdentification(identity))) => {
+            let texts = identity.device_id_objects.iter().filter_map(|object| object.value_as_str());
+            Ok(Response::Identity(texts.map(str::to_owned).collect()))
+        }
         Ok(Ok(other)) => {
             Err(TransportError::Protocol(format!("an answer that was not asked for: {other:?}")))
         }

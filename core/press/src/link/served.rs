@@ -113,6 +113,8 @@ impl Link for ServedLink {
                     Response::Written { start: *start, count }
                 })
             }
+            // A press that asks cannot be asked.
+            Request::Identify => return Ok(Response::Exception(ExceptionCode::IllegalFunction.into())),
         };
         Ok(response.unwrap_or(Response::Exception(ExceptionCode::IllegalDataAddress.into())))
     }

@@ -72,6 +72,7 @@ impl Link for MemoryLink {
                 Request::Write { start, words } => plc
                     .write(*start, words)
                     .then_some(Response::Written { start: *start, count: words.len() as u16 }),
+                Request::Identify => Some(Response::Exception(1)),
             }
         };
         if late {

@@ -1,8 +1,8 @@
 //! The demo's files: those of `config/`, with the ports that the system gave and an output folder of their own.
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-use super::cell::Cell;
 use crate::cli::CliError;
 
 /// Tells a folder of an earlier demo from one that holds something else.
@@ -35,11 +35,11 @@ pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
 }
 
 /// The plant file for the ports that the system gave.
-pub(super) fn plant_file(out: &Path, cell: &Cell) -> Result<PathBuf, CliError> {
+pub(super) fn plant_file(out: &Path, modbus: SocketAddr, plate: SocketAddr) -> Result<PathBuf, CliError> {
     let path = out.join("plant.toml");
     let text = PLANT
-        .replace("port = 15020", &format!("port = {}", cell.modbus.port()))
-        .replace("127.0.0.1:15021", &cell.plate.to_string())
+        .replace("port = 15020", &format!("port = {}", modbus.port()))
+        .replace("127.0.0.1:15021", &plate.to_string())
         .replace("folder = \"../platen-results\"", "folder = \"results\"");
     std::fs::write(&path, text)?;
     Ok(path)

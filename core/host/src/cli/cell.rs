@@ -8,14 +8,14 @@ use std::time::Duration;
 
 use serde_json::Value as Json;
 
-use crate::cli::CliError;
+use super::CliError;
 
 /// `platen-sim press`, ended with this program.
 #[derive(Debug)]
 pub(super) struct Cell {
     child: Child,
-    /// Where the press serves Modbus.
-    pub(super) modbus: SocketAddr,
+    /// Where the press serves Modbus; `None` on a serial line.
+    pub(super) modbus: Option<SocketAddr>,
     /// Where it says what the plate looks like.
     pub(super) plate: SocketAddr,
     line: Option<BufReader<TcpStream>>,
@@ -44,15 +44,16 @@ fn failed(what: &str) -> impl Fn(std::io::Error) -> CliError + '_ {
 }
 
 impl Cell {
-    /// Starts the program that lies beside this one.
-    pub(super) fn start(config: &Path) -> Result<Self, CliError> {
+    /// Starts the program that lies beside this one; `options` overrule the file.
+    pub(super) fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
         let program =
             std::env::current_exe()?.with_file_name(format!("platen-sim{}", std::env::consts::EXE_SUFFIX));
         let what = format!("{}: cannot be started (`cargo build --release` makes it)", program.display());
         let mut child = Command::new(&program)
             .arg("press")
             .arg(config)
-            .args(["--modbus-port", "0", "--plate-port", "0", "--with-parent"])
+            .args(options)
+            .args(["--plate-port", "0", "--with-parent"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -63,15 +64,13 @@ impl Cell {
         }
         let ports: Json = serde_json::from_str(&line).unwrap_or_default();
         let port = |name: &str| ports[name].as_str().and_then(|text| text.parse().ok());
-        match (port("modbus"), port("plate")) {
-            (Some(modbus), Some(plate)) => Ok(Self { child, modbus, plate, line: None }),
-            _ => {
-                Err(CliError::Failed("platen-sim ended before it was ready; its reason stands above".into()))
-            }
-        }
+        let unready =
+            || CliError::Failed("platen-sim ended before it was ready; its reason stands above".into());
+        let plate = port("plate").ok_or_else(unready)?;
+        Ok(Self { child, modbus: port("modbus"), plate, line: None })
     }
 
-    fn ask(&mut self, question: &str) -> Result<Json, CliError> {
+    pub(super) fn ask(&mut self, question: &str) -> Result<Json, CliError> {
         let line = match &mut self.line {
             Some(line) => line,
             None => {

@@ -1,0 +1,193 @@
+//! `write-test`: a pattern in each figure of the host's block, for comparison with the screen of the press.
+//!
+//! Figures only: status, echoes, heartbeat and counters stay 0, so that no press takes the pattern for a result. Every
+//! write goes through the allow-list; at the end all of the figures hold their "no value" word again.
+
+use std::io::{BufRead, IsTerminal, Write};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use platen_plant::press::{Mode, Output, Press};
+use platen_press::{
+    Client, Figures, HostImage, LinkError, Measurement, ModbusLink, PressImage, Publication, StrokeKey,
+    Verdict, describe_outputs,
+};
+use serde_json::json;
+
+use super::super::run::runtime;
+use super::{CliError, Common, Failure, client, output};
+
+/// A host beats at least twice in this time.
+const WATCH: Duration = Duration::from_millis(1500);
+
+/// One field as it was written.
+struct Written {
+    field: Output,
+    shows: String,
+    read_back: bool,
+    confirmed: Option<bool>,
+}
+
+/// 0 when every pattern was read back, and none was denied at the screen.
+pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
+    let mut press = press.clone();
+    if !press.mode.writes() {
+        press.mode = Mode::Simulate;
+    }
+    let mut asking = client(&press)?;
+    let asks = std::io::stdin().is_terminal() && !common.json;
+    let runtime = runtime()?;
+    runtime.block_on(alone(&press, &mut asking))?;
+    let mut written = Vec::new();
+    for (step, field) in figures(&press).into_iter().enumerate() {
+        let done = runtime.block_on(show(&press, &mut asking, field, step))?;
+        written.push(done);
+        if let (true, Some(last)) = (asks, written.last_mut()) {
+            last.confirmed = Some(confirm(last)?);
+        }
+    }
+    let blank = HostImage::default().encode(&press.map, 0);
+    runtime.block_on(write(&press, &mut asking, &blank))?;
+    let good = written.iter().all(|it| it.read_back && it.confirmed != Some(false));
+    if common.json {
+        let row = |it: &Written| json!({ "field": it.field.name(), "shows": it.shows, "read_back": it.read_back, "confirmed": it.confirmed });
+        output::json(&json!({ "fields": written.iter().map(row).collect::<Vec<_>>(), "good": good }))?;
+    } else {
+        let mut rows = vec![["field", "written", "read back", "on the screen"].map(str::to_owned).to_vec()];
+        let yes = |it: bool| if it { "yes" } else { "NO" }.to_owned();
+        rows.extend(written.iter().map(|it| {
+            let confirmed = it.confirmed.map_or_else(|| "-".into(), yes);
+            vec![it.field.name().into(), it.shows.clone(), yes(it.read_back), confirmed]
+        }));
+        output::table(&rows)?;
+    }
+    Ok(ExitCode::from(u8::from(!good)))
+}
+
+/// Fields that hold a figure, in the order of their registers.
+fn figures(press: &Press) -> Vec<Output> {
+    let holds = |output: &Output| output.measure().is_some() || *output == Output::Station;
+    let mut figures: Vec<_> = press.map.outputs.keys().copied().filter(holds).collect();
+    figures.sort_by_key(|output| press.map.output(*output).and_then(|field| field.place.offset()));
+    figures
+}
+
+/// A result of which only this field has a figure, different from every other step's.
+fn image(press: &Press, field: Output, step: usize) -> HostImage {
+    let Some(place) = press.map.output(field) else { return HostImage::default() };
+    let raw = (11 * (step + 1)) as f64;
+    let number = |index: u16| (raw + f64::from(index)) * place.scale * place.unit.factor();
+    let figures = match place.from.or(field.measure()) {
+        Some(measure) => Figures { values: [(measure, number(0))].into(), stations: Vec::new() },
+        None => Figures {
+            values: Default::default(),
+            stations: (0..place.count).map(|index| Some(number(index))).collect(),
+        },
+    };
+    let measurement = Measurement { verdict: Verdict::CannotTell, figures, scanned_at: None, warning: None };
+    let key = StrokeKey { press: press.press_id, session: 0, stroke: 0, attempt: 0 };
+    let result = Publication { key, run_id: 0, seq: 0, recipe_id: None, measurement };
+    HostImage { result: Some(result), ..HostImage::default() }
+}
+
+/// Connects, and refuses another press than the plant file's.
+async fn reach(press: &Press, asking: &mut Client<ModbusLink>) -> Result<(), Failure> {
+    asking.connect().await?;
+    let words = asking.read(&press.map.read, press.map.read.count).await?;
+    match PressImage::decode(&press.map, press.press_id, &words).map(|image| image.wrong) {
+        Ok(Some(wrong)) => Err(Failure::Handshake(format!(
+            "{}: {} is {}, the plant file says {}: is this the right press?",
+            asking.peer(),
+            wrong.input,
+            wrong.found,
+            wrong.expected
+        ))),
+        Ok(None) | Err(_) => Ok(()),
+    }
+}
+
+/// Refuses to write where a host is at work.
+async fn alone(press: &Press, asking: &mut Client<ModbusLink>) -> Result<(), Failure> {
+    reach(press, asking).await?;
+    let block = press.map.write;
+    let before = asking.read(&block, block.count).await?;
+    tokio::time::sleep(WATCH).await;
+    if asking.read(&block, block.count).await? != before {
+        let text = "a host is writing to this press: stop it before a write-test";
+        return Err(CliError::Failed(text.into()).into());
+    }
+    Ok(())
+}
+
+async fn write(press: &Press, asking: &mut Client<ModbusLink>, words: &[u16]) -> Result<(), LinkError> {
+    let block = press.map.write;
+    for range in press.write.ranges() {
+        let start = u32::from(*range.start()).max(block.addresses().start);
+        let end = (u32::from(*range.end()) + 1).min(block.addresses().end);
+        if start < end {
+            let offsets =
+                (start - block.addresses().start) as usize..(end - block.addresses().start) as usize;
+            asking.guarded_write(start as u16, &words[offsets]).await?;
+        }
+    }
+    Ok(())
+}
+
+async fn show(
+    press: &Press,
+    asking: &mut Client<ModbusLink>,
+    field: Output,
+    step: usize,
+) -> Result<Written, Failure> {
+    if !asking.connected() {
+        reach(press, asking).await?;
+    }
+    let words = image(press, field, step).encode(&press.map, 0);
+    write(press, asking, &words).await?;
+    let block = press.map.write;
+    let found = asking.read(&block, block.count).await?;
+    let value = |words: &[u16]| {
+        describe_outputs(&press.map, words)
+            .into_iter()
+            .find(|(name, _)| *name == field)
+            .map(|(_, value)| value)
+    };
+    let shows = value(&words).unwrap_or_default();
+    Ok(Written { field, read_back: value(&found).as_ref() == Some(&shows), shows, confirmed: None })
+}
+
+fn confirm(written: &Written) -> Result<bool, CliError> {
+    let mut terminal = std::io::stderr();
+    write!(terminal, "{} = {}: does the press show it? [Y/n] ", written.field, written.shows)?;
+    terminal.flush()?;
+    let mut answer = String::new();
+    std::io::stdin().lock().read_line(&mut answer)?;
+    Ok(!answer.trim().eq_ignore_ascii_case("n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use platen_plant::press::Link;
+
+    /// No pattern may look like a result: status, echoes, sequence and owner are 0 in every step.
+    #[test]
+    fn a_pattern_is_never_a_result() {
+        let press = Press::pph1("Press 3", 3, Link::tcp("192.0.2.10", 502, 1));
+        let blank = HostImage::default().encode(&press.map, 0);
+        let fields = figures(&press);
+        assert!(fields.len() > 15, "{fields:?}");
+        for (step, field) in fields.into_iter().enumerate() {
+            let words = image(&press, field, step).encode(&press.map, 0);
+            assert_eq!(words[1..10], [0; 9], "{field}");
+            assert_eq!(words[49], 0, "{field}");
+            let changed = words.iter().zip(&blank).filter(|(a, b)| a != b).count();
+            let place = press.map.output(field).unwrap();
+            assert!(
+                changed <= usize::from(place.registers()) + 1,
+                "{field}: its registers and the check sum"
+            );
+            assert!(changed >= 2, "{field}");
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The figures of a host as Prometheus reads them: for a textfile collector, so that the host opens no port.
+
+use platen_press::ROUND_TRIP_LIMITS_MS;
+
+use super::StatusRecord;
+
+impl StatusRecord {
+    /// The figures as Prometheus reads them (text format 0.0.4).
+    pub fn prometheus(&self, running: bool) -> String {
+        let mut text = String::new();
+        let label = format!("press=\"{}\"", self.press.replace('\\', "\\\\").replace('"', "\\\""));
+        let mut one = |name: &str, kind: &str, help: &str, value: f64| {
+            text += &format!(
+                "# HELP platen_{name} {help}\n# TYPE platen_{name} {kind}\nplaten_{name}{{{label}}} {value}\n"
+            );
+        };
+        one("up", "gauge", "1 while the host runs", f64::from(u8::from(running)));
+        one(
+            "link_fault",
+            "gauge",
+            "1 while something is wrong with the link",
+            f64::from(u8::from(self.link_error.is_some())),
+        );
+        one("error", "gauge", "1 while error_code is not 0", f64::from(u8::from(self.error.is_some())));
+        one("warning", "gauge", "1 while warning_code is not 0", f64::from(u8::from(self.warning.is_some())));
+        for (name, help, count) in [
+            ("strokes_total", "strokes accepted, every attempt", self.strokes),
+            ("measured_total", "results with a measurement", self.measured),
+            ("not_measured_total", "results without a measurement", self.not_measured),
+            ("missed_total", "strokes missed", self.missed),
+            ("ack_timeouts_total", "results not acknowledged in time", self.ack_timeouts),
+            ("torn_reads_total", "reads that found the press writing its block", self.torn_reads),
+            ("rewrites_total", "reads that found the host's block changed", self.rewrites),
+            ("requests_total", "Modbus requests sent", self.link.requests),
+            ("writes_total", "Modbus write requests sent", self.link.writes),
+            ("writes_refused_total", "writes not sent because not allowed", self.link.writes_refused),
+            ("connections_total", "connections built", self.link.connections),
+            ("poisoned_total", "connections dropped for an error", self.link.poisoned),
+            ("timeouts_total", "requests without an answer in time", self.link.timeouts),
+        ] {
+            one(name, "counter", help, count as f64);
+        }
+        one("link_down_seconds_total", "counter", "time out of step with the press", self.link_down_s);
+        for (name, [median, most]) in [
+            ("trigger_to_busy", self.trigger_to_busy_ms),
+            ("stroke_to_result", self.stroke_to_result_ms),
+            ("result_to_ack", self.result_to_ack_ms),
+            ("journal", self.journal_ms),
+        ] {
+            text += &format!("# TYPE platen_{name}_seconds gauge\n");
+            for (quantile, ms) in [("0.5", median), ("0.99", most)] {
+                if let Some(ms) = ms {
+                    text += &format!(
+                        "platen_{name}_seconds{{{label},quantile=\"{quantile}\"}} {}\n",
+                        ms / 1000.0
+                    );
+                }
+            }
+        }
+        text += "# TYPE platen_exceptions_total counter\n";
+        for (code, count) in &self.link.exceptions {
+            text += &format!("platen_exceptions_total{{{label},code=\"{code:02X}\"}} {count}\n");
+        }
+        text += "# TYPE platen_round_trips_total counter\n";
+        let limits = ROUND_TRIP_LIMITS_MS.iter().map(u64::to_string).chain(["longer".into()]);
+        for (limit, count) in limits.zip(&self.link.round_trips) {
+            text += &format!("platen_round_trips_total{{{label},up_to_ms=\"{limit}\"}} {count}\n");
+        }
+        text
+    }
+}
