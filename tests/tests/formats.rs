@@ -132,7 +132,7 @@ impl Head for Again {
         Ok(Plan { wanted: *wanted, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
     }
 
-    fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<u32, String> {
+    fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let lattice = &self.0.lattice;
         let begin = Begin {
             rows: lattice.n_rows,
@@ -150,12 +150,13 @@ impl Head for Again {
             acquired_unix_s: None,
             simulated: true,
             altered: Vec::new(),
+            warm_up_columns: 0,
         };
         let _ = out.begin(begin.clone());
         for (number, column) in self.0.columns.iter().enumerate() {
             let _ = out.column(column_payload(column, number as u32, &begin, 0.0));
         }
-        Ok(0)
+        Ok(())
     }
 }
 
