@@ -156,7 +156,10 @@ fn time(flattening: &mut Flattening, mesh: &DiskMesh, repeat: usize) -> Option<D
     }
 }
 
-const STEPS: [(&str, fn(&Stages) -> Duration); 6] = [
+/// Name of a step of the paper's, and its time.
+type Step = (&'static str, fn(&Stages) -> Duration);
+
+const STEPS: [Step; 6] = [
     ("extract plate points", |s| s.extract),
     ("boundary loop, corners, edges", |s| s.outline),
     ("mid-surface and mesh", |s| s.mesh),
