@@ -80,7 +80,8 @@ fn chain(error: &dyn std::error::Error) -> String {
         }
         cause = inner.source();
     }
-    text
+    // The XML parser quotes the character that it met, a line break for one.
+    text.replace(char::is_control, " ")
 }
 
 /// Compares the header's figures with the file; a sentence when they differ harmlessly.

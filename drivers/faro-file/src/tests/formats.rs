@@ -258,6 +258,13 @@ fn an_index_beyond_the_declared_bounds_is_an_error() {
     check_refused(&lies, "scan.e57", "column 18 lies outside of the declared 0 to 17");
 }
 
+/// Found by fuzzing: the XML parser quotes the line break that it met.
+#[test]
+fn broken_xml_is_told_in_one_line() {
+    let broken = edited(&e57(PLAIN, 1), "\"Structure\">\n", "\"Structure\"/\n");
+    check_refused(&broken, "scan.e57", "Failed to parse XML data");
+}
+
 #[test]
 fn a_prototype_of_no_bits_is_refused_before_memory_runs_out() {
     let edits = [
