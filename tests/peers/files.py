@@ -34,12 +34,16 @@ def mesh(folder):
     vertex, faces = ply["vertex"], numpy.stack(ply["face"]["vertex_indices"])
     other = meshio.read(folder / "plate.ply")
     assert len(other.points) == vertex.count and len(other.cells_dict["triangle"]) == len(faces)
+    vtk = meshio.read(folder / "plate.vtk")
+    assert numpy.array_equal(vtk.points, other.points) and numpy.array_equal(vtk.cells_dict["triangle"], faces)
     rows = list(csv.DictReader((folder / "grid.csv").open()))
     assert len(rows) == vertex.count
     fields = [p.name for p in vertex.properties if p.name.startswith("scalar_")]
     assert {"scalar_u_mm", "scalar_v_mm", "scalar_deviation_mm", "scalar_kappa_u_per_m"} <= set(fields), fields
+    assert [name.removeprefix("scalar_") for name in fields] == list(vtk.point_data)
     for name in fields:
         column = name.removeprefix("scalar_")
+        assert numpy.array_equal(vertex[name], vtk.point_data[column].squeeze(), equal_nan=True), column
         for found, row in zip(vertex[name], rows):
             if row[column] == "":
                 assert math.isnan(found), f"{column}: {found} where the table has nothing"

@@ -86,7 +86,7 @@ fn fill(part: &Path, record: &ResultRecord, surface: &Surface) -> Result<Vec<&'s
 }
 
 /// Draws the pictures of a stroke into its folder, and writes the plate as a table (`grid.csv`) and as a mesh
-/// (`plate.ply`). `strokes` are those of the plate so far, this one last; none for a measurement that has no history.
+/// (`plate.ply`, `plate.vtk`). `strokes` are those of the plate so far, this one last; none for a measurement that has no history.
 ///
 /// All of it can be made again from the documents; what was made already is replaced.
 ///
@@ -107,6 +107,7 @@ pub fn illustrate(
     let table = PlateTable::new(surface, reports);
     keep("grid.csv", table.csv().as_bytes())?;
     keep("plate.ply", &table.ply().map_err(FilesError::Mesh)?)?;
+    keep("plate.vtk", &table.vtk())?;
     for (name, svg) in pictures(record, reports, strokes)? {
         keep(&format!("{name}.svg"), svg.as_bytes())?;
     }

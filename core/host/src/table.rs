@@ -1,5 +1,7 @@
 //! The plate as a table: even nodes with all that the comparisons found there, for spreadsheets and mesh viewers.
 
+mod vtk;
+
 use std::fmt::Write as _;
 
 use ply_rs_bw::ply::{
@@ -272,6 +274,26 @@ mod tests {
         assert_eq!(vertex["z"], Property::Double(0.1 * 0.06));
         assert_eq!(vertex["scalar_deviation_mm"], Property::Float(0.002));
         assert!(matches!(read.payload["vertex"][1]["scalar_deviation_mm"], Property::Float(x) if x.is_nan()));
+    }
+
+    #[test]
+    fn the_vtk_file_holds_every_array_in_its_place() {
+        let table = table(|k| k != 1);
+        let bytes = table.vtk();
+        let after = |head: &str| {
+            let at = bytes.windows(head.len()).position(|window| window == head.as_bytes());
+            &bytes[at.unwrap_or_else(|| panic!("no {head}")) + head.len()..]
+        };
+        let (n, m) = (101 * 101, table.triangles().len());
+        let point = &after(&format!("POINTS {n} double\n"))[24 * 2..];
+        assert_eq!(point[..8], 0.06_f64.to_be_bytes());
+        assert!(after(&format!("POINTS {n} double\n"))[24 * n..].starts_with(b"\nCELLS"));
+        assert!(after(&format!("CELLS {m} {}\n", 4 * m))[16 * m..].starts_with(b"\nCELL_TYPES"));
+        assert!(after(&format!("CELL_TYPES {m}\n"))[4 * m..].starts_with(b"\nPOINT_DATA"));
+        let field = after("SCALARS deviation_mm float 1\nLOOKUP_TABLE default\n");
+        assert_eq!(field.len(), 4 * n + 1);
+        assert_eq!(field[8..12], 0.002_f32.to_be_bytes());
+        assert!(f32::from_be_bytes(field[4..8].try_into().unwrap()).is_nan());
     }
 
     #[test]

@@ -176,7 +176,7 @@ fn summary(
             elapsed.as_secs_f64()
         ))?;
         output::line(&format!(
-            "files: {} (one folder a stroke: result.json, reference_lines.csv, maps as SVG; history.sqlite)",
+            "files: {} (the plate's report plate-1.html; one folder a stroke: result.json, tables, mesh, pictures; history.sqlite)",
             command.out.join("results").display()
         ))?;
         output::line(&format!("next: platen history list {}", command.out.join("plant.toml").display()))?;

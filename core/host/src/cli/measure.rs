@@ -44,7 +44,7 @@ pub(super) struct Command {
     /// Rough direction of growing u in the scanner frame, instead of the plant file's
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
     u_axis: Option<[f64; 3]>,
-    /// New folder for result.json, tables (CSV), the plate as a mesh (PLY) and pictures (SVG)
+    /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -29,7 +29,7 @@ pub(super) struct Command {
     first: RunRef,
     /// The second stroke: run id or plate:stroke
     second: RunRef,
-    /// New folder for maps (SVG), the table (CSV) and the mesh (PLY) of the difference
+    /// New folder for maps (SVG), the table (CSV) and the mesh (PLY, VTK) of the difference
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -127,6 +127,7 @@ fn write(
     let mut written = vec![
         files::put(out, "grid.csv", table.csv().as_bytes())?,
         files::put(out, "plate.ply", &table.ply().map_err(files::FilesError::Mesh)?)?,
+        files::put(out, "plate.vtk", &table.vtk())?,
     ];
     let record = PlateRecord::new(plate, now, None);
     let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);

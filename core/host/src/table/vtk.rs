@@ -1,0 +1,66 @@
+//! The plate's mesh as a legacy VTK file, the one form in which ParaView shows fields and tools read them everywhere.
+//!
+//! "VTK File Formats" (The VTK User's Guide, "Simple Legacy Formats"): a text head before each array, arrays big-endian.
+//! Binary, because VTK's reader of text stops at a number that is none, and nodes without data are NaN here.
+
+use std::fmt::Write as _;
+
+use super::PlateTable;
+
+/// VTK's number of a triangle.
+const TRIANGLE: u32 = 5;
+
+impl PlateTable {
+    /// As a triangle mesh with fields, legacy VTK, binary. Positions in metres; a field's name has its unit; NaN where nothing
+    /// is known. Triangles as in [`ply`](Self::ply).
+    pub fn vtk(&self) -> Vec<u8> {
+        let triangles = self.triangles();
+        let mut file = File::default();
+        file.head(concat!(
+            "# vtk DataFile Version 3.0\nplaten ",
+            env!("CARGO_PKG_VERSION"),
+            ", scanned face, metres\n"
+        ));
+        file.head("BINARY\nDATASET UNSTRUCTURED_GRID\n");
+        file.head(&format!("POINTS {} double\n", self.nodes.len()));
+        file.array(self.nodes.iter().flat_map(|node| node.face).map(f64::to_be_bytes));
+        file.head(&format!("CELLS {} {}\n", triangles.len(), 4 * triangles.len()));
+        file.array(triangles.iter().flat_map(|[a, b, c]| [3, *a, *b, *c]).map(|k| (k as u32).to_be_bytes()));
+        file.head(&format!("CELL_TYPES {}\n", triangles.len()));
+        file.array(triangles.iter().map(|_| TRIANGLE.to_be_bytes()));
+        file.head(&format!("POINT_DATA {}\n", self.nodes.len()));
+        for (k, name) in ["u_mm", "v_mm"].into_iter().enumerate() {
+            file.scalars(name, self.nodes.iter().map(|node| Some(node.uv[k] * 1e3)));
+        }
+        for column in &self.columns {
+            file.scalars(&column.name, column.values.iter().copied());
+        }
+        file.0
+    }
+}
+
+#[derive(Default)]
+struct File(Vec<u8>);
+
+impl File {
+    fn head(&mut self, text: &str) {
+        self.0.extend_from_slice(text.as_bytes());
+    }
+
+    fn array<const N: usize>(&mut self, numbers: impl Iterator<Item = [u8; N]>) {
+        self.0.extend(numbers.flatten());
+        self.0.push(b'\n');
+    }
+
+    fn scalars(&mut self, name: &str, values: impl Iterator<Item = Option<f64>>) {
+        let mut head = String::new();
+        // A name ends at the first blank. Writing to a string does not fail.
+        let _ = writeln!(
+            head,
+            "SCALARS {} float 1\nLOOKUP_TABLE default",
+            name.replace(char::is_whitespace, "_")
+        );
+        self.head(&head);
+        self.array(values.map(|value| value.map_or(f32::NAN, |value| value as f32).to_be_bytes()));
+    }
+}
