@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn what_was_not_seen_is_in_no_figure() {
-        let half = Forming::new(&bent(0.0, Mask::unseen(W, H, 0.02)), &target(10.0), 0.006).unwrap();
+        let half = Forming::new(&bent(0.0, Mask::unseen(W, H, 0.05)), &target(10.0), 0.006).unwrap();
         let whole = Forming::new(&bent(0.0, whole()), &target(10.0), 0.006).unwrap();
         assert!((half.seen_share - 0.5).abs() < 0.02, "{half:?}");
         assert!((half.energy / whole.energy - half.seen_share).abs() < 1e-6);

@@ -147,7 +147,14 @@ impl<const D: usize> Moments<D> {
                 }
             }
         }
-        GridValues { u: self.u, v: self.v, values }
+        // Each of the four values of a cell takes a quarter of its weight.
+        let n_seen = self.cells.iter().filter(|c| c.n_points >= LEAST_POINTS).count();
+        GridValues {
+            u: self.u,
+            v: self.v,
+            values,
+            stated: 4.0 * n_seen as f64 / self.weight.max(f64::MIN_POSITIVE),
+        }
     }
 
     fn add_right_hand_side(&self, cell: &Cell<D>, i: usize, k: usize, rhs: &mut [[f64; D]]) {

@@ -34,6 +34,8 @@ pub(crate) struct GridValues {
     pub(crate) v: Axis,
     /// v outer, u inner.
     pub(crate) values: Vec<Option<f64>>,
+    /// Mean variance of a value as the points' weights state it.
+    pub(crate) stated: f64,
 }
 
 /// Nullity of the third-difference penalty along an axis: quadratics.
@@ -45,6 +47,9 @@ const EXPONENTS: (f64, f64) = (-1.0, 10.0);
 const STIFF: [f64; 2] = [9.0, 9.0];
 /// Rounds of filling gaps with the smoothed values; each takes up what the gaps' values still bend the spline.
 const ROUNDS: usize = 5;
+/// The values' variance is taken to be at least this part of what the weights state: data without noise would ask for a
+/// penalty against which the points vanish in rounding.
+const LEAST_NOISE: f64 = 0.01;
 /// Width of the last step of the search, in decades. The criterion is flat: a tenth of a decade changes nothing.
 const LAST_STEP: f64 = 0.2;
 
@@ -63,7 +68,7 @@ impl GridValues {
         }
         best = criterion.minimise();
         let [scale_u, scale_v] = criterion.scales(best);
-        let noise = criterion.noise(best);
+        let noise = criterion.noise(best).max(LEAST_NOISE * self.stated);
         Penalty { u: scale_u / (noise * 0.5 * self.v.step()), v: scale_v / (noise * 0.5 * self.u.step()) }
     }
 
