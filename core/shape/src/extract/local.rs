@@ -147,13 +147,14 @@ impl LocalFace {
 /// The plane through points about their centre: two axes at right angles, each over the mean spacing of points
 /// along it, and the unit normal towards the scanner. `None` when the points lie on a line.
 fn plane(points: &[Vec3], centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
-    let mut spread = Matrix3::zeros();
+    let mut sums = [0.0; 6];
     for point in points {
-        let off = point - centre;
-        spread.syger(1.0, &off, &off, 1.0);
+        let [x, y, z]: [f64; 3] = (point - centre).into();
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
     }
-    spread.fill_upper_triangle_with_lower_triangle();
-    let eigen = spread.symmetric_eigen();
+    let [xx, xy, xz, yy, yz, zz] = sums;
+    let eigen = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let up = eigen.eigenvectors.column(least).into_owned();
     let up = if up.dot(&centre) > 0.0 { -up } else { up };

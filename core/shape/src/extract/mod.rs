@@ -2,7 +2,7 @@
 //!
 //! The steps of the paper's 3.1 in its order. While columns arrive: lattice neighbours that the continuity criterion
 //! joins (`continuity`) grow into components (`regions`), and cells that cannot belong to the plate are let go
-//! (`columns`). After the last column, for every component that may hold the plate: range noise from the scan
+//! (`columns`). Once a component that may hold the plate has ended, at the latest after the last column (`components`): range noise from the scan
 //! itself (`noise`), mixed pixels (`mixed`), a low-pass copy and its normals (`smooth`), faces by region growing on
 //! them (`grow`). Pieces of a face that something cuts apart are joined (`pieces`), the plate is chosen by its
 //! size (`choose`), its face is taken to the cell (`trim`), and where rows and columns leave it is measured
@@ -13,6 +13,7 @@
 
 mod choose;
 mod columns;
+mod components;
 mod continuity;
 mod crossings;
 mod grow;
@@ -29,17 +30,17 @@ mod surface;
 mod trim;
 mod window;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use platen_scan::{Column, ColumnError, ScanHeader};
 
 use crate::{Patch, PlateSpec, Sample};
-use columns::{Cell, Columns, Kept, MARGIN, Segment, cells_of};
+use columns::{Cell, Columns, Kept, Segment, cells_of};
+use components::Closed;
 use continuity::Continuity;
 use pieces::Piece;
 pub use refusal::Refusal;
-use regions::{Extent, Regions, Run};
-use spread::Spread;
+use regions::{Regions, Run};
 use surface::Surface;
 
 /// A component that outgrows the plate's area by this factor is dropped.
@@ -48,14 +49,6 @@ const OUTGROWN: f64 = 4.0;
 /// Area across the beams, in parts of the plate's area, from which a component is looked at: a strip of the plate
 /// beside a chain, seen at a grazing angle.
 const LEAST_PART: f64 = 0.005;
-
-/// A component of at most this area and width, in parts of the plate's area and diagonal, holds little besides
-/// the plate. Larger ones are looked at only when no plate is found among these.
-const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
-
-/// A component of at least this part of the plate's area is looked at as soon as it has ended. Smaller ones wait: looked
-/// at, every piece of furniture in a dome would hold memory until the end.
-const CLOSED_PART: f64 = 0.3;
 
 /// A plate that reaches out of the region of interest over less than this is not cut by it, metres.
 const CUT_TOLERANCE: f64 = 0.05;
@@ -75,8 +68,8 @@ pub struct Extractor {
     warm_up_columns: u32,
     /// Columns up to here have come without a gap, and in order.
     in_order: u32,
-    /// Surfaces of components of about the plate's size that no later column can reach.
-    closed: BTreeMap<u32, Surface>,
+    /// Components of about the plate's size that no later column can reach, by their roots.
+    closed: BTreeMap<u32, Closed>,
 }
 
 impl Extractor {
@@ -136,31 +129,11 @@ impl Extractor {
         }
     }
 
-    /// Looks at the components that ended so many columns before `newest` that nothing more joins them: most of the
-    /// work on the plate is done before the last column comes, as long as columns come in order.
-    fn look_at_closed(&mut self, newest: u32) {
-        if newest != self.in_order {
-            return;
-        }
-        self.in_order += 1;
-        let Some(last) = newest.checked_sub(MARGIN + 1) else { return };
-        let runs = self.columns.get(last).map_or(0..0, |column| column.runs.clone());
-        let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
-        for root in roots {
-            let extent = self.regions.extent(root);
-            let large = extent.area_mm2 >= self.plate_mm2(CLOSED_PART);
-            if extent.columns.1 == last && large && self.is_near_size(root) {
-                let surface = self.surface(&[root]);
-                self.closed.insert(root, surface);
-            }
-        }
-    }
-
     /// Cells that are held now: those of the columns, as far as the plate may lie in them, and those around the
     /// components that have been looked at already. What a scan needs of memory follows from it.
     #[must_use]
     pub fn cells_held(&self) -> usize {
-        self.columns.n_cells() + self.closed.values().map(|s| s.window.cells.len()).sum::<usize>()
+        self.columns.n_cells() + self.closed.values().map(|c| c.surface.window.cells.len()).sum::<usize>()
     }
 
     /// The plate's face, once all columns have come.
@@ -170,17 +143,33 @@ impl Extractor {
     pub fn finish(mut self) -> Result<Patch, Refusal> {
         self.check()?;
         let (near_size, larger) = self.components();
-        let mut surfaces = self.surfaces(&near_size);
+        let mut closed = std::mem::take(&mut self.closed);
+        let mut known = BTreeMap::new();
+        let mut surfaces = Vec::new();
+        for root in near_size {
+            surfaces.push(match closed.remove(&root) {
+                Some(Closed { surface, plate }) => {
+                    known.extend(plate.map(|(label, patch)| ((surface.root, label), patch)));
+                    surface
+                }
+                None => self.surface(&[root]),
+            });
+        }
         let mut pieces = self.pieces(&surfaces, 0);
         let mut candidates = choose::candidates(&pieces);
         if !candidates.iter().any(|c| c.fits(&self.spec)) {
-            let more = self.surfaces(&larger);
+            let more: Vec<Surface> = larger.iter().map(|root| self.surface(&[*root])).collect();
             pieces.extend(self.pieces(&more, surfaces.len()));
             surfaces.extend(more);
             candidates = choose::candidates(&pieces);
         }
         let chosen = choose::choose(&candidates, &self.spec)?;
         let chosen: Vec<&Piece> = chosen.pieces.iter().map(|&i| &pieces[i]).collect();
+        if let [piece] = chosen.as_slice()
+            && let Some(patch) = known.remove(&(surfaces[piece.surface].root, piece.label))
+        {
+            return patch;
+        }
         let joined;
         let surface = match self.roots(&surfaces, &chosen).as_slice() {
             [_] => &surfaces[chosen[0].surface],
@@ -249,52 +238,6 @@ impl Extractor {
             |row| a.range(row),
             |row| b.range(row),
         );
-    }
-
-    /// True when a component may hold a piece of the plate.
-    fn may_be_plate(&self, extent: Extent) -> bool {
-        (self.plate_mm2(LEAST_PART)..=self.plate_mm2(OUTGROWN)).contains(&extent.area_mm2)
-    }
-
-    /// True when a component holds little besides the plate.
-    fn is_near_size(&mut self, root: u32) -> bool {
-        let extent = self.regions.extent(root);
-        if extent.area_mm2 > self.plate_mm2(NEAR_SIZE.0) {
-            return false;
-        }
-        let mut spread = Spread::default();
-        for index in extent.columns.0..=extent.columns.1 {
-            let Some(column) = self.columns.get(index) else { continue };
-            let azimuth = self.header.azimuth_start + self.header.azimuth_step * f64::from(index);
-            let (sin_az, cos_az) = azimuth.sin_cos();
-            for run in self.regions.runs_of(&[root], column.runs.clone()) {
-                for row in [run.first_row, run.end_row - 1] {
-                    let (sin_el, cos_el) = self.elevation[row as usize];
-                    let range = f64::from(column.range(row));
-                    spread.add([cos_el * cos_az, cos_el * sin_az, sin_el].map(|c| c * range));
-                }
-            }
-        }
-        spread.width() <= NEAR_SIZE.1 * self.spec.width.hypot(self.spec.height)
-    }
-
-    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
-    fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
-        let mut roots = Vec::new();
-        for index in 0..self.columns.len() {
-            let runs = self.columns.get(index).map_or(0..0, |column| column.runs.clone());
-            for number in runs {
-                let root = self.regions.root(number);
-                if self.may_be_plate(self.regions.extent(root)) && !roots.contains(&root) {
-                    roots.push(root);
-                }
-            }
-        }
-        roots.into_iter().partition(|root| self.is_near_size(*root))
-    }
-
-    fn surfaces(&mut self, roots: &[u32]) -> Vec<Surface> {
-        roots.iter().map(|root| self.closed.remove(root).unwrap_or_else(|| self.surface(&[*root]))).collect()
     }
 
     fn surface(&mut self, roots: &[u32]) -> Surface {
