@@ -425,3 +425,38 @@ fn every_transition_is_taken() {
     let never: Vec<_> = all.into_iter().filter(|transition| !taken.contains(transition)).collect();
     assert!(never.is_empty(), "never taken: {never:?}");
 }
+
+/// The link breaks while a result waits for its acknowledge. The press takes it and makes the next stroke; its
+/// acknowledge still stands when the link is back, and belongs to the result before.
+#[test]
+fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
+    let mut bench = Bench::new(config());
+    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+    bench.calm_cycle(1);
+    let press =
+        |stroke_id, trigger, ack| Event::Press(Box::new(PressImage { stroke_id, trigger, ack, ..calm() }));
+    let finish = |bench: &mut Bench| {
+        for _ in 0..2 {
+            while !bench.records.is_empty() {
+                bench.journal(true);
+            }
+            bench.acquire();
+            bench.judge();
+        }
+        bench.step(Event::Written);
+    };
+    bench.step(press(2, true, false));
+    finish(&mut bench);
+    assert!(bench.machine.image().valid);
+    bench.step(Event::Disconnected);
+    bench.step(Event::Connected);
+    bench.step(press(3, true, true));
+    bench.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
+    finish(&mut bench);
+    assert_eq!((bench.machine.image().ack_stroke_id, bench.machine.image().valid), (3, true));
+    bench.step(press(3, false, true));
+    assert!(bench.machine.image().valid, "the acknowledge of stroke 2 withdrew the result of stroke 3");
+    bench.step(press(3, false, false));
+    bench.step(press(3, false, true));
+    assert!(!bench.machine.image().valid, "its own acknowledge");
+}

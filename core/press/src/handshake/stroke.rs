@@ -50,6 +50,8 @@ impl Handshake {
         };
         self.run_id = self.run_id.wrapping_add(1);
         self.last = Some(key);
+        // An acknowledge that stands now is that of an earlier result.
+        self.ack_was_low = !press.ack;
         self.asked = press.attempt;
         self.counted = Some((key.session, key.stroke));
         let data = Box::new(press.data.clone());

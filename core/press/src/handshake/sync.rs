@@ -138,7 +138,6 @@ impl Handshake {
         if self.work == Work::WaitAck {
             self.work = Work::Publish;
         }
-        self.ack_was_low |= concluded;
         Transition::T5
     }
 
