@@ -176,7 +176,7 @@ mod tests {
             plate: "CAL".into(),
             scans: 5,
             sigma_correlated: 0.0375e-3,
-            sigma_true: Some(0.12e-3),
+            sigma_true: Some(0.125e-3),
         }
     }
 
