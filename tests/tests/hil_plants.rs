@@ -4,6 +4,8 @@
 
 mod rig;
 
+use std::future::{Ready, ready};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use platen_plant::PlantFile;
@@ -11,8 +13,10 @@ use platen_plant::press::{Link, Mode, Press, Role, Serial, Transport};
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
 use rig::{Host, Memory, assert_clean, done, quick};
+use tokio::net::TcpListener;
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::*;
+use tokio_modbus::server::tcp::{Server, accept_tcp_connection};
 
 const SCAN: Duration = Duration::from_millis(5);
 const STROKES: u32 = 6;
@@ -95,4 +99,126 @@ async fn the_press_that_asks() {
     socket.peers = vec![[127, 0, 0, 1].into()];
     tokio::spawn(client_blocks(sim.modbus().unwrap().port(), socket.port));
     run(press, sim).await;
+}
+
+/// A controller with bits only: the program of `platen press map config/plant-bits.toml`, cycle by cycle.
+#[derive(Debug, Default)]
+struct BitPress {
+    /// 40201, the press's register.
+    p: u16,
+    /// 40301 and on, the host's.
+    h: [u16; 3],
+    to_do: u32,
+    waiting: bool,
+    accepted: bool,
+    /// Figures of the results taken, with pass and fail.
+    results: Vec<(u16, i16, bool, bool)>,
+    writes_outside: usize,
+}
+
+impl BitPress {
+    fn cycle(&mut self) {
+        let [ready, busy, valid, pass, fail] = [0, 1, 2, 3, 4].map(|bit| self.h[0] >> bit & 1 == 1);
+        let ack = self.p & 2 != 0;
+        let stroke_done = self.to_do > 0 && ready && !ack;
+        if stroke_done && !self.waiting {
+            self.waiting = true;
+            self.to_do -= 1;
+        }
+        self.accepted = self.waiting && (self.accepted || busy);
+        let valid_now = self.accepted && valid && !busy;
+        if self.waiting && valid_now {
+            self.results.push((self.h[1], self.h[2].cast_signed(), pass, fail));
+            self.waiting = false;
+            self.p |= 2;
+        }
+        if self.p & 2 != 0 && !valid {
+            self.p &= !2;
+        }
+        self.p = self.p & !1 | u16::from(self.waiting);
+        self.accepted &= self.waiting;
+    }
+
+    fn read(&self, address: u16, count: u16) -> Option<Vec<u16>> {
+        let word = |at: u16| match at {
+            200 => Some(self.p),
+            300..=302 => Some(self.h[usize::from(at - 300)]),
+            _ => None,
+        };
+        (address..address.checked_add(count)?).map(word).collect()
+    }
+
+    fn write(&mut self, address: u16, words: &[u16]) -> Option<()> {
+        let start = usize::from(address.wrapping_sub(300));
+        let Some(place) = self.h.get_mut(start..start.saturating_add(words.len())) else {
+            self.writes_outside += 1;
+            return None;
+        };
+        place.copy_from_slice(words);
+        Some(())
+    }
+}
+
+#[derive(Clone)]
+struct Served(Arc<Mutex<BitPress>>);
+
+impl tokio_modbus::server::Service for Served {
+    type Request = Request<'static>;
+    type Response = Response;
+    type Exception = ExceptionCode;
+    type Future = Ready<Result<Response, ExceptionCode>>;
+
+    fn call(&self, request: Request<'static>) -> Self::Future {
+        let mut press = self.0.lock().unwrap();
+        ready(match request {
+            Request::ReadHoldingRegisters(address, count) => press
+                .read(address, count)
+                .map(Response::ReadHoldingRegisters)
+                .ok_or(ExceptionCode::IllegalDataAddress),
+            Request::WriteMultipleRegisters(address, words) => press
+                .write(address, &words)
+                .map(|()| Response::WriteMultipleRegisters(address, words.len() as u16))
+                .ok_or(ExceptionCode::IllegalDataAddress),
+            _ => Err(ExceptionCode::IllegalFunction),
+        })
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_press_with_bits_only() {
+    let mut press = example("plant-bits.toml");
+    let bits = Arc::new(Mutex::new(BitPress { to_do: STROKES, ..BitPress::default() }));
+    let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
+    press.link = Link::tcp("127.0.0.1", listener.local_addr().unwrap().port(), press.link.unit);
+    let served = Served(Arc::clone(&bits));
+    tokio::spawn(async move {
+        let on_connected = |stream, address| {
+            let served = served.clone();
+            async move { accept_tcp_connection(stream, address, |_| Ok(Some(served.clone()))) }
+        };
+        Server::new(listener).serve(&on_connected, |_| {}).await
+    });
+    let program = Arc::clone(&bits);
+    tokio::spawn(async move {
+        let mut cycle = tokio::time::interval(Duration::from_millis(5));
+        loop {
+            cycle.tick().await;
+            program.lock().unwrap().cycle();
+        }
+    });
+    // The scanner looks at a plate that is never bent.
+    let cell = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
+    // Long enough for the press to see busy: it has nothing else to know its stroke by.
+    let host = Host::start(press, Memory::new(7), cell.control(), Duration::from_millis(200));
+    let all = async {
+        while bits.lock().unwrap().results.len() < STROKES as usize {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    tokio::time::timeout(rig::LIMIT, all).await.unwrap();
+    let scans = host.heard.scans.lock().unwrap().len();
+    host.stop().await;
+    let bits = bits.lock().unwrap();
+    assert_eq!(bits.results, vec![(1000, -1, false, true); STROKES as usize], "gap, sense, pass, fail");
+    assert_eq!((scans, bits.writes_outside, bits.h[0]), (STROKES as usize, 0, 0));
 }

@@ -31,7 +31,7 @@ pub fn plant_schema<'a>(
     };
     let rules: Vec<Json> = plugins.into_iter().map(rule).collect();
     if !rules.is_empty() {
-        schema["$defs"]["plugin"]["allOf"] = Json::Array(rules);
+        schema["$defs"]["options_of_plugin"]["allOf"] = Json::Array(rules);
     }
     Ok(schema)
 }

@@ -127,7 +127,7 @@ fn the_plant_schema_has_the_keys_that_the_reader_allows() {
     let plugin = &schema["$defs"]["plugin"];
     let tables = [
         ("plant", "plant", &properties["plant"]),
-        ("scanner", "scanner", plugin),
+        ("scanner", "scanner", &properties["scanner"]),
         ("frame", "frame", frame),
         ("frame.press_from_scanner", "frame.press_from_scanner", &frame["properties"]["press_from_scanner"]),
         ("frame.region_of_interest", "frame.region_of_interest", &frame["properties"]["region_of_interest"]),
@@ -200,7 +200,7 @@ fn the_options_of_installed_plugins_are_part_of_the_plant_schema() {
     });
     assert_eq!(options_schema(&declared), options);
     let schema = plant_schema([("faro-stream", declared.as_slice()), ("harmonic", &[])]).unwrap();
-    let rules = &schema["$defs"]["plugin"]["allOf"];
+    let rules = &schema["$defs"]["options_of_plugin"]["allOf"];
     assert_eq!(
         rules[0],
         json!({

@@ -46,6 +46,11 @@ impl EdgeCounter {
         image.stroke_id = self.stroke;
     }
 
+    /// Whether the trigger is known to be low: only then can the next stroke be seen to begin.
+    pub(super) fn armed(&self) -> bool {
+        self.level == Some(false)
+    }
+
     fn count(&mut self) {
         if self.stroke == u16::MAX {
             self.session = self.session.checked_add(1).unwrap_or(1);
@@ -71,9 +76,13 @@ mod tests {
     fn a_stroke_is_a_settled_rising_trigger() {
         let mut counter = EdgeCounter::new(2, &Recalled::empty(1));
         let seen = strokes(&mut counter, &[0, 0, 1, 0, 1, 1, 0, 1, 1, 0, 0, 1, 1]);
-        let strokes: Vec<u16> = seen.iter().map(|&(_, stroke)| stroke).collect();
-        assert_eq!(strokes, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 2]);
+        let numbers: Vec<u16> = seen.iter().map(|&(_, stroke)| stroke).collect();
+        assert_eq!(numbers, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 2]);
         assert!(seen[6].0, "one low reading is a bounce");
+        strokes(&mut counter, &[0]);
+        assert!(!counter.armed(), "a stroke that came now would be taken for a bounce");
+        strokes(&mut counter, &[0]);
+        assert!(counter.armed());
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use platen_plant::press::{Measure, OnMissed};
 
+use super::edges::EdgeCounter;
 use super::machine::{Handshake, Job};
 use super::{LinkState, Work};
 use crate::{Code, Figures, HostImage, Publication, Severity, Verdict};
@@ -64,7 +65,7 @@ impl Handshake {
         let standing = self.work == Work::Publish || self.unacked.is_some() && self.work != Work::Clear;
         let stroke = self.stroke().or(self.last);
         HostImage {
-            ready: online && !busy && !self.blocked() && !self.held(),
+            ready: online && !busy && !self.blocked() && !self.held() && self.sees_the_next_stroke(),
             busy: busy && !stopped,
             valid: result.is_some() && standing && !stopped,
             scan_done: self.job.as_ref().is_some_and(|job| job.acquired_at.is_some()) && !stopped,
@@ -83,6 +84,12 @@ impl Handshake {
             owner: self.owner,
             host_state: self.state().number(),
         }
+    }
+
+    /// Without a stroke counter READY waits until the trigger has settled low: a press that raises it at once again,
+    /// between two readings, would bend a plate that nobody measures.
+    fn sees_the_next_stroke(&self) -> bool {
+        self.edges.as_ref().is_none_or(EdgeCounter::armed)
     }
 
     /// The result that may stand in the registers: the last one, once it is journalled.
