@@ -5,16 +5,18 @@
 mod rig;
 
 use std::future::{Ready, ready};
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use platen_plant::PlantFile;
 use platen_plant::press::{Link, Mode, Press, Role, Serial, Transport};
+use platen_press::PressLink;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
 use rig::{Host, Memory, assert_clean, done, quick};
 use tokio::net::TcpListener;
-use tokio_modbus::client::{Context, tcp};
+use tokio_modbus::client::tcp;
 use tokio_modbus::prelude::*;
 use tokio_modbus::server::tcp::{Server, accept_tcp_connection};
 
@@ -31,6 +33,10 @@ fn example(name: &str) -> Press {
 /// Runs an example on a simulated press that has its number; everything is judged there.
 async fn run(press: Press, sim: SimPress) {
     let host = Host::start(press, Memory::new(7), sim.control(), SCAN);
+    judge(host, sim).await;
+}
+
+async fn judge(host: Host, sim: SimPress) {
     let tally = done(&sim, &host).await;
     assert_clean(&tally);
     assert_eq!((tally.taken.len(), tally.plates_served), (STROKES as usize, u64::from(STROKES)));
@@ -62,22 +68,9 @@ async fn the_press_on_a_serial_line() {
     run(press, sim).await;
 }
 
-/// A port that nobody listens on.
-fn free_port() -> u16 {
-    std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port()
-}
-
-async fn ask(port: u16) -> Context {
-    loop {
-        if let Ok(context) = tcp::connect_slave(([127, 0, 0, 1], port).into(), Slave(1)).await {
-            return context;
-        }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
-}
-
 /// The client blocks of a press: carries its block to the host and the host's block back, until one of them is gone.
-async fn client_blocks(press: u16, host: u16) {
+async fn client_blocks(press: SocketAddr, host: SocketAddr) {
+    let ask = async |at| tcp::connect_slave(at, Slave(1)).await.unwrap();
     let (mut press, mut host) = (ask(press).await, ask(host).await);
     press.read_holding_registers(100, 64).await.unwrap().unwrap();
     loop {
@@ -95,10 +88,13 @@ async fn the_press_that_asks() {
     let config = Config { strokes: STROKES, press_id: press.press_id, ..quick() };
     let sim = SimPress::start(config).await.unwrap();
     let Transport::Tcp(socket) = &mut press.link.transport else { unreachable!("plant-server.toml is TCP") };
-    (socket.host, socket.port) = ("127.0.0.1".into(), free_port());
+    (socket.host, socket.port) = ("127.0.0.1".into(), 0);
     socket.peers = vec![[127, 0, 0, 1].into()];
-    tokio::spawn(client_blocks(sim.modbus().unwrap().port(), socket.port));
-    run(press, sim).await;
+    let mut link = PressLink::new(&press);
+    let PressLink::Served(served) = &mut link else { unreachable!("it is the press that asks") };
+    tokio::spawn(client_blocks(sim.modbus().unwrap(), served.listen().await.unwrap()));
+    let host = Host::on(press, link, Memory::new(7), sim.control(), SCAN);
+    judge(host, sim).await;
 }
 
 /// A controller with bits only: the program of `platen press map config/plant-bits.toml`, cycle by cycle.
@@ -209,13 +205,11 @@ async fn the_press_with_bits_only() {
     // The scanner looks at a plate that is never bent.
     let cell = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
     // Long enough for the press to see busy: it has nothing else to know its stroke by.
-    let host = Host::start(press, Memory::new(7), cell.control(), Duration::from_millis(200));
-    let all = async {
-        while bits.lock().unwrap().results.len() < STROKES as usize {
-            tokio::time::sleep(Duration::from_millis(5)).await;
-        }
-    };
-    tokio::time::timeout(rig::LIMIT, all).await.unwrap();
+    let mut host = Host::start(press, Memory::new(7), cell.control(), Duration::from_millis(200));
+    host.until("every result acknowledged", |status| {
+        status.metrics.result_to_ack.count == u64::from(STROKES)
+    })
+    .await;
     let scans = host.heard.scans.lock().unwrap().len();
     host.stop().await;
     let bits = bits.lock().unwrap();

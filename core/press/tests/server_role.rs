@@ -4,6 +4,7 @@
 
 mod bench;
 
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -14,29 +15,19 @@ use platen_press::{Answer, PressLink, StrokeKey, channels, run_press};
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::*;
 
-/// A port that nobody listens on.
-fn free_port() -> u16 {
-    std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port()
-}
-
-async fn ask(port: u16) -> Context {
-    loop {
-        if let Ok(context) = tcp::connect_slave(([127, 0, 0, 1], port).into(), Slave(1)).await {
-            return context;
-        }
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+async fn ask(host: SocketAddr) -> Context {
+    tcp::connect_slave(host, Slave(1)).await.unwrap()
 }
 
 /// The client blocks of a press: writes its own block and reads the host's, every 10 ms.
-async fn exchange(plc: SharedPlc, port: u16) {
-    let mut context = ask(port).await;
+async fn exchange(plc: SharedPlc, host_at: SocketAddr) {
+    let mut context = ask(host_at).await;
     loop {
         let own = plc.lock().unwrap().regs[P..P + 32].to_vec();
         let written = context.write_multiple_registers(P as u16, &own).await;
         let read = context.read_holding_registers(H as u16, 64).await;
         let (Ok(Ok(())), Ok(Ok(words))) = (written, read) else {
-            context = ask(port).await;
+            context = ask(host_at).await;
             continue;
         };
         plc.lock().unwrap().regs[H..H + 64].copy_from_slice(&words);
@@ -47,10 +38,11 @@ async fn exchange(plc: SharedPlc, port: u16) {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn thirty_strokes_of_a_press_that_asks() {
     let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, 0)));
-    let port = free_port();
-    let mut press = Press::pph1("Press 3", 3, Link::tcp("127.0.0.1", port, 1));
+    let mut press = Press::pph1("Press 3", 3, Link::tcp("127.0.0.1", 0, 1));
     press.role = Role::Server;
-    let link = PressLink::new(&press);
+    let mut link = PressLink::new(&press);
+    let PressLink::Served(served) = &mut link else { unreachable!("it is the press that asks") };
+    let host_at = served.listen().await.unwrap();
     let (host, side) = channels();
     let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
     let ms = Duration::from_millis;
@@ -59,12 +51,12 @@ async fn thirty_strokes_of_a_press_that_asks() {
     tokio::spawn(scanner);
     let run = tokio::spawn(run_press(press, link, Memory::new(7), side));
     tokio::spawn(bench::run_plc(plc.clone()));
-    tokio::spawn(exchange(plc.clone(), port));
+    tokio::spawn(exchange(plc.clone(), host_at));
     plc.lock().unwrap().to_do = 30;
     bench::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
 
     // What is not its own the press may not write, and other functions and units it may not use.
-    let mut stranger = ask(port).await;
+    let mut stranger = ask(host_at).await;
     let refused = stranger.write_multiple_registers(110, &[1, 2]).await.unwrap();
     assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress));
     let refused = stranger.read_coils(0, 1).await.unwrap();

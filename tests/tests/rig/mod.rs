@@ -120,8 +120,19 @@ pub(crate) struct Host {
 impl Host {
     /// Starts on `press` with a scan of `scan`; the plate is asked for at `cell`.
     pub(crate) fn start(press: Press, journal: Memory, cell: SocketAddr, scan: Duration) -> Self {
-        let (host, side) = channels();
         let link = PressLink::new(&press);
+        Self::on(press, link, journal, cell, scan)
+    }
+
+    /// Starts on a link that is there already.
+    pub(crate) fn on(
+        press: Press,
+        link: PressLink,
+        journal: Memory,
+        cell: SocketAddr,
+        scan: Duration,
+    ) -> Self {
+        let (host, side) = channels();
         let run = tokio::spawn(async move { run_press(press, link, journal, side).await.unwrap() });
         let heard = Heard::default();
         let answers = host.answers;

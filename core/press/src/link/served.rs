@@ -35,7 +35,14 @@ pub struct ServedLink {
     socket: Socket,
     unit: u8,
     registers: Arc<Registers>,
-    server: Option<AbortHandle>,
+    server: Option<Listening>,
+}
+
+/// The server, and where it is reached.
+#[derive(Debug)]
+struct Listening {
+    address: SocketAddr,
+    task: AbortHandle,
 }
 
 /// Both blocks, as the press sees them.
@@ -63,12 +70,28 @@ impl ServedLink {
         let registers = Arc::new(Registers { press: read, host: write, words });
         Self { socket: socket.clone(), unit: press.link.unit, registers, server: None }
     }
+
+    /// Listens from now on, and says where: with port 0 the system chooses. Later calls find it listening.
+    ///
+    /// # Errors
+    /// When the address is not this computer's, or the port is taken.
+    pub async fn listen(&mut self) -> Result<SocketAddr, TransportError> {
+        if let Some(server) = self.server.as_ref().filter(|server| !server.task.is_finished()) {
+            return Ok(server.address);
+        }
+        let listener = TcpListener::bind((self.socket.host.as_str(), self.socket.port)).await?;
+        let address = listener.local_addr()?;
+        let (registers, peers) = (Arc::clone(&self.registers), self.socket.peers.clone());
+        let task = tokio::spawn(serve(listener, registers, self.unit, peers)).abort_handle();
+        self.server = Some(Listening { address, task });
+        Ok(address)
+    }
 }
 
 impl Drop for ServedLink {
     fn drop(&mut self) {
         if let Some(server) = &self.server {
-            server.abort();
+            server.task.abort();
         }
     }
 }
@@ -80,11 +103,7 @@ impl Link for ServedLink {
 
     /// Listens, then waits for the press to write its block.
     async fn connect(&mut self) -> Result<(), TransportError> {
-        if self.server.as_ref().is_none_or(AbortHandle::is_finished) {
-            let listener = TcpListener::bind((self.socket.host.as_str(), self.socket.port)).await?;
-            let (registers, peers) = (Arc::clone(&self.registers), self.socket.peers.clone());
-            self.server = Some(tokio::spawn(serve(listener, registers, self.unit, peers)).abort_handle());
-        }
+        self.listen().await?;
         while !self.registers.press_is_there() {
             sleep(LOOK).await;
         }
