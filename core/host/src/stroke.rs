@@ -5,16 +5,21 @@
 //! ```
 //! Each arrow is one function here, with one type on each side. Nothing travels back.
 
+mod last;
+mod tape;
+
+pub use last::Last;
+pub use tape::Tape;
+
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use nalgebra::Rotation3;
-use platen_scan::{Column, ColumnError, ScanEnd, ScanHeader, Window};
+use platen_scan::{ColumnError, ScanHeader, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, Measurement, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
 use platen_shape::task::{Task, Verdict};
-use platen_shape::{Patch, PlateSpec, Surface, Turned, Vec3, turned};
+use platen_shape::{Patch, PlateSpec, Turned, turned};
 
 use crate::plugin::{JobSpec, PluginError, Report, ScanEvent, Scanner, Surfaces};
 use crate::rig::Rig;
@@ -73,43 +78,6 @@ pub struct Scanned {
     pub extract: Duration,
 }
 
-/// A whole scan as it came, for the archive.
-#[derive(Debug, Default)]
-pub struct Tape {
-    header: Option<ScanHeader>,
-    columns: Vec<Column>,
-    cells: usize,
-    end: Option<ScanEnd>,
-}
-
-/// Most cells that are held (29 bytes each): a full dome of the finest step that anyone measures plates with.
-const TAPE_CELLS: usize = 50_000_000;
-
-impl Tape {
-    fn push(&mut self, column: Column) {
-        self.cells += column.len();
-        if self.cells > TAPE_CELLS {
-            self.columns = Vec::new();
-        } else {
-            self.columns.push(column);
-        }
-    }
-
-    /// The scan.
-    ///
-    /// # Errors
-    /// Why it is not whole.
-    pub fn finish(self) -> Result<(ScanHeader, Vec<Column>, ScanEnd), String> {
-        match (self.header, self.end) {
-            _ if self.cells > TAPE_CELLS => {
-                Err(format!("{} cells are too many to hold; measure a window", self.cells))
-            }
-            (Some(header), Some(end)) => Ok((header, self.columns, end)),
-            _ => Err("it has no end".to_owned()),
-        }
-    }
-}
-
 /// Scans; the plate is extracted while columns arrive. All that came goes to the tape, when there is one.
 ///
 /// # Errors
@@ -127,7 +95,7 @@ pub fn scan(
     let mut take = |event| match (event, &mut extractor) {
         (ScanEvent::Begin(header), _) => {
             if let Some(tape) = tape.as_deref_mut() {
-                tape.header = Some(header.clone());
+                tape.begin(header.clone());
             }
             extractor = Some((header.clone(), Extractor::new(&header, spec)));
             Ok(())
@@ -153,7 +121,7 @@ pub fn scan(
     }
     let end = end?;
     if let Some(tape) = tape {
-        tape.end = Some(end);
+        tape.end(end);
     }
     let (header, mut extractor) = extractor.ok_or(NotMeasured::NoHeader)?;
     let acquired = Instant::now();
@@ -178,24 +146,6 @@ pub struct Measured {
     pub measurement: Measurement,
     /// From patch to outline.
     pub outline_time: Duration,
-}
-
-/// The plate at its last scan, from which (0, 0) goes on.
-#[derive(Debug, Clone, Copy)]
-pub struct Last<'a> {
-    /// Its shape and place then.
-    pub surface: &'a Surface,
-    /// How far the press says that it turned the plate since, radians.
-    pub fed_by: Option<f64>,
-}
-
-impl Last<'_> {
-    /// Direction of growing u now, scanner frame: as it was, turned by what the press says about its own z.
-    fn u_axis(&self, press_z: Vec3) -> Vec3 {
-        let (width, middle) = (self.surface.width(), 0.5 * self.surface.height());
-        let along_u = self.surface.point(width, middle) - self.surface.point(0.0, middle);
-        Rotation3::new(press_z * self.fed_by.unwrap_or(0.0)) * along_u
-    }
 }
 
 /// From the plate's face to its shape. At its first scan the hint of `spec` tells its corners apart, later the way
@@ -241,30 +191,4 @@ pub fn verdict(reports: &[Result<Report, PluginError>]) -> Verdict {
         Err(_) => Some(Verdict::CannotTell),
     });
     given.max().unwrap_or(Verdict::CannotTell)
-}
-
-#[cfg(test)]
-mod tests {
-    use platen_shape::surface::{Axis, Fit, Mask};
-
-    use super::*;
-
-    #[test]
-    fn u_goes_on_from_the_last_scan_and_turns_with_the_press() {
-        // Radians: of a spline's normal equations, which stiffen as points without noise ask for more smoothing.
-        const ROUNDING: f64 = 1e-7;
-        let mut fit = Fit::new(Axis::new(0.0, 2.0, 4), Axis::new(0.0, 1.0, 4));
-        for i in 0..400 {
-            let (u, v) = (0.1 * (f64::from(i % 20) + 0.5), 0.05 * (f64::from(i / 20) + 0.5));
-            fit.add(u, v, [5.0 + u, v, -3.0], 1e6);
-        }
-        let mask = Mask::unseen(2.0, 1.0, 1.0);
-        let surface = Surface::new(fit.solve([0.0, 0.0, 1.0]).unwrap(), 0.04, mask);
-        let u_axis = |fed_by, press_z| Last { surface: &surface, fed_by }.u_axis(press_z).normalize();
-        assert!((u_axis(None, Vec3::z()) - Vec3::x()).norm() < ROUNDING);
-        let quarter = Some(std::f64::consts::FRAC_PI_2);
-        assert!((u_axis(quarter, Vec3::z()) - Vec3::y()).norm() < ROUNDING);
-        // A scanner that hangs upside down sees the press turn the other way.
-        assert!((u_axis(quarter, -Vec3::z()) + Vec3::y()).norm() < ROUNDING);
-    }
 }
