@@ -133,13 +133,8 @@ impl<'a> Page<'a> {
 }
 
 fn chip(verdict: Verdict) -> Markup {
-    let (class, word) = match verdict {
-        Verdict::Pass => ("pass", "PASS"),
-        Verdict::Fail => ("fail", "FAIL"),
-        Verdict::CannotTell => ("cannot_tell", "CANNOT TELL"),
-        Verdict::NotMeasured => ("not_measured", "NOT MEASURED"),
-    };
-    html! { span class={ "verdict " (class) } { (word) } }
+    let words = verdict.words();
+    html! { span class={ "verdict " (words.replace(' ', "_")) } { (words.to_uppercase()) } }
 }
 
 fn part(kept: Option<&KeptPlate>) -> String {

@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use platen_plant::PlantFile;
+use platen_shape::task::Verdict;
 use tokio::sync::{mpsc, watch};
 
 use super::cell::{Cell, Taken};
-use super::run::{runtime, stop_signal, verdict_words};
+use super::run::{runtime, stop_signal};
 use super::{CliError, Common, output};
 use crate::progress;
 use crate::run::{self, StrokeReport, Watcher};
@@ -81,7 +82,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 fn progress(report: &StrokeReport) {
     let what = if report.baseline { "baseline".to_owned() } else { format!("stroke {}", report.key.stroke) };
     let text = match &report.result {
-        Ok(record) => verdict_words(record.verdict).to_owned(),
+        Ok(record) => record.verdict.words().to_owned(),
         Err(why) => why.clone(),
     };
     progress::phase(&format!("{what}: {text}; the press bends"));
@@ -128,7 +129,7 @@ fn summary(
         let record = report.result.as_ref().ok();
         let scan_ms = record.map(|r| r.timings_ms.acquire + r.timings_ms.extract);
         let evaluation_ms = record.map(|r| r.timings_ms.total - r.timings_ms.extract);
-        let verdict = record.map_or("not measured", |r| verdict_words(r.verdict));
+        let verdict = record.map_or(Verdict::NotMeasured, |r| r.verdict).words();
         rows.push(vec![
             if report.baseline { "blank".to_owned() } else { report.key.stroke.to_string() },
             number(seen.map(|t| t.accepted_ms)),
@@ -147,10 +148,8 @@ fn summary(
         }));
         before = gap.or(before);
     }
-    let passed = reports
-        .last()
-        .and_then(|r| r.result.as_ref().ok())
-        .is_some_and(|r| r.verdict == platen_shape::task::Verdict::Pass);
+    let passed =
+        reports.last().and_then(|r| r.result.as_ref().ok()).is_some_and(|r| r.verdict == Verdict::Pass);
     // The commit word and its tail agree, and name the last stroke: result_seq, result_seq_tail, result_stroke_id.
     let correct = registers
         .as_deref()

@@ -8,7 +8,6 @@ use clap::Args;
 use jiff::Timestamp;
 use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_shape::Surface;
-use platen_shape::task::Verdict;
 
 use super::scan_source::{self, READ_LIMIT};
 use super::{CliError, Common, output};
@@ -143,13 +142,7 @@ pub(super) fn measure_file(
 }
 
 fn print(record: &ResultRecord) -> Result<(), CliError> {
-    let verdict = match record.verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::CannotTell => "cannot tell",
-        Verdict::NotMeasured => "not measured",
-    };
-    output::line(&format!("plate {}: {verdict}", record.plate))?;
+    output::line(&format!("plate {}: {}", record.plate, record.verdict.words()))?;
     for sentence in &record.says {
         output::line(&format!("  {sentence}"))?;
     }

@@ -98,19 +98,10 @@ fn print(report: &StrokeReport, json: bool) -> Result<(), CliError> {
     }
     let text = match &report.result {
         Ok(record) => {
-            format!("{}: {}", verdict_words(record.verdict), record.says.first().map_or("", |s| s.as_str()))
+            format!("{}: {}", record.verdict.words(), record.says.first().map_or("", |s| s.as_str()))
         }
-        Err(why) => format!("not measured: {why}"),
+        Err(why) => format!("{}: {why}", Verdict::NotMeasured.words()),
     };
     let what = if report.baseline { "baseline" } else { "stroke" };
     output::line(&format!("{what} {} {text} ({:.1} s)", report.key.stroke, report.elapsed.as_secs_f64()))
-}
-
-pub(super) fn verdict_words(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::CannotTell => "cannot tell",
-        Verdict::NotMeasured => "not measured",
-    }
 }

@@ -64,13 +64,13 @@ pub(super) fn text_on(position: f64) -> RGBColor {
     if position.abs() > 0.45 { PAPER } else { INK }
 }
 
-/// The word and the colour of a verdict; the word alone says all.
-pub(super) fn verdict(verdict: Verdict) -> (&'static str, RGBColor) {
+/// The colour behind a verdict's words; they alone say all.
+pub(super) fn verdict(verdict: Verdict) -> RGBColor {
     match verdict {
-        Verdict::Pass => ("PASS", RGBColor(22, 110, 90)),
-        Verdict::Fail => ("FAIL", RGBColor(165, 60, 10)),
-        Verdict::CannotTell => ("CANNOT TELL", RGBColor(122, 98, 10)),
-        Verdict::NotMeasured => ("NOT MEASURED", RGBColor(90, 94, 100)),
+        Verdict::Pass => RGBColor(22, 110, 90),
+        Verdict::Fail => RGBColor(165, 60, 10),
+        Verdict::CannotTell => RGBColor(122, 98, 10),
+        Verdict::NotMeasured => RGBColor(90, 94, 100),
     }
 }
 

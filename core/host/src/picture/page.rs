@@ -143,12 +143,12 @@ impl Page<'_> {
     pub(super) fn head(&self, caption: &Caption<'_>, what: &str) -> Result<(), PictureError> {
         self.text(&caption.title(), (24.0, 34.0), Text::new(38.0).bold())?;
         self.text(what, (24.0, 78.0), Text::new(24.0))?;
-        let (word, colour) = colour::verdict(caption.verdict);
+        let words = caption.verdict.words().to_uppercase();
         // A capital letter of a bold sans serif is about 0.72 of its height wide.
-        let chip = 0.72 * 34.0 * word.len() as f64 + 40.0;
+        let chip = 0.72 * 34.0 * words.len() as f64 + 40.0;
         let right = self.width - 24.0;
-        self.fill((right - chip, 12.0), (right, 58.0), colour)?;
+        self.fill((right - chip, 12.0), (right, 58.0), colour::verdict(caption.verdict))?;
         let look = Text::new(34.0).bold().centred().coloured(PAPER);
-        self.text(word, (right - chip / 2.0, 35.0), look)
+        self.text(&words, (right - chip / 2.0, 35.0), look)
     }
 }

@@ -1,6 +1,5 @@
 //! The plate under one board: profile and board above, the gap below.
 
-use platen_shape::task::Verdict;
 use plotters::style::RGBColor;
 
 use super::colour::{self, INK, PALE, STEEL, WOOD, WOOD_EDGE};
@@ -200,19 +199,9 @@ impl Sheet<'_> {
     }
 }
 
-/// Whether a board can be judged at all is told by its verdict; used by the strip too.
-pub(super) fn mark(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::CannotTell => "cannot tell",
-        Verdict::NotMeasured => "not measured",
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use platen_shape::task::Seat;
+    use platen_shape::task::{Seat, Verdict};
 
     use super::*;
     use crate::record::PointRecord;

@@ -4,7 +4,6 @@ use platen_shape::task::Verdict;
 
 use super::colour::{self, INK, PALE, PAPER};
 use super::page::{Page, Text, draw};
-use super::section::mark;
 use super::{Caption, PictureError, Yardstick, with_uncertainty};
 
 const SIZE: (u32, u32) = (1200, 560);
@@ -105,7 +104,7 @@ fn draw_point(
     if !newest {
         return Ok(());
     }
-    let words = format!("{} mm, {}", with_uncertainty(gap, point.uncertainty_mm), mark(point.verdict));
+    let words = format!("{} mm, {}", with_uncertainty(gap, point.uncertainty_mm), point.verdict.words());
     // Gaps fall: the upper right corner stays free.
     page.ring((x, y(gap)), 17, INK, 3)?;
     page.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())

@@ -16,6 +16,19 @@ pub enum Verdict {
     NotMeasured,
 }
 
+impl Verdict {
+    /// As it is told to people.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::CannotTell => "cannot tell",
+            Self::Fail => "fail",
+            Self::NotMeasured => "not measured",
+        }
+    }
+}
+
 /// The answer of one comparison.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Findings {
