@@ -6,7 +6,7 @@
 //! on an artefact of known shape only, as gaps under boards that ought to fit.
 
 use crate::target::Placement;
-use crate::{Surface, TargetSurface};
+use crate::{EXPANDED, Surface, TargetSurface};
 
 /// Differences that ought to be zero, with what was stated of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,9 +40,8 @@ pub struct ArtefactGap {
     pub sigma: f64,
 }
 
-/// Share of the gaps that their expanded uncertainty is to cover, and that uncertainty in standard deviations.
+/// Share of the gaps that their expanded uncertainty is to cover.
 const COVERED: f64 = 0.95;
-const EXPANDED: f64 = 1.96;
 
 /// The systematic error, one sigma, with which the expanded uncertainty covers 95 % of the gaps. A scanner's range error
 /// swings: under boards of half a wave it shows twice, under those of a whole one not at all, and gaps scatter far less like normal

@@ -38,5 +38,8 @@ pub use surface::{Surface, SurfaceParts};
 pub use target::{Placement, TargetError, TargetSurface};
 pub use turned::{Turned, turned};
 
+/// Half width of a 95 % interval in standard deviations: every stated uncertainty and level of detection is expanded by it.
+pub const EXPANDED: f64 = 1.96;
+
 /// A point or vector in space, metres, scanner frame unless said.
 pub type Vec3 = nalgebra::Vector3<f64>;

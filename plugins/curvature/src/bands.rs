@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use platen_sdk::PlateGrid;
-use platen_shape::Surface;
 use platen_shape::surface::Curvature;
+use platen_shape::{EXPANDED, Surface};
 
 /// A patch of the plate that bent in one sense.
 #[derive(Debug, Clone)]
@@ -86,7 +86,7 @@ pub(crate) fn measure(
     Band {
         angle: section.angle(from, to),
         sense,
-        uncertainty: crate::EXPANDED * sigma,
+        uncertainty: EXPANDED * sigma,
         centre: [middle(0), middle(1)],
         direction: (x.atan2(-y) + PI).rem_euclid(PI),
         length: section.along[1] - section.along[0],

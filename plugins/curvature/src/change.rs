@@ -1,12 +1,12 @@
 //! What a stroke bent.
 
 use platen_sdk::{NodeState, PlateGrid, Report};
-use platen_shape::Surface;
 use platen_shape::surface::Curvature;
 use platen_shape::task::Figure;
+use platen_shape::{EXPANDED, Surface};
 
 use crate::bands::{self, Band};
-use crate::{EXPANDED, Nodes, Options, figure, place};
+use crate::{Nodes, Options, figure, place};
 
 /// Median of chi squared with three degrees of freedom.
 const MEDIAN: f64 = 2.366;

@@ -1,10 +1,10 @@
 //! What is still to bend.
 
 use platen_sdk::{NodeState, PlateGrid, Report};
-use platen_shape::TargetSurface;
 use platen_shape::task::Figure;
+use platen_shape::{EXPANDED, TargetSurface};
 
-use crate::{EXPANDED, Nodes, figure, place};
+use crate::{Nodes, figure, place};
 
 /// Adds the field, the figures and the sentences of the missing curvature.
 pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {

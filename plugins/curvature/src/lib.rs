@@ -51,7 +51,7 @@ use platen_sdk::{
 };
 use platen_shape::surface::Curvature;
 use platen_shape::task::{Figure, Findings};
-use platen_shape::{Surface, TargetSurface};
+use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 platen_sdk::options! {
     /// Options of `curvature`.
@@ -68,9 +68,6 @@ platen_sdk::options! {
 }
 
 struct Bending(Options);
-
-/// Half width of a 95 % interval in standard deviations.
-const EXPANDED: f64 = 1.96;
 
 impl Comparison for Bending {
     const INFO: Info = Info::new(

@@ -1,13 +1,10 @@
 //! What changed beyond doubt.
 
 use platen_sdk::{NodeState, PlateGrid};
-use platen_shape::Vec3;
+use platen_shape::{EXPANDED, Vec3};
 
 use crate::align::Motion;
 use crate::grid::Nodes;
-
-/// Half width of a 95 % interval in standard deviations.
-const EXPANDED: f64 = 1.96;
 
 /// Displacement at every node.
 #[derive(Debug)]

@@ -209,7 +209,7 @@ fn calibrated(seeds: u64, amplitude: f64, judged: u64) -> [f64; 3] {
     let calibrating = null_pairs(seeds..seeds + judged * 3 / 5, amplitude, 0.0);
     let pooled = |square: fn(&detect::Changes) -> f64| calibrating.iter().map(square).sum::<f64>();
     let shown = pooled(|pair| pair.normal.iter().map(|d| d * d).sum());
-    let stated = pooled(|pair| pair.lod.iter().map(|lod| (lod / 1.96).powi(2)).sum());
+    let stated = pooled(|pair| pair.lod.iter().map(|lod| (lod / platen_shape::EXPANDED).powi(2)).sum());
     let nodes = (calibrating.len() * PlateGrid::NODES) as f64;
     let sigma_correlated = ((shown - stated) / nodes).max(0.0).sqrt();
     let judged = changed_share(&null_pairs(seeds + 1000..seeds + 1000 + judged, amplitude, sigma_correlated));

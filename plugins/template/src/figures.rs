@@ -1,10 +1,10 @@
 //! The named figures, in the words of the press's register map.
 
 use platen_shape::task::{Figure, Quantity, Task};
-use platen_shape::{Surface, TargetSurface};
+use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::deviation::Deviation;
-use crate::judge::{EXPANDED, Judged};
+use crate::judge::Judged;
 
 /// Nodes along each side for the mean curvature: the result's grid.
 const GRID: usize = 21;

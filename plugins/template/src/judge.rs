@@ -1,13 +1,10 @@
 //! What one board says: its gap, the uncertainty, the verdict and the sentence.
 
 use platen_shape::task::{Contact, Seat, Template, TemplateFinding, Verdict};
-use platen_shape::{Surface, TargetSurface};
+use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::seat::{Profile, Rest};
 use crate::section::{Board, Line, Section};
-
-/// Half width of a 95 % interval in standard deviations.
-pub(crate) const EXPANDED: f64 = 1.96;
 
 /// A board whose edge rises less than this over its own chord counts as straight, metres: no template is cut finer.
 const STRAIGHT: f64 = 0.1e-3;
