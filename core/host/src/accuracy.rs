@@ -10,6 +10,8 @@ use serde::Deserialize;
 use platen_shape::measure::Measurement;
 use platen_shape::{Surface, Vec3};
 
+use crate::units::metres;
+
 /// Width of the strip along the edges whose surface is judged apart, metres.
 pub const EDGE_STRIP: f64 = 0.1;
 /// Width of the strip along the edges whose curvature is not judged, metres.
@@ -145,7 +147,7 @@ impl Accuracy {
         let markers: Vec<f64> = truth
             .markers
             .iter()
-            .map(|m| (surface.face(m.u_mm / 1000.0, m.v_mm / 1000.0) - Vec3::from(m.position_m)).norm())
+            .map(|m| (surface.face(metres(m.u_mm), metres(m.v_mm)) - Vec3::from(m.position_m)).norm())
             .collect();
         let (inside, edge) = heights(surface, &truth.face);
         let cells = Cells::of(surface, &truth.grid);

@@ -8,7 +8,7 @@ use platen_plant::plant::CalibrationUse;
 use platen_plant::{Document, Error as PlantError, Reported, Table};
 use serde::Serialize;
 
-use crate::record::mm;
+use crate::units::{metres, mm};
 
 /// Standard deviations above this are no scanner's: a plate was bent, or the scanner moved. Millimetres.
 const LARGEST_SIGMA_MM: f64 = 20.0;
@@ -94,10 +94,10 @@ impl Calibration {
         let instrument = table.string("instrument").required();
         let plate = table.name("plate").required();
         let scans = table.integer("scans").at_least(1).required();
-        let sigma = |mm: f64| mm / 1000.0;
         let correlated =
-            table.number("sigma_correlated_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(sigma).required();
-        let systematic = table.number("sigma_true_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(sigma).optional();
+            table.number("sigma_correlated_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(metres).required();
+        let systematic =
+            table.number("sigma_true_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(metres).optional();
         table.finish();
         Ok(Self {
             made: made?,

@@ -16,3 +16,4 @@ pub mod scan_file;
 pub mod sequence;
 pub mod stroke;
 pub mod table;
+mod units;

@@ -8,6 +8,7 @@ use platen_shape::task::Verdict;
 
 use crate::picture::StripPoint;
 use crate::record::{ResultRecord, TemplateRecord};
+use crate::units::mm;
 
 /// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
 ///
@@ -37,8 +38,8 @@ pub fn of_stroke(stroke: &Stroke) -> StripPoint {
     let figure = |name: &str| stroke.figures.get(name).copied();
     StripPoint {
         label: label(stroke),
-        gap_mm: figure("gap.max").map(|metres| metres * 1000.0),
-        uncertainty_mm: figure("gap.uncertainty").map(|metres| metres * 1000.0),
+        gap_mm: figure("gap.max").map(mm),
+        uncertainty_mm: figure("gap.uncertainty").map(mm),
         sense: figure("sense").map_or(0, |sense| sense.clamp(-1.0, 1.0).round() as i8),
         verdict: verdict(stroke),
     }

@@ -19,16 +19,14 @@ use serde_json::{Map, Value as Json, json};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
 use platen_shape::task::{Figure, Task, Verdict};
-use platen_shape::{ShapeChecks, Vec3};
+use platen_shape::{EXPANDED, ShapeChecks, Vec3};
 
 use crate::plugin::{PluginError, Report};
 use crate::stroke::{Measured, Scanned};
+use crate::units::{mm, mm_pair, readable};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.result/1";
-
-/// Half width of a 95 % interval in standard deviations.
-const EXPANDED: f64 = 1.96;
 
 /// One measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -241,15 +239,6 @@ impl ResultRecord {
     }
 }
 
-/// Metres to millimetres: the only place where a length becomes one that people read.
-pub(crate) fn mm(metres: f64) -> f64 {
-    metres * 1000.0
-}
-
-pub(crate) fn mm_pair(place: [f64; 2]) -> [f64; 2] {
-    place.map(mm)
-}
-
 fn sentences(reports: &[Result<Report, PluginError>]) -> Vec<String> {
     let mut says = Vec::new();
     for report in reports {
@@ -312,12 +301,7 @@ fn comparison(report: &Result<Report, PluginError>) -> Json {
 
 /// A figure in the units that people read.
 pub(crate) fn figure(figure: &Figure) -> Json {
-    let (suffix, factor) = match figure.unit.as_str() {
-        "m" => ("_mm", 1000.0),
-        "rad" => ("_deg", 1.0_f64.to_degrees()),
-        "1/m" => ("_per_m", 1.0),
-        _ => ("", 1.0),
-    };
+    let (suffix, factor) = readable(&figure.unit);
     let mut record = Map::new();
     record.insert("name".into(), json!(figure.name));
     record.insert(format!("value{suffix}"), json!(figure.value * factor));

@@ -30,6 +30,7 @@ use crate::past;
 use crate::picture::Yardstick;
 use crate::plugin::{Catalogue, Comparison, PluginError, Surfaces, surface_from_bytes};
 use crate::rig::{self, RigError};
+use crate::units::{mm, mm_pair};
 
 /// Why there is no sequence.
 #[derive(Debug, thiserror::Error)]
@@ -207,7 +208,7 @@ impl SequenceStroke {
             verdict: point.verdict,
             die_set: told.die_id.filter(|die| *die != 0),
             force_kn: told.force.filter(|force| *force != 0.0).map(|newtons| newtons / 1e3),
-            ram_depth_mm: told.ram_depth.filter(|depth| *depth != 0.0).map(|metres| metres * 1e3),
+            ram_depth_mm: told.ram_depth.filter(|depth| *depth != 0.0).map(mm),
             gap_mm: point.gap_mm,
             gap_uncertainty_mm: point.uncertainty_mm,
             overshoot_mm: point.gap_mm.map(|gap| if point.sense > 0 { gap.abs() } else { 0.0 }),
@@ -243,12 +244,12 @@ fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Ve
         };
         let Some([u, v]) = angle.at else { break };
         let mut bend = Bend {
-            at_mm: [u * 1e3, v * 1e3],
+            at_mm: mm_pair([u, v]),
             angle_deg: angle.value.to_degrees(),
             uncertainty_deg: angle.uncertainty.map(f64::to_degrees),
             direction_deg: direction.value.to_degrees(),
-            length_mm: length.value * 1e3,
-            width_mm: width.value * 1e3,
+            length_mm: mm(length.value),
+            width_mm: mm(width.value),
             feed_mm: None,
             rehit_of: None,
             bent_back: bent_back(file, [u, v], direction.value, angle.value),

@@ -12,6 +12,7 @@ use ply_rs_bw::writer::Writer;
 use platen_shape::Surface;
 
 use crate::plugin::{Field, NodeState, Report};
+use crate::units::{mm, mm_pair, readable};
 
 /// Nodes along u and v: those at which our comparisons give their fields.
 const NODES: [usize; 2] = [101, 101];
@@ -65,9 +66,9 @@ impl PlateTable {
         }
         text.push('\n');
         for (k, Node { uv: [u, v], face: [x, y, z], seen }) in self.nodes.iter().enumerate() {
-            let seen = u8::from(*seen);
+            let (seen, [u, v]) = (u8::from(*seen), mm_pair([*u, *v]));
             // Writing to a string does not fail.
-            let _ = write!(text, "{:.3},{:.3},{x:.6},{y:.6},{z:.6},{seen}", u * 1e3, v * 1e3);
+            let _ = write!(text, "{:.3},{:.3},{x:.6},{y:.6},{z:.6},{seen}", u, v);
             for column in &self.columns {
                 text.push(',');
                 if let Some(value) = column.values[k] {
@@ -128,7 +129,7 @@ impl PlateTable {
         for (axis, value) in AXES.iter().zip(face) {
             element.insert((*axis).into(), Property::Double(value));
         }
-        let own = uv.map(|metres| Some(metres * 1e3)).into_iter();
+        let own = uv.map(|metres| Some(mm(metres))).into_iter();
         let values = own.chain(self.columns.iter().map(|column| column.values[k]));
         for (name, value) in self.scalars().zip(values) {
             element.insert(name, Property::Float(value.map_or(f32::NAN, |value| value as f32)));
@@ -156,13 +157,7 @@ const FACE: &str = "vertex_indices";
 
 /// One column for each component of a field, in the unit that people read.
 fn columns(field: &Field) -> Vec<Column> {
-    let (suffix, factor) = match field.unit.as_str() {
-        "m" => ("_mm", 1000.0),
-        "rad" => ("_deg", 1.0_f64.to_degrees()),
-        "1/m" => ("_per_m", 1.0),
-        "1/m2" => ("_per_m2", 1.0),
-        _ => ("", 1.0),
-    };
+    let (suffix, factor) = readable(&field.unit);
     let one = |component: usize| {
         let part = match field.components {
             1 => String::new(),

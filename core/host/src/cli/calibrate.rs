@@ -14,8 +14,8 @@ use super::{CliError, Common, measure, output};
 use crate::calibration::{Calibration, CalibrationRecord};
 use crate::plugin::{PluginError, Surfaces};
 use crate::progress;
-use crate::record::mm;
 use crate::rig::{self, Rig};
+use crate::units::mm;
 
 /// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
 /// supports, metres.

@@ -14,6 +14,7 @@ use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
 use crate::report::{self, ReportError};
+use crate::units::mm;
 use pick::RunRef;
 
 #[derive(Debug, Args)]
@@ -125,8 +126,8 @@ fn verdict(stroke: &Stroke) -> String {
     }
 }
 
-fn mm(stroke: &Stroke, figure: &str) -> String {
-    stroke.figures.get(figure).map(|metres| format!("{:.1}", metres * 1000.0)).unwrap_or_default()
+fn length(stroke: &Stroke, figure: &str) -> String {
+    stroke.figures.get(figure).map(|metres| format!("{:.1}", mm(*metres))).unwrap_or_default()
 }
 
 fn list(strokes: &[Stroke]) -> Result<(), CliError> {
@@ -156,8 +157,8 @@ fn list(strokes: &[Stroke]) -> Result<(), CliError> {
             },
             stroke.key.attempt.to_string(),
             verdict(stroke),
-            mm(stroke, "gap.max"),
-            mm(stroke, "gap.uncertainty"),
+            length(stroke, "gap.max"),
+            length(stroke, "gap.uncertainty"),
             stroke.ack.clone().unwrap_or_default(),
         ]);
     }

@@ -12,9 +12,9 @@ use serde::Serialize;
 
 use super::{CliError, Common, measure, output};
 use crate::progress;
-use crate::record::mm;
 use crate::rig::Rig;
 use crate::stroke::{Measured, Scanned};
+use crate::units::{metres, mm};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \
@@ -116,7 +116,7 @@ fn look(
     scanned: &Scanned,
     measured: &Measured,
 ) -> Vec<Result<Disc, discs::NoDisc>> {
-    let reach = command.within_mm / 1000.0;
+    let reach = metres(command.within_mm);
     let surface = &measured.measurement.surface;
     plate.markers.iter().map(|marker| discs::find(&scanned.patch, surface, marker.at, reach)).collect()
 }

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use platen_plant::PlateFile;
 use platen_plant::plate::{Target, TargetShape};
 
+use crate::units::{metres, mm};
+
 /// Limit of a board where the plate file has none, millimetres, and its chord: the trade's 3 mm on 2 m.
 const USUAL: [f64; 2] = [3.0, 2000.0];
 
@@ -36,9 +38,9 @@ impl Default for Yardstick {
 impl Yardstick {
     /// The yardstick of a plate.
     pub fn of(plate: &PlateFile) -> Self {
-        let limits = plate.templates.iter().map(|template| template.limit * 1000.0);
+        let limits = plate.templates.iter().map(|template| mm(template.limit));
         let limit_mm = limits.filter(|limit| *limit > 0.0).min_by(f64::total_cmp).unwrap_or(USUAL[0]);
-        let chord_mm = plate.templates.first().map_or(USUAL[1], |template| template.chord * 1000.0);
+        let chord_mm = plate.templates.first().map_or(USUAL[1], |template| mm(template.chord));
         let radius = plate.target.as_ref().and_then(smallest_radius);
         let by_board = 10.0 * per_m(limit_mm, chord_mm);
         Self { limit_mm, chord_mm, bend_per_m: radius.map_or(by_board, |radius| 1.0 / radius) }
@@ -83,7 +85,7 @@ impl Yardstick {
 
 /// Curvature that opens a gap under a board, 1/m.
 fn per_m(gap_mm: f64, chord_mm: f64) -> f64 {
-    8.0 * (gap_mm / 1000.0) / (chord_mm / 1000.0).powi(2)
+    8.0 * metres(gap_mm) / metres(chord_mm).powi(2)
 }
 
 fn smallest_radius(target: &Target) -> Option<f64> {

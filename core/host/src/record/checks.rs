@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use platen_shape::{Check, EdgeCheck, ShapeChecks};
-
-use super::{EXPANDED, mm};
+use crate::units::mm;
+use platen_shape::{Check, EXPANDED, EdgeCheck, ShapeChecks};
 
 /// What tape, square and sight line would show.
 #[derive(Debug, Clone, Serialize, Deserialize)]

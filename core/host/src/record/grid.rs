@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use platen_shape::evaluate::{self, GRID};
 use platen_shape::measure::Measurement;
 
-use super::mm;
 use crate::plugin::{Field, NodeState, Report};
+use crate::units::mm;
 
 /// Places on an even grid over the plate; null where nothing is known.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -8,8 +8,8 @@ use platen_shape::evaluate;
 use platen_shape::measure::Measurement;
 use platen_shape::task::{Seat, TemplateFinding, Verdict};
 
-use super::{mm, mm_pair};
 use crate::plugin::Report;
+use crate::units::{mm, mm_pair};
 
 /// One reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -6,8 +6,8 @@ use platen_plant::PlateFile;
 use platen_plant::plate::{Facing, RadiusOf, Target, TargetShape};
 use platen_shape::{Surface, Vec3};
 
-use super::mm;
 use crate::picture::Yardstick;
+use crate::units::mm;
 
 /// The plate as its file had it at this stroke.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

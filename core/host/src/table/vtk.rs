@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 
 use super::PlateTable;
+use crate::units::mm;
 
 /// VTK's number of a triangle.
 const TRIANGLE: u32 = 5;
@@ -30,7 +31,7 @@ impl PlateTable {
         file.array(triangles.iter().map(|_| TRIANGLE.to_be_bytes()));
         file.head(&format!("POINT_DATA {}\n", self.nodes.len()));
         for (k, name) in ["u_mm", "v_mm"].into_iter().enumerate() {
-            file.scalars(name, self.nodes.iter().map(|node| Some(node.uv[k] * 1e3)));
+            file.scalars(name, self.nodes.iter().map(|node| Some(mm(node.uv[k]))));
         }
         for column in &self.columns {
             file.scalars(&column.name, column.values.iter().copied());

@@ -18,6 +18,7 @@ use crate::cli::CliError;
 use crate::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
 use crate::rig;
 use crate::stroke::NotMeasured;
+use crate::units::metres;
 
 /// Casting the rays of a full dome takes minutes on a slow machine.
 const SCAN_LIMIT: Duration = Duration::from_secs(3600);
@@ -79,7 +80,7 @@ impl Scene {
 
     /// What is known of the plate before it is scanned.
     fn spec(&self) -> PlateSpec {
-        let [width, height, thickness] = self.size_mm.map(|mm| mm / 1000.0);
+        let [width, height, thickness] = self.size_mm.map(metres);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
         PlateSpec {
             width,

@@ -20,8 +20,8 @@ use super::{figures, seeds, stages};
 use crate::accuracy::{Truth, rms};
 use crate::cli::CliError;
 use crate::plugin::{Catalogue, Comparison, Field, Flattening, NodeState, Report, Surfaces};
-use crate::record::mm;
 use crate::rig;
+use crate::units::{metres, mm};
 
 /// Extent and thickness of the plates, millimetres.
 const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
@@ -184,7 +184,7 @@ fn figure(report: &Report, name: &str) -> Option<f64> {
 }
 
 fn task() -> Task {
-    let [width, height, thickness] = SIZE_MM.map(|mm| mm / 1000.0);
+    let [width, height, thickness] = SIZE_MM.map(metres);
     Task {
         plate: "bench".into(),
         width,
@@ -219,7 +219,7 @@ fn task() -> Task {
 /// A board of the wanted face's radius touches the flatter plate with its middle; its ends stand off by the difference of
 /// the sagittas.
 fn true_gap() -> f64 {
-    let half_thickness = 0.5 * SIZE_MM[2] / 1000.0;
+    let half_thickness = metres(0.5 * SIZE_MM[2]);
     let sagitta = |radius: f64| radius - (radius * radius - 0.25 * BOARD * BOARD).sqrt();
     sagitta(WANTED - half_thickness) - sagitta(ROLLED - half_thickness)
 }
