@@ -7,8 +7,7 @@ use std::time::Instant;
 
 use platen_abi as abi;
 
-use super::instance::Report;
-use super::job::{self, EmittedFrame, HostBuffer};
+use super::job::{self, EmittedFrame, Event, HostBuffer};
 
 /// Largest frame: a column of the finest scanner has some 400 kB, a surface with covariance some 10 MB.
 const MAX_FRAME_BYTES: u64 = 256 << 20;
@@ -147,7 +146,7 @@ unsafe extern "C" fn emit(_: *const abi::Host, job: u64, frame: *const abi::Fram
     // SAFETY: the plugin's string lives for the call.
     let format = unsafe { lossy(frame.format) };
     let emitted = EmittedFrame { format, flags: frame.flags, buffer };
-    if job.frames.send(Report::Frame(emitted)).is_err() { abi::status::CANCELLED } else { abi::status::OK }
+    if job.frames.send(Event::Frame(emitted)).is_err() { abi::status::CANCELLED } else { abi::status::OK }
 }
 
 unsafe extern "C" fn get_extension(_: *const abi::Host, _: *const c_char) -> *const c_void {

@@ -12,7 +12,7 @@ use platen_abi::payload;
 use platen_plant::OptionValue;
 use platen_scan::Window;
 
-use super::job::{self, CancelToken, EmittedFrame, HostBuffer, JobSpec, Listed};
+use super::job::{self, CancelToken, EmittedFrame, Event, HostBuffer, JobSpec, Listed};
 use super::values::Values;
 use super::{Kind, Library, PluginError, host_table};
 
@@ -25,13 +25,6 @@ const CANCEL_POLL: Duration = Duration::from_millis(20);
 
 /// Frames under way between a plugin and its consumer: enough to keep both busy, few enough to bound memory.
 const FRAMES_UNDER_WAY: usize = 64;
-
-/// What the plugin's thread reports of a job.
-#[derive(Debug)]
-pub(super) enum Report {
-    Frame(EmittedFrame),
-    Done(Result<(), PluginError>),
-}
 
 /// A frame for a plugin.
 #[derive(Debug)]
@@ -47,7 +40,7 @@ enum Command {
     Open(Reply<Result<(), PluginError>>),
     Estimate(Option<payload::Window>, Reply<Option<f64>>),
     Arm(abi::Job, Reply<Result<(), PluginError>>),
-    Run(abi::Job, Vec<InputFrame>, SyncSender<Report>),
+    Run(abi::Job, Vec<InputFrame>, SyncSender<Event>),
 }
 
 /// The C instance. Only `cancel` may be called through it from other threads.
@@ -211,7 +204,7 @@ impl Emitted {
 pub struct RunningJob<'a> {
     instance: &'a Instance,
     listed: Listed,
-    inbox: Receiver<Report>,
+    inbox: Receiver<Event>,
     started: Instant,
     token: CancelToken,
     cancelled_at: Option<Instant>,
@@ -228,11 +221,11 @@ impl RunningJob<'_> {
             let until = self.cancelled_at.map_or(self.listed.0.deadline, |at| at + GRACE);
             let left = until.saturating_duration_since(Instant::now());
             match self.inbox.recv_timeout(left.min(CANCEL_POLL)) {
-                Ok(Report::Frame(EmittedFrame { format, flags, buffer })) if self.cancelled_at.is_none() => {
+                Ok(Event::Frame(EmittedFrame { format, flags, buffer })) if self.cancelled_at.is_none() => {
                     return Some(Emitted { format, flags, buffer });
                 }
-                Ok(Report::Frame(_)) => {}
-                Ok(Report::Done(result)) => self.result = Some(self.judge(result)),
+                Ok(Event::Frame(_)) => {}
+                Ok(Event::Done(result)) => self.result = Some(self.judge(result)),
                 Err(RecvTimeoutError::Timeout) if left > CANCEL_POLL => {}
                 Err(RecvTimeoutError::Timeout) if self.cancelled_at.is_none() => self.cancel(),
                 Err(RecvTimeoutError::Timeout) => self.result = Some(Err(self.instance.hangs(self.started))),
@@ -363,7 +356,7 @@ fn serve(raw: *mut abi::Instance, name: &str, inbox: &Receiver<Command>) {
                 let result = call(name, |error| unsafe {
                     (table.run)(raw, &raw const job, frames.as_ptr(), frames.len() as u32, error)
                 });
-                let _ = reports.send(Report::Done(result));
+                let _ = reports.send(Event::Done(result));
             }
         }
     }

@@ -7,7 +7,7 @@ use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::instance::Report;
+use super::PluginError;
 
 /// Cancels a job from another thread.
 #[derive(Debug, Clone, Default)]
@@ -80,13 +80,20 @@ pub(super) struct EmittedFrame {
     pub(super) buffer: HostBuffer,
 }
 
+/// What happens in a job, as its consumer hears of it.
+#[derive(Debug)]
+pub(super) enum Event {
+    Frame(EmittedFrame),
+    Done(Result<(), PluginError>),
+}
+
 /// One job in progress.
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) id: u64,
     pub(super) deadline: Instant,
     pub(super) cancelled: AtomicBool,
-    pub(super) frames: SyncSender<Report>,
+    pub(super) frames: SyncSender<Event>,
     pub(super) buffers: Mutex<BTreeMap<u64, HostBuffer>>,
 }
 
@@ -110,7 +117,7 @@ pub(super) fn find(id: u64) -> Option<Arc<Job>> {
 }
 
 /// Puts a job on the list until the guard is dropped.
-pub(super) fn begin(deadline: Instant, frames: SyncSender<Report>) -> Listed {
+pub(super) fn begin(deadline: Instant, frames: SyncSender<Event>) -> Listed {
     let job = Arc::new(Job {
         id: next_id(),
         deadline,
