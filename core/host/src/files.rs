@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use platen_shape::Surface;
 
 use crate::picture::{self, Caption, PictureError, StripPoint};
-use crate::plugin::{Report, surface_bytes};
-use crate::record::{LineRecord, ResultRecord};
-use crate::table::PlateTable;
+use crate::plugin::{Report, surface_bytes, surface_from_bytes};
+use crate::record::{LineRecord, PlateRecord, ResultRecord};
+use crate::table::{PlateTable, csv_cell};
 
 /// Name of the surface's file: what comparisons are given, a `platen.surface/1` buffer of `platen.h`.
 pub const SURFACE: &str = "surface.platen";
@@ -63,6 +63,16 @@ pub fn write(folder: &Path, record: &ResultRecord, surface: &Surface) -> Result<
     written
 }
 
+/// The surface beside a result document.
+///
+/// # Errors
+/// Which file, and why it cannot be read any more.
+pub fn surface_beside(document: &Path) -> Result<Surface, String> {
+    let path = document.with_file_name(SURFACE);
+    let read = std::fs::read(&path).map_err(|e| e.to_string()).and_then(|bytes| surface_from_bytes(&bytes));
+    read.map_err(|why| format!("{}: {why}", path.display()))
+}
+
 fn failed(path: &Path) -> impl Fn(std::io::Error) -> FilesError + use<> {
     let path = path.to_path_buf();
     move |source| FilesError::Write { path: path.clone(), source }
@@ -99,56 +109,63 @@ pub fn illustrate(
     reports: &[&Report],
     strokes: &[StripPoint],
 ) -> Result<Vec<PathBuf>, FilesError> {
-    let mut files = Vec::new();
-    let mut keep = |name: &str, content: &[u8]| {
-        files.push(put(folder, name, content)?);
-        Ok::<(), FilesError>(())
-    };
-    let table = PlateTable::new(surface, reports);
-    keep("grid.csv", table.csv().as_bytes())?;
-    keep("plate.ply", &table.ply().map_err(FilesError::Mesh)?)?;
-    keep("plate.vtk", &table.vtk())?;
-    for (name, svg) in pictures(record, reports, strokes)? {
-        keep(&format!("{name}.svg"), svg.as_bytes())?;
+    let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
+    let scale = &record.plate_file.scale;
+    let mut files = fields(folder, surface, reports, &record.plate_file, &caption)?;
+    for line in &record.reference_lines {
+        for template in &line.templates {
+            let section = picture::section(line, template, &caption, scale);
+            files.push(put_picture(folder, &format!("section-{}", template.name), section)?);
+        }
+    }
+    if !strokes.is_empty() {
+        files.push(put_picture(folder, "strokes", picture::strip(strokes, &caption, scale))?);
     }
     Ok(files)
 }
 
-/// Replaces a file in one step.
+/// What comparisons found at every place: as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`), and a
+/// map of each field.
+///
+/// # Errors
+/// [`FilesError`].
+pub(crate) fn fields(
+    folder: &Path,
+    surface: &Surface,
+    reports: &[&Report],
+    plate: &PlateRecord,
+    caption: &Caption<'_>,
+) -> Result<Vec<PathBuf>, FilesError> {
+    let table = PlateTable::new(surface, reports);
+    let mut files = vec![
+        put(folder, "grid.csv", table.csv().as_bytes())?,
+        put(folder, "plate.ply", &table.ply().map_err(FilesError::Mesh)?)?,
+        put(folder, "plate.vtk", &table.vtk())?,
+    ];
+    for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
+        let map = picture::map(field, plate, caption, &plate.scale);
+        files.push(put_picture(folder, &field.name, map)?);
+    }
+    Ok(files)
+}
+
+fn put_picture(folder: &Path, name: &str, svg: Result<String, PictureError>) -> Result<PathBuf, FilesError> {
+    let svg = svg.map_err(|e| FilesError::Picture { name: name.to_owned(), why: e.to_string() })?;
+    put(folder, &format!("{}.svg", file_name(name)), svg.as_bytes())
+}
+
+/// Replaces a file in a folder.
 pub(crate) fn put(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, FilesError> {
-    let (part, path) = (folder.join(format!("{name}.part")), folder.join(name));
-    std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, &path)).map_err(failed(&path))?;
+    let path = folder.join(name);
+    replace(&path, content)?;
     Ok(path)
 }
 
-/// Every picture of a stroke with its name.
-fn pictures(
-    record: &ResultRecord,
-    reports: &[&Report],
-    strokes: &[StripPoint],
-) -> Result<Vec<(String, String)>, FilesError> {
-    let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
-    let (plate, scale) = (&record.plate_file, &record.plate_file.scale);
-    let mut all = Vec::new();
-    let mut draw = |name: String, svg: Result<String, PictureError>| match svg {
-        Ok(svg) => {
-            all.push((file_name(&name), svg));
-            Ok(())
-        }
-        Err(e) => Err(FilesError::Picture { name, why: e.to_string() }),
-    };
-    for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
-        draw(field.name.clone(), picture::map(field, plate, &caption, scale))?;
-    }
-    for line in &record.reference_lines {
-        for template in &line.templates {
-            draw(format!("section-{}", template.name), picture::section(line, template, &caption, scale))?;
-        }
-    }
-    if !strokes.is_empty() {
-        draw("strokes".into(), picture::strip(strokes, &caption, scale))?;
-    }
-    Ok(all)
+/// Replaces a file in one step: a reader finds the old one or the new one, never half.
+pub(crate) fn replace(path: &Path, content: &[u8]) -> Result<(), FilesError> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path)).map_err(failed(path))
 }
 
 /// A name as a file's: what a file system or a shell may mind becomes `_`.
@@ -170,22 +187,12 @@ fn lines_csv(lines: &[LineRecord]) -> String {
     text
 }
 
-/// A cell of CSV (RFC 4180): a name may hold a comma or a quote.
-pub(crate) fn csv_cell(text: &str) -> String {
-    match text.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn names_stay_in_their_folder_and_cells_in_their_column() {
+    fn names_stay_in_their_folder() {
         assert_eq!(file_name("../a b/\u{c4}1"), ".._a_b_\u{c4}1");
-        assert_eq!(csv_cell("plain"), "plain");
-        assert_eq!(csv_cell("a, \"b\""), "\"a, \"\"b\"\"\"");
     }
 }

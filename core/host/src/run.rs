@@ -13,7 +13,6 @@ mod journal;
 mod prometheus;
 mod region;
 mod status;
-mod surface_file;
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;

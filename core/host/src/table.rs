@@ -62,7 +62,7 @@ impl PlateTable {
         let mut text = String::from("u_mm,v_mm,x_m,y_m,z_m,seen");
         for column in &self.columns {
             text.push(',');
-            text.push_str(&super::files::csv_cell(&column.name));
+            text.push_str(&csv_cell(&column.name));
         }
         text.push('\n');
         for (k, Node { uv: [u, v], face: [x, y, z], seen }) in self.nodes.iter().enumerate() {
@@ -154,6 +154,14 @@ impl PlateTable {
 const AXES: [&str; 3] = ["x", "y", "z"];
 /// The usual name of a face's corners in PLY.
 const FACE: &str = "vertex_indices";
+
+/// A cell of CSV (RFC 4180): a name may hold a comma or a quote.
+pub(crate) fn csv_cell(text: &str) -> String {
+    match text.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
+}
 
 /// One column for each component of a field, in the unit that people read.
 fn columns(field: &Field) -> Vec<Column> {
@@ -289,6 +297,12 @@ mod tests {
         assert_eq!(field.len(), 4 * n + 1);
         assert_eq!(field[8..12], 0.002_f32.to_be_bytes());
         assert!(f32::from_be_bytes(field[4..8].try_into().unwrap()).is_nan());
+    }
+
+    #[test]
+    fn cells_stay_in_their_column() {
+        assert_eq!(csv_cell("plain"), "plain");
+        assert_eq!(csv_cell("a, \"b\""), "\"a, \"\"b\"\"\"");
     }
 
     #[test]

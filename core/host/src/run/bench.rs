@@ -381,7 +381,8 @@ impl Bench {
             (Measure::EvaluateTime, start.elapsed()),
             (Measure::StrokeToResultTime, stroke.started.elapsed()),
         ];
-        let mut answer = figures::measurement(&measured, &reports, &stroke.plate, times, stroke.scanned_at);
+        let mut answer =
+            figures::measurement(&measured, &reports, verdict, &stroke.plate, times, stroke.scanned_at);
         // A result whose files are lost still goes to the press, and says so.
         answer.warning = folder.is_none().then_some(Code::StorageDegraded);
         Ok(Judged { answer, record, surface: measured.measurement.surface, reports, folder })

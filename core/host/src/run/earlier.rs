@@ -4,8 +4,7 @@ use platen_history::{Archive, Error, Stroke};
 use platen_press::StrokeData;
 use platen_shape::Surface;
 
-use super::surface_file;
-use crate::past;
+use crate::{files, past};
 
 /// An earlier scan of the plate.
 #[derive(Debug)]
@@ -44,9 +43,8 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
     let document = stroke.document?;
     // Written by this program as JSON; what cannot be read any more is as good as nothing said.
     let data: StrokeData = serde_json::from_str(&stroke.data).unwrap_or_default();
-    Some(Earlier {
-        surface: surface_file::beside(&document)?,
-        supports: past::supports(&document),
-        plate_rot: data.plate_rot,
-    })
+    let surface = files::surface_beside(&document)
+        .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
+        .ok()?;
+    Some(Earlier { surface, supports: past::supports(&document), plate_rot: data.plate_rot })
 }

@@ -6,12 +6,13 @@ use platen_press::{Figures, Measurement, Timestamp, Verdict};
 use platen_shape::task;
 
 use crate::plugin::{PluginError, Report};
-use crate::stroke::{self, Measured};
+use crate::stroke::Measured;
 
 /// What goes to the press. Figures that no comparison gave stay out and show as invalid.
 pub(super) fn measurement(
     measured: &Measured,
     reports: &[Result<Report, PluginError>],
+    verdict: task::Verdict,
     plate: &PlateFile,
     times: [(Measure, std::time::Duration); 3],
     scanned_at: jiff::Timestamp,
@@ -41,7 +42,7 @@ pub(super) fn measurement(
     };
     figures.stations = plate.stations.iter().map(station).collect();
     Measurement {
-        verdict: match stroke::verdict(reports) {
+        verdict: match verdict {
             task::Verdict::Pass => Verdict::Pass,
             task::Verdict::Fail => Verdict::Fail,
             task::Verdict::CannotTell => Verdict::CannotTell,

@@ -10,6 +10,8 @@ use platen_press::{Answer, Code, Durations, Language, Status};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
+use crate::files;
+
 /// The newest alarm, as the dispatcher hears it.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
 
@@ -165,8 +167,7 @@ pub(super) async fn keep(
             tokio::time::sleep(RESET_SHOWS).await;
         }
         let record = StatusRecord::of(&press, &status.borrow_and_update(), &alarm, reset_at);
-        let written = write(&path, &record);
-        if let Err(error) = written.as_ref().map_err(|e| format!("{}: {e}", path.display()))
+        if let Err(error) = write(&path, &record)
             && !std::mem::replace(&mut reported, true)
         {
             tracing::warn!("{error}; `platen status` will be out of date");
@@ -186,11 +187,10 @@ pub(super) async fn keep(
     }
 }
 
-fn write(path: &Path, record: &StatusRecord) -> std::io::Result<()> {
+fn write(path: &Path, record: &StatusRecord) -> Result<(), String> {
     if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
-    let part = path.with_extension("part");
-    std::fs::write(&part, serde_json::to_vec_pretty(record)?)?;
-    std::fs::rename(part, path)
+    let text = serde_json::to_vec_pretty(record).map_err(|e| e.to_string())?;
+    files::replace(path, &text).map_err(|e| e.to_string())
 }
