@@ -13,7 +13,7 @@ use platen_host::accuracy::{Accuracy, Truth, rms};
 use platen_host::plugin::{Catalogue, JobSpec, Scanner};
 use platen_host::rig::{self, Rig};
 use platen_host::stroke::{self, Measured};
-use platen_plant::{OptionValue, PlantFile, PluginUse, Value};
+use platen_plant::{PlantFile, Value};
 use platen_shape::PlateSpec;
 use platen_sim_plate::Pose;
 use serde_json::Value as Json;
@@ -105,11 +105,7 @@ impl Lab {
     }
 
     fn measure(&mut self, driver: &str, options: Vec<(&str, Value)>, spec: &PlateSpec) -> Measured {
-        let (library, mut values) = rig::load(&self.catalogue, &PluginUse::by_default(driver)).unwrap();
-        for (name, value) in options {
-            values.retain(|known| known.name != name);
-            values.push(OptionValue { name: name.into(), value, given: true });
-        }
+        let (library, values) = rig::load_with(&self.catalogue, driver, options).unwrap();
         let scanner = Scanner::create(&library, &values).unwrap();
         scanner.instance().open(LIMIT).unwrap();
         let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec, None).unwrap();

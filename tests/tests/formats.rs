@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use platen_host::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
 use platen_host::rig;
-use platen_plant::{OptionValue, PluginUse, Value};
+use platen_plant::Value;
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::stream::{
@@ -194,8 +194,8 @@ fn mirrored(ptx: &Path) -> PathBuf {
 /// Reads a file through the built library.
 fn read(path: &Path) -> Lattice {
     let catalogue = Catalogue::new(Some(platen_tests::built()));
-    let (library, mut values) = rig::load(&catalogue, &PluginUse::by_default("faro-file")).unwrap();
-    values.push(OptionValue { name: "file".into(), value: Value::Path(path.into()), given: true });
+    let options = [("file", Value::Path(path.into()))];
+    let (library, values) = rig::load_with(&catalogue, "faro-file", options).unwrap();
     let scanner = Scanner::create(&library, &values).unwrap();
     let mut lattice = None;
     let end = scanner.scan(JobSpec::untriggered(Duration::from_secs(100)), None, &mut |event| {

@@ -6,7 +6,6 @@ use std::time::Duration;
 use jiff::Timestamp;
 use platen_plant::plant::CalibrationUse;
 use platen_plant::{Document, Error as PlantError, Reported, Table};
-use serde::Serialize;
 
 use crate::units::{metres, mm};
 
@@ -28,23 +27,6 @@ pub struct Calibration {
     pub sigma_correlated: f64,
     /// Systematic error of a gap, one sigma, metres; known only from an artefact of known shape.
     pub sigma_true: Option<f64>,
-}
-
-/// A calibration as people read it.
-#[derive(Debug, Clone, Serialize)]
-pub struct CalibrationRecord {
-    /// When it was found out.
-    pub made: Timestamp,
-    /// Scanner.
-    pub instrument: String,
-    /// Plate or artefact.
-    pub plate: String,
-    /// Scans that were taken.
-    pub scans: usize,
-    /// Correlated error of a pair of scans, one sigma.
-    pub sigma_correlated_mm: f64,
-    /// Systematic error of a gap, one sigma.
-    pub sigma_true_mm: Option<f64>,
 }
 
 /// Why a plant's calibration does not hold.
@@ -126,18 +108,6 @@ impl Calibration {
             file += &format!("sigma_true_mm = {:.4}\n", mm(sigma));
         }
         file
-    }
-
-    /// As people read it.
-    pub fn record(&self) -> CalibrationRecord {
-        CalibrationRecord {
-            made: self.made,
-            instrument: self.instrument.clone(),
-            plate: self.plate.clone(),
-            scans: self.scans,
-            sigma_correlated_mm: mm(self.sigma_correlated),
-            sigma_true_mm: self.sigma_true.map(mm),
-        }
     }
 }
 

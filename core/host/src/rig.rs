@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use platen_plant::plant::RigidTransform;
 use platen_plant::plate::{self, PlateFile};
-use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, check_options};
+use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, Value, check_options};
 use platen_shape::task::{self, Task};
-use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
+use platen_shape::{PlateSpec, RegionOfInterest, TargetError, TargetSurface, Vec3};
 
 use crate::calibration::Calibration;
 use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
@@ -55,6 +55,32 @@ pub fn load(catalogue: &Catalogue, wanted: &PluginUse) -> Result<(Library, Vec<O
     Ok((library, values))
 }
 
+/// A library with its defaults but for these options.
+///
+/// # Errors
+/// The library cannot be used.
+pub fn load_with<'a>(
+    catalogue: &Catalogue,
+    plugin: &str,
+    options: impl IntoIterator<Item = (&'a str, Value)>,
+) -> Result<(Library, Vec<OptionValue>), RigError> {
+    let (library, mut values) = load(catalogue, &PluginUse::by_default(plugin))?;
+    for (name, value) in options {
+        values.retain(|known| known.name != name);
+        values.push(OptionValue { name: name.to_owned(), value, given: true });
+    }
+    Ok((library, values))
+}
+
+/// A comparison that may take as long as one of a stroke.
+///
+/// # Errors
+/// The library cannot be used, or every fault of its options.
+pub fn comparison(catalogue: &Catalogue, wanted: &PluginUse) -> Result<Comparison, RigError> {
+    let (library, values) = load(catalogue, wanted)?;
+    Ok(Comparison::create(&library, &values, EVALUATION_LIMIT)?)
+}
+
 impl Rig {
     /// Loads what the plant file names.
     ///
@@ -63,11 +89,8 @@ impl Rig {
     pub fn of(plant: &PlantFile, catalogue: &Catalogue) -> Result<Self, RigError> {
         let (library, values) = load(catalogue, &plant.flattening)?;
         let flattening = Flattening::create(&library, &values, EVALUATION_LIMIT)?;
-        let comparison = |wanted| {
-            let (library, values) = load(catalogue, wanted)?;
-            Ok(Comparison::create(&library, &values, EVALUATION_LIMIT)?)
-        };
-        let comparisons = plant.comparisons.iter().map(comparison).collect::<Result<_, RigError>>()?;
+        let comparisons = plant.comparisons.iter().map(|wanted| comparison(catalogue, wanted));
+        let comparisons = comparisons.collect::<Result<_, RigError>>()?;
         Ok(Self {
             flattening,
             comparisons,
@@ -136,6 +159,15 @@ pub fn task(plate: &PlateFile, calibration: Option<&Calibration>, supports_chang
         supports: plate.supports.iter().map(|support| support.at).collect(),
         supports_changed,
     }
+}
+
+/// The mid-surface that a plate is to become; `None` where its file has no `[target]`.
+///
+/// # Errors
+/// The target does not fit the plate.
+pub fn target(plate: &PlateFile) -> Result<Option<TargetSurface>, TargetError> {
+    let plate::Plate { width, height, thickness, .. } = plate.plate;
+    plate.target.map(|target| TargetSurface::new(&target_of(&target), width, height, thickness)).transpose()
 }
 
 fn target_of(target: &plate::Target) -> task::Target {

@@ -14,7 +14,6 @@
 //! told. What is not known is null, never 0.
 
 use std::f64::consts::PI;
-use std::path::Path;
 
 use jiff::Timestamp;
 use serde::Serialize;
@@ -23,14 +22,13 @@ use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
 use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_press::StrokeData;
 use platen_shape::task::{Figure, Verdict};
-use platen_shape::{Forming, Surface, TargetSurface};
+use platen_shape::{Forming, Surface};
 
-use crate::files::SURFACE;
-use crate::past;
 use crate::picture::Yardstick;
-use crate::plugin::{Catalogue, Comparison, PluginError, Surfaces, surface_from_bytes};
+use crate::plugin::{Catalogue, PluginError, Surfaces};
 use crate::rig::{self, RigError};
 use crate::units::{mm, mm_pair};
+use crate::{files, past};
 
 /// Why there is no sequence.
 #[derive(Debug, thiserror::Error)]
@@ -161,14 +159,13 @@ impl Sequence {
         if kept.is_empty() {
             return Err(SequenceError::NoStrokes(plate));
         }
-        let (library, values) = rig::load(catalogue, &PluginUse::by_default("curvature"))?;
-        let curvature = Comparison::create(&library, &values, rig::EVALUATION_LIMIT)?;
+        let curvature = rig::comparison(catalogue, &PluginUse::by_default("curvature"))?;
         let mut before: Option<Surface> = None;
         let mut strokes: Vec<SequenceStroke> = Vec::new();
         for stroke in &kept {
             progress(&format!("stroke {}", past::label(stroke)));
             let file = stroke.recipe.and_then(|recipe| PlateFile::load(&plant.plate_path(recipe)).ok());
-            let now = stroke.document.as_deref().and_then(surface_beside);
+            let now = stroke.document.as_deref().and_then(|document| files::surface_beside(document).ok());
             let mut row = SequenceStroke::of(stroke);
             if let (Some(now), Some(file)) = (&now, &file) {
                 row.add_forming(now, file);
@@ -188,12 +185,6 @@ impl Sequence {
         }
         Ok(Self { plate, summary: Summary::of(&strokes, &kept), strokes })
     }
-}
-
-/// The surface beside a result document, where it still is and can be read.
-pub fn surface_beside(document: &Path) -> Option<Surface> {
-    let bytes = std::fs::read(document.with_file_name(SURFACE)).ok()?;
-    surface_from_bytes(&bytes).ok()
 }
 
 impl SequenceStroke {
@@ -220,10 +211,7 @@ impl SequenceStroke {
     }
 
     fn add_forming(&mut self, surface: &Surface, file: &PlateFile) {
-        let task = rig::task(file, None, false);
-        let target = task.target.and_then(|target| {
-            TargetSurface::new(&target, surface.width(), surface.height(), surface.thickness()).ok()
-        });
+        let target = rig::target(file).ok().flatten();
         let tolerance = Yardstick::of(file).tolerance_per_m();
         let forming = target.and_then(|target| Forming::new(surface, &target, tolerance));
         self.energy_left_j = forming.map(|forming| forming.energy);
@@ -271,8 +259,7 @@ fn last_bend(earlier: &[SequenceStroke]) -> Option<&Bend> {
 
 /// Whether a bend turns against the target there; `None` where the target is straight across it.
 fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> Option<bool> {
-    let task = rig::task(file, None, false);
-    let target = TargetSurface::new(&task.target?, task.width, task.height, task.thickness).ok()?;
+    let target = rig::target(file).ok()??;
     let (sin, cos) = direction.sin_cos();
     let wanted = target.curvature(u, v).along([-sin, cos]);
     // 1e-6 1/m: a radius of a thousand kilometres is straight.

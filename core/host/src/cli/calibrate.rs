@@ -11,11 +11,11 @@ use platen_shape::{Surface, TargetSurface};
 use serde::Serialize;
 
 use super::{CliError, Common, measure, output};
-use crate::calibration::{Calibration, CalibrationRecord};
+use crate::calibration::Calibration;
 use crate::plugin::{PluginError, Surfaces};
-use crate::progress;
 use crate::rig::{self, Rig};
 use crate::units::mm;
+use crate::{files, progress};
 
 /// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
 /// supports, metres.
@@ -53,8 +53,16 @@ pub(super) struct Command {
 /// What was found.
 #[derive(Debug, Serialize)]
 struct Found {
-    #[serde(flatten)]
-    calibration: CalibrationRecord,
+    made: Timestamp,
+    /// Scanner: maker, model, serial number.
+    instrument: String,
+    plate: String,
+    /// Scans that were taken.
+    scans: usize,
+    /// Correlated error of a pair of scans, one sigma.
+    sigma_correlated_mm: f64,
+    /// Systematic error of a gap, one sigma; null without an artefact.
+    sigma_true_mm: Option<f64>,
     pairs: Vec<PairRecord>,
     /// Gaps under boards on the artefact.
     artefact: Vec<GapRecord>,
@@ -123,9 +131,18 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         sigma_correlated,
         sigma_true,
     };
-    std::fs::write(&file, calibration.to_toml())
-        .map_err(|e| CliError::Failed(format!("{}: cannot be written: {e}", file.display())))?;
-    let found = Found { calibration: calibration.record(), pairs, artefact: gaps, file };
+    files::replace(&file, calibration.to_toml().as_bytes())?;
+    let found = Found {
+        made: calibration.made,
+        instrument: calibration.instrument,
+        plate: calibration.plate,
+        scans: calibration.scans,
+        sigma_correlated_mm: mm(sigma_correlated),
+        sigma_true_mm: sigma_true.map(mm),
+        pairs,
+        artefact: gaps,
+        file,
+    };
     if common.json {
         output::json(&found)?
     } else {
@@ -140,11 +157,8 @@ fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetS
         return Ok(None);
     }
     let usage = |why: String| CliError::Usage(format!("{}: {why}", command.plate.display()));
-    let task = rig::task(plate, None, false);
-    let target =
-        task.target.ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))?;
-    let shape = TargetSurface::new(&target, task.width, task.height, task.thickness);
-    shape.map(Some).map_err(|e| usage(e.to_string()))
+    let shape = rig::target(plate).map_err(|e| usage(e.to_string()))?;
+    shape.map(Some).ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))
 }
 
 /// What every two of the scans differ by, along the normal, the plate's own movement taken away.
@@ -236,14 +250,14 @@ fn print(found: &Found) -> Result<(), CliError> {
             found.pairs.len()
         ))?;
     }
-    output::line(&format!("correlated error of a pair: {:.3} mm", found.calibration.sigma_correlated_mm))?;
+    output::line(&format!("correlated error of a pair: {:.3} mm", found.sigma_correlated_mm))?;
     for gap in &found.artefact {
         output::line(&format!(
             "boards of {:.0} mm on the artefact: {} gaps of {:.3} mm rms, of which {:.3} mm (one sigma) are systematic",
             gap.chord_mm, gap.boards, gap.gap_rms_mm, gap.systematic_mm
         ))?;
     }
-    match found.calibration.sigma_true_mm {
+    match found.sigma_true_mm {
         Some(sigma) => output::line(&format!("systematic error of a gap: {sigma:.3} mm"))?,
         None => output::line("systematic error of a gap: not known, for want of an artefact (--artefact)")?,
     }

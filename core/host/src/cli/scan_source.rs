@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use platen_plant::{OptionValue, PluginUse, Value};
+use platen_plant::Value;
 use platen_scan::{ScanEnd, Window};
 
 use super::CliError;
@@ -18,15 +18,9 @@ const SHOW_EVERY: u32 = 32;
 
 /// The file driver, set to one file and, where it holds several scans, to one of them, counted from 1.
 pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Result<Scanner, CliError> {
-    let (library, mut values) = rig::load(catalogue, &PluginUse::by_default("faro-file"))?;
-    let mut set = |name: &str, value| {
-        values.retain(|given| given.name != name);
-        values.push(OptionValue { name: name.to_owned(), value, given: true });
-    };
-    set("file", Value::Path(std::path::absolute(scan)?));
-    if let Some(cloud) = cloud {
-        set("cloud", Value::Int(i64::from(cloud)));
-    }
+    let file = ("file", Value::Path(std::path::absolute(scan)?));
+    let cloud = cloud.map(|cloud| ("cloud", Value::Int(i64::from(cloud))));
+    let (library, values) = rig::load_with(catalogue, "faro-file", [file].into_iter().chain(cloud))?;
     let scanner = Scanner::create(&library, &values)?;
     scanner.instance().open(READ_LIMIT).map_err(|e| CliError::Failed(format!("{}: {e}", scan.display())))?;
     Ok(scanner)

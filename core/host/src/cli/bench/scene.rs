@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use platen_plant::{OptionValue, PluginUse, Value};
+use platen_plant::Value;
 use platen_scan::{Column, ScanHeader, Window};
 use platen_shape::extract::Extractor;
 use platen_shape::{Patch, PlateSpec, Vec3};
@@ -174,9 +174,8 @@ impl Scene {
         };
         let (plate, truth) = (file("toml")?, file("json")?);
         std::fs::write(&plate, self.description(setting.seed))?;
-        let (library, mut values) = rig::load(catalogue, &PluginUse::by_default("simulated"))?;
         let whole = |n: u64| Value::Int(i64::try_from(n).unwrap_or(i64::MAX));
-        for (name, value) in [
+        let options = [
             ("plate_file", Value::Path(plate)),
             ("truth_file", Value::Path(truth.clone())),
             ("step_deg", Value::Float(setting.step_deg)),
@@ -185,10 +184,8 @@ impl Scene {
             ("seed", whole(setting.seed)),
             ("threads", whole(setting.threads as u64)),
             ("warm_up_columns", whole(0)),
-        ] {
-            values.retain(|known| known.name != name);
-            values.push(OptionValue { name: name.into(), value, given: true });
-        }
+        ];
+        let (library, values) = rig::load_with(catalogue, "simulated", options)?;
         let scanner = Scanner::create(&library, &values)?;
         scanner.instance().open(SCAN_LIMIT)?;
         Ok((scanner, truth))

@@ -9,7 +9,7 @@ use std::time::Duration;
 use nalgebra::Matrix3;
 use serde_json::{Map, Value as Json, json};
 
-use platen_plant::{OptionValue, PluginUse, Value};
+use platen_plant::Value;
 use platen_shape::task::{
     Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template,
 };
@@ -103,11 +103,7 @@ impl Tools {
     pub(super) fn load(catalogue: &Catalogue, names: &[String]) -> Result<Self, CliError> {
         let flattening = super::flattenings(catalogue, names)?.into_iter().next();
         let comparison = |name: &str, option: Option<(&str, Value)>| -> Result<Comparison, CliError> {
-            let (library, mut values) = rig::load(catalogue, &PluginUse::by_default(name))?;
-            if let Some((name, value)) = option {
-                values.retain(|known| known.name != name);
-                values.push(OptionValue { name: name.into(), value, given: true });
-            }
+            let (library, values) = rig::load_with(catalogue, name, option)?;
             Ok(Comparison::create(&library, &values, COMPARISON_LIMIT)?)
         };
         Ok(Self {

@@ -6,17 +6,15 @@ use clap::Args;
 use platen_history::Stroke;
 use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_shape::Surface;
-use platen_shape::task::Verdict;
 use serde_json::json;
 
 use super::{RunRef, open};
 use crate::calibration::Calibration;
 use crate::cli::{CliError, Common, output};
-use crate::picture::{Caption, map};
+use crate::picture::Caption;
 use crate::plugin::{Catalogue, Comparison, Report, Surfaces};
 use crate::record::{PlateRecord, figure};
-use crate::table::PlateTable;
-use crate::{files, past, progress, rig, sequence};
+use crate::{files, past, progress, rig};
 
 /// The comparisons that need two surfaces.
 const COMPARISONS: [&str; 2] = ["displacement", "curvature"];
@@ -98,14 +96,13 @@ fn name(stroke: &Stroke) -> String {
 fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Comparison, CliError> {
     let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
     let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
-    let (library, values) = rig::load(catalogue, &wanted)?;
-    Ok(Comparison::create(&library, &values, rig::EVALUATION_LIMIT)?)
+    Ok(rig::comparison(catalogue, &wanted)?)
 }
 
 fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
     let gone = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
     let document = stroke.document.as_deref().ok_or_else(|| gone("was not measured"))?;
-    sequence::surface_beside(document).ok_or_else(|| gone("its surface is not kept any more"))
+    files::surface_beside(document).map_err(|_| gone("its surface is not kept any more"))
 }
 
 fn plate_file(plant: &PlantFile, stroke: &Stroke) -> Result<PlateFile, CliError> {
@@ -122,22 +119,10 @@ fn write(
     reports: &[Report],
 ) -> Result<Vec<PathBuf>, CliError> {
     std::fs::create_dir_all(out)?;
-    let reports: Vec<&Report> = reports.iter().collect();
-    let table = PlateTable::new(now, &reports);
-    let mut written = vec![
-        files::put(out, "grid.csv", table.csv().as_bytes())?,
-        files::put(out, "plate.ply", &table.ply().map_err(files::FilesError::Mesh)?)?,
-        files::put(out, "plate.vtk", &table.vtk())?,
-    ];
     let record = PlateRecord::new(plate, now, None);
     let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);
     // Two strokes side by side are judged by nobody: the verdict is that of the second.
-    let verdict: Verdict = past::verdict(strokes[1]);
-    let caption = Caption { plate: &title, stroke: None, verdict };
-    for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
-        let svg = map(field, &record, &caption, &record.scale)
-            .map_err(|e| files::FilesError::Picture { name: field.name.clone(), why: e.to_string() })?;
-        written.push(files::put(out, &format!("{}.svg", files::file_name(&field.name)), svg.as_bytes())?);
-    }
-    Ok(written)
+    let caption = Caption { plate: &title, stroke: None, verdict: past::verdict(strokes[1]) };
+    let reports: Vec<&Report> = reports.iter().collect();
+    Ok(files::fields(out, now, &reports, &record, &caption)?)
 }
