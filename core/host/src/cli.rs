@@ -15,6 +15,7 @@ mod press;
 mod run;
 mod scan;
 mod scan_source;
+mod setup;
 mod status;
 mod verify;
 

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use clap::Args;
 use jiff::Timestamp;
-use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_plant::PlateFile;
 use platen_shape::Surface;
 
 use super::scan_source::{self, READ_LIMIT};
+use super::setup::Setup;
 use super::{CliError, Common, output};
 use crate::plugin::{Catalogue, JobSpec, Surfaces};
 use crate::record::{Context, ResultRecord};
@@ -25,24 +26,14 @@ use crate::{calibration, files, progress};
 pub(super) struct Command {
     /// Scan file: structured E57, PTX, XYZ with row and column, XYB
     scan: PathBuf,
-    /// Plate file: size, target, markers, lines, templates
-    #[arg(long, value_name = "PLATE.toml")]
-    plate: PathBuf,
-    /// Plant file: frame, flattening, comparisons; without it, defaults
-    #[arg(long, value_name = "PLANT.toml")]
-    plant: Option<PathBuf>,
+    #[command(flatten)]
+    setup: Setup,
     /// Scan of the same plate at the stroke before
     #[arg(long, value_name = "SCAN")]
     before: Option<PathBuf>,
     /// Scan of the same plate before the first stroke
     #[arg(long, value_name = "SCAN")]
     baseline: Option<PathBuf>,
-    /// Flattening plugin to use instead of the plant file's
-    #[arg(long, value_name = "NAME")]
-    flattening: Option<String>,
-    /// Rough direction of growing u in the scanner frame, instead of the plant file's
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
-    u_axis: Option<[f64; 3]>,
     /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -53,12 +44,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         return Err(CliError::Usage(files::FilesError::Exists(out.clone()).to_string()));
     }
     let catalogue = common.catalogue();
-    let plate = PlateFile::load(&command.plate)?;
-    let mut plant = command.plant.as_deref().map_or_else(|| Ok(PlantFile::default()), PlantFile::load)?;
-    if let Some(name) = &command.flattening {
-        plant.flattening = PluginUse::by_default(name);
-    }
-    plant.frame.u_axis = command.u_axis.or(plant.frame.u_axis);
+    let (plant, plate) = command.setup.load()?;
     let calibration = plant.calibration.as_ref().and_then(|wanted| {
         // Whether the scanner was warm, a file does not tell.
         let found = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
@@ -112,14 +98,6 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    let direction: [f64; 3] =
-        numbers.try_into().map_err(|_| "give three numbers, e.g. 0.84,0.54,0".to_owned())?;
-    let sound = direction.iter().all(|c| c.is_finite()) && direction.iter().any(|c| *c != 0.0);
-    sound.then_some(direction).ok_or_else(|| "give a direction that is not 0,0,0".to_owned())
 }
 
 /// Measures one scan file with the file driver; `last` is the plate at the scan before.

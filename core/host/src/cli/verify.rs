@@ -6,15 +6,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_plant::PlateFile;
 use platen_shape::discs::{self, Disc};
 use serde::Serialize;
 
+use super::setup::Setup;
 use super::{CliError, Common, measure, output};
-use crate::progress;
 use crate::rig::Rig;
 use crate::stroke::{Measured, Scanned};
 use crate::units::{metres, mm};
+use crate::{files, progress};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \
@@ -25,18 +26,8 @@ use crate::units::{metres, mm};
 pub(super) struct Command {
     /// Scan file: structured E57, PTX, XYZ with row and column, XYB
     scan: PathBuf,
-    /// Plate file with the painted markers
-    #[arg(long, value_name = "PLATE.toml")]
-    plate: PathBuf,
-    /// Plant file: frame and flattening; without it, defaults
-    #[arg(long, value_name = "PLANT.toml")]
-    plant: Option<PathBuf>,
-    /// Flattening plugin to use instead of the plant file's
-    #[arg(long, value_name = "NAME")]
-    flattening: Option<String>,
-    /// Rough direction of growing u in the scanner frame, instead of the plant file's
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = measure::direction)]
-    u_axis: Option<[f64; 3]>,
+    #[command(flatten)]
+    setup: Setup,
     /// How far from its marker a disc is looked for
     #[arg(long, value_name = "MM", default_value_t = 80.0, value_parser = length)]
     within_mm: f64,
@@ -77,19 +68,14 @@ struct MarkerRecord {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let catalogue = common.catalogue();
-    let plate = PlateFile::load(&command.plate)?;
+    let (mut plant, plate) = command.setup.load()?;
     if plate.markers.is_empty() {
-        let plate = command.plate.display();
+        let plate = command.setup.plate.display();
         return Err(CliError::Usage(format!(
             "{plate}: names no marker; add a [[marker]] for each painted disc"
         )));
     }
-    let mut plant = command.plant.as_deref().map_or_else(|| Ok(PlantFile::default()), PlantFile::load)?;
     plant.comparisons = Vec::new();
-    plant.frame.u_axis = command.u_axis.or(plant.frame.u_axis);
-    if let Some(name) = &command.flattening {
-        plant.flattening = PluginUse::by_default(name);
-    }
     let mut rig = Rig::of(&plant, &catalogue)?;
     let (scanned, measured) = measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None)?;
     progress::done();
@@ -98,8 +84,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     if let Some(file) = &command.picture {
         let drawn = picture::draw(&scanned.patch, &measured.measurement, &plate, &discs);
         let drawn = drawn.map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
-        std::fs::write(file, drawn)
-            .map_err(|e| CliError::Failed(format!("{}: cannot be written: {e}", file.display())))?;
+        files::replace(file, drawn.as_bytes())?;
     }
     let found = record(command, &plate, &discs);
     if common.json {
