@@ -2,11 +2,13 @@
 
 mod disk;
 mod edges;
+mod error;
 mod face;
 pub(crate) mod foot;
 mod topology;
 mod triangulate;
 
-pub use disk::{DiskMesh, DiskParts, MeshError};
+pub use disk::{DiskMesh, DiskParts};
+pub use error::MeshError;
 pub use face::Face;
 pub(crate) use face::{biweight, sigma_across};

@@ -2,9 +2,9 @@
 
 use std::ops::Deref;
 
+use super::error::{MeshError, malformed, not_a_disk};
 use super::topology::check_topology;
 use crate::Vec3;
-use crate::surface::Undetermined;
 
 /// What a [`DiskMesh`] is made of: plain data, unchecked.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,26 +38,6 @@ pub struct DiskParts {
 /// Read-only access to the [`DiskParts`] it was made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskMesh(DiskParts);
-
-/// Why a set of parts is no disk. Each is a fault of the program that made the parts.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MeshError {
-    /// A length, index or number is outside what the type allows.
-    #[error("mesh: {what}; the program that made this mesh is at fault, report it")]
-    Malformed {
-        /// The first fault found.
-        what: String,
-    },
-    /// Too few samples lie on the plate.
-    #[error(transparent)]
-    Undetermined(#[from] Undetermined),
-    /// The triangles do not form a disk.
-    #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
-    NotADisk {
-        /// The first fault found.
-        what: String,
-    },
-}
 
 impl DiskMesh {
     /// Checks the parts.
@@ -93,14 +73,6 @@ impl Deref for DiskMesh {
     fn deref(&self) -> &DiskParts {
         &self.0
     }
-}
-
-pub(super) fn malformed(what: impl Into<String>) -> MeshError {
-    MeshError::Malformed { what: what.into() }
-}
-
-pub(super) fn not_a_disk(what: impl Into<String>) -> MeshError {
-    MeshError::NotADisk { what: what.into() }
 }
 
 fn check_numbers(parts: &DiskParts) -> Result<(), MeshError> {

@@ -1,7 +1,6 @@
 //! Whether triangles form a disk: a question of indices alone.
 
-use super::MeshError;
-use super::disk::{malformed, not_a_disk};
+use super::error::{MeshError, malformed, not_a_disk};
 
 /// One disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
 /// together through edges, and V - E + F = 1. Together these exclude pinched vertices and handles.

@@ -1,0 +1,31 @@
+//! What can be wrong with a mesh.
+
+use crate::surface::Undetermined;
+
+/// Why a set of parts is no disk. Each is a fault of the program that made the parts.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// A length, index or number is outside what the type allows.
+    #[error("mesh: {what}; the program that made this mesh is at fault, report it")]
+    Malformed {
+        /// The first fault found.
+        what: String,
+    },
+    /// Too few samples lie on the plate.
+    #[error(transparent)]
+    Undetermined(#[from] Undetermined),
+    /// The triangles do not form a disk.
+    #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
+    NotADisk {
+        /// The first fault found.
+        what: String,
+    },
+}
+
+pub(super) fn malformed(what: impl Into<String>) -> MeshError {
+    MeshError::Malformed { what: what.into() }
+}
+
+pub(super) fn not_a_disk(what: impl Into<String>) -> MeshError {
+    MeshError::NotADisk { what: what.into() }
+}
