@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::faults::{LineFaults, StrokeFaults};
-use crate::steel::PlateConfig;
+use crate::steel::{PlateConfig, Strategy};
 use crate::{Error, Result};
 
 /// A press. Every key has a default; an unknown key is an error.
@@ -150,17 +150,6 @@ impl Default for LinkConfig {
 
 fn default_baud() -> u32 {
     19_200
-}
-
-/// How the next bend is chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Strategy {
-    /// The programme of bends, one after the other, whatever the results say.
-    #[default]
-    Programme,
-    /// Where the result says that the plate is open, until it passes.
-    ClosedLoop,
 }
 
 /// Times of the press, in milliseconds.

@@ -13,13 +13,23 @@ use platen_sim_plate::{Blank, Handling, Plan, PlateState, Pose, Programme, Shape
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::config::Strategy;
 use crate::registers::{HBlock, Verdict};
 
 /// Share of the angle that would close the gap at once; half keeps the press from bending too far.
 const CORRECTION: f64 = 0.5;
 /// Rescans asked for when a result without figures leaves the press blind.
 const RESCANS: u16 = 2;
+
+/// How the next bend is chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strategy {
+    /// The programme of bends, one after the other, whatever the results say.
+    #[default]
+    Programme,
+    /// Where the result says that the plate is open, until it passes.
+    ClosedLoop,
+}
 
 /// The plate, its target and how it is bent there.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]

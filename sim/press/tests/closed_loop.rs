@@ -3,9 +3,8 @@
 
 use platen_sim_plate::{Plan, Plate, Shape};
 use platen_sim_press::HBlock;
-use platen_sim_press::config::Strategy;
 use platen_sim_press::registers::{h, status};
-use platen_sim_press::steel::{Next, PlateConfig, Steel};
+use platen_sim_press::steel::{Next, PlateConfig, Steel, Strategy};
 
 const CHORD: f64 = 2.0;
 const LIMIT: f64 = 0.003;
