@@ -123,6 +123,10 @@ fn a_host_killed_at_each_point_of_a_stroke() {
         order(&mut press, point.before);
         order(&mut press, "\"stroke\"");
         (point.reach)(&mut press, &plant, stroke);
+        if point.name.starts_with("result on record") {
+            let waits = |status: &Json| status["status"]["result_waits_s"].is_number();
+            until("the result that waits in the status", || host.status().filter(waits));
+        }
         host.kill();
         order(&mut press, point.after);
         order(&mut press, r#"{"line_faults":{}}"#);

@@ -208,10 +208,16 @@ fn a_fault_is_reset_and_the_figures_are_for_prometheus() {
         "platen_up{press=\"press\"} 1",
         "platen_error{press=\"press\"} 0",
         "platen_strokes_total{press=\"press\"} 0",
+        "platen_results_waiting{press=\"press\"} 0",
+        "platen_records_lost_total{press=\"press\"} 0",
     ] {
         assert!(text.lines().any(|it| it == line), "{line} is not in\n{text}");
     }
-    assert!(text.contains("platen_exceptions_total{press=\"press\",code=\"01\"}"), "{text}");
+    for metric in
+        ["platen_exceptions_total{press=\"press\",code=\"01\"}", "platen_disk_free_bytes{press=\"press\"}"]
+    {
+        assert!(text.contains(metric), "{metric} is not in\n{text}");
+    }
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         let (_, value) = line.rsplit_once(' ').unwrap();
         assert!(value.parse::<f64>().is_ok(), "{line}");

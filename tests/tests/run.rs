@@ -197,7 +197,10 @@ fn starved_run(blocks: u32, wanted: &str) {
     assert_eq!(words[7], 402, "warning_code: {words:?}\n{}", host.log());
     assert_ne!(words[55], 0xFFFF, "measured and delivered all the same\n{}", host.log());
     let says = |text: &serde_json::Value| text.as_str().is_some_and(|text| text.starts_with("402 "));
-    until("the warning in the status", || host.status().filter(|it| says(&it["status"]["warning"])));
+    let status =
+        until("the warning in the status", || host.status().filter(|it| says(&it["status"]["warning"])));
+    assert!(status["status"]["records_lost"].as_u64() > Some(0), "{status:#}");
+    assert!(status["status"]["disk_free"].as_u64() > Some(0), "{status:#}");
     assert!(host.log().contains(wanted), "{}", host.log());
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }

@@ -7,6 +7,7 @@
 
 mod archive;
 mod bench;
+mod disk;
 mod earlier;
 mod figures;
 mod journal;
@@ -77,18 +78,19 @@ pub async fn run(
     let rig = Rig::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (tasks, inbox) = std::sync::mpsc::channel();
-    let bench =
-        Bench::new(plant, catalogue, rig, &press, Arc::clone(&history), host.answers.clone(), watcher);
+    let lost = Arc::default();
+    let ends = bench::Ends { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
+    let bench = Bench::new(plant, catalogue, rig, &press, Arc::clone(&history), ends);
     let bench = std::thread::Builder::new().name("bench".into()).spawn(move || bench.serve(&inbox));
     let bench = bench.map_err(HostError::Thread)?;
 
     let link = PressLink::new(&press);
     let alarm = status::NewestAlarm::default();
     let status = tokio::spawn(status::keep(
-        plant.output.folder.join("status.json"),
+        plant.output.folder.clone(),
         press.clone(),
         host.status.clone(),
-        Arc::clone(&alarm),
+        status::Beside { alarm: Arc::clone(&alarm), lost },
         host.answers.clone(),
     ));
     let mut press_side = tokio::spawn(run_press(press, link, journal::Adapter(Arc::clone(&history)), side));

@@ -250,8 +250,11 @@ async fn a_link_cut_in_the_middle_of_a_scan_delivers_once() {
     host.reachable.store(false, Ordering::SeqCst);
     tokio::time::sleep(MS(1500)).await;
     assert_eq!(cell.plc().results.len(), 3);
+    let waits = || host.status.borrow().metrics.result_waits;
+    assert!(waits().is_some_and(|since| since > MS(1000)), "{:?}", waits());
     host.reachable.store(true, Ordering::SeqCst);
     bench::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
+    bench::until(MS(1000), "no result to wait", || waits().is_none()).await;
     host.stop().await;
     assert_eq!(cell.check(), (4, 4));
 }
@@ -408,6 +411,7 @@ async fn a_full_disk_stops_no_result_and_is_told() {
     assert_eq!(cell.alarmed(Code::StorageFailed), 1);
     let status = cell.plc().results.last().unwrap().status;
     assert_ne!(status & 1 << 10, 0, "storage_degraded");
+    assert!(host.status.borrow().metrics.journal_failed >= 3);
     *cell.journal.full.lock().unwrap() = false;
     cell.strokes(2).await;
     assert_eq!(cell.plc().results.last().unwrap().status & 1 << 10, 0);

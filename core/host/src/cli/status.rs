@@ -60,6 +60,15 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             "link: {} connections, {} dropped for an error, out of step for {:.1} s",
             status.link.connections, status.link.poisoned, status.link_down_s
         ))?;
+        if let Some(waits_s) = status.result_waits_s {
+            output::line(&format!("a result has waited {waits_s:.0} s for the press"))?;
+        }
+        let free = status.disk_free.map(|bytes| format!("{:.1} GB free, ", bytes as f64 / 1e9));
+        output::line(&format!(
+            "disk: {}{} records could not be written",
+            free.unwrap_or_default(),
+            status.records_lost
+        ))?;
         for (what, [median, worst]) in [
             ("trigger to busy", status.trigger_to_busy_ms),
             ("stroke to result", status.stroke_to_result_ms),

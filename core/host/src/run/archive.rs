@@ -12,6 +12,7 @@ use std::time::{Duration, SystemTime};
 
 use platen_plant::plant::{KeepScans, Output};
 
+use super::disk;
 use crate::plugin::ScanEvent;
 use crate::scan_file::{self, ScanFileError};
 use crate::stroke::Tape;
@@ -114,8 +115,7 @@ fn write(folder: &Path, tape: Tape) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
     let cells: usize = columns.iter().map(platen_scan::Column::len).sum();
     let needed = cells as u64 * CELL_BYTES;
-    let space = rustix::fs::statvfs(folder).map_err(|e| e.to_string())?;
-    let free = space.f_bavail.saturating_mul(space.f_frsize);
+    let free = disk::free(folder).map_err(|e| e.to_string())?;
     if free < needed.saturating_add(RESERVE) {
         let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
         return Err(format!(

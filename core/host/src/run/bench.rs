@@ -1,6 +1,7 @@
 //! The bench: scans and measures one stroke at a time, on a thread of its own.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -97,9 +98,19 @@ pub(super) struct Bench {
     scan_limit: Option<Duration>,
     history: Arc<Mutex<History>>,
     archive: Archive,
-    answers: UnboundedSender<Answer>,
-    watcher: Option<Watcher>,
+    ends: Ends,
     in_hand: Option<InHand>,
+}
+
+/// Those who hear of the bench's work.
+#[derive(Debug)]
+pub(super) struct Ends {
+    /// The press side.
+    pub(super) answers: UnboundedSender<Answer>,
+    /// Who watches each stroke.
+    pub(super) watcher: Option<Watcher>,
+    /// How many strokes' documents could not be written.
+    pub(super) lost: Arc<AtomicU64>,
 }
 
 impl Bench {
@@ -109,8 +120,7 @@ impl Bench {
         rig: Rig,
         press: &Press,
         history: Arc<Mutex<History>>,
-        answers: UnboundedSender<Answer>,
-        watcher: Option<Watcher>,
+        ends: Ends,
     ) -> Self {
         Self {
             plant: plant.clone(),
@@ -124,8 +134,7 @@ impl Bench {
             scan_limit: press.timeouts.scan,
             history,
             archive: Archive::start(&plant.output),
-            answers,
-            watcher,
+            ends,
             in_hand: None,
         }
     }
@@ -154,7 +163,7 @@ impl Bench {
 
     fn say(&self, answer: Answer) {
         // A press side that ended needs no answer.
-        let _ = self.answers.send(answer);
+        let _ = self.ends.answers.send(answer);
     }
 
     fn connect(&mut self) {
@@ -295,7 +304,7 @@ impl Bench {
     }
 
     fn report(&self, report: StrokeReport) {
-        if let Some(watcher) = &self.watcher {
+        if let Some(watcher) = &self.ends.watcher {
             // A watcher that went away needs no report.
             let _ = watcher.strokes.send(report);
         }
@@ -402,6 +411,7 @@ impl Bench {
         match written {
             Ok(()) => Some(folder),
             Err(why) => {
+                self.ends.lost.fetch_add(1, Ordering::Relaxed);
                 tracing::error!(key = %stroke.key, "the record is lost: {why}");
                 None
             }

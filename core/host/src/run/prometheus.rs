@@ -23,11 +23,22 @@ impl StatusRecord {
         );
         one("error", "gauge", "1 while error_code is not 0", f64::from(u8::from(self.error.is_some())));
         one("warning", "gauge", "1 while warning_code is not 0", f64::from(u8::from(self.warning.is_some())));
+        one(
+            "results_waiting",
+            "gauge",
+            "results on record that the press has not got",
+            f64::from(u8::from(self.result_waits_s.is_some())),
+        );
+        one("result_waits_seconds", "gauge", "how long it has waited", self.result_waits_s.unwrap_or(0.0));
+        if let Some(free) = self.disk_free {
+            one("disk_free_bytes", "gauge", "free where results are written", free as f64);
+        }
         for (name, help, count) in [
             ("strokes_total", "strokes accepted, every attempt", self.strokes),
             ("measured_total", "results with a measurement", self.measured),
             ("not_measured_total", "results without a measurement", self.not_measured),
             ("missed_total", "strokes missed", self.missed),
+            ("records_lost_total", "records and result folders that could not be written", self.records_lost),
             ("ack_timeouts_total", "results not acknowledged in time", self.ack_timeouts),
             ("torn_reads_total", "reads that found the press writing its block", self.torn_reads),
             ("rewrites_total", "reads that found the host's block changed", self.rewrites),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -10,10 +11,22 @@ use platen_press::{Answer, Code, Durations, Language, Status};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
+use super::disk;
 use crate::files;
 
 /// The newest alarm, as the dispatcher hears it.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
+
+/// What the press side does not know.
+#[derive(Debug, Default)]
+pub(super) struct Beside {
+    pub(super) alarm: NewestAlarm,
+    /// How many strokes' documents could not be written.
+    pub(super) lost: Arc<AtomicU64>,
+}
+
+/// Its name in the output folder.
+const FILE: &str = "status.json";
 
 /// From a reset until the press side has told how it stands after it.
 const RESET_SHOWS: Duration = Duration::from_millis(400);
@@ -65,6 +78,13 @@ pub struct StatusRecord {
     pub torn_reads: u64,
     /// Reads that found the host's own block changed by the press.
     pub rewrites: u64,
+    /// Seconds that the result in hand has waited for the press; null when none waits. There is never more than one: no
+    /// stroke is accepted before it is delivered.
+    pub result_waits_s: Option<f64>,
+    /// Bytes that are free where results are written; null where that cannot be told.
+    pub disk_free: Option<u64>,
+    /// Records of the history and result folders that could not be written.
+    pub records_lost: u64,
     /// Seconds without being in step with the press, the present loss apart.
     pub link_down_s: f64,
     /// What happened on the link.
@@ -95,7 +115,13 @@ pub struct LinkRecord {
 }
 
 impl StatusRecord {
-    fn of(press: &Press, status: &Status, alarm: &NewestAlarm, reset_at: Option<jiff::Timestamp>) -> Self {
+    fn of(
+        press: &Press,
+        folder: &Path,
+        status: &Status,
+        beside: &Beside,
+        reset_at: Option<jiff::Timestamp>,
+    ) -> Self {
         let percentiles = |durations: &Durations| {
             [50.0, 99.0].map(|percent| durations.percentile(percent).map(|d| d.as_secs_f64() * 1000.0))
         };
@@ -111,7 +137,7 @@ impl StatusRecord {
             link_error: status.link_error.map(words),
             error: status.host.error.map(words),
             warning: status.host.warning.map(words),
-            alarm: alarm.lock().unwrap_or_else(PoisonError::into_inner).clone(),
+            alarm: beside.alarm.lock().unwrap_or_else(PoisonError::into_inner).clone(),
             strokes: status.metrics.strokes,
             measured: status.metrics.measured,
             not_measured: status.metrics.not_measured,
@@ -123,6 +149,9 @@ impl StatusRecord {
             ack_timeouts: status.metrics.ack_timeouts,
             torn_reads: status.metrics.torn_reads,
             rewrites: status.metrics.rewrites,
+            result_waits_s: status.metrics.result_waits.map(|waits| waits.as_secs_f64()),
+            disk_free: disk::free(folder).ok(),
+            records_lost: status.metrics.journal_failed + beside.lost.load(Ordering::Relaxed),
             link_down_s: status.metrics.link_down.as_secs_f64(),
             link: LinkRecord {
                 requests: status.counts.requests,
@@ -143,19 +172,19 @@ impl StatusRecord {
     /// # Errors
     /// When there is none, or it cannot be read.
     pub fn load(folder: &Path) -> std::io::Result<Self> {
-        Ok(serde_json::from_slice(&std::fs::read(folder.join("status.json"))?)?)
+        Ok(serde_json::from_slice(&std::fs::read(folder.join(FILE))?)?)
     }
 }
 
 /// Keeps the file up to date, at most once a second but at once when the state changes; hands on requests for a reset.
 pub(super) async fn keep(
-    path: PathBuf,
+    folder: PathBuf,
     press: Press,
     mut status: watch::Receiver<Status>,
-    alarm: NewestAlarm,
+    beside: Beside,
     answers: mpsc::UnboundedSender<Answer>,
 ) {
-    let request = reset_request(path.parent().unwrap_or(Path::new(".")));
+    let request = reset_request(&folder);
     let mut reset_at = None;
     let mut reported = false;
     loop {
@@ -166,8 +195,8 @@ pub(super) async fn keep(
             let _ = answers.send(Answer::Reset);
             tokio::time::sleep(RESET_SHOWS).await;
         }
-        let record = StatusRecord::of(&press, &status.borrow_and_update(), &alarm, reset_at);
-        if let Err(error) = write(&path, &record)
+        let record = StatusRecord::of(&press, &folder, &status.borrow_and_update(), &beside, reset_at);
+        if let Err(error) = write(&folder, &record)
             && !std::mem::replace(&mut reported, true)
         {
             tracing::warn!("{error}; `platen status` will be out of date");
@@ -187,10 +216,8 @@ pub(super) async fn keep(
     }
 }
 
-fn write(path: &Path, record: &StatusRecord) -> Result<(), String> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    }
+fn write(folder: &Path, record: &StatusRecord) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let text = serde_json::to_vec_pretty(record).map_err(|e| e.to_string())?;
-    files::replace(path, &text).map_err(|e| e.to_string())
+    files::put(folder, FILE, &text).map(drop).map_err(|e| e.to_string())
 }

@@ -55,6 +55,8 @@ pub(super) struct Clock {
     polled: Instant,
     triggered: Instant,
     busy_untold: bool,
+    /// Since when a result waits for the press.
+    result_since: Option<Instant>,
     next_status: Instant,
 }
 
@@ -74,6 +76,7 @@ impl Clock {
             polled: now,
             triggered: now,
             busy_untold: false,
+            result_since: None,
             next_status: now,
         }
     }
@@ -331,6 +334,7 @@ impl<L: Link> Runner<L> {
 
     fn journaled(&mut self, done: Done) {
         if let Some(error) = &done.error {
+            self.metrics.journal_failed += 1;
             tracing::error!(error, stroke = %done.key, "the journal cannot be written");
         }
         self.metrics.journal.add(done.took);
@@ -342,6 +346,8 @@ impl<L: Link> Runner<L> {
         for effect in self.handshake.step(event, now) {
             self.carry_out(effect);
         }
+        let waits = self.handshake.state().work == Work::Publish;
+        self.clock.result_since = waits.then(|| self.clock.result_since.unwrap_or_else(Instant::now));
     }
 
     fn carry_out(&mut self, effect: Effect) {
@@ -418,6 +424,8 @@ impl<L: Link> Runner<L> {
             stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict,
             trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_millis()),
             stroke_to_result_ms = stroke_to_result.as_millis(),
+            waited_ms = self.clock.result_since.map(|since| since.elapsed().as_millis()),
+            journal_failed = self.metrics.journal_failed,
             missed = self.handshake.missed_total(), connections = self.client.counts().connects,
             "result in the registers"
         );
@@ -431,6 +439,7 @@ impl<L: Link> Runner<L> {
         }
         self.clock.next_status = now + STATUS;
         self.metrics.missed = self.handshake.missed_total();
+        self.metrics.result_waits = self.clock.result_since.map(|since| now - since);
         let status = Status {
             state: self.handshake.state(),
             link_error: self.handshake.link_error(),

@@ -62,6 +62,10 @@ pub struct Metrics {
     pub result_to_ack: Durations,
     /// From asking for a record of the journal until it would survive a power cut.
     pub journal: Durations,
+    /// Records that the journal could not take.
+    pub journal_failed: u64,
+    /// How long the result in hand has been waiting for the press; `None` when none waits.
+    pub result_waits: Option<Duration>,
     /// Time without being in step with the press, the present loss apart.
     pub link_down: Duration,
 }
