@@ -1,11 +1,11 @@
 //! The register map in force as a page for the programmer of the press: Markdown, CSV, and the program to write.
 
+mod rules;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use platen_plant::press::{
-    Block, Field, Input, Kind, Output, Parity, Place, Press, Role, Table, Transport, Unit,
-};
+use platen_plant::press::{Block, Field, Input, Kind, Output, Place, Press, Role, Table, Unit};
 
 use crate::reference_program;
 
@@ -127,11 +127,9 @@ pub fn map_markdown(press: &Press) -> String {
         map.profile.name(),
         press.press_id
     );
-    page += "Addresses are zero-based, as on the wire; beside them in 6-digit notation. ";
-    page += "Each block travels in one transaction.\n\n## Connection\n\n";
-    for line in connection(press) {
-        let _ = writeln!(page, "- {line}");
-    }
+    page += "Addresses are zero-based, as on the wire; beside them in 6-digit notation.\n";
+    list(&mut page, "Connection", &rules::connection(press));
+    list(&mut page, "How to read the tables", &rules::notation(press));
     let functions = |table| if table == Table::Holding { "function 3" } else { "function 4" };
     let (read, write) = (&map.read, &map.write);
     let (to_host, to_press) = if press.role == Role::Server {
@@ -152,10 +150,8 @@ pub fn map_markdown(press: &Press) -> String {
     );
     section(&mut page, &format!("Host to press: {to_press}"), write, &outputs(press));
     let _ = write!(page, "\nThe host changes registers {} (zero-based) and no others. ", press.write);
-    page += "Registers without a row are reserved: leave them 0.\n\n## Rules\n\n";
-    for rule in rules(press) {
-        let _ = writeln!(page, "- {rule}");
-    }
+    page += "Registers without a row are reserved: leave them 0.\n";
+    list(&mut page, "Rules", &rules::rules(press));
     let _ = write!(
         page,
         "\n## Reference program (IEC 61131-3 Structured Text)\n\n```\n{}```\n",
@@ -164,52 +160,11 @@ pub fn map_markdown(press: &Press) -> String {
     page
 }
 
-/// How the two find each other.
-fn connection(press: &Press) -> Vec<String> {
-    let (link, ms) = (&press.link, |time: std::time::Duration| time.as_millis());
-    let mut lines = Vec::new();
-    match (&link.transport, press.role) {
-        (Transport::Tcp(socket), Role::Server) => {
-            lines.push(format!(
-                "The host is the Modbus TCP server at {}:{}, unit {}; the press is the client.",
-                socket.host, socket.port, link.unit
-            ));
-            lines.push(
-                "Write your block and read the host's in turn, every 20 to 100 ms, each whole in one request. Without a \
-                 write for 2 s the host takes the press for gone."
-                    .into(),
-            );
-        }
-        (Transport::Tcp(socket), Role::Client) => lines.push(format!(
-            "The press is the Modbus TCP server at {}:{}, unit {}. One connection is held open.",
-            socket.host, socket.port, link.unit
-        )),
-        (Transport::RtuOverTcp(socket, _), _) => lines.push(format!(
-            "The press is a Modbus RTU slave, unit {}, behind the gateway {}:{} that passes RTU frames unchanged.",
-            link.unit, socket.host, socket.port
-        )),
-        (Transport::Rtu(serial, _), _) => lines.push(format!(
-            "The press is a Modbus RTU slave, unit {}: {} baud, 8 data bits, {} parity, {} stop bit{}.",
-            link.unit,
-            serial.baud,
-            match serial.parity {
-                Parity::Even => "even",
-                Parity::Odd => "odd",
-                Parity::None => "no",
-            },
-            serial.stop_bits,
-            if serial.stop_bits == 1 { "" } else { "s" }
-        )),
+fn list(page: &mut String, title: &str, lines: &[String]) {
+    let _ = write!(page, "\n## {title}\n\n");
+    for line in lines {
+        let _ = writeln!(page, "- {line}");
     }
-    if press.role == Role::Client {
-        let most = press.write.max_writes_per_s;
-        lines.push(format!(
-            "The host polls every {} ms, expects each answer within {} ms and writes at most {most} times a second.",
-            ms(link.poll),
-            ms(link.response_timeout)
-        ));
-    }
-    lines
 }
 
 fn section(page: &mut String, title: &str, block: &Block, rows: &[Row]) {
@@ -247,82 +202,6 @@ pub fn map_csv(press: &Press) -> String {
         }
     }
     csv
-}
-
-fn rules(press: &Press) -> Vec<String> {
-    let map = &press.map;
-    let has = |input| map.inputs.contains_key(&input);
-    let mut rules = Vec::new();
-    if map.counts_strokes() {
-        let counter = map.counter;
-        rules.push(format!(
-            "Set stroke_id before trigger. It counts by one, from {} to {}, then from {} again. Hold trigger until \
-             ack_stroke_id equals stroke_id.",
-            counter.first, counter.wrap, counter.first
-        ));
-        rules.push(
-            "Use a result only if status_result_valid is 1, result_stroke_id is your stroke_id, session_echo your \
-             session_id, result_seq equals result_seq_tail, the host's heartbeat moves, and status_simulated is 0."
-                .into(),
-        );
-    } else {
-        rules.push(
-            "Stroke counting is not available on this press: a missed stroke cannot be noticed.".into(),
-        );
-        rules.push("Hold trigger until status_result_valid.".into());
-    }
-    if has(Input::StrokeIdTail) {
-        rules.push("Write stroke_id_tail first and stroke_id last, in the same program cycle.".into());
-    }
-    if has(Input::SessionId) {
-        rules.push("Draw session_id at random when the controller starts and when the part changes.".into());
-    }
-    if has(Input::Ack) {
-        rules.push("Raise ack when the result is read; drop it when status_result_valid is 0.".into());
-    } else if !map.counts_strokes() {
-        rules.push("Drop trigger when the result is read: that is the acknowledge.".into());
-    }
-    if has(Input::Enable) {
-        rules.push("Hold enable at 1 while strokes are to be measured; 0 during a scan gives it up.".into());
-    }
-    if has(Input::ClearToScan) {
-        rules.push(
-            "Raise clear_to_scan when ram and plate are at rest, and hold it until status_scan_done: only then is the \
-             plate free to move."
-                .into(),
-        );
-    }
-    if has(Input::Baseline) {
-        rules.push(
-            "For a scan of the blank before its first stroke raise baseline together with trigger, under a stroke_id of \
-             its own."
-                .into(),
-        );
-    }
-    if has(Input::Rescan) && has(Input::Attempt) {
-        rules.push(
-            "To measure the same stroke again count attempt up by one and raise rescan; stroke_id stays. The result is \
-             the one whose attempt_echo is your attempt."
-                .into(),
-        );
-    }
-    if has(Input::PartEnd) {
-        rules.push("Raise part_end for at least 0.5 s when the plate leaves.".into());
-    }
-    if has(Input::ErrorReset) {
-        rules.push("Raise error_reset for at least 0.5 s to clear latched errors and missed_count.".into());
-    }
-    if map.outputs.contains_key(&Output::ErrorCode) {
-        rules
-            .push("The texts of error_code and warning_code: platen press map PLANT --format alarms.".into());
-    }
-    if has(Input::Heartbeat) {
-        let limit = press.timeouts.heartbeat_in.as_secs_f64();
-        rules.push(format!("Count heartbeat up at least every {} s.", limit / 4.0));
-    }
-    rules.push("A figure without a value holds its \"no value\" word, never 0.".into());
-    rules.push("The host measures only: no output of it may start, stop or release motion.".into());
-    rules
 }
 
 #[cfg(test)]
@@ -367,9 +246,22 @@ mod tests {
     }
 
     #[test]
+    fn a_valid_result_is_told_by_the_bits_that_there_are() {
+        let counting = map_markdown(&press());
+        let all = "exactly one of status_pass, status_fail, status_cannot_tell and status_not_measured is 1";
+        assert!(counting.contains(all), "{counting}");
+        let mut bare = press();
+        bare.map = RegisterMap::bits();
+        assert!(map_markdown(&bare).contains("neither status_pass nor status_fail"));
+    }
+
+    #[test]
     fn a_press_that_does_not_count_is_told_so() {
         let mut bare = press();
         bare.map = RegisterMap::word();
-        assert!(map_markdown(&bare).contains("Stroke counting is not available"));
+        let page = map_markdown(&bare);
+        assert!(page.contains("Stroke counting is not available"), "{page}");
+        assert!(page.contains("keep it at 0 for at least 60 ms"), "two equal reads, every 20 ms: {page}");
+        assert!(!page.contains("ack_stroke_id") && !page.contains("ABCD"), "{page}");
     }
 }
