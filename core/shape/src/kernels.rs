@@ -1,4 +1,4 @@
-//! Where dense algebra runs.
+//! How dense algebra and long loops run.
 
 /// Runs work on faer's dense kernels on a thread of its own, and waits for it.
 ///
@@ -11,4 +11,11 @@ pub(crate) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
         Ok(done) => done,
         Err(panic) => std::panic::resume_unwind(panic),
     })
+}
+
+/// Runs a loop compiled for the widest vector registers of this processor. What is to be so compiled must be inlined into
+/// `work`; results are the same to the last bit as without.
+#[inline(always)]
+pub(crate) fn wide<T>(work: impl FnOnce() -> T) -> T {
+    pulp::Arch::new().dispatch(work)
 }

@@ -4,11 +4,12 @@ mod disk;
 mod edges;
 mod error;
 mod face;
-pub(crate) mod foot;
+mod facets;
 mod topology;
 mod triangulate;
 
 pub use disk::{DiskMesh, DiskParts};
 pub use error::MeshError;
 pub use face::Face;
-pub(crate) use face::{biweight, sigma_across};
+pub(crate) use face::{biweight, per_sigma_across};
+pub(crate) use facets::Facets;

@@ -13,7 +13,6 @@ mod moments;
 mod net;
 mod parts;
 mod smoothing;
-mod spans;
 
 pub use axis::Axis;
 pub use fit::{Fit, Fitted, Undetermined};
@@ -21,7 +20,6 @@ pub use mask::Mask;
 pub use net::{Jet, Net};
 pub use parts::{SurfaceError, SurfaceParts};
 pub(crate) use smoothing::Penalty;
-pub(crate) use spans::Spans;
 
 use crate::Vec3;
 use axis::Stencil;

@@ -5,9 +5,8 @@
 //! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
 
 use super::Quality;
-use crate::mesh::foot::walk;
-use crate::mesh::{Face, biweight, sigma_across};
-use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Spans, Surface, Undetermined};
+use crate::mesh::{Face, Facets, biweight, per_sigma_across};
+use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend.
@@ -36,16 +35,21 @@ pub(super) fn settle(
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
     let mut fit = Fit::<3>::new(Axis::of_length(spec.width, SPAN), Axis::of_length(spec.height, SPAN));
     let mut seen = Seen::new(spec);
+    let per_scale = 1.0 / face.noise_scale;
     let mut variance = 0.0;
-    walk(&Spans::of(&carried), patch.samples.iter(), |sample, foot| {
-        let [.., u, v] = foot.value;
-        let sigma = face.noise_scale * sigma_across(sample, &foot.normal);
-        let weight = biweight(foot.height / sigma) / (sigma * sigma);
-        let mid = sample.point - foot.normal * (0.5 * spec.thickness) - middle;
-        fit.add(u, v, mid.into(), weight);
-        seen.add(sample, [u, v]);
-        variance += f64::from(sample.sigma).powi(2);
-    });
+    Facets::carrying(&face.face, |[a, b]| carried.jet(a, b)).walk(
+        patch.samples.iter(),
+        #[inline(always)]
+        |sample, foot| {
+            let [u, v] = foot.value;
+            let per_sigma = per_scale * per_sigma_across(sample, &foot.normal);
+            let weight = biweight(foot.height * per_sigma) * per_sigma * per_sigma;
+            let mid = sample.point - foot.normal * (0.5 * spec.thickness) - middle;
+            fit.add(u, v, mid.into(), weight);
+            seen.add(sample, [u, v]);
+            variance += f64::from(sample.sigma).powi(2);
+        },
+    );
     let fitted = fit.solve(direction(&face.mid).into())?;
     let n = patch.samples.len();
     let quality = Quality {
@@ -60,9 +64,8 @@ pub(super) fn settle(
     Ok(Settled { surface, quality })
 }
 
-/// The face over (a, b) and with it the chart, (x, y, z, 0, u, v): the latter by least squares on the vertices, with a
-/// penalty that acts below three spans only.
-fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<6>, Undetermined> {
+/// The chart over (a, b), by least squares on the vertices, with a penalty that acts below three spans only.
+fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<2>, Undetermined> {
     let (a, b) = (face.mid.u, face.mid.v);
     let mut fit = Fit::<2>::new(a, b);
     for ([x, y], uv) in places.iter().zip(&chart.uv) {
@@ -70,10 +73,7 @@ fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<6>, Unde
     }
     let density = places.len() as f64 / (a.end() * b.end());
     let weight = |step: f64| density * (3.0 * step / std::f64::consts::TAU).powi(6);
-    let uv = fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net;
-    let control =
-        face.face.control.iter().zip(&uv.control).map(|([x, y, z], [u, v])| [*x, *y, *z, 0.0, *u, *v]);
-    Ok(Net { u: a, v: b, control: control.collect() })
+    Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net)
 }
 
 /// Mean normal of the plate: at right angles to both diagonals.

@@ -8,8 +8,8 @@
 
 use super::MeshError;
 use super::edges::coons;
-use super::foot::walk;
-use crate::surface::{Axis, Fit, Fitted, Net, Spans, Undetermined};
+use super::facets::Facets;
+use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
 use crate::{Outline, Patch, PlateSpec, Sample, Vec3};
 
 /// Length of a span of the smooth face, metres. Bends of a press are three and more times as wide; finer detail is left
@@ -57,15 +57,18 @@ impl Face {
     }
 }
 
-/// Standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
-pub(crate) fn sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
-    let cosine = sample.point.dot(normal).abs() / sample.point.norm();
-    f64::from(sample.sigma) * cosine.max(LEAST_COSINE)
+/// One over the standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
+#[inline(always)]
+pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
+    let range = sample.point.norm();
+    let towards = sample.point.dot(normal).abs().max(LEAST_COSINE * range);
+    range / (f64::from(sample.sigma) * towards)
 }
 
 /// Tukey's biweight of a residual, in standard deviations.
+#[inline(always)]
 pub(crate) fn biweight(residual: f64) -> f64 {
-    let x = residual / CUT_OFF;
+    let x = residual * (1.0 / CUT_OFF);
     (1.0 - x * x).max(0.0).powi(2)
 }
 
@@ -85,18 +88,19 @@ fn robust_scale(mut sizes: Vec<f64>) -> f64 {
 struct Heights {
     places: Vec<[f64; 2]>,
     heights: Vec<f64>,
-    sigmas: Vec<f64>,
+    /// One over their standard deviations.
+    per_sigmas: Vec<f64>,
 }
 
 impl Heights {
     fn over(base: &Net<3>, patch: &Patch) -> Self {
         let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
         let thinned = patch.samples.iter().filter(|s| s.column % every == 0 && s.row % every == 0);
-        let mut out = Self { places: Vec::new(), heights: Vec::new(), sigmas: Vec::new() };
-        walk(&Spans::of(base), thinned, |sample, foot| {
-            out.places.push(foot.at);
+        let mut out = Self { places: Vec::new(), heights: Vec::new(), per_sigmas: Vec::new() };
+        Facets::of(base).walk(thinned, |sample, foot| {
+            out.places.push(foot.value);
             out.heights.push(foot.height);
-            out.sigmas.push(sigma_across(sample, &foot.normal));
+            out.per_sigmas.push(per_sigma_across(sample, &foot.normal));
         });
         out
     }
@@ -110,18 +114,19 @@ impl Heights {
             }
             fit
         };
-        let all = gather(&|i| self.sigmas[i].powi(-2));
+        let all = gather(&|i| self.per_sigmas[i].powi(2));
         let penalty = all.choose_penalty([1.0]);
         let first = all.solve_with(penalty)?;
         let residuals: Vec<f64> = (0..self.places.len())
             .map(|i| {
-                (self.heights[i] - first.net.point(self.places[i][0], self.places[i][1])[0]) / self.sigmas[i]
+                (self.heights[i] - first.net.point(self.places[i][0], self.places[i][1])[0])
+                    * self.per_sigmas[i]
             })
             .collect();
         let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
         // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
         let robust =
-            gather(&|i| biweight(residuals[i] / scale) / self.sigmas[i].powi(2)).solve_with(penalty)?;
+            gather(&|i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2)).solve_with(penalty)?;
         Ok((robust, scale))
     }
 }

@@ -87,6 +87,7 @@ impl Axis {
     }
 
     /// Span of `x` and its place t in [-1/2, 1/2] there; beyond the ends the last span goes on.
+    #[inline(always)]
     pub(crate) fn locate(&self, x: f64) -> (usize, f64) {
         let s = (x - self.start) / self.step;
         let span = (s.max(0.0) as usize).min(self.n_spans - 1);
@@ -100,6 +101,7 @@ impl Axis {
     }
 
     /// Values and two derivatives at `x`.
+    #[inline(always)]
     pub(crate) fn stencil(&self, x: f64) -> Stencil {
         let (first, t) = self.locate(x);
         let (h1, h2) = (1.0 / self.step, 1.0 / (self.step * self.step));

@@ -46,6 +46,7 @@ impl<const D: usize> Fit<D> {
 
     /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points a little outside count for the
     /// outermost span.
+    #[inline(always)]
     pub fn add(&mut self, u: f64, v: f64, y: [f64; D], w: f64) {
         self.moments.add(u, v, y, w);
     }

@@ -8,7 +8,6 @@ use super::axis::{Axis, BASIS, multiply, pairs};
 use super::band::BandMatrix;
 use super::net::Net;
 use super::smoothing::{GAUSS, GridValues};
-use super::spans::bicubic;
 use nalgebra::{Matrix4, Vector4};
 
 /// Weighted sums over the points of one cell.
@@ -63,6 +62,7 @@ impl<const D: usize> Moments<D> {
     }
 
     /// Adds the point `y` at (u, v) with weight `w`; weight 0 adds nothing.
+    #[inline(always)]
     pub(crate) fn add(&mut self, u: f64, v: f64, y: [f64; D], w: f64) {
         if w <= 0.0 {
             return;
@@ -116,7 +116,7 @@ impl<const D: usize> Moments<D> {
         let mut sum = self.square;
         for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points > 0) {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
-            let polynomial = bicubic(net, i, k);
+            let polynomial = net.polynomial(i, k);
             for d in 0..D {
                 for (a, q) in (0..4).flat_map(|q| (0..4).map(move |p| (p, q))) {
                     // The polynomial's own image under the cell's moments, less twice the right-hand side.
@@ -171,6 +171,7 @@ impl<const D: usize> Moments<D> {
     }
 }
 
+#[inline(always)]
 fn powers(t: f64) -> [f64; 8] {
     let (t2, t3) = (t * t, t * t * t);
     [1.0, t, t2, t3, t2 * t2, t2 * t3, t3 * t3, 0.0]

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::axis::Axis;
+use super::axis::{Axis, BASIS};
 
 /// A bicubic spline map from (u, v) to `D` components.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +95,7 @@ impl<const D: usize> Net<D> {
 
     /// Value and derivatives to second order at (u, v).
     #[must_use]
+    #[inline(always)]
     pub fn jet(&self, u: f64, v: f64) -> Jet<D> {
         let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
         let mut jet = Jet { p: [0.0; D], u: [0.0; D], v: [0.0; D], uu: [0.0; D], uv: [0.0; D], vv: [0.0; D] };
@@ -114,9 +115,31 @@ impl<const D: usize> Net<D> {
     }
 
     /// The four control values that row `k` gives to the span starting at coefficient `i`.
-    pub(super) fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
+    #[inline(always)]
+    fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
         let start = k * self.u.n_coefficients() + i;
         &self.control[start..start + 4]
+    }
+
+    /// The polynomial of the span (i, k) in its middle-centred coordinates s (along u) and t (along v): `[q][p]` is the
+    /// coefficient of s^p t^q.
+    pub(super) fn polynomial(&self, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
+        let mut bicubic = [[[0.0; D]; 4]; 4];
+        for (b, along_v) in BASIS.iter().enumerate() {
+            // Row k + b of the net as a polynomial in s.
+            let mut row = [[0.0; D]; 4];
+            for (control, along_u) in self.row(i, k + b).iter().zip(&BASIS) {
+                for (slot, f) in row.iter_mut().zip(along_u) {
+                    (0..D).for_each(|d| slot[d] += f * control[d]);
+                }
+            }
+            for (slots, f) in bicubic.iter_mut().zip(along_v) {
+                for (slot, x) in slots.iter_mut().zip(&row) {
+                    (0..D).for_each(|d| slot[d] += f * x[d]);
+                }
+            }
+        }
+        bicubic
     }
 }
 
