@@ -12,20 +12,24 @@
 //! | angular noise of 30 urad | `angular_noise` | 3 mm, 0.2 mm |
 //! | scanner leaning by 4 degrees | `inclination` | 3 mm, 0.1 mm |
 //! | warm-up columns | `warm_up_columns` | left out |
+//! | seam of the two faces across the plate | `seam_across_the_plate`, `seam_of_a_head_that_turns_clockwise` | 3 mm, 0.8 mm |
 //! | a person and a chain before the plate | `stray_and_occluded` | 6 mm, 0.5 mm |
 //! | seen under more than 75 degrees | `grazing` | refused: "scan: .." or "plate: .." |
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod stream;
 
+use std::f64::consts::PI;
+
 use platen_host::plugin::{Catalogue, JobSpec};
 use platen_host::rig::Rig;
 use platen_host::stroke::{self, NotMeasured};
 use platen_plant::PlantFile;
+use platen_scan::Window;
 use platen_shape::{PlateSpec, Vec3};
 use platen_sim_plate::{Plate, PlateState, Pose};
 use platen_sim_scanner::stream::{BridgeConfig, Shop};
-use platen_sim_scanner::{Cyclic, Instrument, Surroundings};
+use platen_sim_scanner::{Cyclic, Faces, Instrument, Surroundings};
 use stream::{LIMIT, driver, plate, start};
 
 /// What is wrong: with the scanner, the shop or how the plate lies.
@@ -33,13 +37,16 @@ struct Scene {
     instrument: Instrument,
     surroundings: Surroundings,
     plate: PlateState,
+    /// Errors of the two faces; the seam lies at this azimuth of the plate, degrees.
+    faces: Option<(Faces, f64)>,
+    clockwise: bool,
 }
 
 impl Default for Scene {
     fn default() -> Self {
         let (instrument, surroundings) =
             (Instrument { warm_up_columns: 10, ..Instrument::default() }, Surroundings::default());
-        Self { instrument, surroundings, plate: plate() }
+        Self { instrument, surroundings, plate: plate(), faces: None, clockwise: false }
     }
 }
 
@@ -56,6 +63,8 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
         surroundings: scene.surroundings,
         instrument: scene.instrument,
         noise: Some(scene.instrument.range_sigma),
+        faces: scene.faces.map(|(faces, _)| faces),
+        mirrored: scene.clockwise,
         threads: 2,
         ..Shop::new(Box::new(move || Ok(Some(state.clone()))))
     };
@@ -69,8 +78,12 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let [width, height, thickness] = [truth.width(), truth.height(), truth.thickness()];
     let u_axis = Some(truth.corners()[1] - truth.corners()[0]).map(|u| Vec3::new(u.x, u.y, u.z));
     let spec = PlateSpec { width, height, thickness, face_inset: 0.0, u_axis, region: None };
-    let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, &spec, None)?;
-    assert_eq!(scanned.warm_up_columns, scene.instrument.warm_up_columns);
+    let window = scene.faces.map(|(_, seam_deg)| over_half_a_turn(seam_deg.to_radians(), scene.clockwise));
+    let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), window.as_ref(), &spec, None)?;
+    assert_eq!(scanned.header.seam_column.is_some(), window.is_some());
+    // Those that come last in the host's order are emptied by the driver.
+    let left_out = if scene.clockwise { 0 } else { scene.instrument.warm_up_columns };
+    assert_eq!(scanned.warm_up_columns, left_out);
     let measured = stroke::measure_scanned(&mut rig, &scanned, &spec, None)?;
 
     let corner = |k: usize| (measured.outline.corners[k].point - truth.corners()[k]).norm();
@@ -84,6 +97,13 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     }
     let corners = (0..4).map(corner).fold(0.0, f64::max);
     Ok(Found { corners, surface: (squares / 81.0).sqrt() })
+}
+
+/// A window in which the other face begins at the azimuth `seam`: half a turn before it, and a little behind.
+fn over_half_a_turn(seam: f64, clockwise: bool) -> Window {
+    const BEHIND: f64 = 0.4;
+    let azimuth_start = if clockwise { seam - BEHIND } else { seam - PI };
+    Window { azimuth_start, azimuth_width: PI + BEHIND, elevation_min: -0.72, elevation_max: -0.42 }
 }
 
 #[track_caller]
@@ -158,6 +178,24 @@ fn warm_up_columns() {
     // 40 columns, 2.8 degrees, of ranges that scatter by centimetres, beside the plate.
     let instrument = Instrument { warm_up_columns: 40, ..Scene::default().instrument };
     survives(2.0, 0.1, Scene { instrument, ..Scene::default() });
+}
+
+/// Both faces see a part of the plate, the back face with its own collimation and from 1.1 mm beside; three columns at the seam are left out.
+fn seam(seam_deg: f64, clockwise: bool) -> Scene {
+    let faces = Faces { seam_column: 0, collimation: 50e-6, trunnion: 25e-6, moved: [0.0, 0.5e-3, 1e-3] };
+    let scene = Scene::default();
+    let instrument = Instrument { warm_up_columns: 3, ..scene.instrument };
+    Scene { instrument, faces: Some((faces, seam_deg)), clockwise, ..scene }
+}
+
+#[test]
+fn seam_across_the_plate() {
+    survives(3.0, 0.8, seam(-2.0, false));
+}
+
+#[test]
+fn seam_of_a_head_that_turns_clockwise() {
+    survives(3.0, 0.8, seam(3.0, true));
 }
 
 #[test]

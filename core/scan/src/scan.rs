@@ -15,7 +15,8 @@ pub struct ScanHeader {
     pub elevation_start: f64,
     /// Angle between neighbouring rows, radians, positive.
     pub elevation_step: f64,
-    /// First column of the back face where the scan has two.
+    /// First column of the other face where the scan has two: of the back face, of the front face where the head turns
+    /// clockwise.
     pub seam_column: Option<u32>,
     /// Smallest and largest intensity that the instrument can report.
     pub intensity_range: (u16, u16),

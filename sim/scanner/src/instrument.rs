@@ -22,6 +22,8 @@ pub struct Instrument {
     pub specular_lobe: Option<f64>,
     /// Two faces of the mirror turn.
     pub faces: Option<Faces>,
+    /// The head turns clockwise: columns are measured from the last to the first.
+    pub clockwise: bool,
     /// Columns at the start of each face before the laser is warm: their ranges scatter by centimetres.
     pub warm_up_columns: u32,
     /// Nothing nearer and nothing farther is measured.
@@ -41,10 +43,11 @@ pub struct Cyclic {
     pub phase: f64,
 }
 
-/// A scan whose later columns are measured on the back face, after the others.
+/// A scan of two faces: each turn of the mirror measures a column of both, half a turn of the head apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faces {
-    /// First column of the back face.
+    /// First column of the other face by growing azimuth: of the back face, of the front face where the head turns
+    /// clockwise.
     pub seam_column: u32,
     /// Angle of the beam against the mirror's plane; changes sign between the faces.
     pub collimation: f64,
@@ -66,6 +69,7 @@ impl Default for Instrument {
             cyclic: None,
             specular_lobe: None,
             faces: None,
+            clockwise: false,
             warm_up_columns: 0,
             reach: [0.6, 130.0],
             seed: 1,

@@ -52,14 +52,15 @@ impl View<'_> {
     }
 
     fn is_back(&self, column: u32) -> bool {
-        self.instrument.faces.is_some_and(|faces| column >= faces.seam_column)
+        self.instrument.faces.is_some_and(|faces| (column >= faces.seam_column) != self.instrument.clockwise)
     }
 
-    /// True for the first columns of either face: both are measured when the laser has just been switched on.
+    /// True for the first columns that either face measures: the laser has just been switched on.
     fn is_warm_up(&self, column: u32) -> bool {
-        let back =
-            self.instrument.faces.filter(|_| self.is_back(column)).map_or(0, |faces| faces.seam_column);
-        column - back < self.instrument.warm_up_columns
+        let seam = self.instrument.faces.map_or(0, |faces| faces.seam_column);
+        let face = if column < seam { 0..seam } else { seam..self.lattice.n_columns };
+        let before = if self.instrument.clockwise { face.end - 1 - column } else { column - face.start };
+        before < self.instrument.warm_up_columns
     }
 
     /// Casts the middle ray of every cell of a column.

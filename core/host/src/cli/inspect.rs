@@ -132,7 +132,7 @@ fn print(header: &ScanHeader, counts: &Counts) -> Result<(), CliError> {
     let (low, high) = header.intensity_range;
     output::line(&format!("intensity {low} to {high}"))?;
     if let Some(seam) = header.seam_column {
-        output::line(&format!("two faces: the back face begins at column {seam}"))?;
+        output::line(&format!("two faces: the other one begins at column {seam}"))?;
     }
     if !header.instrument.is_empty() {
         output::line(&format!("instrument: {}", header.instrument))?;

@@ -2,7 +2,8 @@
 //!
 //! A chain or the ram in front of the plate can cut its face into components. Two pieces are one face when, on most rows
 //! or columns that hold both, the surface leaves the one and enters the other as one smooth curve, and what stands
-//! between them is nearer than both or was not measured.
+//! between them is nearer than both or was not measured. So are the parts of a face on both sides of the seam of the
+//! scanner's faces, where warm-up columns are left out.
 
 use nalgebra::Vector3;
 
@@ -21,6 +22,11 @@ const AGREEING: f64 = 0.6;
 const LEAST_RADIUS: f64 = 2.0;
 const ANGLE_NOISE: f64 = 0.06;
 
+/// How far beside the curve an end may lie, metres: the scanner's two faces disagree by millimetres, and where the
+/// columns left out at their seam are few, this and the noise of a single sample turn the chord far more than
+/// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far above.
+const STEP: f64 = 3e-3;
+
 /// Widest hidden strip, metres.
 const WIDEST_STRIP: f64 = 1.5;
 
@@ -33,6 +39,8 @@ struct End {
     normal: Vec3,
     /// What lies next to it is nearer, or was not measured.
     hidden: bool,
+    /// Cells next to it that were not measured, up to [`INSET`].
+    unmeasured: u32,
 }
 
 /// A face of a component, with its ends on all rows and columns.
@@ -94,13 +102,13 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Vector3<f32>], 
             let at = index(line, place);
             // Something nearer, or nothing at all: columns that were left out, a patch without echo.
             let beside = (1..=INSET).filter_map(|far| place.checked_add_signed(outward * far as isize));
-            let mut beside =
-                beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
+            let beside = beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
             let near = window.cells[at].range_m - IN_FRONT;
             let hidden = beside.clone().all(|cell| !cell.valid)
-                || beside.any(|cell| cell.valid && cell.range_m < near);
-            let normal = normals[index(line, inner)];
-            End { place: offset + place as u32, point: window.points[at], normal: normal.cast(), hidden }
+                || beside.clone().any(|cell| cell.valid && cell.range_m < near);
+            let unmeasured = beside.take_while(|cell| !cell.valid).count() as u32;
+            let normal = normals[index(line, inner)].cast();
+            End { place: offset + place as u32, point: window.points[at], normal, hidden, unmeasured }
         };
         Some([end(low, -1), end(high, 1)])
     });
@@ -129,17 +137,18 @@ fn agree(a: &Ends, b: &Ends) -> bool {
     together >= LEAST_LINES && agreeing as f64 >= AGREEING * together as f64
 }
 
-/// True when a curve of nearly constant curvature leads from one end to the other: the chord makes equal and
-/// opposite angles with the surface at both.
+/// True when a curve of nearly constant curvature leads from one end to the other, which lies farther on their line:
+/// the chord makes equal and opposite angles with the surface at both, as far as a small step between them lets it.
 fn one_curve(a: &End, b: &End) -> bool {
     let chord = b.point - a.point;
     let length = chord.norm();
     let (sin_a, sin_b) = (a.normal.dot(&chord) / length, b.normal.dot(&chord) / length);
     let turn = a.normal.angle(&b.normal);
-    a.hidden
-        && b.hidden
+    let step = STEP / length;
+    let nothing_between = b.place - a.place == a.unmeasured + 1;
+    (a.hidden && b.hidden || nothing_between)
         && length < WIDEST_STRIP
-        && (sin_a + sin_b).abs() < ANGLE_NOISE
-        && sin_a.abs().max(sin_b.abs()) < length / LEAST_RADIUS + ANGLE_NOISE
+        && (sin_a + sin_b).abs() < ANGLE_NOISE + 2.0 * step
+        && sin_a.abs().max(sin_b.abs()) < length / LEAST_RADIUS + ANGLE_NOISE + step
         && turn < length / LEAST_RADIUS + ANGLE_NOISE
 }

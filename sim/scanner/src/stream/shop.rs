@@ -20,7 +20,7 @@ const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 /// Seconds that one core takes to cast one cell.
 const SECONDS_PER_CELL: f64 = 2e-6;
 
-/// Columns of each face that are cast before the other face's turn.
+/// Columns of a face that are cast, and handed over, at a time.
 const TURNS: u32 = 64;
 
 /// Who says what lies in the press: the plate, nothing, or why it cannot be said.
@@ -43,7 +43,7 @@ pub struct Shop {
     pub margin: Option<f64>,
     /// What records hold.
     pub values: Values,
-    /// Columns clockwise and row 0 at the bottom, as some scanners count. Such a one is warm from the start.
+    /// A head that turns clockwise; columns are counted so, and row 0 is at the bottom.
     pub mirrored: bool,
     /// Threads.
     pub threads: usize,
@@ -99,11 +99,13 @@ impl Shop {
     fn instrument(&self, device: &Device, lattice: &SimLattice, number: u32) -> Instrument {
         // Half a turn of the head sees everything once; what lies beyond is seen by the back face.
         let half = (PI / lattice.azimuth_step).round() as u32;
-        let faces = self.faces.map(|faces| Faces { seam_column: half, ..faces });
+        let both = half < lattice.n_columns;
+        let seam = |half| if self.mirrored { lattice.n_columns - half } else { half };
+        let faces = self.faces.filter(|_| both).map(|faces| Faces { seam_column: seam(half), ..faces });
         Instrument {
             range_sigma: self.noise.unwrap_or_else(|| device.range_sigma()),
-            faces: faces.filter(|_| half < lattice.n_columns),
-            warm_up_columns: if self.mirrored { 0 } else { self.instrument.warm_up_columns },
+            faces,
+            clockwise: self.mirrored,
             seed: self.instrument.seed.wrapping_add(u64::from(number).wrapping_mul(SEED_STRIDE)),
             ..self.instrument
         }
@@ -203,44 +205,45 @@ impl Shot<'_> {
     fn take(&self, out: &mut dyn Receiver) -> ControlFlow<()> {
         out.begin(self.begin.clone())?;
         let all = self.lattice.n_columns;
-        let Some(faces) = self.instrument.faces else {
-            return self.cast(0..all, &mut |column| self.deliver(column, all, out));
+        let [front, back] = match (self.instrument.faces, self.instrument.clockwise) {
+            (None, _) => [0..all, 0..0],
+            (Some(faces), false) => [0..faces.seam_column, faces.seam_column..all],
+            (Some(faces), true) => [faces.seam_column..all, 0..faces.seam_column],
         };
         // Each turn of the mirror writes a column of either face.
-        let front = faces.seam_column;
-        for start in (0..front).step_by(TURNS as usize) {
-            let end = (start + TURNS).min(front);
-            let mut turns = [Vec::new(), Vec::new()];
-            for (face, columns) in turns.iter_mut().zip([start..end, start + front..(end + front).min(all)]) {
-                self.cast(columns, &mut |column| {
-                    face.push(column);
-                    ControlFlow::Continue(())
-                })?;
-            }
-            let [fronts, backs] = turns;
-            let mut backs = backs.into_iter();
-            for column in fronts {
-                self.deliver(column, front, out)?;
+        let turns = front.len() as u32;
+        for start in (0..turns).step_by(TURNS as usize) {
+            let mut backs = self.turns(&back, start)?.into_iter();
+            for column in self.turns(&front, start)? {
+                self.deliver(column, turns, out)?;
                 if let Some(back) = backs.next() {
-                    self.deliver(back, front, out)?;
+                    self.deliver(back, turns, out)?;
                 }
             }
         }
         ControlFlow::Continue(())
     }
 
-    fn cast(
-        &self,
-        columns: Range<u32>,
-        deliver: &mut dyn FnMut(SimColumn) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        scan_range(&self.scene, &self.lattice, &self.instrument, self.shop.threads, columns, deliver)
+    /// What one face measures in [`TURNS`] turns of the mirror, in the order of measuring.
+    fn turns(&self, face: &Range<u32>, start: u32) -> ControlFlow<(), Vec<SimColumn>> {
+        let n = face.len() as u32;
+        let [start, end] = [start, start + TURNS].map(|turn| turn.min(n));
+        let clockwise = self.instrument.clockwise;
+        let range =
+            if clockwise { face.end - end..face.end - start } else { face.start + start..face.start + end };
+        let mut columns = Vec::new();
+        scan_range(&self.scene, &self.lattice, &self.instrument, self.shop.threads, range, |column| {
+            columns.push(column);
+            ControlFlow::Continue(())
+        })?;
+        if clockwise {
+            columns.reverse();
+        }
+        ControlFlow::Continue(columns)
     }
 
     /// Hands a column over; the head turns past `turns` of them.
     fn deliver(&self, mut column: SimColumn, turns: u32, out: &mut dyn Receiver) -> ControlFlow<()> {
-        let width = self.lattice.azimuth_step * f64::from(self.lattice.n_columns);
-        let time_s = self.device.column_s(width, f64::from(column.index % turns) / f64::from(turns));
         let mut number = column.index;
         if self.shop.mirrored {
             number = self.lattice.n_columns - 1 - number;
@@ -250,6 +253,8 @@ impl Shot<'_> {
             column.intensity.reverse();
             column.state.reverse();
         }
+        let width = self.lattice.azimuth_step * f64::from(self.lattice.n_columns);
+        let time_s = self.device.column_s(width, f64::from(number % turns) / f64::from(turns));
         out.column(column_payload(&column, number, &self.begin, time_s))
     }
 }
