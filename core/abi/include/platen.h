@@ -238,7 +238,8 @@ typedef struct platen_chart {
 
 /* Mid-surface S(u, v): bicubic B-spline over uniform knots, three beyond each end. Grids are v outer, u inner. */
 typedef struct platen_surface {
-  uint32_t struct_size, mask_u, mask_v, reserved;
+  uint32_t struct_size, mask_u, mask_v;
+  float noise_share; /* of the covariance: scatter of the scan, the rest what smoothing takes from the shape; 0: not told, all */
   double thickness;
   platen_span knots_u, knots_v;
   platen_span control;          /* f64, 3 each */

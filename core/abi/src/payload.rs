@@ -195,8 +195,9 @@ header! {
         mask_u: u32,
         /// Mask cells along v.
         mask_v: u32,
-        /// 0.
-        reserved: u32,
+        /// Share of the covariance that is scatter of the scan, the rest what smoothing takes from the plate's own shape; 0: not
+        /// told, all of it.
+        noise_share: f32,
         /// Thickness of the plate.
         thickness: f64,
         /// f64, uniform, three knots beyond each end; the plate is 0 to W.

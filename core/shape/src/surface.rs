@@ -34,6 +34,7 @@ pub struct Surface {
     thickness: f64,
     precision: BandFactor,
     covariance: Vec<[f64; 49]>,
+    noise_share: f32,
     mask: Mask,
 }
 
@@ -76,7 +77,8 @@ impl Surface {
     #[must_use]
     pub fn new(fitted: Fitted<3>, thickness: f64, mask: Mask) -> Self {
         let covariance = fitted.precision.local_inverse();
-        Self { net: fitted.net, thickness, precision: fitted.precision, covariance, mask }
+        let noise_share = fitted.noise_share as f32;
+        Self { net: fitted.net, thickness, precision: fitted.precision, covariance, noise_share, mask }
     }
 
     /// Extent along u, metres.
@@ -154,6 +156,14 @@ impl Surface {
     pub fn sigma_point(&self, u: f64, v: f64) -> f64 {
         let (su, sv) = (self.net.u.stencil(u), self.net.v.stencil(v));
         self.variance(&su, &sv, |i, k| su.value[i] * sv.value[k]).sqrt()
+    }
+
+    /// Standard deviation of the position along the normal over scans of the same shape, metres: less than
+    /// [`Self::sigma_point`] by what smoothing takes from the shape, which is the same in every scan. For changes of a
+    /// shape, not for the shape itself.
+    #[must_use]
+    pub fn sigma_repeat(&self, u: f64, v: f64) -> f64 {
+        self.sigma_point(u, v) * f64::from(self.noise_share).sqrt()
     }
 
     /// Standard deviations of the curvatures u, v and uv, 1/m.

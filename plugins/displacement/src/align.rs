@@ -35,6 +35,8 @@ pub(crate) struct Motion {
 #[derive(Debug)]
 pub(crate) struct Alignment<'a> {
     pub(crate) motion: Motion,
+    /// How much each place of the grid had its say in it, 0 to 1.
+    pub(crate) says: Vec<f64>,
     pub(crate) name: &'a str,
 }
 
@@ -93,8 +95,8 @@ fn these(nodes: &Nodes, places: &[usize]) -> Motion {
     motion
 }
 
-/// The largest part that kept its shape lies where it lay.
-pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result<Motion> {
+/// The largest part that kept its shape lies where it lay; with how much each place is of that part, 0 to 1.
+pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result<(Motion, Vec<f64>)> {
     let start = whole(nodes);
     let mut best = (f64::NEG_INFINITY, start.clone());
     for row in 0..VOTERS {
@@ -112,7 +114,8 @@ pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result
         let weights = weights(nodes, &motion);
         step(nodes, &mut motion, weights.into_iter().enumerate(), SHARING);
     }
-    Ok(motion)
+    let says = weights(nodes, &motion);
+    Ok((motion, says))
 }
 
 /// All seen places together.

@@ -3,7 +3,7 @@
 use platen_sdk::{NodeState, PlateGrid};
 use platen_shape::{EXPANDED, Vec3};
 
-use crate::align::Motion;
+use crate::align::Alignment;
 use crate::grid::Nodes;
 
 /// Displacement at every node.
@@ -25,13 +25,19 @@ pub(crate) struct Changes {
     pub(crate) state: Vec<NodeState>,
 }
 
-pub(crate) fn changes(nodes: &Nodes, motion: &Motion, sigma_correlated: f64, min_patch: f64) -> Changes {
+pub(crate) fn changes(
+    nodes: &Nodes,
+    Alignment { motion, says, .. }: &Alignment<'_>,
+    sigma_correlated: f64,
+    min_patch: f64,
+) -> Changes {
     let moved: Vec<Vec3> = nodes.before.iter().map(|p| motion.apply(p)).collect();
     let vectors: Vec<Vec3> = nodes.now.iter().zip(&moved).map(|(now, before)| now - before).collect();
     let normal: Vec<f64> = vectors.iter().zip(&nodes.normal).map(|(d, n)| d.dot(n)).collect();
     let sigma: Vec<f64> = (0..PlateGrid::NODES)
         .map(|i| {
-            let align = motion.sigma(&nodes.before[i], &nodes.normal[i]);
+            // Where a place had its say the alignment follows its error, and does not add to it.
+            let align = motion.sigma(&nodes.before[i], &nodes.normal[i]) * (1.0 - says[i]).sqrt();
             nodes.sigma[i].hypot(sigma_correlated).hypot(align)
         })
         .collect();

@@ -36,7 +36,7 @@ impl Nodes {
             now: places().map(|[u, v]| now.face(u, v)).collect(),
             before: places().map(|[u, v]| before.face(u, v)).collect(),
             normal: places().map(|[u, v]| now.normal(u, v)).collect(),
-            sigma: places().map(|[u, v]| now.sigma_point(u, v).hypot(before.sigma_point(u, v))).collect(),
+            sigma: places().map(|[u, v]| now.sigma_repeat(u, v).hypot(before.sigma_repeat(u, v))).collect(),
             seen: places().map(seen).collect(),
         }
     }

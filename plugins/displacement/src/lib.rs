@@ -12,9 +12,10 @@
 //! | `none` | nothing: for a plate on fixed supports under a fixed scanner |
 //!
 //! A place is *unchanged* when its displacement along the normal is below the level of detection,
-//! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2): s1 and s2 from the splines' covariances, s_corr from the
-//! plant's null pairs, s_align from the alignment. Places above it that hang together over less than `min_patch`
-//! count as unchanged too: by chance 5 % of a plate that kept its shape lies above the LoD.
+//! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2): s1 and s2 from the splines' covariances, without what smoothing
+//! takes from a shape, which is the same in both scans; s_corr from the plant's null pairs; s_align from the alignment, where
+//! a place had no say in it. Places above the LoD that hang together over less than `min_patch` count as unchanged too:
+//! by chance 5 % of a plate that kept its shape lies above it.
 //!
 //! ```toml
 //! [[comparison]]
@@ -92,14 +93,15 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     };
     same_plate(&inputs.now, earlier)?;
     let nodes = Nodes::new(&inputs.now, earlier);
-    let motion = match options.alignment.as_str() {
-        "corners" => align::corners(&nodes),
-        "supports" => on_supports(inputs, earlier)?,
-        "none" => Motion::none(),
+    let few = |motion| (motion, vec![0.0; PlateGrid::NODES]);
+    let (motion, says) = match options.alignment.as_str() {
+        "corners" => few(align::corners(&nodes)),
+        "supports" => few(on_supports(inputs, earlier)?),
+        "none" => few(Motion::none()),
         _ => align::unchanged(check, &nodes)?,
     };
-    let alignment = Alignment { motion, name: &options.alignment };
-    let changes = detect::changes(&nodes, &alignment.motion, inputs.task.sigma_correlated, options.min_patch);
+    let alignment = Alignment { motion, says, name: &options.alignment };
+    let changes = detect::changes(&nodes, &alignment, inputs.task.sigma_correlated, options.min_patch);
     Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &options.against))
 }
 

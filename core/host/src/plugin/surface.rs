@@ -13,7 +13,7 @@ pub(super) fn buffer(surface: &Surface) -> HostBuffer {
         struct_size: size_of::<payload::Surface>() as u32,
         mask_u: parts.mask_cells[0] as u32,
         mask_v: parts.mask_cells[1] as u32,
-        reserved: 0,
+        noise_share: parts.noise_share,
         thickness: parts.thickness,
         knots_u: layout.add::<f64>(parts.knots_u.len()),
         knots_v: layout.add::<f64>(parts.knots_v.len()),
@@ -60,6 +60,7 @@ fn parts(bytes: &[u8]) -> Result<SurfaceParts, Malformed> {
         thickness: head.thickness,
         precision_factor: payload::slice::<f64>(bytes, head.precision_factor)?.to_vec(),
         covariance: payload::slice::<[f64; 49]>(bytes, head.covariance)?.to_vec(),
+        noise_share: if head.noise_share == 0.0 { 1.0 } else { head.noise_share },
         mask_cells: [head.mask_u as usize, head.mask_v as usize],
         seen: payload::slice::<u8>(bytes, head.seen)?.iter().map(|seen| *seen != 0).collect(),
     })

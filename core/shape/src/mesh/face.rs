@@ -115,7 +115,7 @@ impl Heights {
             fit
         };
         let all = gather(&|i| self.per_sigmas[i].powi(2));
-        let penalty = all.choose_penalty([1.0]);
+        let penalty = all.choose_penalty([1.0]).penalty;
         let first = all.solve_with(penalty)?;
         let residuals: Vec<f64> = (0..self.places.len())
             .map(|i| {

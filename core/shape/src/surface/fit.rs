@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::band::BandFactor;
 use super::moments::Moments;
 use super::net::Net;
-use super::smoothing::Penalty;
+use super::smoothing::{Chosen, Penalty};
 
 /// Points being gathered for a fit of `D` components over two axes.
 #[derive(Debug, Clone)]
@@ -21,6 +21,9 @@ pub struct Fitted<const D: usize> {
     pub net: Net<D>,
     /// Cholesky factor of the coefficients' precision, the same for every component.
     pub(crate) precision: BandFactor,
+    /// Share of the covariance that is scatter of the points, the mean over the axes' rectangle: what is left of it when two fits
+    /// to the same shape are compared. The rest is what the penalty takes from a shape, the same in both. 1 under a given penalty.
+    pub noise_share: f64,
     /// Weighted sum of squared residuals over the points and components.
     pub residual_square: f64,
     /// Sum of the weights.
@@ -56,11 +59,12 @@ impl<const D: usize> Fit<D> {
     /// # Errors
     /// [`Undetermined`] when there are too few points, or all in one place.
     pub fn solve(&self, direction: [f64; D]) -> Result<Fitted<D>, Undetermined> {
-        self.solve_with(self.choose_penalty(direction))
+        let Chosen { penalty, noise_share } = self.choose_penalty(direction);
+        Ok(Fitted { noise_share, ..self.solve_with(penalty)? })
     }
 
     /// The penalty that the data make most likely.
-    pub(crate) fn choose_penalty(&self, direction: [f64; D]) -> Penalty {
+    pub(crate) fn choose_penalty(&self, direction: [f64; D]) -> Chosen {
         self.moments.grid_values(direction).choose_penalty()
     }
 
@@ -74,7 +78,14 @@ impl<const D: usize> Fit<D> {
         precision.solve(&mut control);
         let net = Net { u: self.u, v: self.v, control };
         let residual_square = self.moments.residual_square(&net);
-        Ok(Fitted { net, precision, residual_square, weight: self.moments.weight, n_points })
+        Ok(Fitted {
+            net,
+            precision,
+            noise_share: 1.0,
+            residual_square,
+            weight: self.moments.weight,
+            n_points,
+        })
     }
 }
 

@@ -23,6 +23,8 @@ pub struct SurfaceParts {
     pub precision_factor: Vec<f64>,
     /// Per control value: covariances with those up to three away, 7 x 7, v outer, u inner, metres squared.
     pub covariance: Vec<[f64; 49]>,
+    /// Share of the covariance that is scatter of the scan, above 0 to 1, the mean over the plate.
+    pub noise_share: f32,
     /// Number of mask cells along u and along v.
     pub mask_cells: [usize; 2],
     /// Per mask cell, v outer, u inner: whether it was seen.
@@ -54,12 +56,16 @@ impl Surface {
         if !numbers.chain(&parts.precision_factor).chain([&parts.thickness]).all(|x| x.is_finite()) {
             return Err(fault("a number is not finite"));
         }
+        if !(parts.noise_share > 0.0 && parts.noise_share <= 1.0) {
+            return Err(fault("the share of noise is not above 0 to 1"));
+        }
         let precision = BandFactor::from_blocks(n_u, n_v, parts.precision_factor)
             .ok_or(fault("the factor does not fit the control net"))?;
         let mask = Mask::from_cells(u.end(), v.end(), parts.mask_cells, parts.seen)
             .ok_or(fault("the mask does not fit its cells"))?;
         let net = Net { u, v, control: parts.control };
-        Ok(Self { net, thickness: parts.thickness, precision, covariance: parts.covariance, mask })
+        let SurfaceParts { thickness, covariance, noise_share, .. } = parts;
+        Ok(Self { net, thickness, precision, covariance, noise_share, mask })
     }
 
     /// The parts of this surface.
@@ -72,6 +78,7 @@ impl Surface {
             thickness: self.thickness,
             precision_factor: self.precision.blocks().to_vec(),
             covariance: self.covariance.clone(),
+            noise_share: self.noise_share,
             mask_cells: self.mask.cells(),
             seen: self.mask.seen_cells().to_vec(),
         }

@@ -23,6 +23,14 @@ pub(crate) struct Penalty {
     pub(crate) v: f64,
 }
 
+/// The penalty that the data make most likely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Chosen {
+    pub(crate) penalty: Penalty,
+    /// Share of the covariance that is scatter: see [`Fitted::noise_share`](super::Fitted::noise_share).
+    pub(crate) noise_share: f64,
+}
+
 /// The two Gauss places of a span, from its middle: a function of degree 1 fitted to evenly spread noise has
 /// independent noise of equal size there.
 pub(crate) const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_812_9];
@@ -55,7 +63,7 @@ const LAST_STEP: f64 = 0.2;
 
 impl GridValues {
     /// The most likely penalty.
-    pub(crate) fn choose_penalty(&self) -> Penalty {
+    pub(crate) fn choose_penalty(&self) -> Chosen {
         let (along_u, along_v) = (Spectrum::new(&self.u), Spectrum::new(&self.v));
         let (mut filled, gaps) = self.filled();
         let mut criterion = Criterion::new(&along_u, &along_v, &filled);
@@ -69,7 +77,11 @@ impl GridValues {
         best = criterion.minimise();
         let [scale_u, scale_v] = criterion.scales(best);
         let noise = criterion.noise(best).max(LEAST_NOISE * self.stated);
-        Penalty { u: scale_u / (noise * 0.5 * self.v.step()), v: scale_v / (noise * 0.5 * self.u.step()) }
+        let penalty = Penalty {
+            u: scale_u / (noise * 0.5 * self.v.step()),
+            v: scale_v / (noise * 0.5 * self.u.step()),
+        };
+        Chosen { penalty, noise_share: criterion.noise_share(best) }
     }
 
     /// The values with gaps filled by the seen values around them, weighted by distance; and the gaps.
@@ -190,6 +202,16 @@ impl<'a> Criterion<'a> {
             log_det += product.ln();
         }
         (square, log_det)
+    }
+
+    /// What noise alone makes the spline scatter by, over what is not known of it in all, both as variances summed over the
+    /// coordinates: a coordinate shrunk by the factor f scatters by f^2 of its noise, and is known to f of it.
+    fn noise_share(&self, x: [f64; 2]) -> f64 {
+        let [su, sv] = self.scales(x);
+        let kept = |ru: &f64, rv: &f64| 1.0 / (1.0 + su * ru + sv * rv);
+        let all =
+            || self.v.roughness.iter().flat_map(|rv| self.u.roughness.iter().map(move |ru| kept(ru, rv)));
+        all().map(|f| f * f).sum::<f64>() / all().sum::<f64>()
     }
 
     /// Variance of a grid value at exponents `x`.

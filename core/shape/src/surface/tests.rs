@@ -91,6 +91,7 @@ fn parts_give_the_surface_back() {
     assert_eq!(refused(|p| p.control.truncate(7)), "the control net does not fit its knots");
     assert_eq!(refused(|p| p.precision_factor.truncate(7)), "the factor does not fit the control net");
     assert_eq!(refused(|p| p.control[3][1] = f64::NAN), "a number is not finite");
+    assert_eq!(refused(|p| p.noise_share = 0.0), "the share of noise is not above 0 to 1");
     assert_eq!(refused(|p| p.seen.truncate(7)), "the mask does not fit its cells");
 }
 
