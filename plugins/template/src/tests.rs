@@ -19,9 +19,14 @@ const WIDTH: f64 = 3.0;
 const HEIGHT: f64 = 2.0;
 const THICKNESS: f64 = 0.04;
 
+/// Numbers of a seed. Those of seeds in a row go together in this generator, so seeds are taken far apart.
+fn spread(seed: u64) -> fastrand::Rng {
+    fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
 /// A fit to points of the mid-surface with noise along the normal, everything seen.
 fn surface(n_points: usize, sigma: f64, seed: u64, plate: impl Fn(f64, f64) -> (Vec3, Vec3)) -> Surface {
-    let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = spread(seed);
     let mut normal = || {
         let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
         radius * (std::f64::consts::TAU * random.f64()).cos()

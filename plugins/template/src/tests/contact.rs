@@ -3,7 +3,7 @@
 use super::*;
 
 /// Height of a circle over its chord's ends.
-fn rise(radius: f64, chord: f64) -> f64 {
+pub(super) fn rise(radius: f64, chord: f64) -> f64 {
     radius - (radius * radius - 0.25 * chord * chord).sqrt()
 }
 
