@@ -11,5 +11,5 @@ mod triangulate;
 pub use disk::{DiskMesh, DiskParts};
 pub use error::MeshError;
 pub use face::Face;
-pub(crate) use face::{biweight, per_sigma_across};
+pub(crate) use face::{Heights, biweight, per_sigma_across, thinned};
 pub(crate) use facets::Facets;

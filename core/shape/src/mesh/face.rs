@@ -84,8 +84,15 @@ fn robust_scale(mut sizes: Vec<f64>) -> f64 {
     (*median / MEDIAN).max(1e-6)
 }
 
+/// The samples that suffice for a smooth face.
+pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
+    let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
+    patch.samples.iter().filter(move |s| s.column % every == 0 && s.row % every == 0)
+}
+
 /// Heights of samples over a surface.
-struct Heights {
+#[derive(Debug, Default)]
+pub(crate) struct Heights {
     places: Vec<[f64; 2]>,
     heights: Vec<f64>,
     /// One over their standard deviations.
@@ -94,19 +101,22 @@ struct Heights {
 
 impl Heights {
     fn over(base: &Net<3>, patch: &Patch) -> Self {
-        let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
-        let thinned = patch.samples.iter().filter(|s| s.column % every == 0 && s.row % every == 0);
-        let mut out = Self { places: Vec::new(), heights: Vec::new(), per_sigmas: Vec::new() };
-        Facets::of(base).walk(thinned, |sample, foot| {
-            out.places.push(foot.value);
-            out.heights.push(foot.height);
-            out.per_sigmas.push(per_sigma_across(sample, &foot.normal));
+        let mut out = Self::default();
+        Facets::of(base).walk(thinned(patch), |sample, foot| {
+            out.add(foot.value, foot.height, per_sigma_across(sample, &foot.normal));
         });
         out
     }
 
+    /// Adds a height, and one over its standard deviation.
+    pub(crate) fn add(&mut self, place: [f64; 2], height: f64, per_sigma: f64) {
+        self.places.push(place);
+        self.heights.push(height);
+        self.per_sigmas.push(per_sigma);
+    }
+
     /// The spline through the heights, and how much larger than stated their noise is.
-    fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
+    pub(crate) fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
         let gather = |weight: &dyn Fn(usize) -> f64| {
             let mut fit = Fit::new(axes[0], axes[1]);
             for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {

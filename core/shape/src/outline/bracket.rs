@@ -3,13 +3,22 @@
 //! A mixed beam sees both sides of the edge: the edge is within a footprint. One that is not has its centre on its own
 //! side, and most likely a footprint away: some beams are mixed so little that it does not show. Where the plate's side face is seen, it is the lower edge of the plate,
 //! of which the place beside the upper one is known from the thickness, that mixes the beams; and a beam on a side face
-//! of a few millimetres falls behind the face's continuation in proportion to its way from the edge.
+//! of a few millimetres falls behind the face's continuation in proportion to its way from the edge. The last cell that was taken
+//! for one of the face may be such a beam too, of which noise hides how far it falls behind: both ranges count, the one
+//! that was taken and the one that was not, or the choice between them would move the edge outwards.
 
+use super::sheet::Settled;
 use super::strip::Strip;
-use crate::patch::{Beyond, Crossing};
+use crate::patch::Beyond;
 
 /// Softness of a bracket in parts of the lattice step: pointing of the beam, shape of the footprint.
 const SOFTNESS: f64 = 0.03;
+
+/// Noise of the smooth face near its edges in parts of that of a sample.
+const FACE_NOISE: f64 = 0.03;
+
+/// Least weight of a bracket, one over a variance in square metres.
+const LEAST_BEND: f64 = 1e2;
 
 /// Part of the brackets that have nothing to do with the edge, and the likelihood that one of those allows it anyway.
 const STRAY_PART: f64 = 0.05;
@@ -45,10 +54,14 @@ pub(super) struct Line {
     /// Distance inwards per range by which a beam falls behind the face's continuation on a square side face.
     per_range: f64,
     excess: f64,
+    /// The last cell of the face, and its range behind the face.
+    cell: f64,
+    residual: f64,
 }
 
 impl Line {
-    pub(super) fn new(strip: &Strip, crossing: &Crossing, thickness: f64) -> Self {
+    pub(super) fn new(strip: &Strip, settled: &Settled, thickness: f64) -> Self {
+        let crossing = &settled.crossing;
         let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
         let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
         let along = 0.5 * (inside.x + outside.x);
@@ -72,6 +85,8 @@ impl Line {
             side: (inward.dot(&crossing.inside) * thickness / (height + thickness)).max(0.0),
             per_range: inward.dot(&beam),
             excess: f64::from(crossing.excess),
+            cell: strip.flatten(settled.cell).y,
+            residual: settled.residual,
         }
     }
 
@@ -82,29 +97,27 @@ impl Line {
 
     /// What the line says, for beams that see `footprint` radians to each side.
     pub(super) fn bracket(&self, footprint: f64, step: f64, noise: f64) -> Bracket {
-        let (along, soft) = (self.along, SOFTNESS * step);
+        let noise = noise * self.per_range.abs();
+        let soft = (SOFTNESS * step).hypot(FACE_NOISE * noise);
         let seen = footprint * self.per_radian;
+        let bracket = |above, below| Bracket { along: self.along, above, below };
+        let last = Term::Last { cell: self.cell, behind: self.residual * self.per_range, soft: noise };
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
-            let at = 0.5 * (self.low + self.high);
-            return Bracket {
-                along,
-                evidence: Evidence::At(at),
-                soft: soft.hypot(0.25 * (self.high - self.low)),
-            };
+            let soft = soft.hypot(0.25 * (self.high - self.low));
+            return bracket(Term::At { place: 0.5 * (self.low + self.high), soft }, last);
         }
         let on_side = self.excess * self.per_range;
-        let noise = noise * self.per_range.abs();
         if self.side > 0.0
             && self.beyond == Beyond::Behind
             && self.mixed.is_none()
             && on_side < SIDE_SLACK * self.side + 3.0 * noise
         {
             let soft = soft.hypot(noise).hypot(SIDE_SLOPE * on_side);
-            return Bracket { along, evidence: Evidence::At(self.low + on_side), soft };
+            return bracket(Term::At { place: self.low + on_side, soft }, last);
         }
-        let mut above = Bound { sure: self.low, likely: self.low };
-        let mut below = Bound { sure: self.high, likely: self.high };
+        let mut above = Bound { sure: self.low, likely: self.low, soft };
+        let mut below = Bound { sure: self.high, likely: self.high, soft };
         if self.side == 0.0 {
             below.likely -= seen;
         }
@@ -114,10 +127,12 @@ impl Line {
         }
         if let Some((lowest, highest)) = self.mixed {
             let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
-            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
-            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
+            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least), soft };
+            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most), soft };
+        } else if self.side > 0.0 && noise > 0.0 {
+            return bracket(Term::Above(above), last);
         }
-        Bracket { along, evidence: Evidence::Between(above, below), soft }
+        bracket(Term::Above(above), Term::Below(below))
     }
 }
 
@@ -167,27 +182,33 @@ pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64, 
     })
 }
 
-/// Where a line says the edge is.
+/// Where a line says the edge is: inside of one place and outside of another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bracket {
     pub(super) along: f64,
-    evidence: Evidence,
-    soft: f64,
+    above: Term,
+    below: Term,
 }
 
-/// Distance inwards, metres.
+/// One thing that a line says of the edge. Distances inwards, metres.
 #[derive(Debug, Clone, Copy)]
-enum Evidence {
-    At(f64),
-    /// Above the first, below the second.
-    Between(Bound, Bound),
+enum Term {
+    /// It is here.
+    At { place: f64, soft: f64 },
+    /// It is inside of this.
+    Above(Bound),
+    /// It is outside of this.
+    Below(Bound),
+    /// It is outside of a cell, or the cell on the side face, `behind` outside of the edge as its noisy range has it.
+    Last { cell: f64, behind: f64, soft: f64 },
 }
 
-/// A bound of the edge, metres: it holds surely at one place and likely at another, farther in.
+/// A bound of the edge: it holds surely at one place and likely at another, farther in.
 #[derive(Debug, Clone, Copy)]
 struct Bound {
     sure: f64,
     likely: f64,
+    soft: f64,
 }
 
 impl Bound {
@@ -205,15 +226,52 @@ impl Bound {
     }
 }
 
+impl Term {
+    /// Likelihood of an edge at `at`, the slope of its logarithm, per metre, and its negative second derivative.
+    fn likelihood(&self, at: f64, least_soft: f64) -> (f64, f64, f64) {
+        let (soft, sign, (likelihood, slope, bend)) = match *self {
+            Self::At { place, soft } => {
+                let soft = soft.max(least_soft);
+                let off = (place - at) / soft;
+                (soft, 1.0, ((-0.5 * off * off).exp(), off, 1.0))
+            }
+            Self::Above(Bound { sure, likely, soft }) => {
+                let soft = soft.max(least_soft);
+                (soft, 1.0, Bound::likelihood((at - sure) / soft, (at - likely) / soft))
+            }
+            Self::Below(Bound { sure, likely, soft }) => {
+                let soft = soft.max(least_soft);
+                (soft, -1.0, Bound::likelihood((sure - at) / soft, (likely - at) / soft))
+            }
+            Self::Last { cell, behind, soft } => {
+                let soft = soft.max(least_soft);
+                let (off, behind) = (((at - cell) / soft).max(0.0), behind / soft);
+                let bend = f64::from(off > 0.0);
+                let log = off * (behind - 0.5 * off);
+                (soft, 1.0, (log.min(0.0).exp(), bend * (behind - off), bend))
+            }
+        };
+        (likelihood, sign * slope / soft, bend / (soft * soft))
+    }
+
+    /// The place nearest to the other side that the term allows, softness left aside.
+    fn limit(&self) -> f64 {
+        match *self {
+            Self::At { place, .. } => place,
+            Self::Above(bound) | Self::Below(bound) => bound.likely,
+            Self::Last { cell, .. } => cell,
+        }
+    }
+}
+
 impl Bracket {
     /// (place, weight) of a pull to the middle with the variance of a uniform distribution.
     pub(super) fn middle(&self, step: f64) -> (f64, f64) {
-        match self.evidence {
-            Evidence::At(at) => (at, 12.0 / (step * step)),
-            Evidence::Between(above, below) => {
-                (0.5 * (above.likely + below.likely), 12.0 / (below.likely - above.likely).max(step).powi(2))
-            }
+        if let Term::At { place, .. } = self.above {
+            return (place, 12.0 / (step * step));
         }
+        let (above, below) = (self.above.limit(), self.below.limit());
+        (0.5 * (above + below), 12.0 / (below - above).max(step).powi(2))
     }
 
     /// One Newton step of the likelihood of an edge at `at`: the place to which the bracket pulls it, and with which
@@ -221,31 +279,23 @@ impl Bracket {
     ///
     /// `least_soft` widens the bracket, to reach it from far away.
     pub(super) fn pull(&self, at: f64, least_soft: f64) -> (f64, f64) {
-        let soft = self.soft.max(least_soft);
-        let (likelihood, slope, bend) = match self.evidence {
-            Evidence::At(place) => {
-                let off = (place - at) / soft;
-                ((-0.5 * off * off).exp(), off, 1.0)
-            }
-            Evidence::Between(above, below) => {
-                let a = Bound::likelihood((at - above.sure) / soft, (at - above.likely) / soft);
-                let b = Bound::likelihood((below.sure - at) / soft, (below.likely - at) / soft);
-                (a.0 * b.0, a.1 - b.1, a.2 + b.2)
-            }
-        };
-        let mine = (1.0 - STRAY_PART) * likelihood;
+        let [a, b] = [self.above, self.below].map(|term| term.likelihood(at, least_soft));
+        let mine = (1.0 - STRAY_PART) * a.0 * b.0;
         let belongs = mine / (mine + STRAY_PART * STRAY_LIKELIHOOD);
-        // In the middle of a wide bracket nothing pulls: a small weight keeps the step finite.
-        let bend = bend.max(1e-3);
-        (at + soft * slope / bend, belongs * bend / (soft * soft))
+        // In the middle of a wide bracket nothing pulls: a small weight, of a tenth of a metre, keeps the step finite.
+        let bend = (a.2 + b.2).max(LEAST_BEND);
+        (at + (a.1 + b.1) / bend, belongs * bend)
     }
 
     /// True when an edge at `at` agrees with the bracket within `slack`.
     pub(super) fn agrees(&self, at: f64, slack: f64) -> bool {
-        match self.evidence {
-            Evidence::At(place) => (place - at).abs() < slack,
-            Evidence::Between(above, below) => above.sure - slack < at && at < below.sure + slack,
-        }
+        let agrees = |term: Term| match term {
+            Term::At { place, .. } => (place - at).abs() < slack,
+            Term::Above(bound) => bound.sure - slack < at,
+            Term::Below(bound) => at < bound.sure + slack,
+            Term::Last { cell, behind, .. } => at < cell + behind.max(0.0) + slack,
+        };
+        agrees(self.above) && agrees(self.below)
     }
 }
 
@@ -309,9 +359,9 @@ mod tests {
 
     #[test]
     fn a_bracket_pulls_from_outside_and_rests_within() {
-        let bound = |at: f64| Bound { sure: at, likely: at };
+        let bound = |at: f64| Bound { sure: at, likely: at, soft: 3e-4 };
         let bracket =
-            Bracket { along: 0.0, evidence: Evidence::Between(bound(-0.003), bound(0.003)), soft: 3e-4 };
+            Bracket { along: 0.0, above: Term::Above(bound(-0.003)), below: Term::Below(bound(0.003)) };
         let (to, weight) = bracket.pull(0.004, 2e-3);
         assert!(to < 0.004 && weight > 0.0);
         let (to, weight) = bracket.pull(0.001, 0.0);

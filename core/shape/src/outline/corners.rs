@@ -47,6 +47,22 @@ impl Plane {
         Self { origin, axes: [first, normal.normalize().cross(&first)] }
     }
 
+    /// The same plane with its first axis along `direction`.
+    pub(super) fn along(&self, direction: Vec2) -> Self {
+        let first = self.lift_direction(direction).normalize();
+        Self { origin: self.origin, axes: [first, self.normal().cross(&first)] }
+    }
+
+    /// Unit normal towards the scanner.
+    pub(super) fn normal(&self) -> Vec3 {
+        self.axes[0].cross(&self.axes[1])
+    }
+
+    /// Height of a point over the plane.
+    pub(super) fn height(&self, point: Vec3) -> f64 {
+        self.normal().dot(&(point - self.origin))
+    }
+
     pub(super) fn project(&self, point: Vec3) -> Vec2 {
         self.direction(point - self.origin)
     }

@@ -8,10 +8,10 @@ use nalgebra::Vector2;
 
 use super::OutlineError;
 use super::bracket::{self, Bracket, Line};
+use super::sheet::Settled;
 use super::spline::{Normal, Precision, Roughness, Spline};
 use super::strip::Strip;
 use crate::Vec3;
-use crate::patch::Crossing;
 use crate::surface::Axis;
 
 /// Span of the curve, metres.
@@ -44,7 +44,7 @@ impl EdgeData {
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
     pub(super) fn new(
-        crossings: &[&Crossing],
+        crossings: &[Settled],
         [from, to]: [Vec3; 2],
         thickness: f64,
         step: f64,

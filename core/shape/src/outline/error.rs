@@ -1,5 +1,7 @@
 //! Why a face has no outline.
 
+use crate::surface::Undetermined;
+
 /// Why the outline of a plate's face could not be told.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OutlineError {
@@ -28,6 +30,9 @@ pub enum OutlineError {
         /// Rows and columns that are seen to cross it.
         crossings: usize,
     },
+    /// The face has too few samples to be smoothed.
+    #[error(transparent)]
+    Face(#[from] Undetermined),
     /// The hint does not tell the corners apart.
     #[error(
         "the u axis hint lies {angle_deg:.0} degrees from the nearest edge of the plate; turn it to within 35 degrees of \

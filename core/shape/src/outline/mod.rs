@@ -3,8 +3,9 @@
 //! As in the paper's 3.2: the mesh of lattice neighbours and its longest boundary loop (`boundary`), corner candidates by
 //! the angle to the k-th neighbours, lines near them by RANSAC and their intersections (`corners`), a spline
 //! along each edge (`edge`). Beyond the paper: the edge is located between the lattice's samples, from the places
-//! where rows and columns leave the face, in the strip along it rolled out into the plane (`strip`). What hides a part
-//! of an edge or a corner's neighbourhood takes its crossings out (`rim`); the curve goes through what is left.
+//! where rows and columns leave the face, brought onto the face smoothed as a whole (`sheet`), in the strip along it rolled
+//! out into the plane (`strip`). What hides a part of an edge or a corner's neighbourhood takes its crossings out (`rim`);
+//! the curve goes through what is left.
 
 mod boundary;
 mod bracket;
@@ -12,16 +13,18 @@ mod corners;
 mod edge;
 mod error;
 mod rim;
+mod sheet;
 mod spline;
 mod strip;
 
 pub use error::OutlineError;
 
-use crate::patch::{Crossing, Patch};
+use crate::patch::Patch;
 use crate::{PlateSpec, Vec3};
 use corners::Plane;
 use edge::{Edge, EdgeData};
 use rim::Rim;
+use sheet::{Settled, Sheet};
 
 /// A corner of the scanned face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,12 +86,14 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let rim = Rim::of(patch, spec)?;
     let corners = corners::find(&rim.flat, rim.step, spec.width.min(spec.height))?;
     let near = corners.map(|corner| rim.lift(&corner));
+    let sheet = Sheet::fit(patch, rim.plane.along(corners[1].point - corners[0].point))?;
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * rim.step;
-        let crossings: Vec<&Crossing> = rim
+        let crossings: Vec<Settled> = rim
             .between(corners[k].at, corners[(k + 1) % 4].at)
-            .filter(|c| (c.inside - from).norm() > margin && (c.inside - to).norm() > margin)
+            .filter_map(|crossing| sheet.settle(patch, crossing))
+            .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
         EdgeData::new(&crossings, [from, to], spec.thickness, rim.step, patch.noise)
     };

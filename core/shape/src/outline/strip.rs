@@ -7,9 +7,9 @@
 use nalgebra::Vector2;
 
 use super::OutlineError;
+use super::sheet::Settled;
 use super::spline::{Normal, Roughness, Spline};
 use crate::Vec3;
-use crate::patch::Crossing;
 use crate::surface::Axis;
 
 /// Spacing of the base curve's points, metres.
@@ -64,14 +64,14 @@ impl Strip {
     /// # Errors
     /// [`OutlineError::Edge`] when too little of the edge is seen.
     pub(super) fn new(
-        crossings: &[&Crossing],
+        crossings: &[Settled],
         from: Vec3,
         to: Vec3,
         step: f64,
         noise: f64,
     ) -> Result<Self, OutlineError> {
         let along = (to - from).normalize();
-        let mean_normal: Vec3 = crossings.iter().map(|c| c.normal).sum();
+        let mean_normal: Vec3 = crossings.iter().map(|s| s.crossing.normal).sum();
         let inward = mean_normal.cross(&along).normalize();
         let up = along.cross(&inward);
         let length = (to - from).norm();
@@ -80,7 +80,7 @@ impl Strip {
         let local = |p: Vec3| Vec3::new((p - from).dot(&along), (p - from).dot(&inward), (p - from).dot(&up));
         let data: Vec<(Vec3, Vec3)> = crossings
             .iter()
-            .map(|c| {
+            .map(|Settled { crossing: c, .. }| {
                 let n = Vec3::new(c.normal.dot(&along), c.normal.dot(&inward), c.normal.dot(&up));
                 (local(0.5 * (c.inside + c.outside)), n)
             })
