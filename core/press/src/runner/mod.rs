@@ -5,6 +5,7 @@
 
 mod cycle;
 mod journal;
+mod listen;
 mod metrics;
 
 use std::time::Duration;
@@ -158,11 +159,11 @@ pub async fn run_press<L: Link, J: Journal>(
 ) -> Result<(), RunError<J::Error>> {
     match press.mode {
         Mode::Off => {
-            cycle::wait_for_stop(side).await;
+            listen::wait_for_stop(side).await;
             Ok(())
         }
         Mode::Listen => {
-            cycle::listen(&press, Client::new(link, &press), side).await;
+            listen::listen(&press, Client::new(link, &press), side).await;
             Ok(())
         }
         Mode::DryRun | Mode::Simulate | Mode::Measure => {

@@ -12,13 +12,14 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 
-use super::bridge::{Scan, Shared, altered, count};
 use super::disturb::Step;
 use super::fault::FaultKind;
 use super::frame::{self, Frame, FrameError};
 use super::message::{
     Abort, Exception, Hello, Refusal, Resume, Role, ScanBegin, ScanEnd, Start, Status, Wanted,
 };
+use super::shared::{Scan, Shared};
+use super::tally::count;
 
 /// Time between two Status frames.
 const STATUS: Duration = Duration::from_millis(900);
@@ -460,4 +461,14 @@ fn status(shared: &Shared) -> Status {
         time_ns: shared.begun.elapsed().as_nanos() as u64,
         synced: false,
     }
+}
+
+/// What is wanted, as the scanner takes it.
+fn altered(shared: &Shared, wanted: Wanted) -> (Wanted, Vec<String>) {
+    if !shared.suffers(FaultKind::ParamsAltered) || wanted.rate_kpts <= 122 {
+        return (wanted, Vec::new());
+    }
+    let note =
+        format!("rate_kpts: {} was asked for, the scanner took {}", wanted.rate_kpts, wanted.rate_kpts / 2);
+    (Wanted { rate_kpts: wanted.rate_kpts / 2, ..wanted }, vec![note])
 }

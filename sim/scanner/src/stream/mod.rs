@@ -9,6 +9,7 @@
 //! light (noise, bias, warm-up, two faces) is in [`crate::Instrument`].
 
 mod bridge;
+mod config;
 mod connection;
 mod disturb;
 mod fault;
@@ -16,12 +17,16 @@ mod frame;
 mod head;
 mod message;
 mod payload;
+mod shared;
 mod shop;
 mod spool;
+mod tally;
 
-pub use bridge::{Bridge, BridgeConfig, BridgeTally};
+pub use bridge::Bridge;
+pub use config::BridgeConfig;
 pub use fault::{Fault, FaultKind};
 pub use head::{Head, Plan, Receiver, Recording};
 pub use message::{Begin, Region, Values, Wanted};
 pub use payload::column_payload;
 pub use shop::{PlateSource, Shop};
+pub use tally::BridgeTally;

@@ -1,0 +1,369 @@
+//! What all connections of a bridge share: its lease, and the scans that run or have run.
+
+use std::collections::VecDeque;
+use std::net::{Shutdown, TcpStream};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use super::config::BridgeConfig;
+use super::disturb::Disturb;
+use super::fault::FaultKind;
+use super::head::{Head, Plan, Receiver};
+use super::message::{Begin, Outcome, Refusal};
+use super::payload;
+use super::spool::Spool;
+use super::tally::{Counts, count};
+
+/// How long a lease lasts from each frame of its holder.
+const LEASE: Duration = Duration::from_secs(5);
+
+/// Longest sleep between two looks at whether a scan is still wanted.
+const NAP: Duration = Duration::from_millis(20);
+
+/// Seconds between two tries to bring the mirror up to speed, and how many there are.
+const STALL: (f64, u32) = (45.0, 5);
+
+/// What all connections share.
+pub(super) struct Shared {
+    pub(super) config: BridgeConfig,
+    pub(super) head: Box<dyn Head>,
+    pub(super) counts: Counts,
+    pub(super) disturb: Mutex<Disturb>,
+    pub(super) begun: Instant,
+    /// Scans are numbered from here on: numbers never return, even when a bridge starts again.
+    first_number: u32,
+    ending: AtomicBool,
+    state: Mutex<State>,
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").field("config", &self.config).finish_non_exhaustive()
+    }
+}
+
+#[derive(Debug, Default)]
+struct State {
+    lease: Option<Lease>,
+    scans: VecDeque<Arc<Scan>>,
+    scans_begun: u32,
+    /// Nobody is let in before.
+    closed_until: Option<Instant>,
+    open: Vec<(u32, TcpStream)>,
+}
+
+#[derive(Debug)]
+struct Lease {
+    client: String,
+    connection: u32,
+    until: Instant,
+}
+
+/// A scan that runs or has run.
+#[derive(Debug)]
+pub(super) struct Scan {
+    pub(super) spool: Spool,
+    aborted: AtomicBool,
+    overflowed: AtomicBool,
+    stalls: AtomicU32,
+}
+
+impl Scan {
+    fn new(spool: Spool) -> Self {
+        let no = || AtomicBool::new(false);
+        Self { spool, aborted: no(), overflowed: no(), stalls: AtomicU32::new(0) }
+    }
+
+    /// True when the bridge's disk could not take all of it.
+    pub(super) fn overflowed(&self) -> bool {
+        self.overflowed.load(Ordering::Relaxed)
+    }
+
+    /// How often the mirror has not come up to speed.
+    pub(super) fn stalls(&self) -> u32 {
+        self.stalls.load(Ordering::Relaxed)
+    }
+}
+
+impl Shared {
+    pub(super) fn new(config: BridgeConfig, head: Box<dyn Head>) -> Self {
+        let disturb = Mutex::new(Disturb::new(&config.faults, config.seed));
+        Self {
+            config,
+            head,
+            counts: Counts::default(),
+            disturb,
+            begun: Instant::now(),
+            first_number: tenths_since_1970(),
+            ending: AtomicBool::new(false),
+            state: Mutex::default(),
+        }
+    }
+
+    /// Ends every scan and connection.
+    pub(super) fn end(&self) {
+        self.ending.store(true, Ordering::Relaxed);
+        for (_, stream) in &self.state().open {
+            // One that has gone already needs no hanging up.
+            let _ = stream.shutdown(Shutdown::Both);
+        }
+        for scan in &self.state().scans {
+            scan.aborted.store(true, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn is_ending(&self) -> bool {
+        self.ending.load(Ordering::Relaxed)
+    }
+
+    /// Numbers a connection; nobody is let in while the bridge is closed.
+    pub(super) fn admit(&self, stream: &TcpStream) -> Option<u32> {
+        let mut state = self.state();
+        if state.closed_until.is_some_and(|until| Instant::now() < until) {
+            return None;
+        }
+        let handle = stream.try_clone().ok()?;
+        let number = self.counts.connections.fetch_add(1, Ordering::Relaxed);
+        state.open.push((number, handle));
+        Some(number)
+    }
+
+    /// A connection has ended.
+    pub(super) fn gone(&self, number: u32) {
+        self.state().open.retain(|(open, _)| *open != number);
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn disturb(&self) -> MutexGuard<'_, Disturb> {
+        self.disturb.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// True when this fault lasts.
+    pub(super) fn suffers(&self, kind: FaultKind) -> bool {
+        self.disturb().lasting(kind).is_some()
+    }
+
+    /// True for the first so many milliseconds of the bridge that the fault says; gives what is left.
+    pub(super) fn at_first(&self, kind: FaultKind) -> Option<Duration> {
+        let ms = self.disturb().lasting(kind)?;
+        Duration::from_millis(ms.into()).checked_sub(self.begun.elapsed())
+    }
+
+    /// Gives the lease to a client, or says who holds it. The same client takes it over: its connection before is
+    /// closed.
+    pub(super) fn lease(&self, client: &str, connection: u32) -> Result<(), Refusal> {
+        if let Some(left) = self.at_first(FaultKind::LeaseStuck) {
+            return Err(busy("press-4", left));
+        }
+        let now = Instant::now();
+        let mut state = self.state();
+        if let Some(lease) = &state.lease {
+            if lease.client != client && now < lease.until {
+                return Err(busy(&lease.client, lease.until - now));
+            }
+            if lease.client == client && lease.connection != connection {
+                let before = lease.connection;
+                for (_, stream) in state.open.iter().filter(|(open, _)| *open == before) {
+                    // One that has gone already needs no hanging up.
+                    let _ = stream.shutdown(Shutdown::Both);
+                }
+            }
+        }
+        state.lease = Some(Lease { client: client.to_owned(), connection, until: now + LEASE });
+        Ok(())
+    }
+
+    /// A frame of this connection has come.
+    pub(super) fn heard(&self, connection: u32) {
+        if let Some(lease) = self.state().lease.as_mut().filter(|lease| lease.connection == connection) {
+            lease.until = Instant::now() + LEASE;
+        }
+    }
+
+    /// The scan of a job.
+    pub(super) fn scan_of(&self, job: &str) -> Option<Arc<Scan>> {
+        self.state().scans.iter().find(|scan| scan.spool.job == job).cloned()
+    }
+
+    /// The scan that runs.
+    pub(super) fn running(&self) -> Option<Arc<Scan>> {
+        self.state().scans.iter().find(|scan| !scan.spool.is_over()).cloned()
+    }
+
+    /// The scan of a job, begun now when there is none.
+    pub(super) fn begin(self: &Arc<Self>, job: &str, plan: Plan) -> Result<Arc<Scan>, Refusal> {
+        if let Some(scan) = self.scan_of(job) {
+            return Ok(scan);
+        }
+        if let Some(running) = self.running() {
+            let text = format!("job {} runs", running.spool.job);
+            return Err(Refusal::new("busy", text).retry(1000));
+        }
+        let failed = |error: std::io::Error| Refusal::new("scanner", format!("the bridge's disk: {error}"));
+        let mut state = self.state();
+        state.scans_begun += 1;
+        let nth = state.scans_begun;
+        // Leaves a number free, so that frames of another scan have one that this bridge never used.
+        let number = self.first_number.wrapping_add(2 * nth);
+        let file = self.config.record.as_ref().map(|folder| folder.join(format!("scan-{nth:05}.psb")));
+        let spool = Spool::new(job, number, file.as_deref(), !self.config.live).map_err(failed)?;
+        let scan = Arc::new(Scan::new(spool));
+        state.scans.push_back(Arc::clone(&scan));
+        while state.scans.len() > self.config.kept_scans.max(1) {
+            state.scans.pop_front();
+        }
+        drop(state);
+        let (shared, running) = (Arc::clone(self), Arc::clone(&scan));
+        std::thread::spawn(move || shared.run(&plan, &running, nth));
+        Ok(scan)
+    }
+
+    /// Ends the scan of a job.
+    pub(super) fn abort(&self, job: &str) {
+        if let Some(scan) = self.scan_of(job).filter(|scan| !scan.spool.is_over()) {
+            scan.aborted.store(true, Ordering::Relaxed);
+            count(&self.counts.aborts);
+        }
+    }
+
+    /// A connection was cut by a fault; the bridge forgets its scans when it died.
+    pub(super) fn was_cut(&self, died: bool) {
+        count(&self.counts.cuts);
+        let closed = self.disturb().lasting(FaultKind::ReconnectTooFast);
+        let mut state = self.state();
+        state.closed_until = closed.map(|ms| Instant::now() + Duration::from_millis(ms.into()));
+        if died {
+            state.scans.drain(..).for_each(|scan| scan.aborted.store(true, Ordering::Relaxed));
+        }
+    }
+
+    /// Takes a scan to its end, which takes as long as with a real scanner.
+    fn run(&self, plan: &Plan, scan: &Scan, nth: u32) {
+        let spool = &scan.spool;
+        count(&self.counts.scans);
+        let mut due = Due { shared: self, scan, started: Instant::now(), taken: 0, why: None };
+        let taken = match due.spin_up() {
+            ControlFlow::Continue(()) => self.head.scan(plan, nth, &mut due),
+            ControlFlow::Break(()) => Ok(()),
+        };
+        let settled = due.wait_until(plan.duration_s);
+        let why = due.why.take();
+        if spool.has_begun() {
+            let ended = match (taken, why, settled) {
+                (Err(why), _, _) | (Ok(()), Some(why), _) => spool.end(Outcome::Failed, Some(why)),
+                (Ok(()), None, ControlFlow::Break(())) => spool.end(Outcome::Aborted, None),
+                (Ok(()), None, ControlFlow::Continue(())) => spool.end(Outcome::Complete, None),
+            };
+            if let Err(error) = ended {
+                spool.refuse(format!("the bridge's disk: {error}"));
+            }
+        } else {
+            spool.refuse(taken.err().or(why).unwrap_or_else(|| "aborted".to_owned()));
+        }
+    }
+}
+
+fn tenths_since_1970() -> u32 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| (since.as_millis() / 100) as u32)
+}
+
+fn busy(holder: &str, left: Duration) -> Refusal {
+    let ms = left.as_millis() as u64 + 1;
+    Refusal::new("busy", format!("held by {holder} for {ms} ms")).retry(ms)
+}
+
+/// Puts what the head measures into the spool when a real scanner would have measured it.
+struct Due<'a> {
+    shared: &'a Shared,
+    scan: &'a Scan,
+    started: Instant,
+    taken: u32,
+    why: Option<String>,
+}
+
+impl Due<'_> {
+    /// Waits for this second of the scanner's time; breaks when the scan was aborted.
+    fn wait_until(&self, second: f64) -> ControlFlow<()> {
+        let due = Duration::from_secs_f64(self.shared.config.time_scale * second);
+        loop {
+            if self.scan.aborted.load(Ordering::Relaxed) {
+                return ControlFlow::Break(());
+            }
+            let left = due.saturating_sub(self.started.elapsed());
+            if left.is_zero() {
+                return ControlFlow::Continue(());
+            }
+            std::thread::sleep(left.min(NAP));
+        }
+    }
+
+    /// The mirror comes up to speed, sooner or later.
+    fn spin_up(&mut self) -> ControlFlow<()> {
+        let stalls = self.shared.disturb().lasting(FaultKind::StartStall).unwrap_or(0);
+        for stall in 1..=stalls.min(STALL.1) {
+            self.scan.stalls.store(stall, Ordering::Relaxed);
+            self.started = Instant::now();
+            self.wait_until(STALL.0)?;
+        }
+        if stalls > STALL.1 {
+            self.why = Some(format!("the mirror did not come up to speed in {} tries", STALL.1));
+            return ControlFlow::Break(());
+        }
+        self.started = Instant::now();
+        ControlFlow::Continue(())
+    }
+
+    fn fail(&mut self, why: impl Into<String>) -> ControlFlow<()> {
+        self.why = Some(why.into());
+        ControlFlow::Break(())
+    }
+
+    /// What stops a scanner before its next column.
+    fn mishap(&mut self) -> ControlFlow<()> {
+        let (taken, bytes) = (self.taken, self.scan.spool.bytes());
+        let at = |kind| self.shared.disturb().lasting(kind);
+        if at(FaultKind::StorageFull).is_some_and(|column| taken >= column) {
+            return self.fail("the card is full");
+        }
+        if at(FaultKind::Tilted).is_some_and(|column| taken >= column) {
+            return self.fail("the scanner was moved: its inclination changed by 0.4 degrees");
+        }
+        if at(FaultKind::Overflow).is_some_and(|kilobytes| bytes > 1000 * u64::from(kilobytes)) {
+            self.scan.overflowed.store(true, Ordering::Relaxed);
+            return self.fail("the bridge's disk is full");
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl Receiver for Due<'_> {
+    fn begin(&mut self, mut begin: Begin) -> ControlFlow<()> {
+        if self.shared.suffers(FaultKind::ClockJump) {
+            begin.acquired_unix_s = Some(0.0);
+        }
+        self.shared.counts.columns.store(begin.columns, Ordering::Relaxed);
+        match self.scan.spool.begin(begin) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => self.fail(format!("the bridge's disk: {error}")),
+        }
+    }
+
+    fn column(&mut self, mut bytes: Vec<u8>) -> ControlFlow<()> {
+        self.wait_until(payload::time_s(&bytes))?;
+        self.mishap()?;
+        self.taken += 1;
+        if self.taken > 3 && self.shared.suffers(FaultKind::ClockJump) {
+            payload::set_clock_back(&mut bytes);
+        }
+        match self.scan.spool.column(bytes) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => self.fail(format!("the bridge's disk: {error}")),
+        }
+    }
+}
