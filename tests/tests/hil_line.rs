@@ -14,6 +14,7 @@ use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
 use platen_sim_press::{Command, Config, SimPress, Tally};
 use rig::{Host, LIMIT, Memory, assert_clean, done, quick, tcp};
+use tokio::task::JoinSet;
 
 const SCAN: Duration = Duration::from_millis(5);
 
@@ -47,23 +48,36 @@ fn assert_all(what: &str, tally: &Tally, strokes: usize) {
     assert_eq!(tally.plates_served, strokes as u64, "{what}: scans");
 }
 
+/// Runs cells beside each other: each has a press, a line and a host of its own, and mostly waits.
+async fn beside_each_other<F: Future<Output = ()> + Send + 'static>(cells: impl IntoIterator<Item = F>) {
+    let mut cells: JoinSet<()> = cells.into_iter().collect();
+    while let Some(cell) = cells.join_next().await {
+        cell.unwrap();
+    }
+}
+
+fn with(fault: (&'static str, Set), others: LineFaults) -> (&'static str, LineFaults) {
+    let mut line_faults = others;
+    fault.1(&mut line_faults);
+    (fault.0, line_faults)
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn each_fault_on_tcp() {
-    for (name, set) in FAULTS {
-        let mut line_faults = LineFaults::default();
-        set(&mut line_faults);
+    beside_each_other(FAULTS.map(|fault| async move {
+        let (name, line_faults) = with(fault, LineFaults::default());
         let (_press, host, tally) = rig::run(Config { strokes: 8, line_faults, ..quick() }, SCAN).await;
         assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
         assert_all(name, &tally, 8);
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn each_fault_on_rtu_through_tcp() {
-    for (name, set) in FAULTS {
-        let mut line_faults = LineFaults::default();
-        set(&mut line_faults);
+    beside_each_other(FAULTS.map(|fault| async move {
+        let (name, line_faults) = with(fault, LineFaults::default());
         let link = LinkConfig::RtuOverTcp { port: 0 };
         let press = SimPress::start(Config { strokes: 4, link, line_faults, ..quick() }).await.unwrap();
         let address = press.modbus().unwrap();
@@ -74,7 +88,8 @@ async fn each_fault_on_rtu_through_tcp() {
         assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
         assert_all(name, &tally, 4);
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -101,16 +116,17 @@ async fn serial(config: Config) -> (SimPress, Press, tempfile::TempDir) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn each_fault_on_a_serial_line() {
-    for (name, set) in FAULTS.into_iter().filter(|(name, _)| *name != "wrong transaction") {
-        let mut line_faults = LineFaults { late_ms: LATE_MS, ..LineFaults::default() };
-        set(&mut line_faults);
+    let faults = FAULTS.into_iter().filter(|(name, _)| *name != "wrong transaction");
+    beside_each_other(faults.map(|fault| async move {
+        let (name, line_faults) = with(fault, LineFaults { late_ms: LATE_MS, ..LineFaults::default() });
         let (press, plant, _folder) = serial(Config { strokes: 4, line_faults, ..quick() }).await;
         let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
         let tally = done(&press, &host).await;
         assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
         assert_all(name, &tally, 4);
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -158,14 +174,15 @@ async fn an_adapter_that_is_pulled_is_found_under_its_name() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_lasting_exception_is_a_fault_until_reset() {
-    for (exception_code, code) in [
+    let lasting = [
         (1, Code::IllegalFunction),
         (2, Code::IllegalAddress),
         (3, Code::IllegalAddress),
         (4, Code::DeviceFailure),
         (8, Code::DeviceFailure),
         (9, Code::DeviceFailure),
-    ] {
+    ];
+    beside_each_other(lasting.map(|(exception_code, code)| async move {
         let press = SimPress::start(Config { strokes: 4, automatic: false, ..quick() }).await.unwrap();
         let mut host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), SCAN);
         host.until("ready", |status| status.host.ready).await;
@@ -179,19 +196,21 @@ async fn a_lasting_exception_is_a_fault_until_reset() {
         let tally = done(&press, &host).await;
         assert_all(&code.to_string(), &tally, 4);
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn exceptions_that_pass_cost_no_stroke() {
-    for exception_code in [4, 5, 6, 7, 8, 9, 10, 11] {
+    beside_each_other([4, 5, 6, 7, 8, 9, 10, 11].map(|exception_code| async move {
         let line_faults = LineFaults { exception: 0.05, exception_code, ..LineFaults::default() };
         let (_press, host, tally) = rig::run(Config { strokes: 6, line_faults, ..quick() }, SCAN).await;
         assert!(!tally.line_faults.is_empty(), "{exception_code}: the seed hits nothing");
         assert_all(&format!("exception {exception_code:02X}"), &tally, 6);
         assert_eq!(tally.connections, 1, "{exception_code:02X}: an exception keeps the connection");
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,10 +1,11 @@
 //! A pseudo terminal as a serial line: the host opens its name, the press has its other end.
 //!
 //! A terminal that nobody has open is hung up, which an event loop would report for ever after. So threads of their own
-//! read and write it; they end, and with them the terminal, when the press lets go of its end.
+//! read and write it; they end, and with them the terminal, when the press lets go of its end. The link goes first, as
+//! a pulled adapter's does: the terminal's number may be another's a moment later.
 
 use std::io::{ErrorKind, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -23,17 +24,40 @@ pub(crate) fn plug(device: &Path) -> io::Result<DuplexStream> {
     line.set_timeout(LOOK)?;
     let name = host.name().ok_or_else(|| io::Error::other("the terminal has no name"))?;
     relink(&name, device)?;
+    let link = Link { device: device.to_path_buf(), terminal: name.into() };
     let (near, far) = duplex(4096);
     let (heard, said) = split(far);
-    let writer = line.try_clone_native()?;
+    let mut writer = line.try_clone_native()?;
     let pulled = Arc::new(AtomicBool::new(false));
     let runtime = Handle::current();
     let (also_pulled, also_runtime) = (Arc::clone(&pulled), runtime.clone());
-    thread::Builder::new()
-        .name("pty write".into())
-        .spawn(move || write_line(writer, heard, &also_runtime, &also_pulled))?;
-    thread::Builder::new().name("pty read".into()).spawn(move || read_line(line, said, &runtime, &pulled))?;
+    let also_link = link.clone();
+    thread::Builder::new().name("pty write".into()).spawn(move || {
+        write_line(&mut writer, heard, &also_runtime, &also_pulled);
+        also_link.remove();
+    })?;
+    thread::Builder::new().name("pty read".into()).spawn(move || {
+        read_line(&mut line, said, &runtime, &pulled);
+        link.remove();
+    })?;
     Ok(near)
+}
+
+/// The name under which the host finds a terminal.
+#[derive(Clone)]
+struct Link {
+    device: PathBuf,
+    terminal: PathBuf,
+}
+
+impl Link {
+    /// Called before either end of the terminal is closed; a link to the next terminal stays.
+    fn remove(&self) {
+        if std::fs::read_link(&self.device).is_ok_and(|terminal| terminal == self.terminal) {
+            // Who removed the folder meanwhile has removed the link.
+            let _ = std::fs::remove_file(&self.device);
+        }
+    }
 }
 
 /// Replaces the link at one go: whoever opens it finds the old terminal or the new one.
@@ -43,7 +67,7 @@ fn relink(name: &str, device: &Path) -> io::Result<()> {
     std::fs::rename(fresh, device)
 }
 
-fn read_line(mut line: TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
+fn read_line(line: &mut TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
     let mut bytes = [0; 512];
     while !pulled.load(Ordering::Relaxed) {
         match line.read(&mut bytes) {
@@ -56,7 +80,7 @@ fn read_line(mut line: TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &Ha
     }
 }
 
-fn write_line(mut line: TTYPort, mut press: ReadHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
+fn write_line(line: &mut TTYPort, mut press: ReadHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
     let mut bytes = [0; 512];
     while let Ok(n @ 1..) = runtime.block_on(press.read(&mut bytes)) {
         // What is said on a line where nobody listens is lost.
