@@ -342,6 +342,7 @@ fn a_picture_shows_the_scan_and_the_decisions_are_said() {
     let picture = bench.file("picture.png");
     let said = run(&["inspect".as_ref(), scan.as_ref(), "--picture".as_ref(), picture.as_ref()]);
     let notes = said["notes"].to_string();
+    assert_eq!(said["notes"][0], "read from PTX");
     assert!(notes.contains("rows and columns are swapped"), "{notes}");
     assert!(notes.contains("row 0 is at the bottom of the file"), "{notes}");
     let bytes = std::fs::read(&picture).unwrap();

@@ -17,21 +17,27 @@ use platen_sim_plate::{Plate, PlateState, Reply};
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, Shop};
 use serde_json::Value as Json;
 
-/// `platen-sim cell --serve`.
+/// `platen-sim cell`.
 struct Cell {
     child: Child,
     out: BufReader<ChildStdout>,
     modbus: String,
+    /// Empty where scans come as files.
     scanner: String,
     line: BufReader<TcpStream>,
 }
 
 impl Cell {
+    /// Scans come over TCP.
     fn start(press: &Path, more: &[&str]) -> Self {
+        Self::run(press, &[&["--serve", "127.0.0.1:0"], more].concat())
+    }
+
+    fn run(press: &Path, more: &[&str]) -> Self {
         let mut child = platen_tests::program("platen-sim")
             .arg("cell")
             .arg(press)
-            .args(["--with-parent", "--serve", "127.0.0.1:0", "--modbus-port", "0", "--plate-port", "0"])
+            .args(["--with-parent", "--modbus-port", "0", "--plate-port", "0"])
             .args(more)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -41,7 +47,7 @@ impl Cell {
         let mut ready = String::new();
         out.read_line(&mut ready).unwrap();
         let ready: Json = serde_json::from_str(&ready).unwrap();
-        let port = |name: &str| ready[name].as_str().unwrap().to_owned();
+        let port = |name: &str| ready[name].as_str().unwrap_or_default().to_owned();
         let line = BufReader::new(TcpStream::connect(port("plate")).unwrap());
         Self { child, out, modbus: port("modbus"), scanner: port("scanner"), line }
     }
@@ -136,6 +142,16 @@ fn assert_registers(history: &[Json], taken: &[Json]) {
     }
 }
 
+/// The corners of a result are those of the plate in the press.
+#[track_caller]
+fn assert_corners(document: &Json, plate: &PlateState) {
+    let plate = Plate::new(plate).unwrap();
+    for (found, truth) in document["corners_m"].as_array().unwrap().iter().zip(plate.corners()) {
+        let off = Vector3::from_fn(|k, _| found[k].as_f64().unwrap()) - truth;
+        assert!(off.norm() < 3e-3, "{:.2} mm: {off}", 1e3 * off.norm());
+    }
+}
+
 #[test]
 fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,15 +169,9 @@ fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
     let history = Host::history(&plant);
     assert_registers(&history, taken);
 
-    // The corners of the last result are those of the plate in the press.
     let documents: Vec<Json> = history.iter().map(document).collect();
     assert_eq!(plate.strokes, 20);
-    let plate = Plate::new(&plate).unwrap();
-    let last = documents.last().unwrap();
-    for (found, truth) in last["corners_m"].as_array().unwrap().iter().zip(plate.corners()) {
-        let off = Vector3::from_fn(|k, _| found[k].as_f64().unwrap()) - truth;
-        assert!(off.norm() < 3e-3, "{:.2} mm: {off}", 1e3 * off.norm());
-    }
+    assert_corners(documents.last().unwrap(), &plate);
 
     // Region scans: the blank in the region of interest, every stroke where the stroke before lay.
     let columns: Vec<u64> = documents.iter().map(|d| d["scan"]["columns"].as_u64().unwrap()).collect();
@@ -173,6 +183,37 @@ fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
     println!("bridge: {bridge}");
     assert_eq!((&bridge["scans"], &bridge["cuts"]), (&21.into(), &1.into()), "{bridge}");
     assert!(bridge["resumes"].as_u64().unwrap() >= 1, "{bridge}");
+}
+
+#[test]
+fn a_late_file_that_grows_is_the_scan_of_its_own_stroke() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    let few = |text: String| programme(text, 5, 1);
+    let more = ["--drop", scans.to_str().unwrap(), "--late-file", "3", "--step-deg", "0.08"];
+    let mut cell = Cell::run(&press(folder.path(), few), &more);
+    let files = format!(
+        "plugin = \"faro-file\"\n[scanner.options]\nfolder = {scans:?}\npattern = \"*.e57\"\npoll_ms = 20\n"
+    );
+    let plant = plant(folder.path(), &cell.modbus, "", |text| {
+        let (before, rest) = text.split_once("plugin = \"faro-stream\"").unwrap();
+        format!("{before}{files}\n[frame]{}", rest.split_once("[frame]").unwrap().1)
+    });
+    let mut host = Host::start(&plant);
+    let (stats, plate) = cell.wait_done();
+    let log = host.log();
+    assert_clean(&stats, &log);
+    let history = Host::history(&plant);
+    assert_registers(&history, stats["taken"].as_array().unwrap());
+    assert_eq!((history.len(), plate.strokes), (6, 5), "five strokes and the blank\n{log}");
+    let documents: Vec<Json> = history.iter().map(document).collect();
+    assert_corners(documents.last().unwrap(), &plate);
+
+    let waited: Vec<f64> = documents.iter().map(|d| d["timings_ms"]["acquire"].as_f64().unwrap()).collect();
+    println!("waited for files, ms: {waited:.0?}");
+    // It was not there for 750 ms, and not whole for as long again.
+    assert!(waited[3] > 1500.0, "{waited:?}\n{log}");
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
 
 #[test]

@@ -37,7 +37,7 @@ impl<R: Read + Seek> E57<R> {
         let cloud = choose(reader.pointclouds(), chosen)?;
         check_prototype(&cloud.prototype)?;
         let fields = Fields::find(&cloud)?;
-        let mut about = describe(&cloud);
+        let mut about = About { format: fields.format(), ..describe(&cloud) };
         about.notes.extend(length_note);
         if fields.return_index.is_some() {
             about.notes.push("several echoes per beam: the first of each is used".to_owned());
@@ -264,6 +264,19 @@ impl Fields {
             intensity: find(RecordName::Intensity),
             return_index: find(RecordName::ReturnIndex),
         })
+    }
+
+    /// How the cells are held, for people.
+    fn format(&self) -> String {
+        let numbers = match self.position[0].data_type {
+            RecordDataType::Single { .. } => "f32".to_owned(),
+            RecordDataType::Double { .. } => "f64".to_owned(),
+            RecordDataType::ScaledInteger { scale, .. } => format!("scaled integers of {scale}"),
+            RecordDataType::Integer { .. } => "integers".to_owned(),
+        };
+        let coordinates = if self.spherical { "spherical" } else { "Cartesian" };
+        let gaps = if self.state.is_some() { "gaps flagged" } else { "gaps not flagged" };
+        format!("{FORMAT}: {coordinates} coordinates, {numbers}, {gaps}")
     }
 
     /// The cell of a point, `None` for the second and later echoes of a beam.

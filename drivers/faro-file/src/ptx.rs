@@ -178,6 +178,7 @@ impl Part {
         }
         let mirror = if determinant < -RIGID { Mirror::Y } else { Mirror::None };
         About {
+            format: FORMAT.to_owned(),
             cells: u64::from(self.columns) * u64::from(self.per_column),
             intensity: Some((0.0, 1.0)),
             mirror,

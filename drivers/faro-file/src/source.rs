@@ -8,6 +8,8 @@ use crate::error::{Error, Result};
 /// What a file says of its scan besides the cells.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct About {
+    /// Name of the format, and how it holds the cells.
+    pub(crate) format: String,
     /// Cells stored.
     pub(crate) cells: u64,
     /// Smallest and largest intensity declared.
@@ -95,14 +97,13 @@ fn survey(source: &mut Remembered<'_>, known: &Expected, out: &mut dyn Receiver)
     })?;
     let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
     let mut plan = survey.decide(&Expected { intensity: about.intensity, mirror, ..*known })?;
-    if let Some((own, warm_up_columns)) = &about.own
-        && plan.take_over(own, *warm_up_columns)
-    {
-        return Ok((plan, checksum));
+    let own = about.own.as_ref();
+    if !own.is_some_and(|(header, warm_up_columns)| plan.take_over(header, *warm_up_columns)) {
+        plan.header.notes.splice(0..0, about.notes);
+        plan.header.instrument = about.instrument;
+        plan.header.acquired_unix_s = about.acquired_unix_s;
     }
-    plan.header.notes.splice(0..0, about.notes);
-    plan.header.instrument = about.instrument;
-    plan.header.acquired_unix_s = about.acquired_unix_s;
+    plan.header.notes.insert(0, format!("read from {}", about.format));
     Ok((plan, checksum))
 }
 

@@ -60,7 +60,8 @@ impl<R: Read + Seek> Xyb<R> {
             return Err(Error::Incomplete { format: FORMAT, what });
         }
         let cells = bytes / RECORD as u64;
-        let about = About { cells, intensity: Some(REFLECTANCE), ..About::default() };
+        let about =
+            About { format: FORMAT.to_owned(), cells, intensity: Some(REFLECTANCE), ..About::default() };
         let lines = Order::Lines(header.rows);
         let mut xyb = Self { file, offset: header.length, order: lines, about };
         if u64::from(header.rows) * u64::from(header.columns) == cells {

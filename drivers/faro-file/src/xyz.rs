@@ -29,7 +29,8 @@ impl<R: Read + Seek> Xyz<R> {
     pub(crate) fn open(mut file: R) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
         let cells = length / TYPICAL_LINE;
-        Ok(Self { file, about: About { cells, ..About::default() } })
+        let format = "XYZ with row and column".to_owned();
+        Ok(Self { file, about: About { format, cells, ..About::default() } })
     }
 }
 

@@ -2,7 +2,7 @@
 //! each stroke, the way an export script of a real scanner does.
 //!
 //! Files: the scanner starts when the host has accepted a stroke and the plate lies still; the file is named
-//! `SESSION-STROKE-ATTEMPT.e57` and appears whole. The scanner knows the press only by its second port.
+//! `SESSION-STROKE-ATTEMPT.e57` and appears whole, but for a late one (`--late-file`). The scanner knows the press only by its second port.
 
 use crate::bridge;
 use crate::error::Error;
@@ -13,10 +13,14 @@ use clap::Args;
 use platen_sim_press::SimPress;
 use platen_sim_scanner::FileFormat;
 use platen_sim_scanner::stream::Bridge;
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+/// How long a late file is not there, and then how long only its first half.
+const LATE: Duration = Duration::from_millis(750);
 
 /// How often the scanner looks at the press.
 const LOOK: Duration = Duration::from_millis(20);
@@ -29,6 +33,9 @@ pub(crate) struct Command {
     /// Folder for scans
     #[arg(long, value_name = "FOLDER", required_unless_present = "serve")]
     drop: Option<PathBuf>,
+    /// The file of this stroke comes late, and half of it lies under its name before the rest, as on a slow share
+    #[arg(long, value_name = "STROKE", requires = "drop")]
+    late_file: Option<u16>,
     /// Format of the scans: e57, ptx, xyz or xyb
     #[arg(long, default_value = "e57")]
     format: String,
@@ -52,7 +59,8 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
         Some(drop) => {
             let ending = Arc::new(AtomicBool::new(false));
             let (format, device) = (command.format, command.device);
-            let scanner = Scanner { address: control, drop, format, device, ending: Arc::clone(&ending) };
+            let (address, late_file, ending_too) = (control, command.late_file, Arc::clone(&ending));
+            let scanner = Scanner { address, drop, late_file, format, device, ending: ending_too };
             dropping(press, &command.press, scanner, &ending).await?;
         }
         None => press::until_told(press, &command.press).await?,
@@ -83,6 +91,7 @@ async fn dropping(
 struct Scanner {
     address: String,
     drop: PathBuf,
+    late_file: Option<u16>,
     format: String,
     device: Device,
     ending: Arc<AtomicBool>,
@@ -111,8 +120,25 @@ impl Scanner {
         let Wanted { session, stroke, attempt } = wanted;
         let path = self.drop.join(format!("{session:05}-{stroke:05}-{attempt}.{}", self.format));
         let shot = self.device.shot(state.as_ref(), number).map_err(platen_sim_press::Error::from)?;
-        shot.write(&path)?;
+        if self.late_file == Some(stroke) {
+            let hidden = self.drop.join(format!(".late.{}", self.format));
+            shot.write(&hidden)?;
+            grow(&path, &std::fs::read(&hidden)?)?;
+            std::fs::remove_file(hidden)?;
+        } else {
+            shot.write(&path)?;
+        }
         tracing::info!(path = %path.display(), "scan dropped");
         Ok(())
     }
+}
+
+/// Writes a file late and in two halves.
+fn grow(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let (first, second) = bytes.split_at(bytes.len() / 2);
+    std::thread::sleep(LATE);
+    let mut file = std::fs::File::create_new(path)?;
+    file.write_all(first)?;
+    std::thread::sleep(LATE);
+    file.write_all(second)
 }

@@ -63,7 +63,10 @@ fn every_encoding_of_an_e57_gives_the_same_cells() {
         {
             for gaps in [Gaps::Flagged, Gaps::LeftOut, Gaps::Zero] {
                 let style = E57Style { spherical, coordinates, gaps, ..PLAIN };
-                check(&e57(style, 1), "scan.e57", quantum);
+                let lattice = check(&e57(style, 1), "scan.e57", quantum);
+                let kind = if spherical { "spherical" } else { "Cartesian" };
+                let said = &lattice.header().notes[0];
+                assert!(said.starts_with(&format!("read from E57: {kind} coordinates, ")), "{said}");
             }
         }
     }
