@@ -13,8 +13,7 @@ use platen_press::{Code, LinkState};
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
 use platen_sim_press::{Command, Config, SimPress, Tally};
-use rig::{Host, LIMIT, Memory, assert_clean, done, quick, tcp};
-use tokio::task::JoinSet;
+use rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, done, quick, tcp};
 
 const SCAN: Duration = Duration::from_millis(5);
 
@@ -46,14 +45,6 @@ fn assert_all(what: &str, tally: &Tally, strokes: usize) {
     assert_clean(tally);
     assert_eq!((tally.taken.len(), tally.missed_reported), (strokes, 0), "{what}");
     assert_eq!(tally.plates_served, strokes as u64, "{what}: scans");
-}
-
-/// Runs cells beside each other: each has a press, a line and a host of its own, and mostly waits.
-async fn beside_each_other<F: Future<Output = ()> + Send + 'static>(cells: impl IntoIterator<Item = F>) {
-    let mut cells: JoinSet<()> = cells.into_iter().collect();
-    while let Some(cell) = cells.join_next().await {
-        cell.unwrap();
-    }
 }
 
 fn with(fault: (&'static str, Set), others: LineFaults) -> (&'static str, LineFaults) {

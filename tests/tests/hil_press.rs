@@ -8,7 +8,7 @@ use platen_press::{Code, LinkState};
 use platen_sim_press::faults::StrokeFaults;
 use platen_sim_press::registers::status;
 use platen_sim_press::{Cause, Command, Config, SimPress};
-use rig::{Host, LIMIT, Memory, assert_clean, quick, run, tcp};
+use rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, quick, run, tcp};
 
 const fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
@@ -98,7 +98,7 @@ async fn bad_habits_of_a_press_lose_nothing() {
         ("counter set back", |it| it.counter_back = 0.5),
         ("no acknowledge", |it| it.no_ack = 1.0),
     ];
-    for (habit, set) in habits {
+    beside_each_other(habits.map(|(habit, set)| async move {
         let mut stroke_faults = StrokeFaults::default();
         set(&mut stroke_faults);
         let (_press, host, tally) =
@@ -108,7 +108,8 @@ async fn bad_habits_of_a_press_lose_nothing() {
         let missed: Vec<_> = tally.taken.iter().map(|it| (it.stroke_id, it.words[9])).collect();
         assert_eq!(u64::from(tally.missed_reported), tally.skipped, "{habit}: {missed:?}");
         host.stop().await;
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -152,11 +153,12 @@ async fn a_second_host_never_writes_and_the_first_goes_on() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nothing_is_written_to_the_wrong_press() {
-    for (config, code) in [
+    let wrong = [
         (Config { press_id: 4, ..quick() }, Code::PressId),
         (Config { map_version: 2, ..quick() }, Code::MapVersion),
         (Config { map_version: 0, ..quick() }, Code::MapVersion),
-    ] {
+    ];
+    beside_each_other(wrong.map(|(config, code)| async move {
         let press = SimPress::start(Config { wait_ready: false, ..config }).await.unwrap();
         let mut host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), ms(5));
         host.until("refusal", |status| status.link_error == Some(code)).await;
@@ -164,7 +166,8 @@ async fn nothing_is_written_to_the_wrong_press() {
         assert_eq!(press.tally().writes, 0, "{code}");
         host.stop().await;
         assert_eq!(press.tally().writes, 0, "{code}, at the stop");
-    }
+    }))
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

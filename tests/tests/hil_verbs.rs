@@ -40,6 +40,12 @@ fn check_needs_no_press() {
     assert_eq!(said["exchanges"][0]["registers"], 32);
     let people = verb("check", &plant, &[]);
     assert!(String::from_utf8_lossy(&people.stdout).contains("holding registers 100..=163 and no others"));
+    let map = json(&verb("map", &plant, &["--json"]));
+    assert_eq!(map["press_to_host"].as_array().unwrap().len(), 32, "{map:#}");
+    assert_eq!(map["may_write"], "100..=163");
+    let alarms = json(&verb("map", &plant, &["--format", "alarms", "--language", "ja", "--json"]));
+    assert_eq!((alarms[0]["code"].as_u64(), alarms[0]["severity"].as_str()), (Some(101), Some("error")));
+    assert!(alarms[0]["text"].as_str().unwrap().contains("プレス"), "{alarms}");
     std::fs::write(&plant, "[press]\nname = \"x\"\n").unwrap();
     assert_eq!(verb("check", &plant, &["--json"]).status.code(), Some(2));
 }
@@ -169,7 +175,7 @@ fn a_write_test_writes_figures_and_leaves_none() {
 
 #[test]
 fn soak_on_each_line() {
-    for (line, strokes, wanted) in [("tcp", "60", 100), ("rtu-over-tcp", "12", 12), ("rtu", "12", 12)] {
+    let soak = |line: &str, strokes: &str, wanted: u64| {
         let output = platen_tests::program("platen")
             .args(["press", "soak", "-n", strokes, "--line", line, "--json"])
             .output()
@@ -181,7 +187,13 @@ fn soak_on_each_line() {
             (Some(wanted), Some(wanted)),
             "{line}: {run:#}"
         );
-    }
+    };
+    // Each has a press of its own, and mostly waits.
+    std::thread::scope(|scope| {
+        for (line, strokes, wanted) in [("tcp", "60", 100), ("rtu-over-tcp", "12", 12), ("rtu", "12", 12)] {
+            scope.spawn(move || soak(line, strokes, wanted));
+        }
+    });
 }
 
 #[test]

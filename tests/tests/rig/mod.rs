@@ -23,7 +23,7 @@ use platen_sim_press::{Config, SimPress, Tally};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::sync::{mpsc, watch};
-use tokio::task::JoinHandle;
+use tokio::task::{JoinHandle, JoinSet};
 
 /// Longer than any of these tests takes on a busy machine.
 pub(crate) const LIMIT: Duration = Duration::from_secs(300);
@@ -51,6 +51,16 @@ pub(crate) fn quick() -> Config {
 /// What the product is told of a press at `address`.
 pub(crate) fn tcp(address: SocketAddr) -> Press {
     Press::pph1("Press 3", 3, Link::tcp(address.ip().to_string(), address.port(), 1))
+}
+
+/// Runs cells beside each other: each has a press, a line and a host of its own, and mostly waits.
+pub(crate) async fn beside_each_other<F: Future<Output = ()> + Send + 'static>(
+    cells: impl IntoIterator<Item = F>,
+) {
+    let mut cells: JoinSet<()> = cells.into_iter().collect();
+    while let Some(cell) = cells.join_next().await {
+        cell.unwrap();
+    }
 }
 
 /// A journal in memory: what would be on the disk, whatever becomes of the host.
