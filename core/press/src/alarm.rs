@@ -11,6 +11,16 @@ pub enum Severity {
     Warning,
 }
 
+impl Severity {
+    /// In one word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        }
+    }
+}
+
 /// Language of texts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Language {
@@ -173,10 +183,7 @@ pub fn alarms_csv(language: Language) -> String {
     let mut csv = String::from("code,severity,text,remedy\n");
     for code in Code::ALL {
         let alarm = code.alarm();
-        let severity = match alarm.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-        };
+        let severity = alarm.severity.name();
         let (text, remedy) = (alarm.text(language), alarm.remedy(language));
         csv += &format!("{},{severity},\"{text}\",\"{remedy}\"\n", code.number());
     }

@@ -21,7 +21,7 @@ pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,
     Response, ServedLink, TransportError, consequence,
 };
-pub use page::{map_csv, map_markdown};
+pub use page::{MapPage, MapRow, map_csv, map_markdown, map_page};
 pub use probe::{Reading, readings};
 pub use program::reference_program;
 pub use replay::{Replayed, Sample, Side, replay};

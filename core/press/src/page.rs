@@ -7,6 +7,8 @@ use std::fmt::Write;
 
 use platen_plant::press::{Block, Field, Input, Kind, Output, Place, Press, Role, Table, Unit};
 
+use serde::Serialize;
+
 use crate::reference_program;
 
 /// One field on the page.
@@ -76,6 +78,19 @@ impl Row {
             String::new()
         };
         format!("{list}{}{text} {order}", field.kind.name()).trim_end().to_owned()
+    }
+
+    /// All of it as the page shows it.
+    fn show(&self, block: &Block) -> MapRow {
+        MapRow {
+            address: self.address(block),
+            six_digit: self.modicon(block),
+            name: self.name,
+            kind: self.kind(),
+            step: self.step(),
+            meaning: self.meaning,
+            notes: self.notes(),
+        }
     }
 
     /// What one raw step means.
@@ -172,14 +187,11 @@ fn section(page: &mut String, title: &str, block: &Block, rows: &[Row]) {
         page,
         "\n## {title}\n\n| address | 6-digit | name | type | 1 step | meaning | notes |\n|---|---|---|---|---|---|---|\n"
     );
-    for row in rows {
-        let (address, modicon, kind, step, notes) =
-            (row.address(block), row.modicon(block), row.kind(), row.step(), row.notes());
-        let _ = writeln!(
-            page,
-            "| {address} | {modicon} | {} | {kind} | {step} | {} | {notes} |",
-            row.name, row.meaning
-        );
+    for MapRow { address, six_digit, name, kind, step, meaning, notes } in
+        rows.iter().map(|row| row.show(block))
+    {
+        let _ =
+            writeln!(page, "| {address} | {six_digit} | {name} | {kind} | {step} | {meaning} | {notes} |");
     }
 }
 
@@ -191,17 +203,78 @@ pub fn map_csv(press: &Press) -> String {
         ("host to press", &press.map.write, outputs(press)),
     ];
     for (direction, block, rows) in sides {
-        for row in rows {
-            let (address, modicon, kind, step, notes) =
-                (row.address(block), row.modicon(block), row.kind(), row.step(), row.notes());
+        for MapRow { address, six_digit, name, kind, step, meaning, notes } in
+            rows.iter().map(|row| row.show(block))
+        {
             let _ = writeln!(
                 csv,
-                "{direction},{address},{modicon},{},{kind},{step},\"{}\",\"{notes}\"",
-                row.name, row.meaning
+                "{direction},{address},{six_digit},{name},{kind},{step},\"{meaning}\",\"{notes}\""
             );
         }
     }
     csv
+}
+
+/// The page for programs.
+#[derive(Debug, Clone, Serialize)]
+pub struct MapPage {
+    /// Name of the press.
+    pub press: String,
+    /// Its number.
+    pub press_id: u16,
+    /// The built-in map that the plant file started from.
+    pub profile: &'static str,
+    /// What the press tells the host.
+    pub press_to_host: Vec<MapRow>,
+    /// What the host tells the press.
+    pub host_to_press: Vec<MapRow>,
+    /// The registers that the host may change, zero-based.
+    pub may_write: String,
+    /// How the two find each other.
+    pub connection: Vec<String>,
+    /// How the rows are read.
+    pub notation: Vec<String>,
+    /// What the press must do.
+    pub rules: Vec<String>,
+    /// The reference program, Structured Text.
+    pub program: String,
+}
+
+/// One field of a block, as the page shows it.
+#[derive(Debug, Clone, Serialize)]
+pub struct MapRow {
+    /// Zero-based, with the bit after a point; `-` for a field without a register.
+    pub address: String,
+    /// The same in 6-digit notation.
+    pub six_digit: String,
+    /// Name in the plant file.
+    pub name: &'static str,
+    /// Type, with the order of its words.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// What one raw step means; empty for a plain number.
+    pub step: String,
+    /// What it means.
+    pub meaning: &'static str,
+    /// Everything else that must be known about it.
+    pub notes: String,
+}
+
+/// The page as data.
+pub fn map_page(press: &Press) -> MapPage {
+    let show = |rows: Vec<Row>, block| rows.iter().map(|row| row.show(block)).collect();
+    MapPage {
+        press: press.name.clone(),
+        press_id: press.press_id,
+        profile: press.map.profile.name(),
+        press_to_host: show(inputs(press), &press.map.read),
+        host_to_press: show(outputs(press), &press.map.write),
+        may_write: press.write.to_string(),
+        connection: rules::connection(press),
+        notation: rules::notation(press),
+        rules: rules::rules(press),
+        program: reference_program(press),
+    }
 }
 
 #[cfg(test)]
@@ -228,6 +301,8 @@ mod tests {
         let fields = press().map.inputs.len() + press().map.outputs.len();
         assert_eq!(page.lines().filter(|line| line.starts_with("| ")).count(), fields + 2);
         assert_eq!(map_csv(&press()).lines().count(), fields + 1);
+        let data = map_page(&press());
+        assert_eq!(data.press_to_host.len() + data.host_to_press.len(), fields);
     }
 
     #[test]

@@ -16,7 +16,9 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand, ValueEnum};
 use platen_plant::PlantFile;
 use platen_plant::press::{Press, Role};
-use platen_press::{Client, Language, LinkError, ModbusLink, alarms_csv, map_csv, map_markdown};
+use platen_press::{
+    Client, Code, Language, LinkError, ModbusLink, alarms_csv, map_csv, map_markdown, map_page,
+};
 
 use super::{CliError, Common, output};
 
@@ -231,7 +233,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 fn dispatch(common: &Common, verb: &Verb) -> Result<ExitCode, Failure> {
     match verb {
         Verb::Check { plant } => line::check(common, &load(plant)?)?,
-        Verb::Map { plant, format, language } => map(&load(plant)?, *format, *language)?,
+        Verb::Map { plant, format, language } => map(common, &load(plant)?, *format, *language)?,
         Verb::Ping { plant, count } => line::ping(common, &load(plant)?, *count)?,
         Verb::ScanUnit { plant, units } => return line::scan_units(common, &load(plant)?, units),
         Verb::Dump { plant, raw, range } => registers::dump(common, &load(plant)?, *raw, range.as_ref())?,
@@ -259,12 +261,26 @@ fn load(plant: &Path) -> Result<Press, CliError> {
     PlantFile::load(plant)?.press.ok_or_else(missing)
 }
 
-fn map(press: &Press, format: Format, language: Tongue) -> Result<(), CliError> {
+fn map(common: &Common, press: &Press, format: Format, language: Tongue) -> Result<(), CliError> {
     match format {
+        Format::Md | Format::Csv if common.json => output::json(&map_page(press)),
+        Format::Alarms if common.json => output::json(&alarms(language.into())),
         Format::Md => output::line(map_markdown(press).trim_end()),
         Format::Csv => output::line(map_csv(press).trim_end()),
         Format::Alarms => output::line(alarms_csv(language.into()).trim_end()),
     }
+}
+
+/// The alarm table as data.
+fn alarms(language: Language) -> Vec<serde_json::Value> {
+    let row = |code: &Code| {
+        let alarm = code.alarm();
+        serde_json::json!({
+            "code": code.number(), "severity": alarm.severity.name(), "text": alarm.text(language),
+            "remedy": alarm.remedy(language),
+        })
+    };
+    Code::ALL.iter().map(row).collect()
 }
 
 /// Someone who asks the press; not connected yet.

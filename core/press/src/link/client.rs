@@ -178,8 +178,10 @@ impl<L: Link> Client<L> {
             }
             Ok(Ok(answer)) => {
                 self.connected = was_connected;
-                let ms = sent.elapsed().as_millis() as u64;
-                self.counts.round_trips[ROUND_TRIP_LIMITS_MS.partition_point(|&limit| limit < ms)] += 1;
+                let took = sent.elapsed();
+                let class =
+                    ROUND_TRIP_LIMITS_MS.partition_point(|&limit| Duration::from_millis(limit) < took);
+                self.counts.round_trips[class] += 1;
                 Ok(answer)
             }
             Ok(Err(source)) => {

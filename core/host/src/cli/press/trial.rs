@@ -154,7 +154,7 @@ async fn trial(press: &Press, strokes: u32, patience: Duration) -> Result<Report
         if report.steps.len() <= 1 {
             return Err(Failure::Handshake(format!("{}: {why}{newest}", press.name)));
         }
-        report.add("end", format!("{why}{newest}"), format!("{strokes} strokes"), false);
+        report.add("end", format!("{why}{newest}"), format!("{strokes} to make"), false);
     }
     Ok(report)
 }
