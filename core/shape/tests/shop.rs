@@ -1,6 +1,6 @@
 //! What happens in a shop, on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
 
-#![allow(clippy::unwrap_used, reason = "test code")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "test code")]
 
 #[path = "support/synthetic.rs"]
 mod synthetic;
@@ -89,11 +89,28 @@ fn an_edge_along_a_column_of_the_lattice() {
 
 #[test]
 fn coarse_lattices() {
-    // Samples 15 to 21 mm apart.
-    for step_deg in [0.12_f64, 0.15, 0.17] {
+    // Samples 19 to 24 mm apart on the plate.
+    for step_deg in [0.12_f64, 0.15] {
         for radius in [None, Some(9.0), Some(-9.0)] {
             let scene = Scene { step: step_deg.to_radians(), ..Scene::of(Plate { radius, ..plate() }) };
             check(&format!("{step_deg} degrees, {radius:?}"), &scene, 4e-3);
+        }
+    }
+}
+
+#[test]
+fn too_coarse_lattices_are_refused_with_the_step_to_set() {
+    for step_deg in [0.17_f64, 0.3, 0.6] {
+        for radius in [None, Some(5.0)] {
+            let scene = Scene { step: step_deg.to_radians(), ..Scene::of(Plate { radius, ..plate() }) };
+            let (header, columns) = scene.scan();
+            let refusal = extract(&header, &columns, &scene.spec()).unwrap_err();
+            println!("{step_deg} degrees, {radius:?}: {refusal}");
+            let Refusal::TooCoarse { spacing_mm, step_deg: fine, .. } = refusal else {
+                panic!("{step_deg} degrees, {radius:?}: {refusal}");
+            };
+            // Seen from 7 m, at 50 to 60 degrees from the normal.
+            assert!((100.0..180.0).contains(&(spacing_mm / step_deg)) && (0.14..0.2).contains(&fine));
         }
     }
 }

@@ -12,6 +12,9 @@ const AREA: std::ops::Range<f64> = 0.5..1.1;
 /// spans 0.89 of its length; something in front of an edge takes more.
 const SIDE: std::ops::Range<f64> = 0.82..1.06;
 
+/// The widest spacing of samples on the plate, metres, at which its corners are told to some millimetres.
+const WIDEST_SPACING: f64 = 0.025;
+
 /// A face of this part of W x H is worth a complaint about its size.
 const NOTABLE: f64 = 0.15;
 
@@ -21,6 +24,8 @@ pub(super) struct Candidate {
     /// Indices into the list of pieces.
     pub(super) pieces: Vec<usize>,
     area: f64,
+    /// Side of the square of the face that a cell stands for, metres.
+    spacing: f64,
     centre: Vec3,
     /// Longer and shorter side of the smallest rectangle around it, metres.
     sides: [f64; 2],
@@ -30,8 +35,10 @@ impl Candidate {
     fn of(pieces: &[Piece], members: Vec<usize>) -> Self {
         let points: Vec<Vec3> = members.iter().flat_map(|&i| pieces[i].outline.iter().copied()).collect();
         let centre = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
-        let area = members.iter().map(|&i| pieces[i].area).sum();
-        Self { pieces: members, area, centre, sides: smallest_rectangle(&points, centre) }
+        let area = members.iter().map(|&i| pieces[i].area).sum::<f64>();
+        let n_cells: usize = members.iter().map(|&i| pieces[i].n_cells).sum();
+        let spacing = (area / n_cells.max(1) as f64).sqrt();
+        Self { pieces: members, area, spacing, centre, sides: smallest_rectangle(&points, centre) }
     }
 
     /// True when area and sides are those of the plate.
@@ -61,30 +68,50 @@ pub(super) fn candidates(pieces: &[Piece]) -> Vec<Candidate> {
     (0..pieces.len()).map(members).filter(|m| !m.is_empty()).map(|m| Candidate::of(pieces, m)).collect()
 }
 
-/// The one candidate that fits the plate.
+/// The one candidate that fits the plate. `step` is the angle between beams, radians.
 ///
 /// # Errors
-/// Why none or several do.
-pub(super) fn choose<'a>(candidates: &'a [Candidate], spec: &PlateSpec) -> Result<&'a Candidate, Refusal> {
+/// Why none or several do, or that its samples lie too far apart.
+pub(super) fn choose<'a>(
+    candidates: &'a [Candidate],
+    spec: &PlateSpec,
+    step: f64,
+) -> Result<&'a Candidate, Refusal> {
     let fitting: Vec<_> = candidates.iter().filter(|c| c.fits(spec)).collect();
     match fitting.as_slice() {
-        [one] => Ok(one),
-        [] => Err(why_none(candidates, spec)),
+        [one] => check_spacing(one.spacing, step).map(|()| *one),
+        [] => Err(why_none(candidates, spec, step)),
         [first, second, ..] => {
             Err(Refusal::SeveralPlates { count: fitting.len(), first: first.centre, second: second.centre })
         }
     }
 }
 
-fn why_none(candidates: &[Candidate], spec: &PlateSpec) -> Refusal {
+/// Refuses samples that lie `spacing` apart on the plate, metres, where that is too far.
+pub(super) fn check_spacing(spacing: f64, step: f64) -> Result<(), Refusal> {
+    if spacing <= WIDEST_SPACING {
+        return Ok(());
+    }
+    Err(Refusal::TooCoarse {
+        spacing_mm: 1000.0 * spacing,
+        widest_mm: 1000.0 * WIDEST_SPACING,
+        step_deg: (step * WIDEST_SPACING / spacing).to_degrees(),
+    })
+}
+
+fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
     let plate = spec.width * spec.height;
     let closeness = |c: &&Candidate| (c.area / plate).ln().abs();
     let nearest = candidates.iter().min_by(|a, b| closeness(a).total_cmp(&closeness(b)));
     match nearest {
-        Some(face) if face.area > NOTABLE * plate => Refusal::WrongSize {
-            at: face.centre,
-            found_mm: face.sides.map(|s| s * 1000.0),
-            expected_mm: sides(spec).map(|s| s * 1000.0),
+        // The rim of a face is lost over some cells: one of few cells seems smaller than it is.
+        Some(face) if face.area > NOTABLE * plate => match check_spacing(face.spacing, step) {
+            Err(too_coarse) => too_coarse,
+            Ok(()) => Refusal::WrongSize {
+                at: face.centre,
+                found_mm: face.sides.map(|s| s * 1000.0),
+                expected_mm: sides(spec).map(|s| s * 1000.0),
+            },
         },
         _ => Refusal::NoPlate {
             largest_m2: candidates.iter().map(|c| c.area).fold(0.0, f64::max),

@@ -21,6 +21,7 @@ pub(super) struct Face {
     pub(super) label: u32,
     /// Area of the surface, square metres.
     pub(super) area: f64,
+    pub(super) n_cells: usize,
 }
 
 /// Labels the cells of a window by face and lists the faces, the largest first. `slope_reach` is that of the normals.
@@ -35,11 +36,12 @@ pub(super) fn faces(window: &Window, normals: &[Vector3<f32>], slope_reach: usiz
             continue;
         }
         let number = faces.len() as u32;
-        let mut face = Face { label: number, area: 0.0 };
+        let mut face = Face { label: number, area: 0.0, n_cells: 0 };
         label[seed] = number;
         front.push(seed);
         while let Some(at) = front.pop() {
             face.area += area(window, at, &normals[at]);
+            face.n_cells += 1;
             for next in [at - 1, at + 1, at - n_rows, at + n_rows] {
                 if flat[next] && label[next] == NO_FACE {
                     label[next] = number;

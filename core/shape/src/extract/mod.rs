@@ -163,7 +163,12 @@ impl Extractor {
             surfaces.extend(more);
             candidates = choose::candidates(&pieces);
         }
-        let chosen = choose::choose(&candidates, &self.spec)?;
+        let step = (self.header.azimuth_step * self.header.elevation_step).sqrt();
+        if candidates.is_empty() {
+            // Components without a face: too few cells across, or no surface at all.
+            surfaces.iter().try_for_each(|surface| choose::check_spacing(surface.spacing(), step))?;
+        }
+        let chosen = choose::choose(&candidates, &self.spec, step)?;
         let chosen: Vec<&Piece> = chosen.pieces.iter().map(|&i| &pieces[i]).collect();
         if let [piece] = chosen.as_slice()
             && let Some(patch) = known.remove(&(surfaces[piece.surface].root, piece.label))

@@ -50,6 +50,7 @@ pub(super) struct Piece {
     pub(super) surface: usize,
     pub(super) label: u32,
     pub(super) area: f64,
+    pub(super) n_cells: usize,
     /// Points on it for its extent: about one in 256 cells.
     pub(super) outline: Vec<Vec3>,
     rows: Ends,
@@ -77,7 +78,7 @@ impl Piece {
             .into_iter()
             .flat_map(|lines| lines.ends.iter().step_by(4).flatten().flat_map(|[a, b]| [a.point, b.point]));
         let outline = outline.collect();
-        Self { surface, label: face.label, area: face.area, outline, rows, columns }
+        Self { surface, label: face.label, area: face.area, n_cells: face.n_cells, outline, rows, columns }
     }
 
     /// True when `other` continues this piece behind something nearer.

@@ -68,6 +68,20 @@ pub enum Refusal {
         /// Middle of another, metres.
         second: Vec3,
     },
+    /// The lattice is too coarse for the plate's edges.
+    #[error(
+        "samples lie {spacing_mm:.0} mm apart on the plate, its edges and corners need {widest_mm:.0} mm or less; \
+         scan with an angular step of {} degrees or less, or from nearer",
+        (step_deg * 100.0).floor() / 100.0
+    )]
+    TooCoarse {
+        /// Side of the square of the face that a sample stands for, millimetres.
+        spacing_mm: f64,
+        /// The widest that is measured, millimetres.
+        widest_mm: f64,
+        /// Angle between beams at which it would be reached.
+        step_deg: f64,
+    },
     /// The region of interest cuts the plate.
     #[error(
         "the plate reaches out of the region of interest over {cut_mm:.0} mm of its edge; enlarge the region"

@@ -44,6 +44,14 @@ impl Surface {
         notable.map(move |face| Piece::new(number, &self.window, &self.labels, face, &self.normals))
     }
 
+    /// Mean distance of neighbouring beams, across them, metres.
+    pub(super) fn spacing(&self) -> f64 {
+        let own = self.window.own.iter().zip(&self.window.cells).filter(|(own, _)| **own);
+        let (n, sum) = own.fold((0, 0.0), |(n, sum), (_, cell)| (n + 1, sum + f64::from(cell.range_m)));
+        let header = &self.window.header;
+        sum / f64::from(n.max(1)) * (header.azimuth_step * header.elevation_step).sqrt()
+    }
+
     /// The cells of a face as cells of another window that holds this one.
     pub(super) fn region(&self, label: u32, into: &Window) -> Vec<bool> {
         let mut region = vec![false; into.cells.len()];
