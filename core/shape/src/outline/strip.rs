@@ -1,8 +1,9 @@
 //! The narrow strip of the face along an edge, rolled out into the plane.
 //!
-//! A base curve on the face, near the edge, is developed: its turning within the surface is kept, the surface's own
-//! bending is not. In the plane a straight cut is straight however the plate is bent, up to the small strain of the
-//! face, so that a stiff curve can be fitted there to what the lattice says of the edge.
+//! A base curve on the face, near the edge, is developed as it runs on the mid-surface below it: its turning within the
+//! surface is kept, the surface's own bending is not. In the plane a straight cut is straight however the plate is bent
+//! (on the face itself a bend band askew to the edge shifts it by half the thickness times the band's angle), so that a
+//! stiff curve can be fitted there to what the lattice says of the edge.
 
 use nalgebra::Vector2;
 
@@ -59,7 +60,7 @@ pub(super) struct Strip {
 impl Strip {
     /// The strip along the edge from `from` to `to`, through the crossings that lie on a common curve.
     ///
-    /// `step` is the spacing of the crossings, `noise` that of the range, metres.
+    /// `depth` is that of the mid-surface, `step` the spacing of the crossings, `noise` that of the range, metres.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of the edge is seen.
@@ -67,6 +68,7 @@ impl Strip {
         crossings: &[Settled],
         from: Vec3,
         to: Vec3,
+        depth: f64,
         step: f64,
         noise: f64,
     ) -> Result<Self, OutlineError> {
@@ -117,7 +119,7 @@ impl Strip {
                 (point, (along * n_x.at(x) + inward * n_y.at(x) + up).normalize())
             })
             .collect();
-        Ok(Self { from, along, first: start, stations: roll_out(&points) })
+        Ok(Self { from, along, first: start, stations: roll_out(&points, depth) })
     }
 
     /// A point near the edge, on the face, as (along, inwards) in the plane, metres.
@@ -183,15 +185,17 @@ fn robust_across(axis: Axis, data: &[(Vec3, Vec3)], step: f64) -> Option<(Spline
     (weights.iter().sum::<f64>() > 8.0).then_some((curve?, weights))
 }
 
-/// Develops a curve with the normals of its surface: the direction turns in the plane as it turns in the surface.
-fn roll_out(points: &[(Vec3, Vec3)]) -> Vec<Station> {
+/// Develops the curve `depth` below one with the normals of its surface: the direction turns in the plane as it turns in
+/// the surface.
+fn roll_out(points: &[(Vec3, Vec3)], depth: f64) -> Vec<Station> {
     let n = points.len();
-    let chord = |i: usize| points[i + 1].0 - points[i].0;
+    let on_face = |i: usize| points[i + 1].0 - points[i].0;
+    let chord = |i: usize| on_face(i) - (points[i + 1].1 - points[i].1) * depth;
     let mut stations = Vec::with_capacity(n);
     let (mut flat, mut heading) = (Vector2::zeros(), 0.0_f64);
     for (i, &(point, normal)) in points.iter().enumerate() {
         let (back, ahead) = (i.saturating_sub(1), i.min(n - 2));
-        let tangent = (chord(back) + chord(ahead)).normalize();
+        let tangent = (on_face(back) + on_face(ahead)).normalize();
         let inward = normal.cross(&tangent).normalize();
         // Half of the turn at this point comes before its tangent, half after.
         let turn = if i > 0 && i + 1 < n {
