@@ -102,17 +102,20 @@ fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json
 }
 
 /// S(u, v) of the record, evaluated by de Boor's recursion: nothing of the program's own evaluation is used.
-struct Spline<'a> {
+struct Spline {
     knots: [Vec<f64>; 2],
-    control: &'a Json,
+    /// v outer, u inner.
+    control: Vec<Vec<Vec3>>,
 }
 
-impl Spline<'_> {
-    fn of(result: &Json) -> Spline<'_> {
+impl Spline {
+    fn of(result: &Json) -> Self {
         let knots = |name: &str| {
             result["surface"][name].as_array().unwrap().iter().map(|k| k.as_f64().unwrap()).collect()
         };
-        Spline { knots: [knots("knots_u"), knots("knots_v")], control: &result["surface"]["control_m"] }
+        let rows = result["surface"]["control_m"].as_array().unwrap().iter();
+        let control = rows.map(|row| row.as_array().unwrap().iter().map(vec3).collect()).collect();
+        Self { knots: [knots("knots_u"), knots("knots_v")], control }
     }
 
     fn basis(knots: &[f64], i: usize, degree: usize, x: f64) -> f64 {
@@ -129,13 +132,14 @@ impl Spline<'_> {
 
     fn point(&self, u: f64, v: f64) -> Vec3 {
         let weights = |knots: &[f64], x: f64| {
-            (0..knots.len() - 4).map(|i| Self::basis(knots, i, 3, x)).collect::<Vec<_>>()
+            let near = (0..knots.len() - 4).filter(|&i| knots[i] <= x && x < knots[i + 4]);
+            near.map(|i| (i, Self::basis(knots, i, 3, x))).collect::<Vec<_>>()
         };
         let (wu, wv) = (weights(&self.knots[0], u), weights(&self.knots[1], v));
         let mut sum = Vec3::zeros();
-        for (j, b) in wv.iter().enumerate().filter(|(_, b)| **b != 0.0) {
-            for (i, a) in wu.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                sum += a * b * vec3(&self.control[j][i]);
+        for (j, b) in &wv {
+            for (i, a) in &wu {
+                sum += a * b * self.control[*j][*i];
             }
         }
         sum
