@@ -124,23 +124,20 @@ impl Column {
         if end > u64::from(n_rows) {
             return Err(ColumnError::Rows { index: self.index, first_row: self.first_row, end, n_rows });
         }
-        for i in 0..expected {
-            let (r, az, el) = (self.range_m[i], self.azimuth[i], self.elevation[i]);
-            let sound = match self.state[i] {
-                State::Valid => r.is_finite() && r > 0.0 && az.is_finite() && el.is_finite(),
-                State::DirectionOnly => az.is_finite() && el.is_finite(),
-                State::NoReturn => true,
-            };
-            if !sound {
-                let row = self.first_row + i as u32;
-                return Err(ColumnError::NotFinite {
-                    index: self.index,
-                    row,
-                    range_m: r,
-                    azimuth: az,
-                    elevation: el,
-                });
-            }
+        let angles = self.azimuth.iter().zip(&self.elevation);
+        let unsound = |((state, r), (az, el)): ((&State, &f64), (&f64, &f64))| match state {
+            State::Valid => !(r.is_finite() && *r > 0.0 && az.is_finite() && el.is_finite()),
+            State::DirectionOnly => !(az.is_finite() && el.is_finite()),
+            State::NoReturn => false,
+        };
+        if let Some(i) = self.state.iter().zip(&self.range_m).zip(angles).position(unsound) {
+            return Err(ColumnError::NotFinite {
+                index: self.index,
+                row: self.first_row + i as u32,
+                range_m: self.range_m[i],
+                azimuth: self.azimuth[i],
+                elevation: self.elevation[i],
+            });
         }
         Ok(())
     }

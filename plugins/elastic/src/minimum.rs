@@ -37,6 +37,7 @@ pub(crate) fn minimise(
     let graph = Graph::of_elements(&mesh.triangles, &nodes, x.len());
     let mut spd = Spd::<2>::analyse(&graph, &plane_picture(mesh)).map_err(|e| unsolved(&e))?;
     let energy = |x: &[[f64; 2]]| membrane.energy(x) + hold.energy(x);
+    let mut here = energy(x);
     let mut last_step = 0.0;
     for _ in 0..MAX_STEPS {
         go_on()?;
@@ -52,9 +53,10 @@ pub(crate) fn minimise(
         let mut direction = [gradient.iter().map(|g| [-g[0], -g[1]]).collect::<Vec<_>>()];
         spd.solve(&mut direction).map_err(|e| unsolved(&e))?;
         let [direction] = direction;
-        let Some(share) = line_search(energy, x, &direction, &gradient) else {
+        let Some((share, there)) = line_search(energy, here, x, &direction, &gradient) else {
             return Err(not_found("no step lowers the energy"));
         };
+        here = there;
         let mut longest = 0.0_f64;
         for (x, d) in x.iter_mut().zip(&direction) {
             longest = longest.max(share * d[0].hypot(d[1]));
@@ -69,22 +71,23 @@ pub(crate) fn minimise(
     Err(not_found(&format!("no minimum in {MAX_STEPS} steps")))
 }
 
-/// The largest of 1, 1/2, 1/4 ... that lowers the energy enough without turning a triangle over.
+/// The largest of 1, 1/2, 1/4 ... that lowers the energy `here` enough without turning a triangle over, and the energy there.
 fn line_search(
     energy: impl Fn(&[[f64; 2]]) -> f64,
+    here: f64,
     x: &[[f64; 2]],
     direction: &[[f64; 2]],
     gradient: &[[f64; 2]],
-) -> Option<f64> {
-    let here = energy(x);
+) -> Option<(f64, f64)> {
     let slope: f64 = direction.iter().zip(gradient).map(|(d, g)| d[0] * g[0] + d[1] * g[1]).sum();
     let there = |share: f64| {
         let moved: Vec<_> =
             x.iter().zip(direction).map(|(x, d)| [x[0] + share * d[0], x[1] + share * d[1]]).collect();
         energy(&moved)
     };
-    let mut shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0)).take(40);
-    shares.find(|share| there(*share) <= here * (1.0 + ROUNDING) + SUFFICIENT * share * slope)
+    let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0)).take(40);
+    let mut tried = shares.map(|share| (share, there(share)));
+    tried.find(|(share, there)| *there <= here * (1.0 + ROUNDING) + SUFFICIENT * share * slope)
 }
 
 pub(crate) fn unsolved(error: &SparseError) -> Error {

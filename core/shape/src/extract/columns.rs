@@ -76,25 +76,29 @@ impl Kept {
 /// Copies a column into cells. `inside` says of a row and a range whether the sample is in the region of interest.
 pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32, f32) -> bool) -> Vec<Cell> {
     let azimuth = header.azimuth_start + header.azimuth_step * f64::from(column.index);
-    let cell = |i: usize| {
-        if column.state[i] != State::Valid {
+    let angles = column.azimuth.iter().zip(&column.elevation);
+    let samples = column.state.iter().zip(&column.range_m).zip(angles).zip(&column.intensity);
+    let cell = |(row, (((state, range_m), (true_azimuth, true_elevation)), intensity)): (
+        u32,
+        (((&State, &f64), (&f64, &f64)), &u16),
+    )| {
+        if *state != State::Valid {
             return Cell::default();
         }
-        let row = column.first_row + i as u32;
         let elevation = header.elevation_start - header.elevation_step * f64::from(row);
-        let range_m = column.range_m[i] as f32;
-        let azimuth_off = column.azimuth[i] - azimuth;
+        let range_m = *range_m as f32;
+        let azimuth_off = true_azimuth - azimuth;
         let azimuth_off = if azimuth_off.abs() < 3.0 { azimuth_off } else { wrap_azimuth(azimuth_off) };
         Cell {
             range_m,
             azimuth_off: azimuth_off as f32,
-            elevation_off: (column.elevation[i] - elevation) as f32,
-            intensity: column.intensity[i],
+            elevation_off: (true_elevation - elevation) as f32,
+            intensity: *intensity,
             valid: true,
             inside: inside(row, range_m),
         }
     };
-    (0..column.len()).map(cell).collect()
+    (column.first_row..).zip(samples).map(cell).collect()
 }
 
 /// All columns, with the bookkeeping of what can be dropped.

@@ -66,14 +66,17 @@ impl Continuity {
         }
     }
 
-    /// True when the second and the third of four consecutive ranges down a column are on one surface.
+    /// True when two consecutive ranges down a column are on one surface; `beyond` gives the ones before and behind them.
     #[inline]
-    pub(super) fn joins_down(&self, ranges: [Option<f32>; 4]) -> bool {
-        let [before, Some(here), Some(next), behind] = ranges else { return false };
+    pub(super) fn joins_down(
+        &self,
+        [here, next]: [f32; 2],
+        beyond: impl FnOnce() -> [Option<f32>; 2],
+    ) -> bool {
         if self.down.joins(here, next) {
             return true;
         }
-        let (Some(before), Some(behind)) = (before, behind) else { return false };
+        let [Some(before), Some(behind)] = beyond() else { return false };
         let rates = [here - before, next - here, behind - next];
         let [least, most] = [
             rates.map(f32::abs).into_iter().fold(f32::MAX, f32::min),

@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 
 use super::window::Window;
 use crate::Vec3;
+use crate::kernels::wide;
 
 /// Cells on a side of the square that shares one fit.
 pub(super) const TILE: usize = 4;
@@ -49,13 +50,8 @@ fn basis([x, y]: [f64; 2]) -> SVector<f64, 6> {
     SVector::from([1.0, x, y, x * x, x * y, y * y])
 }
 
-/// x^p y^q up to the fourth order: the products of two functions of the basis.
-fn monomials([x, y]: [f64; 2]) -> [f64; 15] {
-    let (xx, xy, yy) = (x * x, x * y, y * y);
-    [1.0, x, y, xx, xy, yy, xx * x, xx * y, x * yy, yy * y, xx * xx, xx * xy, xx * yy, xy * yy, yy * yy]
-}
-
-/// Which monomial is the product of two functions of the basis.
+/// Which monomial is the product of two functions of the basis, of 1, x, y, x^2, x y, y^2, x^3, x^2 y, x y^2, y^3, x^4, x^3 y,
+/// x^2 y^2, x y^3, y^4.
 const PRODUCTS: [[usize; 6]; 6] = [
     [0, 1, 2, 3, 4, 5],
     [1, 3, 4, 6, 7, 8],
@@ -64,6 +60,88 @@ const PRODUCTS: [[usize; 6]; 6] = [
     [4, 7, 8, 11, 12, 13],
     [5, 8, 9, 12, 13, 14],
 ];
+
+/// Points of a fit at most.
+const MOST: usize = (TILE + 2 * REACH) * (TILE + 2 * REACH);
+
+/// Lanes of a sum, to fill vector registers.
+const LANES: usize = 16;
+
+/// Sum of terms over whole lanes of two lists.
+#[inline(always)]
+fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for lane in 0..LANES {
+            lanes[lane] += term(a[lane], b[lane]);
+        }
+    }
+    let mut half = LANES / 2;
+    while half > 0 {
+        (0..half).for_each(|lane| lanes[lane] += lanes[lane + half]);
+        half /= 2;
+    }
+    lanes[0]
+}
+
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    sum(a, b, |a, b| a * b)
+}
+
+/// The points of a fit, by coordinate, with zeros up to whole lanes.
+struct Points {
+    n: usize,
+    by_axis: [[f64; MOST]; 3],
+}
+
+impl Points {
+    fn new() -> Self {
+        Self { n: 0, by_axis: [[0.0; MOST]; 3] }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, point: &[f64; 3]) {
+        (0..3).for_each(|d| self.by_axis[d][self.n] = point[d]);
+        self.n += 1;
+    }
+
+    #[inline(always)]
+    fn axes(&self) -> [&[f64]; 3] {
+        let len = self.n.next_multiple_of(LANES).min(MOST);
+        self.by_axis.each_ref().map(|numbers| &numbers[..len])
+    }
+
+    /// Moves the origin into the middle of the points, and returns where that was.
+    #[inline(always)]
+    fn centre(&mut self) -> Vec3 {
+        let n = self.n;
+        let centre = Vec3::from(self.axes().map(|x| sum(x, x, |x, _| x) / n as f64));
+        for (numbers, centre) in self.by_axis.iter_mut().zip(centre.iter()) {
+            numbers[..n].iter_mut().for_each(|x| *x -= centre);
+        }
+        centre
+    }
+
+    /// Coordinate of each point along an axis.
+    #[inline(always)]
+    fn along(&self, axis: &Vec3) -> [f64; MOST] {
+        let mut along = [0.0; MOST];
+        let [x, y, z] = self.axes();
+        for (((along, x), y), z) in along.iter_mut().zip(x).zip(y).zip(z) {
+            *along = axis.x * x + axis.y * y + axis.z * z;
+        }
+        along
+    }
+}
+
+/// Products of two lists.
+#[inline(always)]
+fn times(a: &[f64], b: &[f64]) -> [f64; MOST] {
+    let mut product = [0.0; MOST];
+    product.iter_mut().zip(a).zip(b).for_each(|((product, a), b)| *product = a * b);
+    product
+}
 
 impl LocalFace {
     /// The square of cells that shares a fit with `index`.
@@ -76,30 +154,40 @@ impl LocalFace {
         let span =
             |tile: usize, n: usize| (tile * TILE).saturating_sub(REACH)..(tile * TILE + TILE + REACH).min(n);
         let rows = span(tile.1, window.n_rows);
-        let mut points = Vec::with_capacity((TILE + 2 * REACH) * (TILE + 2 * REACH));
+        let mut points = Points::new();
         for column in span(tile.0, window.n_columns) {
             let cells = column * window.n_rows + rows.start..column * window.n_rows + rows.end;
             let on_face = face[cells.clone()].iter().zip(&window.points[cells]);
-            points.extend(on_face.filter(|(on_face, _)| **on_face).map(|(_, point)| *point));
+            on_face.filter(|(on_face, _)| **on_face).for_each(|(_, point)| points.push(point));
         }
-        if points.len() < LEAST_CELLS {
+        if points.n < LEAST_CELLS {
             return None;
         }
-        Self::through(&points)
+        wide(
+            #[inline(always)]
+            || Self::through(&mut points),
+        )
     }
 
-    fn through(points: &[Vec3]) -> Option<Self> {
-        let n = points.len() as f64;
-        let centre = points.iter().sum::<Vec3>() / n;
+    #[inline(always)]
+    fn through(points: &mut Points) -> Option<Self> {
+        let centre = points.centre();
         let (along, up) = plane(points, centre)?;
+        let len = points.axes()[0].len();
+        let [x, y, z] = [along[0], along[1], up].map(|axis| points.along(&axis));
+        let [x, y, z] = [&x[..len], &y[..len], &z[..len]];
+        let [xx, xy, yy] = [times(x, x), times(x, y), times(y, y)];
+        let [xx, xy, yy] = [&xx[..len], &xy[..len], &yy[..len]];
+        // Of the first order nothing is left: the origin is the middle.
+        let second = [dot(x, x), dot(x, y), dot(y, y)];
+        let third = [dot(xx, x), dot(xx, y), dot(xy, y), dot(yy, y)];
+        let fourth = [dot(xx, xx), dot(xx, xy), dot(xy, xy), dot(xy, yy), dot(yy, yy)];
         let mut moments = [0.0; 15];
-        let mut b = SVector::<f64, 6>::zeros();
-        for point in points {
-            let off = point - centre;
-            let at = along.map(|axis| axis.dot(&off));
-            moments.iter_mut().zip(monomials(at)).for_each(|(sum, m)| *sum += m);
-            b.axpy(up.dot(&off), &basis(at), 1.0);
-        }
+        moments[0] = points.n as f64;
+        moments[3..6].copy_from_slice(&second);
+        moments[6..10].copy_from_slice(&third);
+        moments[10..].copy_from_slice(&fourth);
+        let b = SVector::from([0.0, dot(z, x), dot(z, y), dot(z, xx), dot(z, xy), dot(z, yy)]);
         let mut a = SMatrix::from_fn(|i, k| moments[PRODUCTS[i][k]]);
         // A trace of ridge on the second order alone lets a narrow strip fall back to a plane.
         for k in 3..6 {
@@ -144,24 +232,20 @@ impl LocalFace {
     }
 }
 
-/// The plane through points about their centre: two axes at right angles, each over the mean spacing of points
+/// The plane through points about their centre, which is their origin: two axes at right angles, each over the mean spacing of points
 /// along it, and the unit normal towards the scanner. `None` when the points lie on a line.
-fn plane(points: &[Vec3], centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
-    let mut sums = [0.0; 6];
-    for point in points {
-        let [x, y, z]: [f64; 3] = (point - centre).into();
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-    }
-    let [xx, xy, xz, yy, yz, zz] = sums;
-    let eigen = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigen();
+#[inline(always)]
+fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
+    let [x, y, z] = points.axes();
+    let (xy, xz, yz) = (dot(x, y), dot(x, z), dot(y, z));
+    let eigen = Matrix3::new(dot(x, x), xy, xz, xy, dot(y, y), yz, xz, yz, dot(z, z)).symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let up = eigen.eigenvectors.column(least).into_owned();
     let up = if up.dot(&centre) > 0.0 { -up } else { up };
     let axis = |k: usize| {
         let k = (least + k) % 3;
         // k even steps have a mean square of k^2 / 12; as many along one axis as along the other.
-        let spacing = (12.0 * eigen.eigenvalues[k]).sqrt() / points.len() as f64;
+        let spacing = (12.0 * eigen.eigenvalues[k]).sqrt() / points.n as f64;
         (spacing > 0.0).then(|| eigen.eigenvectors.column(k) / spacing)
     };
     Some(([axis(1)?, axis(2)?], up))
@@ -179,9 +263,11 @@ mod tests {
             let (sin, cos) = (s / radius).sin_cos();
             Vec3::new(6.0 + radius * sin, y, -3.6 - radius * (1.0 - cos))
         };
-        let points: Vec<Vec3> =
-            (0..160).map(|i| point(0.8 + 0.04 * f64::from(i % 10), 0.02 * f64::from(i / 10))).collect();
-        let face = LocalFace::through(&points).expect("a face");
+        let mut points = Points::new();
+        (0..160).for_each(|i| {
+            points.push(&point(0.8 + 0.04 * f64::from(i % 10), 0.02 * f64::from(i / 10)).into())
+        });
+        let face = LocalFace::through(&mut points).expect("a face");
         let beyond = point(1.24, 0.1);
         let off = beyond - face.centre;
         let at = face.along.map(|axis| axis.dot(&off));

@@ -26,12 +26,12 @@ pub(super) enum Pixel {
 pub(super) fn tell(window: &Window, noise: &Noise) -> Vec<Pixel> {
     let n_rows = window.n_rows;
     let mut pixels = vec![Pixel::Untold; window.cells.len()];
-    for column in 2..window.n_columns.saturating_sub(2) {
-        for row in 2..n_rows.saturating_sub(2) {
+    for (column, rows) in window.inner_spans(2) {
+        for row in rows {
             let index = column * n_rows + row;
             let here = window.inverse[index];
             if here > 0.0 {
-                let bound = BOUND * 6.0_f32.sqrt() * noise.at(index) * here * here;
+                let bound = BOUND * 6.0_f32.sqrt() * noise.of(column, row) * here * here;
                 let down = along(&window.inverse, index, 1, bound);
                 let across = along(&window.inverse, index, n_rows, bound);
                 pixels[index] = match (down, across) {

@@ -20,6 +20,7 @@ mod grow;
 mod local;
 mod mixed;
 mod noise;
+mod parts;
 mod pieces;
 mod refusal;
 mod regions;
@@ -221,9 +222,10 @@ impl Extractor {
                 let range = f64::from(cells[at].range_m);
                 solid += range * range * self.elevation[first_row as usize + at].1;
                 at += 1;
-                let range = |i: usize| cells.get(i).filter(|cell| usable(cell)).map(|cell| cell.range_m);
-                let before = if at >= 2 { range(at - 2) } else { None };
-                if !self.continuity.joins_down([before, range(at - 1), range(at), range(at + 1)]) {
+                let Some(next) = cells.get(at).filter(|cell| usable(cell)) else { break };
+                let known = |i: usize| cells.get(i).filter(|cell| usable(cell)).map(|cell| cell.range_m);
+                let beyond = || [if at >= 2 { known(at - 2) } else { None }, known(at + 1)];
+                if !self.continuity.joins_down([cells[at - 1].range_m, next.range_m], beyond) {
                     break;
                 }
             }
@@ -281,15 +283,17 @@ impl Extractor {
         let face = trim::grow_back(window, noise, normals, face);
         let mut number = vec![0; face.len()];
         let mut samples = Vec::with_capacity(face.iter().filter(|f| **f).count());
-        for cell in (0..face.len()).filter(|&cell| face[cell]) {
-            number[cell] = samples.len() as u32;
-            samples.push(Sample {
-                point: window.points[cell],
-                column: window.first_column + (cell / window.n_rows) as u32,
-                row: window.first_row + (cell % window.n_rows) as u32,
-                sigma: noise.at(cell),
-                intensity: window.cells[cell].intensity,
-            });
+        for (column, rows) in window.inner_spans(0) {
+            for (cell, row) in (column * window.n_rows + rows.start..).zip(rows).filter(|(c, _)| face[*c]) {
+                number[cell] = samples.len() as u32;
+                samples.push(Sample {
+                    point: window.points[cell].into(),
+                    column: window.first_column + column as u32,
+                    row: window.first_row + row as u32,
+                    sigma: noise.of(column, row),
+                    intensity: window.cells[cell].intensity,
+                });
+            }
         }
         let (crossings, cut) = crossings::find(window, noise, &face, pixels, |cell| number[cell]);
         if cut > CUT_TOLERANCE {

@@ -62,7 +62,12 @@ impl Noise {
 
     /// Standard deviation at a cell, metres.
     pub(super) fn at(&self, index: usize) -> f32 {
-        let (column, row) = (index / self.n_rows, index % self.n_rows);
+        self.of(index / self.n_rows, index % self.n_rows)
+    }
+
+    /// The same by column and row.
+    #[inline]
+    pub(super) fn of(&self, column: usize, row: usize) -> f32 {
         self.block[column / BLOCK.0 * self.blocks_down + row / BLOCK.1]
     }
 }

@@ -5,9 +5,8 @@
 //! between them is nearer than both or was not measured. So are the parts of a face on both sides of the seam of the
 //! scanner's faces, where warm-up columns are left out.
 
-use nalgebra::Vector3;
-
 use super::grow::Face;
+use super::smooth::Normal;
 use super::window::Window;
 use crate::Vec3;
 
@@ -70,7 +69,7 @@ impl Piece {
         window: &Window,
         labels: &[u32],
         face: &Face,
-        normals: &[Vector3<f32>],
+        normals: &[Normal],
     ) -> Self {
         let lines = |rows: bool| lines(window, labels, face.label, normals, rows);
         let (rows, columns) = (lines(true), lines(false));
@@ -87,7 +86,7 @@ impl Piece {
     }
 }
 
-fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Vector3<f32>], rows: bool) -> Ends {
+fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: bool) -> Ends {
     let n_rows = window.n_rows;
     let (n_lines, n_places, first, offset) = if rows {
         (n_rows, window.n_columns, window.first_row, window.first_column)
@@ -108,8 +107,8 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Vector3<f32>], 
             let hidden = beside.clone().all(|cell| !cell.valid)
                 || beside.clone().any(|cell| cell.valid && cell.range_m < near);
             let unmeasured = beside.take_while(|cell| !cell.valid).count() as u32;
-            let normal = normals[index(line, inner)].cast();
-            End { place: offset + place as u32, point: window.points[at], normal, hidden, unmeasured }
+            let normal = Vec3::from(normals[index(line, inner)].map(f64::from));
+            End { place: offset + place as u32, point: window.points[at].into(), normal, hidden, unmeasured }
         };
         Some([end(low, -1), end(high, 1)])
     });

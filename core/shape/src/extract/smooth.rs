@@ -5,8 +5,11 @@
 //! not the positions moves samples along their beams only and leaves planes where they are. The copy serves the
 //! normals and nothing else.
 
+use std::ops::Range;
+
 use super::continuity::Continuity;
 use super::window::Window;
+use crate::kernels::wide;
 
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];
@@ -18,66 +21,85 @@ const PAIRS: usize = 10;
 pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity) -> Vec<f32> {
     let n_rows = window.n_rows;
     let n = window.cells.len();
+    // The first and the last column are margin and stay as they are.
+    let spans: Vec<(usize, Range<usize>)> =
+        (1..window.n_columns - 1).map(|c| (c, window.spans[c].clone())).collect();
     // Weight of the link to the cell below, and to the cell in the next column.
     let mut down = vec![0.0_f32; n];
     let mut across = vec![0.0_f32; n];
-    for index in 0..n - n_rows {
-        if !usable[index] {
-            continue;
-        }
-        let row = index % n_rows;
-        let range = |i: usize| window.cells[i].range_m;
-        let known = |i: Option<usize>| i.filter(|i| usable[*i]).map(range);
-        let below = |k: usize| known((row + k < n_rows).then_some(index + k));
-        if continuity.joins_down([known((row > 0).then(|| index - 1)), below(0), below(1), below(2)]) {
-            down[index] = 1.0;
-        }
-        let link = continuity.across[window.first_row as usize + row];
-        if usable[index + n_rows] && link.joins(range(index), range(index + n_rows)) {
-            across[index] = 1.0;
+    for (column, rows) in &spans {
+        for row in rows.clone() {
+            let index = column * n_rows + row;
+            if !usable[index] {
+                continue;
+            }
+            let range = |i: usize| window.cells[i].range_m;
+            let known = |i: usize| usable[i].then(|| range(i));
+            if row + 1 < n_rows && usable[index + 1] {
+                let before = || if row > 0 { known(index - 1) } else { None };
+                let beyond = || [before(), if row + 2 < n_rows { known(index + 2) } else { None }];
+                down[index] = continuity.joins_down([range(index), range(index + 1)], beyond).into();
+            }
+            let link = continuity.across[window.first_row as usize + row];
+            if usable[index + n_rows] && link.joins(range(index), range(index + n_rows)) {
+                across[index] = 1.0;
+            }
         }
     }
-    let per_link: Vec<f32> = (0..n)
-        .map(|i| {
-            let up = if i > 0 { down[i - 1] } else { 0.0 };
-            let back = if i >= n_rows { across[i - n_rows] } else { 0.0 };
-            1.0 / (down[i] + across[i] + up + back).max(1.0)
-        })
-        .collect();
-    let mut from = window.inverse.clone();
-    let mut to = from.clone();
-    for factor in std::iter::repeat_n(FACTORS, PAIRS).flatten() {
-        diffuse(&from, &mut to, &down, &across, &per_link, n_rows, factor);
-        std::mem::swap(&mut from, &mut to);
+    let mut per_link = vec![1.0_f32; n];
+    for (column, rows) in &spans {
+        for i in column * n_rows + rows.start..column * n_rows + rows.end {
+            per_link[i] = 1.0 / (down[i] + across[i] + down[i - 1] + across[i - n_rows]).max(1.0);
+        }
     }
-    from
+    let links = Links { down, across, per_link };
+    let mut copies = [window.inverse.clone(), window.inverse.clone()];
+    // A half step of a column needs the one before of its two neighbours, so the half steps follow each other through
+    // the columns, one column apart: what a column needs is still in the cache.
+    wide(
+        #[inline(always)]
+        || {
+            for front in 0..spans.len() + 2 * PAIRS {
+                for step in 0..(2 * PAIRS).min(front + 1) {
+                    let Some((column, rows)) = spans.get(front - step) else { continue };
+                    let [even, odd] = &mut copies;
+                    let (from, to) = if step % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
+                    let cells = column * n_rows + rows.start..column * n_rows + rows.end;
+                    links.diffuse(from, to, cells, n_rows, FACTORS[step % 2]);
+                }
+            }
+        },
+    );
+    let [smooth, _] = copies;
+    smooth
 }
 
-/// One half step. The first and the last column of a window are margin and stay as they are.
-fn diffuse(
-    from: &[f32],
-    to: &mut [f32],
-    down: &[f32],
-    across: &[f32],
-    per_link: &[f32],
-    n_rows: usize,
-    factor: f32,
-) {
-    let n = from.len();
-    let span = n_rows..n - n_rows;
-    let len = span.len();
-    let (here, below, above) = (&from[span.clone()], &from[n_rows + 1..][..len], &from[n_rows - 1..][..len]);
-    let (next, previous) = (&from[2 * n_rows..][..len], &from[..len]);
-    let (w_below, w_above) = (&down[span.clone()], &down[n_rows - 1..][..len]);
-    let (w_next, w_previous) = (&across[span.clone()], &across[..len]);
-    let (per_link, to) = (&per_link[span.clone()], &mut to[span]);
-    for i in 0..len {
-        let q = here[i];
-        let sum = w_below[i] * (below[i] - q)
-            + w_above[i] * (above[i] - q)
-            + w_next[i] * (next[i] - q)
-            + w_previous[i] * (previous[i] - q);
-        to[i] = q + factor * per_link[i] * sum;
+/// Weights of the links to the cell below and to the cell in the next column, and one over the sum of a cell's weights.
+struct Links {
+    down: Vec<f32>,
+    across: Vec<f32>,
+    per_link: Vec<f32>,
+}
+
+impl Links {
+    /// One half step of some cells of a column.
+    #[inline(always)]
+    fn diffuse(&self, from: &[f32], to: &mut [f32], cells: Range<usize>, n_rows: usize, factor: f32) {
+        let (start, len) = (cells.start, cells.len());
+        let (here, below, above) =
+            (&from[start..][..len], &from[start + 1..][..len], &from[start - 1..][..len]);
+        let (next, previous) = (&from[start + n_rows..][..len], &from[start - n_rows..][..len]);
+        let (w_below, w_above) = (&self.down[start..][..len], &self.down[start - 1..][..len]);
+        let (w_next, w_previous) = (&self.across[start..][..len], &self.across[start - n_rows..][..len]);
+        let (per_link, to) = (&self.per_link[start..][..len], &mut to[start..][..len]);
+        for i in 0..len {
+            let q = here[i];
+            let sum = w_below[i] * (below[i] - q)
+                + w_above[i] * (above[i] - q)
+                + w_next[i] * (next[i] - q)
+                + w_previous[i] * (previous[i] - q);
+            to[i] = q + factor * per_link[i] * sum;
+        }
     }
 }
 
@@ -98,20 +120,25 @@ pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
     ((noise_in_spacings / NOISE_PER_CELL).ceil() as usize).clamp(1, MOST_CELLS)
 }
 
+/// A unit normal, zero where there is none.
+pub(super) type Normal = [f32; 3];
+
+/// Cosine of the angle between two normals, where there are both.
+#[inline]
+pub(super) fn cos_between(a: &Normal, b: &Normal) -> Option<f32> {
+    let both = *a != Normal::default() && *b != Normal::default();
+    both.then(|| a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+}
+
 /// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour. Slopes are taken over
 /// `reach` cells on each side, where there are as many.
-pub(super) fn normals(
-    window: &Window,
-    smooth: &[f32],
-    usable: &[bool],
-    reach: usize,
-) -> Vec<nalgebra::Vector3<f32>> {
+pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool], reach: usize) -> Vec<Normal> {
     let n_rows = window.n_rows;
     let (per_azimuth, per_elevation) =
         (1.0 / window.header.azimuth_step, -1.0 / window.header.elevation_step);
-    let mut normals = vec![nalgebra::Vector3::zeros(); smooth.len()];
-    for column in reach..window.n_columns.saturating_sub(reach) {
-        for row in reach..n_rows.saturating_sub(reach) {
+    let mut normals = vec![Normal::default(); smooth.len()];
+    for (column, rows) in window.inner_spans(reach) {
+        for row in rows {
             let index = column * n_rows + row;
             if !usable[index] {
                 continue;
@@ -123,7 +150,7 @@ pub(super) fn normals(
                 per_azimuth * f64::from(q_next),
                 per_elevation * f64::from(q_down),
             );
-            normals[index] = normal.unwrap_or_default().cast();
+            normals[index] = normal.map_or(Normal::default(), |n| <[f64; 3]>::from(n).map(|x| x as f32));
         }
     }
     normals

@@ -1,13 +1,11 @@
 //! All that is computed of one component, in order.
 
-use nalgebra::Vector3;
-
 use super::continuity::Continuity;
 use super::grow::{self, Face};
 use super::mixed::{self, Pixel};
 use super::noise::Noise;
 use super::pieces::Piece;
-use super::smooth;
+use super::smooth::{self, Normal};
 use super::window::Window;
 
 /// A component with its noise, mixed pixels, slope_reach, normals and faces.
@@ -20,7 +18,7 @@ pub(super) struct Surface {
     pub(super) pixels: Vec<Pixel>,
     /// Cells on each side over which the normals' slopes are taken.
     pub(super) slope_reach: usize,
-    pub(super) normals: Vec<Vector3<f32>>,
+    pub(super) normals: Vec<Normal>,
     labels: Vec<u32>,
     faces: Vec<Face>,
 }

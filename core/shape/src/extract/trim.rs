@@ -6,10 +6,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use nalgebra::Vector3;
-
 use super::local::LocalFace;
 use super::noise::Noise;
+use super::parts::{NONE, parts};
+use super::smooth::{Normal, cos_between};
 use super::window::Window;
 
 /// Cells by which the region is worn down beyond the reach of slopes: half of the widest bridge to a side face.
@@ -66,31 +66,12 @@ fn widen(mask: &[bool], n_rows: usize, by: usize) -> Vec<bool> {
 }
 
 fn largest_part(mask: &[bool], n_rows: usize) -> Vec<bool> {
-    let mut label = vec![0_u32; mask.len()];
-    let (mut best, mut best_size, mut number) = (0, 0, 0);
-    let mut front = Vec::new();
-    for seed in 0..mask.len() {
-        if !mask[seed] || label[seed] != 0 {
-            continue;
-        }
-        number += 1;
-        let mut size = 0;
-        label[seed] = number;
-        front.push(seed);
-        while let Some(at) = front.pop() {
-            size += 1;
-            for next in neighbours(at, n_rows, mask.len()) {
-                if mask[next] && label[next] == 0 {
-                    label[next] = number;
-                    front.push(next);
-                }
-            }
-        }
-        if size > best_size {
-            (best, best_size) = (number, size);
-        }
-    }
-    label.iter().map(|l| best != 0 && *l == best).collect()
+    let (label, n) = parts(mask, n_rows);
+    let mut sizes = vec![0_usize; n];
+    label.iter().filter(|label| **label != NONE).for_each(|label| sizes[*label as usize] += 1);
+    // Of equal ones the first.
+    let largest = (0..n as u32).rev().max_by_key(|label| sizes[*label as usize]);
+    label.iter().map(|label| Some(*label) == largest).collect()
 }
 
 /// The four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each other.
@@ -106,12 +87,7 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 /// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it. The last rings
 /// have no part in the fit: a side face whose first cells lie within the noise must not bend it. And no cell may have
 /// the normal of another face than the cell of the core from which it was reached.
-pub(super) fn grow_back(
-    window: &Window,
-    noise: &Noise,
-    normals: &[Vector3<f32>],
-    core: Vec<bool>,
-) -> Vec<bool> {
+pub(super) fn grow_back(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {
     let n_rows = window.n_rows;
     let mut rings: VecDeque<Vec<usize>> = VecDeque::new();
     let mut origin: Vec<u32> = (0..core.len() as u32).collect();
@@ -154,8 +130,8 @@ pub(super) fn grow_back(
 }
 
 /// True when a cell has the normal of another face than a cell of the core; cells beyond the component have none.
-fn is_other_face(normals: &[Vector3<f32>], cell: usize, core: usize) -> bool {
-    normals[cell] != Vector3::zeros() && normals[cell].dot(&normals[core]) < COS_OTHER_FACE
+fn is_other_face(normals: &[Normal], cell: usize, core: usize) -> bool {
+    cos_between(&normals[cell], &normals[core]).is_some_and(|cos| cos < COS_OTHER_FACE)
 }
 
 /// The cells that a fit continues to: each within its noise, and all together within theirs, since a side face whose

@@ -1,5 +1,7 @@
 //! A component of the lattice and what lies right around it, as a dense grid.
 
+use std::ops::Range;
+
 use platen_scan::ScanHeader;
 
 use super::columns::{Cell, Columns, MARGIN, union};
@@ -20,9 +22,11 @@ pub(super) struct Window {
     /// a sine of the angle, straight to within the square of the step, at any incidence.
     pub(super) inverse: Vec<f32>,
     /// Positions of the valid cells, metres.
-    pub(super) points: Vec<Vec3>,
+    pub(super) points: Vec<[f64; 3]>,
     /// Cells of the component.
     pub(super) own: Vec<bool>,
+    /// Per column the rows between which cells are filled; a plate that lies askew leaves half of the window empty.
+    pub(super) spans: Vec<Range<usize>>,
     pub(super) header: ScanHeader,
     /// Nominal azimuth of each column and elevation of each row.
     azimuths: Vec<Turn>,
@@ -48,8 +52,9 @@ impl Window {
             n_rows,
             cells: vec![Cell::default(); n],
             inverse: vec![0.0; n],
-            points: vec![Vec3::zeros(); n],
+            points: vec![[0.0; 3]; n],
             own: vec![false; n],
+            spans: Vec::with_capacity(n_columns),
             header: header.clone(),
             per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
             azimuths: (first_column..end_column)
@@ -65,7 +70,10 @@ impl Window {
         for i in 0..n_columns {
             let around = &own[i.saturating_sub(MARGIN as usize)..(i + MARGIN as usize + 1).min(n_columns)];
             let rows = |run: &Run| run.first_row.saturating_sub(MARGIN)..(run.end_row + MARGIN).min(end_row);
-            window.fill(i, &union(around.iter().flatten().map(rows)), columns);
+            let wanted = union(around.iter().flatten().map(rows));
+            let at = |row: Option<u32>| row.map_or(0, |row| (row - first_row) as usize);
+            window.spans.push(at(wanted.first().map(|r| r.start))..at(wanted.last().map(|r| r.end)));
+            window.fill(i, &wanted, columns);
             for run in &own[i] {
                 let at = |row: u32| i * n_rows + (row - first_row) as usize;
                 window.own[at(run.first_row)..at(run.end_row - 1) + 1].fill(true);
@@ -88,7 +96,7 @@ impl Window {
         }
     }
 
-    fn fill(&mut self, i: usize, wanted: &[std::ops::Range<u32>], columns: &Columns) {
+    fn fill(&mut self, i: usize, wanted: &[Range<u32>], columns: &Columns) {
         let Some(column) = columns.get(self.first_column + i as u32) else { return };
         for segment in &column.segments {
             for rows in wanted {
@@ -100,11 +108,19 @@ impl Window {
                     self.cells[at] = cell;
                     if cell.valid {
                         self.inverse[at] = 1.0 / cell.range_m;
-                        self.points[at] = self.point(at);
+                        self.points[at] = self.point(at).into();
                     }
                 }
             }
         }
+    }
+
+    /// Columns and the rows of each where cells are filled, without the `margin` outermost ones of the window.
+    pub(super) fn inner_spans(&self, margin: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let columns = margin..self.n_columns.saturating_sub(margin).max(margin);
+        let last = self.n_rows.saturating_sub(margin);
+        let rows = move |span: &Range<usize>| span.start.max(margin)..span.end.min(last).max(margin);
+        columns.map(move |column| (column, rows(&self.spans[column])))
     }
 
     /// Nominal direction of a cell.

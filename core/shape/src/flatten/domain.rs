@@ -138,6 +138,7 @@ pub fn first_turned(triangles: &[[u32; 3]], uv: &[[f64; 2]]) -> Option<usize> {
 }
 
 /// Area of a plane triangle, positive counter-clockwise.
+#[inline]
 pub fn signed_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
     0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 }

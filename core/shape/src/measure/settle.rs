@@ -11,6 +11,8 @@ use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend.
 const SPAN: f64 = 0.06;
+/// Facets along a span of the smooth face: 25 mm.
+const FACETS: usize = 4;
 /// Cells of the mask, metres.
 const MASK_CELL: f64 = 0.025;
 /// Rows up to this far apart are neighbours: a single dropout is no hole.
@@ -37,7 +39,7 @@ pub(super) fn settle(
     let mut seen = Seen::new(spec);
     let per_scale = 1.0 / face.noise_scale;
     let mut variance = 0.0;
-    Facets::carrying(&face.face, |[a, b]| carried.jet(a, b)).walk(
+    Facets::carrying(&face.face, FACETS, |[a, b]| carried.jet(a, b)).walk(
         patch.samples.iter(),
         #[inline(always)]
         |sample, foot| {

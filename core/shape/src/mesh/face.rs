@@ -15,6 +15,8 @@ use crate::{Outline, Patch, PlateSpec, Sample, Vec3};
 /// Length of a span of the smooth face, metres. Bends of a press are three and more times as wide; finer detail is left
 /// to S, which is fitted to all samples.
 const SPAN: f64 = 0.1;
+/// Facets along a span of the first picture: 50 mm; it has no finer detail than its edges.
+const FACETS: usize = 2;
 /// Samples used for the smooth face, at least, where there are as many: every n-th of every n-th column.
 const ENOUGH: usize = 30_000;
 /// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
@@ -87,7 +89,9 @@ fn robust_scale(mut sizes: Vec<f64>) -> f64 {
 /// The samples that suffice for a smooth face.
 pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
     let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
-    patch.samples.iter().filter(move |s| s.column % every == 0 && s.row % every == 0)
+    let columns = patch.samples.chunk_by(|a, b| a.column == b.column);
+    let columns = columns.filter(move |samples| samples[0].column.is_multiple_of(every));
+    columns.flatten().filter(move |sample| sample.row.is_multiple_of(every))
 }
 
 /// Heights of samples over a surface.
@@ -102,7 +106,7 @@ pub(crate) struct Heights {
 impl Heights {
     fn over(base: &Net<3>, patch: &Patch) -> Self {
         let mut out = Self::default();
-        Facets::of(base).walk(thinned(patch), |sample, foot| {
+        Facets::of(base, FACETS).walk(thinned(patch), |sample, foot| {
             out.add(foot.value, foot.height, per_sigma_across(sample, &foot.normal));
         });
         out

@@ -17,8 +17,6 @@ use crate::Vec3;
 use crate::kernels::wide;
 use crate::surface::{Axis, Jet, Net};
 
-/// Facets along a span of the surface, each way: 25 mm on the face.
-const PER_SPAN: usize = 4;
 /// A facet serves points up to this share of its size from its middle; beyond, the next one does.
 const REACH: f64 = 0.6;
 /// Facets tried for a point, one after the other, before all are looked at.
@@ -124,20 +122,20 @@ pub(crate) struct Facets {
 }
 
 impl Facets {
-    /// The facets of `surface`, which carry its own coordinates (a, b).
-    pub(crate) fn of(surface: &Net<3>) -> Self {
+    /// The facets of `surface`, `per_span` along each span each way, which carry its own coordinates (a, b).
+    pub(crate) fn of(surface: &Net<3>, per_span: usize) -> Self {
         let own = |at: [f64; 2]| {
             let zero = [0.0; 2];
             Jet { p: at, u: [1.0, 0.0], v: [0.0, 1.0], uu: zero, uv: zero, vv: zero }
         };
-        Self::carrying(surface, own)
+        Self::carrying(surface, per_span, own)
     }
 
     /// The facets of `surface`, which carry a pair given with its derivatives by (a, b).
-    pub(crate) fn carrying(surface: &Net<3>, carried: impl Fn([f64; 2]) -> Jet<2>) -> Self {
+    pub(crate) fn carrying(surface: &Net<3>, per_span: usize, carried: impl Fn([f64; 2]) -> Jet<2>) -> Self {
         let axes = [surface.u, surface.v];
-        let n = axes.map(|axis| PER_SPAN * axis.n_spans());
-        let size = axes.map(|axis| axis.step() / PER_SPAN as f64);
+        let n = axes.map(|axis| per_span * axis.n_spans());
+        let size = axes.map(|axis| axis.step() / per_span as f64);
         let facet = |k: usize| {
             let cell = [k % n[0], k / n[0]];
             let at = [0, 1].map(|d| axes[d].start() + size[d] * (cell[d] as f64 + 0.5));
@@ -214,13 +212,13 @@ impl Facets {
         cell[1] * self.n[0] + cell[0]
     }
 
-    /// The same, tried from the nearest of the facets in the spans' first quarters.
+    /// The same, tried from the nearest of every fourth facet each way.
     #[cold]
     #[inline(never)]
     fn find_afresh(&self, p: &Vec3) -> Option<(usize, Offset)> {
         let mut best = (0, f64::INFINITY);
-        for row in (0..self.n[1]).step_by(PER_SPAN) {
-            for at in (row * self.n[0]..(row + 1) * self.n[0]).step_by(PER_SPAN) {
+        for row in (0..self.n[1]).step_by(4) {
+            for at in (row * self.n[0]..(row + 1) * self.n[0]).step_by(4) {
                 let distance = (self.facets[at].point - p).norm_squared();
                 if distance < best.1 {
                     best = (at, distance);
@@ -244,7 +242,7 @@ mod tests {
         // Coordinates that are not those of the arc: a = u + 0.02 u^2.
         let arc = |a: f64| ((1.0 + 0.08 * a).sqrt() - 1.0) / 0.04;
         let net = Net::approximate(axes[0], axes[1], |a, b| point(arc(a), b));
-        let facets = Facets::of(&net);
+        let facets = Facets::of(&net, 4);
         let truth = |k: u32| {
             let (a, v, h) =
                 (4.0 * f64::from(k) / 199.0, 2.0 * f64::from(k % 7) / 6.0, 0.005 * f64::from(k % 5));

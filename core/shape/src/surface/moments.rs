@@ -96,14 +96,25 @@ impl<const D: usize> Moments<D> {
         let mut rhs = vec![[0.0; D]; self.u.n_coefficients() * self.v.n_coefficients()];
         let products: Vec<((usize, usize), [f64; 7])> =
             pairs().map(|(i, j)| ((i, j), multiply(&BASIS[i], &BASIS[j]))).collect();
+        // By power, the coefficients of all pairs side by side; some more than pairs, for whole vector registers.
+        let mut by_power = [[0.0; 12]; 7];
+        for (pair, (_, product)) in products.iter().enumerate() {
+            (0..7).for_each(|p| by_power[p][pair] = product[p]);
+        }
         for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.gram[0][0] > 0.0) {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
             self.add_right_hand_side(cell, i, k, &mut rhs);
             for ((a, b), pv) in &products {
                 // Moments of this pair of v-splines, left as a polynomial in u.
-                let row: [f64; 7] = std::array::from_fn(|p| (0..7).map(|q| pv[q] * cell.gram[q][p]).sum());
-                for ((c, d), pu) in &products {
-                    let value = row.iter().zip(pu).map(|(x, y)| x * y).sum();
+                let mut row = [0.0; 8];
+                for (f, moments) in pv.iter().zip(&cell.gram) {
+                    row.iter_mut().zip(moments).for_each(|(slot, moment)| *slot += f * moment);
+                }
+                let mut values = [0.0; 12];
+                for (x, pairs) in row.iter().zip(&by_power) {
+                    values.iter_mut().zip(pairs).for_each(|(value, f)| *value += x * f);
+                }
+                for (((c, d), _), value) in products.iter().zip(values) {
                     matrix.add_pair([i + c, i + d], [k + a, k + b], value);
                 }
             }
