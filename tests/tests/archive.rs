@@ -81,6 +81,34 @@ fn a_kept_scan_measured_again_gives_the_same_result() {
     assert!(blank.exists() && scan(2).exists() && runs[1].join("result.json").exists());
 }
 
+/// The largest file that the host may write, in blocks of 512 bytes, stands in for a full disk: enough for results and
+/// history, too little for a scan.
+const NO_ROOM_FOR_A_SCAN: u32 = 11_000;
+
+#[test]
+fn a_scan_that_finds_no_room_costs_no_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 1");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let text = std::fs::read_to_string(&plant).unwrap();
+    std::fs::write(&plant, text.replace("step_deg = 0.1", "step_deg = 0.06")).unwrap();
+    let mut host = Host::starved(&plant, NO_ROOM_FOR_A_SCAN);
+    let stats = press.wait_done();
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    let log = host.log();
+    cell::assert_clean(&stats, &log);
+    let taken = stats["taken"].as_array().unwrap();
+    // Register 55 is gap.max, 0xFFFF where nothing was measured.
+    assert!(taken.len() == 2 && taken.iter().all(|result| result["words"][55] != 0xFFFF), "{stats:#}\n{log}");
+    assert_eq!(log.matches("the scan is not kept: ").count(), 2, "{log}");
+    for run in runs(folder.path()) {
+        let names = std::fs::read_dir(&run).unwrap().map(|entry| entry.unwrap().file_name());
+        let names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
+        assert!(names.iter().any(|name| name == "result.json"), "{names:?}\n{log}");
+        assert!(!names.iter().any(|name| name.contains("scan.e57")), "{names:?}\n{log}");
+    }
+}
+
 #[test]
 fn nothing_is_kept_when_the_plant_says_so() {
     let folder = tempfile::tempdir().unwrap();

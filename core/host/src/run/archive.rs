@@ -115,13 +115,7 @@ fn write(folder: &Path, tape: Tape) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
     let cells: usize = columns.iter().map(platen_scan::Column::len).sum();
     let needed = cells as u64 * CELL_BYTES;
-    let free = disk::free(folder).map_err(|e| e.to_string())?;
-    if free < needed.saturating_add(RESERVE) {
-        let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
-        return Err(format!(
-            "it needs {needed} MB, {free} MB are free and 1 GB is left to results; make room"
-        ));
-    }
+    check_room(needed, disk::free(folder).map_err(|e| e.to_string())?)?;
     let written = scan_file::write(&folder.join(NAME), |sink| {
         let columns = columns.into_iter().map(ScanEvent::Column);
         let mut events = std::iter::once(ScanEvent::Begin(header)).chain(columns);
@@ -130,6 +124,15 @@ fn write(folder: &Path, tape: Tape) -> Result<(), String> {
         Ok::<_, ScanFileError>(end)
     });
     written.map(|_| ()).map_err(|e| e.to_string())
+}
+
+/// Refuses a scan of `needed` bytes that would take of the [`RESERVE`].
+fn check_room(needed: u64, free: u64) -> Result<(), String> {
+    if free >= needed.saturating_add(RESERVE) {
+        return Ok(());
+    }
+    let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
+    Err(format!("it needs {needed} MB, {free} MB are free and 1 GB is left to results; make room"))
 }
 
 /// Removes scans older than `age` and what an interrupted host left half-written. Touches no other file.
@@ -170,6 +173,14 @@ fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_last_gigabyte_is_left_to_results() {
+        assert_eq!(check_room(31_000_000, RESERVE + 31_000_000), Ok(()));
+        let refused = check_room(31_000_000, RESERVE + 30_000_000).unwrap_err();
+        assert!(refused.starts_with("it needs 31 MB, 1103 MB are free"), "{refused}");
+        assert!(check_room(u64::MAX, u64::MAX - 1).is_err());
+    }
 
     #[test]
     fn only_own_scans_of_enough_age_are_removed() {

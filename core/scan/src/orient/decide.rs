@@ -4,16 +4,12 @@ use std::f64::consts::TAU;
 
 use super::fit::{self, Fit, Line};
 use super::intensity::Scale;
-use super::survey::{FAR, NEAR, stored_range};
+use super::survey::{FAR, MIN_FILL, NEAR, stored_range};
 use super::{Expected, Mirror, OrientError, Survey, Turn};
 use crate::{ScanHeader, wrap_azimuth};
 
 /// Correlation from which rows and columns count as following the angles.
 const MIN_CORRELATION: f64 = 0.99;
-
-/// Share of places that hold a cell, from which a set of indices is a lattice. Real scans of halls fill more
-/// than half, a scan of the open air a third; a cloud thinned out on export fills less than a hundredth.
-pub(super) const MIN_FILL: f64 = 0.02;
 
 /// Rows and columns with valid cells from which an orientation can be told.
 const MIN_LINES: u32 = 3;

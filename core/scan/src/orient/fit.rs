@@ -27,7 +27,7 @@ impl Line {
         self.elevation2 += elevation * elevation;
         self.east += unit[0];
         self.north += unit[1];
-        self.horizontal += unit[0].hypot(unit[1]);
+        self.horizontal += (unit[0] * unit[0] + unit[1] * unit[1]).sqrt();
     }
 
     /// Mean and variance of the elevation.

@@ -1,7 +1,6 @@
 //! A file that this program wrote: the lattice that it was written from, once the geometry agrees.
 
-use super::decide::MIN_FILL;
-use super::survey::MAX_INDEX;
+use super::survey::{MAX_INDEX, MIN_FILL};
 use super::{Mirror, Plan, Unit};
 use crate::{ScanHeader, wrap_azimuth};
 
