@@ -1,8 +1,8 @@
 //! Dark discs painted on the plate, found by their intensity (paper, marker experiment).
 //!
 //! Every beam near the expected place is taken to where it meets the fitted surface there, so that noise of the range
-//! does not move a disc; the disc's middle is that of the circle whose rim parts dark cells from bright ones best: several times
-//! nearer to the truth than the mean of the cells, which moves with the lattice.
+//! does not move a disc; the disc's middle is that of the circle whose rim parts dark cells from bright ones best. How well
+//! it is known is a matter of the cells' size against the disc's: a cell tells the rim to its own width.
 
 use nalgebra::Matrix3;
 
@@ -28,6 +28,8 @@ pub struct Disc {
     pub centre: Vec3,
     /// From the expected place along u and along v of the surface there, metres.
     pub offset: [f64; 2],
+    /// Standard deviation of the middle along any direction in the surface, metres, as the cells' spacing allows.
+    pub sigma: f64,
     /// Dark cells.
     pub cells: usize,
     /// Intensity of the disc as a share of that of the plate round it.
@@ -92,9 +94,23 @@ pub fn find(patch: &Patch, surface: &Surface, [u, v]: [f64; 2], reach: f64) -> R
         .filter(|cell| distance(cell.at, centre) < 2.0 * first.radius)
         .map(|cell| (cell.at, darkness(cell)))
         .collect();
-    let offset = first.fitted(&round, 0.5 * step).centre;
+    let Circle { centre: offset, radius } = first.fitted(&round, 0.5 * step);
     let centre = middle + along_u * offset[0] + along_v * offset[1];
-    Ok(Disc { centre, offset, cells: spot.len(), contrast: dark / plate })
+    let across = [0, 1].map(|k| {
+        let places = spot.iter().map(|i| cells[*i].lattice[k]);
+        places.clone().max().unwrap_or(0) - places.min().unwrap_or(0) + 1
+    });
+    let sigma = sampled(radius, across);
+    Ok(Disc { centre, offset, sigma, cells: spot.len(), contrast: dark / plate })
+}
+
+/// Standard deviation of the middle of a disc that is so many columns and rows of the lattice wide, the mean over directions.
+///
+/// Columns are a apart and rows b. Along a row the rim is known to a / sqrt 12 at either end, and there are 2 radius / b
+/// rows; likewise along columns. Over a round rim that makes a b (a + b) / (12 pi radius) for both variances together.
+fn sampled(radius: f64, cells: [u32; 2]) -> f64 {
+    let [a, b] = cells.map(|n| 2.0 * radius / f64::from(n));
+    (0.5 * a * b * (a + b) / (12.0 * std::f64::consts::PI * radius)).sqrt()
 }
 
 /// Dark cells that hang together on the lattice.
@@ -232,6 +248,22 @@ mod tests {
         assert!((disc.contrast - 0.4).abs() < 0.03 && disc.cells > 20, "{disc:?}");
         let place = Vec3::new(CORNER[0] + at[0], CORNER[1] + at[1], CORNER[2]);
         assert!((disc.centre - place).norm() < 1e-3, "{disc:?}");
+    }
+
+    #[test]
+    fn discs_lie_as_near_as_the_cells_allow() {
+        let surface = surface();
+        let (mut square, mut stated, discs) = (0.0, 0.0, 40);
+        for k in 0..discs {
+            // Anywhere within a cell.
+            let at = [0.5 + 0.0137 * f64::from(k % 7), 0.47 + 0.0119 * f64::from(k / 7)];
+            let disc = find(&scan(&[(at, 0.02)]), &surface, at, 0.08).expect("painted");
+            square += disc.offset[0].hypot(disc.offset[1]).powi(2);
+            stated += 2.0 * disc.sigma.powi(2);
+        }
+        let ratio = (square / stated).sqrt();
+        println!("{:.3} mm rms, stated {:.3}", 1e3 * (square / 40.0).sqrt(), 1e3 * (stated / 40.0).sqrt());
+        assert!((0.6..1.4).contains(&ratio), "observed over stated {ratio}");
     }
 
     #[test]
