@@ -10,8 +10,7 @@
 //! | beyond | share of the seen area whose curvature exceeds the target's by more than the limit of a board means, 8 g / c^2 |
 //! | energy left | [`platen_shape::Forming`]: elastic energy from the measured to the target's curvature, and its share of the first stroke's |
 //!
-//! Force, ram depth and die set are those that the press told; a press that has none of them sends 0, which counts as not
-//! told. What is not known is null, never 0.
+//! Force, ram depth and die set are those that the press told. What is not known is null, never 0.
 
 use std::f64::consts::PI;
 
@@ -197,9 +196,9 @@ impl SequenceStroke {
             stroke: point.label,
             accepted: stroke.accepted,
             verdict: point.verdict,
-            die_set: told.die_id.filter(|die| *die != 0),
-            force_kn: told.force.filter(|force| *force != 0.0).map(|newtons| newtons / 1e3),
-            ram_depth_mm: told.ram_depth.filter(|depth| *depth != 0.0).map(mm),
+            die_set: told.die_id,
+            force_kn: told.force.map(|newtons| newtons / 1e3),
+            ram_depth_mm: told.ram_depth.map(mm),
             gap_mm: point.gap_mm,
             gap_uncertainty_mm: point.uncertainty_mm,
             overshoot_mm: point.gap_mm.map(|gap| if point.sense > 0 { gap.abs() } else { 0.0 }),

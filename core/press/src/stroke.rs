@@ -31,7 +31,8 @@ impl fmt::Display for StrokeKey {
     }
 }
 
-/// What the press says about a stroke. `None`: not in this press's registers, or not plausible.
+/// What the press says about a stroke. `None`: not in this press's registers, not plausible, or 0 where that says
+/// that the press has none (thickness, force, ram, die).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StrokeData {
     /// Number of the target shape.

@@ -126,6 +126,11 @@ impl Reader<'_> {
         })
     }
 
+    /// A number of which 0 says that the press has none: no stroke is made without force, ram or die, on no plate.
+    fn told(&self, input: Input) -> Option<f64> {
+        self.number(input).filter(|value| *value != 0.0)
+    }
+
     fn data(&self) -> StrokeData {
         StrokeData {
             recipe_id: self.count(Input::RecipeId),
@@ -133,9 +138,9 @@ impl Reader<'_> {
             part_id: self.count_u32(Input::PartId),
             part_name: self.text(Input::PartName),
             bend_index: self.count(Input::BendIndex),
-            thickness: self.number(Input::Thickness),
-            force: self.number(Input::PressForce),
-            ram_depth: self.number(Input::RamDepth),
+            thickness: self.told(Input::Thickness),
+            force: self.told(Input::PressForce),
+            ram_depth: self.told(Input::RamDepth),
             plate_x: self.number(Input::PlateX),
             plate_y: self.number(Input::PlateY),
             plate_rot: self.number(Input::PlateRot),
@@ -144,7 +149,7 @@ impl Reader<'_> {
                 .count_u32(Input::PlcUnixS)
                 .filter(|&unix_s| unix_s > 0)
                 .map(|unix_s| Timestamp { unix_s, ms: self.count(Input::PlcMs).unwrap_or(0) }),
-            die_id: self.count(Input::DieId),
+            die_id: self.count(Input::DieId).filter(|die| *die != 0),
             baseline: self.switch(Input::Baseline).unwrap_or(false),
             dry_run: self.switch(Input::DryRun).unwrap_or(false),
         }
@@ -268,6 +273,19 @@ mod tests {
         close(data.plate_y, -0.008);
         close(data.plate_rot, (-1.5f64).to_radians());
         close(data.temperature, 21.5);
+    }
+
+    #[test]
+    fn zero_tells_nothing_of_what_no_stroke_is_made_without() {
+        let mut words = golden();
+        let of = |data: StrokeData| (data.thickness, data.force, data.ram_depth, data.die_id);
+        let told = of(PressImage::decode(&RegisterMap::pph1(), 3, &words).unwrap().data);
+        assert!(told.0.and(told.1).and(told.2).and(told.3).is_some(), "{told:?}");
+        let map = RegisterMap::pph1();
+        for input in [Input::Thickness, Input::PressForce, Input::RamDepth, Input::DieId] {
+            words[usize::from(map.input(input).unwrap().place.offset().unwrap())] = 0;
+        }
+        assert_eq!(of(PressImage::decode(&map, 3, &words).unwrap().data), (None, None, None, None));
     }
 
     #[test]
