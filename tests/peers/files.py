@@ -2,7 +2,7 @@
 """Reads what a demo left behind with programs that share nothing with us: plyfile, meshio, pyarrow, Python's csv.
 
 usage: platen demo && python3 tests/peers/files.py [FOLDER of the demo] [platen program]
-Install: pip install plyfile meshio pyarrow
+Install: pip install plyfile meshio pyarrow vtk (140 MB: the readers of ParaView)
 """
 import csv
 import json
@@ -16,6 +16,8 @@ import meshio
 import numpy
 import pyarrow.parquet
 from plyfile import PlyData
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOLegacy import vtkDataSetReader
 
 demo = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "platen-demo")
 platen = sys.argv[2] if len(sys.argv) > 2 else "target/release/platen"
@@ -25,6 +27,21 @@ assert runs, f"{demo}: no results; run `platen demo` first"
 
 def same(found, expected, within, what):
     assert abs(found - expected) <= within, f"{what}: {found}, expected {expected}"
+
+
+def paraview(path, expected, faces):
+    """The same mesh and fields in the reader of ParaView."""
+    reader = vtkDataSetReader()
+    reader.SetFileName(str(path))
+    reader.ReadAllScalarsOn()
+    reader.Update()
+    found = reader.GetOutput()
+    assert numpy.array_equal(vtk_to_numpy(found.GetPoints().GetData()), expected.points)
+    assert numpy.array_equal(vtk_to_numpy(found.GetCells().GetConnectivityArray()).reshape(-1, 3), faces)
+    fields = found.GetPointData()
+    assert [fields.GetArrayName(k) for k in range(fields.GetNumberOfArrays())] == list(expected.point_data)
+    for name, values in expected.point_data.items():
+        assert numpy.array_equal(vtk_to_numpy(fields.GetArray(name)), values.squeeze(), equal_nan=True), name
 
 
 def mesh(folder):
@@ -49,6 +66,7 @@ def mesh(folder):
                 assert math.isnan(found), f"{column}: {found} where the table has nothing"
             else:
                 same(found, float(row[column]), 1e-6 + 1e-6 * abs(found), column)
+    paraview(folder / "plate.vtk", vtk, faces)
     points = numpy.stack([vertex[axis] for axis in "xyz"], axis=1)
     a, b, c = (points[faces[:, k]] for k in range(3))
     area = 0.5 * numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1).sum()
