@@ -11,13 +11,13 @@ const RESULT_BLOCKS: u32 = 400;
 #[test]
 fn strokes_are_measured_recorded_and_answered() {
     let folder = tempfile::tempdir().unwrap();
-    let mut press = Press::start(folder.path(), "strokes = 5");
+    let mut press = Press::start(folder.path(), "strokes = 2\nparts = 2");
     let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
     let mut host = Host::start(&plant);
     let stats = press.wait_done();
     assert_clean(&stats, &host.log());
     let taken = stats["taken"].as_array().unwrap();
-    assert_eq!(taken.len(), 6, "five strokes and the blank");
+    assert_eq!(taken.len(), 6, "two plates, of each the blank and two strokes");
     assert_eq!(stats["plates_served"].as_u64().unwrap(), 7, "one look at the start and one scan a stroke");
 
     let history = Host::history(&plant);
@@ -40,6 +40,30 @@ fn strokes_are_measured_recorded_and_answered() {
     assert_eq!(status["status"]["measured"], 6, "{status}");
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     assert_eq!(press.host_status(), 0, "nothing is left valid");
+    two_plates_are_compared(&plant);
+}
+
+/// Two strokes of different plates in (u, v).
+fn two_plates_are_compared(plant: &std::path::Path) {
+    let compare = |first: &str, second: &str| {
+        let mut program = platen_tests::program("platen");
+        program.args(["history", "compare"]).arg(plant).args([first, second, "--json"]).output().unwrap()
+    };
+    // The same stroke of two plates bent alike, and the blank of one against a bent one.
+    let moved = |first: &str, second: &str| {
+        let output = compare(first, second);
+        let said = String::from_utf8_lossy(&output.stderr);
+        let found: serde_json::Value =
+            serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {said}"));
+        let figures = found["comparisons"][0]["figures"].as_array().unwrap();
+        let rms = figures.iter().find(|figure| figure["name"] == "displacement.rms");
+        rms.and_then(|figure| figure["value"].as_f64()).unwrap_or_else(|| panic!("{found:#}"))
+    };
+    let (alike, bent) = (moved("1:2", "2:2"), moved("1:blank", "2:2"));
+    assert!(alike < 0.5e-3 && bent > 10.0 * alike, "{alike} {bent}");
+    let missing = compare("1:2", "3:1");
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("plate 3 has no stroke 1"));
 }
 
 #[test]

@@ -158,7 +158,7 @@ fn list(strokes: &[Stroke]) -> Result<(), CliError> {
             stroke.key.attempt.to_string(),
             verdict(stroke),
             length(stroke, "gap.max"),
-            length(stroke, "gap.uncertainty"),
+            stroke.figures.get("gap.uncertainty").map(|u| format!("{:.2}", mm(*u))).unwrap_or_default(),
             stroke.ack.clone().unwrap_or_default(),
         ]);
     }

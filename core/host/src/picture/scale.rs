@@ -69,7 +69,9 @@ impl Yardstick {
             ),
             "curvature_change" => (format!("Bent by this stroke, {board}"), as_gap),
             "deviation" => ("Deviation from the target, + towards the scanner".into(), self.gaps()),
-            "displacement_normal" => ("Moved by this stroke, + towards the scanner".into(), self.gaps()),
+            "displacement_normal" => {
+                ("Moved since the scan before, + towards the scanner".into(), self.gaps())
+            }
             _ if unit == "m" => (name.replace('_', " "), self.gaps()),
             _ if unit == "1/m" => (curvature_words(name), Scale::even(1.5 * self.bend_per_m, "1/m", true)),
             _ if unit == "1/m2" => {

@@ -159,8 +159,10 @@ impl Sheet<'_> {
         let words = format!("{} mm", with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm)));
         let look = Text::new(30.0).bold();
         let above = height - 32.0;
-        let clear = above > GAP[0] - 20.0 && (above - y(template.limit_mm)).abs() > 22.0;
-        let above = if clear { above } else { height + 34.0 };
+        // Clear of the limit's line, and above the gap's own, which falls away from here to either side.
+        let limit = y(template.limit_mm);
+        let above = if (above - limit).abs() > 22.0 { above } else { limit - 30.0 };
+        let above = if above > GAP[0] - 20.0 { above } else { height + 34.0 };
         match at {
             at if at < 0.2 => page.text(&words, (x + 16.0, above), look),
             at if at > 0.8 => page.text(&words, (x - 16.0, above), look.right()),

@@ -14,6 +14,7 @@ use crate::cli::{CliError, Common, output};
 use crate::picture::Caption;
 use crate::plugin::{Catalogue, Comparison, Report, Surfaces};
 use crate::record::{PlateRecord, figure};
+use crate::units::mm;
 use crate::{files, past, progress, rig};
 
 /// The comparisons that need two surfaces.
@@ -39,6 +40,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (plant, archive) = open(&command.plant)?;
     let (first, second) = (command.first.find(&archive)?, command.second.find(&archive)?);
     let (before, now) = (surface(&first)?, surface(&second)?);
+    same_size(&first, &before, &second, &now)?;
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
     let rested = first.document.as_deref().and_then(past::supports);
@@ -70,7 +72,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     for sentence in reports.iter().flat_map(|report| &report.findings.says) {
         output::line(&format!("  {sentence}"))?;
     }
-    let mut rows = vec![["figure", "first", "second", "change"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["figure in m, rad, s, 1/m", "first", "second", "change"].map(str::to_owned).to_vec()];
     for difference in figures {
         let number = |value: Option<f64>| value.map(|value| format!("{value:.5}")).unwrap_or_default();
         let change = difference.first.zip(difference.second).map(|(a, b)| b - a);
@@ -103,6 +106,19 @@ fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
     let gone = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
     let document = stroke.document.as_deref().ok_or_else(|| gone("was not measured"))?;
     files::surface_beside(document).map_err(|_| gone("its surface is not kept any more"))
+}
+
+/// Places of two plates are the same only where their rectangles are.
+fn same_size(first: &Stroke, before: &Surface, second: &Stroke, now: &Surface) -> Result<(), CliError> {
+    let size = |s: &Surface| format!("{:.1} x {:.1} mm", mm(s.width()), mm(s.height()));
+    let [before, now] = [size(before), size(now)];
+    if before == now {
+        return Ok(());
+    }
+    let (first, second) = (name(first), name(second));
+    Err(CliError::Failed(format!(
+        "{first} measures {before}, {second} {now}: strokes are compared in (u, v); choose plates of one size"
+    )))
 }
 
 fn plate_file(plant: &PlantFile, stroke: &Stroke) -> Result<PlateFile, CliError> {
