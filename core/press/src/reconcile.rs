@@ -2,8 +2,8 @@
 //!
 //! The wanted words are compared with those that the press is known to have (echoed, or read back); what differs is
 //! written until it is echoed. Data come first with the old commit word, then the commit word, then the status, so that
-//! a result is complete before it is valid; a result is withdrawn by its status first. Every write is harmless to
-//! repeat.
+//! a result is complete before it is valid; a result is withdrawn by its status first, also when the next one is there
+//! already because the link was lost in between. Every write is harmless to repeat.
 
 use std::time::Duration;
 
@@ -34,6 +34,8 @@ pub(crate) struct Reconciler {
     spans: Vec<std::ops::Range<usize>>,
     pretend: bool,
     known: Option<Vec<u16>>,
+    /// Sequence number of the result that was made valid last.
+    shown: Option<u16>,
     heartbeat: u16,
     beat_every: Duration,
     next_beat: Instant,
@@ -58,6 +60,7 @@ impl Reconciler {
             spans: spans(press),
             pretend: press.mode == Mode::DryRun,
             known: None,
+            shown: None,
             heartbeat: 0,
             beat_every: press.timeouts.heartbeat,
             next_beat: now,
@@ -121,22 +124,35 @@ impl Reconciler {
         }
         let wanted = image.encode(&self.map, self.heartbeat);
         let Some(known) = &self.known else { return Ok(false) };
-        let withdraw = self.shows_valid(known) && !image.valid;
-        let order = if withdraw {
-            [Turn::Status, Turn::Data, Turn::Commit, Turn::Idle]
-        } else {
-            [Turn::Data, Turn::Commit, Turn::Status, Turn::Idle]
-        };
-        for turn in order.into_iter().filter(|&turn| turn != Turn::Idle || beat || last) {
+        let withdrawn = (self.shows_valid(known) && !(image.valid && self.shows_this(known, &wanted, image)))
+            .then(|| HostImage { valid: false, ..image.clone() }.encode(&self.map, self.heartbeat));
+        let mut steps: Vec<_> = withdrawn.iter().map(|words| (Turn::Status, words)).collect();
+        steps.extend([Turn::Data, Turn::Commit, Turn::Status].map(|turn| (turn, &wanted)));
+        if beat || last {
+            steps.push((Turn::Idle, &wanted));
+        }
+        for (turn, words) in steps {
             for span in self.spans.clone() {
-                let Some(range) = self.differing(turn, &wanted, span) else { continue };
+                let Some(range) = self.differing(turn, words, span) else { continue };
                 if !last && !self.budget.take(now) {
                     return Ok(false);
                 }
-                self.write_range(client, turn, &wanted, range).await?;
+                self.write_range(client, turn, words, range).await?;
             }
         }
-        Ok(self.says(&wanted))
+        let done = self.says(&wanted);
+        if done && image.valid {
+            self.shown = Some(image.result_seq);
+        }
+        Ok(done)
+    }
+
+    /// Whether the valid result in the registers is this one: by its sequence number there, else by this host's memory.
+    fn shows_this(&self, known: &[u16], wanted: &[u16], image: &HostImage) -> bool {
+        match self.map.output(Output::ResultSeq).and_then(|field| field.place.offset()) {
+            Some(offset) => known.get(usize::from(offset)) == wanted.get(usize::from(offset)),
+            None => self.shown.is_none_or(|seq| seq == image.result_seq),
+        }
     }
 
     /// Whether the registers that may be written are known to say this.

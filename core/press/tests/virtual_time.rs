@@ -35,6 +35,7 @@ struct Host {
     status: tokio::sync::watch::Receiver<platen_press::Status>,
     reachable: Arc<std::sync::atomic::AtomicBool>,
     reset_next: Arc<std::sync::atomic::AtomicBool>,
+    lose_withdrawal: Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl Cell {
@@ -66,11 +67,12 @@ impl Cell {
         let link = MemoryLink::new(self.plc.clone(), self.chaos, self.seed);
         let reachable = Arc::clone(&link.reachable);
         let reset_next = Arc::clone(&link.reset_next);
+        let lose_withdrawal = Arc::clone(&link.lose_withdrawal);
         let (HostSide { orders, answers, status }, side) = channels();
         let (scans, alarms) = (Arc::clone(&self.scans), Arc::clone(&self.alarms));
         let scanner = tokio::spawn(bench::host(orders, answers.clone(), MS(40), MS(10), scans, alarms));
         let run = tokio::spawn(run_press(press, link, journal.clone(), side));
-        Host { run, scanner, answers, status, reachable, reset_next }
+        Host { run, scanner, answers, status, reachable, reset_next, lose_withdrawal }
     }
 
     /// Lets the press do `strokes` more and waits until it is done with them.
@@ -83,6 +85,7 @@ impl Cell {
     fn check(&self) -> (usize, usize) {
         let plc = self.plc();
         assert_eq!(plc.outside, 0, "writes outside the allowed registers");
+        assert_eq!(plc.swapped, 0, "a result that changed while it was valid");
         for result in &plc.results {
             let measured = result.status & 1 << 12 == 0;
             assert!(
@@ -255,6 +258,23 @@ async fn a_link_cut_in_the_middle_of_a_scan_delivers_once() {
     host.reachable.store(true, Ordering::SeqCst);
     bench::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
     bench::until(MS(1000), "no result to wait", || waits().is_none()).await;
+    host.stop().await;
+    assert_eq!(cell.check(), (4, 4));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_result_that_could_not_be_withdrawn_is_withdrawn_before_the_next_one() {
+    let cell = Cell::habits(0, Habits { no_ack: true, ..Habits::default() });
+    let host = cell.start();
+    cell.strokes(3).await;
+    // The third result still stands when the fourth stroke is measured without a link.
+    host.lose_withdrawal.store(true, Ordering::SeqCst);
+    cell.plc().to_do = 1;
+    bench::until(MS(20_000), "the lost link", || !host.reachable.load(Ordering::SeqCst)).await;
+    tokio::time::sleep(MS(1000)).await;
+    assert_eq!(cell.scans.lock().unwrap().len(), 4);
+    host.reachable.store(true, Ordering::SeqCst);
+    bench::until(MS(20_000), "the fourth result", || cell.plc().idle()).await;
     host.stop().await;
     assert_eq!(cell.check(), (4, 4));
 }

@@ -24,12 +24,22 @@ pub struct MemoryLink {
     pub reachable: std::sync::Arc<std::sync::atomic::AtomicBool>,
     /// The next request meets a reset connection.
     pub reset_next: std::sync::Arc<std::sync::atomic::AtomicBool>,
+    /// The next write that withdraws a result is lost, and the press is out of reach from then on.
+    pub lose_withdrawal: std::sync::Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl MemoryLink {
     pub fn new(plc: SharedPlc, chaos: Chaos, seed: u64) -> Self {
         let reachable = std::sync::Arc::new(true.into());
-        Self { plc, chaos, random: seed | 1, connected: false, reachable, reset_next: Default::default() }
+        let (reset_next, lose_withdrawal) = Default::default();
+        Self { plc, chaos, random: seed | 1, connected: false, reachable, reset_next, lose_withdrawal }
+    }
+
+    /// Whether this request is the one that is to be lost.
+    fn withdraws(&self, request: &Request) -> bool {
+        let Request::Write { start, words } = request else { return false };
+        self.plc.lock().unwrap().would_withdraw(*start, words)
+            && self.lose_withdrawal.swap(false, std::sync::atomic::Ordering::SeqCst)
     }
 
     /// xorshift64*
@@ -56,6 +66,10 @@ impl Link for MemoryLink {
 
     async fn call(&mut self, request: &Request) -> Result<Response, TransportError> {
         if !self.connected || !self.reachable.load(std::sync::atomic::Ordering::SeqCst) {
+            return Err(TransportError::NotConnected);
+        }
+        if self.withdraws(request) {
+            self.reachable.store(false, std::sync::atomic::Ordering::SeqCst);
             return Err(TransportError::NotConnected);
         }
         tokio::time::sleep(Duration::from_micros(200)).await;

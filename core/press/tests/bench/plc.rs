@@ -44,6 +44,8 @@ pub struct Plc {
     pub gave_up: Vec<u16>,
     pub writes: usize,
     pub outside: usize,
+    /// Writes that put another result in the place of a valid one.
+    pub swapped: usize,
     pub now_ms: u64,
     /// Time from the trigger to its acceptance as this program sees it.
     pub accept_ms: Vec<u64>,
@@ -78,6 +80,7 @@ impl Plc {
             gave_up: Vec::new(),
             writes: 0,
             outside: 0,
+            swapped: 0,
             now_ms: 0,
             accept_ms: Vec::new(),
             waiting: false,
@@ -122,8 +125,22 @@ impl Plc {
             self.outside += 1;
             return false;
         }
+        let before = self.valid_result();
         self.regs[start..start + words.len()].copy_from_slice(words);
+        let after = self.valid_result();
+        self.swapped += usize::from(before.is_some() && after.is_some() && before != after);
         true
+    }
+
+    /// Whether this write would take the valid bit back.
+    pub fn would_withdraw(&self, start: u16, words: &[u16]) -> bool {
+        let status = (H + 2).checked_sub(usize::from(start)).and_then(|at| words.get(at));
+        self.valid_result().is_some() && status.is_some_and(|status| status & 1 << 2 == 0)
+    }
+
+    /// Stroke, sequence number and its copy, while a result is valid.
+    fn valid_result(&self) -> Option<[u16; 3]> {
+        (self.regs[H + 2] & 1 << 2 != 0).then(|| [4, 8, 53].map(|word| self.regs[H + word]))
     }
 
     fn set(&mut self, bit: u16, on: bool) {
