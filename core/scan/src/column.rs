@@ -94,6 +94,9 @@ pub enum ColumnError {
 }
 
 impl Column {
+    /// Bytes of one sample: range, two angles, intensity, state.
+    pub const SAMPLE_BYTES: usize = 3 * size_of::<f64>() + size_of::<u16>() + size_of::<State>();
+
     /// Number of rows held.
     pub fn len(&self) -> usize {
         self.range_m.len()

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3};
 use super::TargetSurface;
 use crate::{Surface, Vec3};
 
-/// A rigid motion from the scanner's frame to the target's.
+/// A rigid motion, as from the scanner's frame to the target's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     rotation: Rotation3<f64>,
@@ -13,11 +13,17 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The motion that brings the material points of the places (u, v) closest to the target's, on the scanned face
-    /// (Kabsch, by the singular vectors of the covariance).
+    /// The motion that brings the material points of the places (u, v) closest to the target's, on the scanned face.
     #[must_use]
     pub fn best(now: &Surface, target: &TargetSurface, places: impl Iterator<Item = [f64; 2]>) -> Self {
-        let pairs: Vec<(Vec3, Vec3)> = places.map(|[u, v]| (now.face(u, v), target.face(u, v))).collect();
+        Self::of_pairs(places.map(|[u, v]| (now.face(u, v), target.face(u, v))))
+    }
+
+    /// The motion that brings the first points of the pairs closest to the second ones (Kabsch, by the singular vectors of
+    /// the covariance).
+    #[must_use]
+    pub fn of_pairs(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
+        let pairs: Vec<(Vec3, Vec3)> = pairs.collect();
         let n = pairs.len().max(1) as f64;
         let from = pairs.iter().map(|(p, _)| p).sum::<Vec3>() / n;
         let to = pairs.iter().map(|(_, q)| q).sum::<Vec3>() / n;
@@ -34,10 +40,16 @@ impl Placement {
         Self { rotation, translation: to - rotation * from }
     }
 
+    /// Where the motion takes a point.
+    #[must_use]
+    pub fn moved(&self, p: &Vec3) -> Vec3 {
+        self.rotation * p + self.translation
+    }
+
     /// Measured minus target along the target's normal at a place (u, v), metres, positive towards the scanner.
     #[must_use]
     pub fn deviation(&self, now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> f64 {
-        let here = self.rotation * now.face(u, v) + self.translation;
+        let here = self.moved(&now.face(u, v));
         (here - target.face(u, v)).dot(&target.normal(u, v))
     }
 }

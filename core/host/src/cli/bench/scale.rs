@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::ValueEnum;
-use platen_scan::{Column, State, Window};
+use platen_scan::{Column, Window};
 use platen_shape::extract::Extractor;
 use platen_shape::measure::measure;
 use platen_shape::outline::outline;
@@ -162,15 +162,10 @@ fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -
         columns_ms: ms(on_columns),
         extract_ms: ms(extracted.saturating_sub(start)),
         measure_ms: ms(measured.saturating_sub(extracted)),
-        raw_lattice_mb: f64::from(header.n_rows) * f64::from(header.n_columns) * sample_bytes()
+        raw_lattice_mb: f64::from(header.n_rows) * f64::from(header.n_columns) * Column::SAMPLE_BYTES as f64
             / f64::from(1 << 20),
         peak_mb: machine::peak_memory_mb(),
     })
-}
-
-/// One sample of a [`Column`]: range, two angles, intensity, state.
-fn sample_bytes() -> f64 {
-    (size_of::<f32>() + 2 * size_of::<f64>() + size_of::<u16>() + size_of::<State>()) as f64
 }
 
 fn print(rows: &[Row]) -> Result<(), CliError> {

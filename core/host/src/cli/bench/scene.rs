@@ -22,6 +22,10 @@ use crate::units::metres;
 
 /// Casting the rays of a full dome takes minutes on a slow machine.
 const SCAN_LIMIT: Duration = Duration::from_secs(3600);
+/// Angle between cells of the scans of `accuracy`: 6 mm at 7 m.
+const STEP_DEG: f64 = 0.05;
+/// Enough round their plates to see where they end.
+const MARGIN_DEG: f64 = 2.0;
 /// The plate is moved by up to this much from seed to seed, metres: many lattice steps.
 const SHIFT: f64 = 0.05;
 /// And turned by up to this much, degrees.
@@ -55,6 +59,13 @@ pub(super) struct Setting {
     pub(super) seed: u64,
     /// Threads that cast rays.
     pub(super) threads: usize,
+}
+
+impl Setting {
+    /// As the scans of `accuracy` are taken.
+    pub(super) fn of_accuracy(noise_mm: f64, seed: u64) -> Self {
+        Self { step_deg: STEP_DEG, margin_deg: MARGIN_DEG, noise_mm, seed, threads: 1 }
+    }
 }
 
 /// A scan in memory, with its truth.

@@ -16,11 +16,6 @@ use crate::plugin::{Catalogue, Flattening};
 use crate::progress;
 use crate::stroke::NotMeasured;
 
-/// Angle between cells: 6 mm at 7 m.
-pub(super) const STEP_DEG: f64 = 0.05;
-/// Enough round the plate to see where it ends.
-pub(super) const MARGIN_DEG: f64 = 2.0;
-
 /// Plates as in the shop, 7 m away, scanned face concave.
 pub(super) fn scenes() -> Vec<Scene> {
     let scene = |name: &str, size_mm: [f64; 3], yaw_deg: f64, shape: &str| Scene {
@@ -87,8 +82,7 @@ pub(super) fn accuracy(
     let load = || super::flattenings(catalogue, &command.flattening);
     let errors = shared(&cases, command.threads, load, |flattenings, (scene, noise_mm, seed)| {
         progress::phase(&format!("{} at {noise_mm} mm, seed {seed}", scene.name));
-        let setting = setting(*noise_mm, *seed);
-        let shot = scene.scan(catalogue, folder, setting)?;
+        let shot = scene.scan(catalogue, folder, Setting::of_accuracy(*noise_mm, *seed))?;
         let failed =
             |e: NotMeasured| CliError::Failed(format!("{} at {noise_mm} mm, seed {seed}: {e}", scene.name));
         let seen = stages::see(&shot).map_err(failed)?;
@@ -136,10 +130,6 @@ fn pairs(
     })?;
     let rows = command.noise_mm.iter().zip(errors.chunks(seeds.len()));
     Ok(rows.map(|(noise_mm, errors)| PairRow { noise_mm: *noise_mm, errors: errors.to_vec() }).collect())
-}
-
-pub(super) fn setting(noise_mm: f64, seed: u64) -> Setting {
-    Setting { step_deg: STEP_DEG, margin_deg: MARGIN_DEG, noise_mm, seed, threads: 1 }
 }
 
 /// Does `work` for every case on several threads, each with tools of its own; results in the order of the cases.

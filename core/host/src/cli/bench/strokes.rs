@@ -6,17 +6,16 @@
 use std::path::Path;
 use std::time::Duration;
 
-use nalgebra::Matrix3;
 use serde_json::{Map, Value as Json, json};
 
 use platen_plant::Value;
 use platen_shape::task::{
     Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template,
 };
-use platen_shape::{Surface, Vec3};
+use platen_shape::{Placement, Surface, Vec3};
 
-use super::scene::{Scene, Shot};
-use super::{figures, seeds, stages};
+use super::scene::{Scene, Setting, Shot};
+use super::{figures, stages};
 use crate::accuracy::{Truth, rms};
 use crate::cli::CliError;
 use crate::plugin::{Catalogue, Comparison, Field, Flattening, NodeState, Report, Surfaces};
@@ -134,11 +133,8 @@ pub(super) fn errors(
             yaw_deg: 10.0,
         };
         // Four scans a seed, none with the errors of another.
-        let shot = scene.scan(
-            catalogue,
-            folder,
-            seeds::setting(noise_mm, seed.wrapping_mul(4).wrapping_add(number)),
-        )?;
+        let setting = Setting::of_accuracy(noise_mm, seed.wrapping_mul(4).wrapping_add(number));
+        let shot = scene.scan(catalogue, folder, setting)?;
         let run = stages::run(&shot, &mut tools.flattening).map_err(|e| failed(&e))?;
         Ok((shot, run.measurement.surface))
     };
@@ -239,28 +235,16 @@ fn displacement(field: &Field, now: &Surface, truth: [&Truth; 2]) -> [f64; 2] {
     }
     let from: Vec<Vec3> = known.iter().map(|(k, ..)| Vec3::from(before.position_m[*k])).collect();
     let to: Vec<Vec3> = known.iter().map(|(_, moved, face, _)| face - moved).collect();
-    let motion = rigid(&from, &to);
+    let motion = Placement::of_pairs(from.iter().copied().zip(to));
     let errors: Vec<(Vec3, Vec3)> = known
         .iter()
         .zip(&from)
         .map(|((k, moved, _, normal), was)| {
-            (moved - (Vec3::from(after.position_m[*k]) - motion(was)), *normal)
+            (moved - (Vec3::from(after.position_m[*k]) - motion.moved(was)), *normal)
         })
         .collect();
     [
         rms(errors.iter().map(|(error, normal)| error.dot(normal))),
         rms(errors.iter().map(|(error, _)| error.norm())),
     ]
-}
-
-/// The rigid motion that takes `from` to `to` best (Kabsch).
-fn rigid(from: &[Vec3], to: &[Vec3]) -> impl Fn(&Vec3) -> Vec3 + use<> {
-    let mean = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len().max(1) as f64;
-    let (a, b) = (mean(from), mean(to));
-    let spread: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (q - b) * (p - a).transpose()).sum();
-    let svd = spread.svd(true, true);
-    let (u, v_t) = (svd.u.unwrap_or_default(), svd.v_t.unwrap_or_default());
-    let mirrored = (u * v_t).determinant().signum();
-    let rotation = u * Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, mirrored)) * v_t;
-    move |p| rotation * (p - a) + b
 }
