@@ -78,10 +78,8 @@ pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32
     let azimuth = header.azimuth_start + header.azimuth_step * f64::from(column.index);
     let angles = column.azimuth.iter().zip(&column.elevation);
     let samples = column.state.iter().zip(&column.range_m).zip(angles).zip(&column.intensity);
-    let cell = |(row, (((state, range_m), (true_azimuth, true_elevation)), intensity)): (
-        u32,
-        (((&State, &f64), (&f64, &f64)), &u16),
-    )| {
+    let cells = (column.first_row..).zip(samples);
+    let cells = cells.map(|(row, (((state, range_m), (true_azimuth, true_elevation)), intensity))| {
         if *state != State::Valid {
             return Cell::default();
         }
@@ -97,8 +95,8 @@ pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32
             valid: true,
             inside: inside(row, range_m),
         }
-    };
-    (column.first_row..).zip(samples).map(cell).collect()
+    });
+    cells.collect()
 }
 
 /// All columns, with the bookkeeping of what can be dropped.
