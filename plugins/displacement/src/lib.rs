@@ -137,10 +137,12 @@ fn report(
     supports_changed: bool,
     against: &str,
 ) -> Report {
-    let largest = (0..PlateGrid::NODES)
-        .filter(|&i| changes.state[i] != NodeState::Unseen)
-        .max_by(|&a, &b| changes.normal[a].abs().total_cmp(&changes.normal[b].abs()));
     let changed = changes.state.iter().filter(|s| **s == NodeState::Seen).count();
+    // What changed beyond doubt, else all that was seen.
+    let counts = |state: NodeState| state == NodeState::Seen || changed == 0 && state != NodeState::Unseen;
+    let largest = (0..PlateGrid::NODES)
+        .filter(|&i| counts(changes.state[i]))
+        .max_by(|&a, &b| changes.normal[a].abs().total_cmp(&changes.normal[b].abs()));
     let seen = changes.state.iter().filter(|s| **s != NodeState::Unseen).count();
     let share = changed as f64 / seen.max(1) as f64;
 
