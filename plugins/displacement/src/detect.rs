@@ -6,6 +6,11 @@ use platen_shape::{EXPANDED, Vec3};
 use crate::align::Alignment;
 use crate::grid::Nodes;
 
+/// Standard deviations that the largest of 441 independent places of an unchanged plate exceeds in 5 % of the pairs
+/// (two-sided, Bonferroni); a surface ties places nearer than a seventh of a metre. Five nodes in a hundred lie above their
+/// level of detection by chance, and they lie together; so a patch is a change when one of its nodes lies beyond this.
+const CERTAIN: f64 = 3.86;
+
 /// Displacement at every node.
 #[derive(Debug)]
 pub(crate) struct Changes {
@@ -19,7 +24,7 @@ pub(crate) struct Changes {
     pub(crate) lod: Vec<f64>,
     /// Its median over what was seen.
     pub(crate) median_lod: f64,
-    /// Share of what was seen that lies above it, before small patches are dropped.
+    /// Share of what was seen that lies above it, before patches are judged.
     pub(crate) above_lod: f64,
     /// What is known.
     pub(crate) state: Vec<NodeState>,
@@ -52,21 +57,23 @@ pub(crate) fn changes(
     let count = |wanted: NodeState| state.iter().filter(|state| **state == wanted).count();
     let (above, below) = (count(NodeState::Seen), count(NodeState::Unchanged));
     let above_lod = above as f64 / (above + below).max(1) as f64;
-    drop_small_patches(&mut state, &normal, (min_patch / nodes.grid.cell()) as usize);
+    let certain = |patch: &[usize]| patch.iter().any(|&i| normal[i].abs() > CERTAIN * sigma[i]);
+    let least = (min_patch / nodes.grid.cell()) as usize;
+    drop_patches(&mut state, &normal, |patch| patch.len() < least || !certain(patch));
     let mut of_seen: Vec<f64> = (0..PlateGrid::NODES).filter(|&i| nodes.seen[i]).map(|i| lod[i]).collect();
     of_seen.sort_by(f64::total_cmp);
     let median_lod = of_seen.get(of_seen.len() / 2).copied().unwrap_or(0.0);
     Changes { vectors, normal, sigma, lod, median_lod, above_lod, state }
 }
 
-/// Connected places of change in one sense that number fewer than `least` become unchanged.
-fn drop_small_patches(state: &mut [NodeState], normal: &[f64], least: usize) {
+/// Connected places of change in one sense become unchanged where `drop` says so.
+fn drop_patches(state: &mut [NodeState], normal: &[f64], drop: impl Fn(&[usize]) -> bool) {
     let label: Vec<i8> = state
         .iter()
         .zip(normal)
         .map(|(state, d)| if *state == NodeState::Seen { d.signum() as i8 } else { 0 })
         .collect();
-    for patch in PlateGrid::patches(&label).into_iter().filter(|patch| patch.len() < least) {
+    for patch in PlateGrid::patches(&label).into_iter().filter(|patch| drop(patch)) {
         patch.into_iter().for_each(|place| state[place] = NodeState::Unchanged);
     }
 }

@@ -14,8 +14,9 @@
 //! A place is *unchanged* when its displacement along the normal is below the level of detection,
 //! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2): s1 and s2 from the splines' covariances, without what smoothing
 //! takes from a shape, which is the same in both scans; s_corr from the plant's null pairs; s_align from the alignment, where
-//! a place had no say in it. Places above the LoD that hang together over less than `min_patch` count as unchanged too:
-//! by chance 5 % of a plate that kept its shape lies above it.
+//! a place had no say in it. By chance 5 % of a plate that kept its shape lies above it. So places above the LoD that hang
+//! together are a change only when they cover `min_patch` and one of them lies beyond 3.86 standard deviations (1.97 LoD), which
+//! happens on one unchanged plate in twenty (two-sided, Bonferroni over 441 independent places).
 //!
 //! ```toml
 //! [[comparison]]
@@ -33,7 +34,7 @@
 //!
 //! Figures: `displacement.rms` along the normal and `displacement.sigma`, the root mean square of its stated deviation, whose
 //! difference on null pairs is what a calibration is about; `displacement.lod`, the median over the plate, and
-//! `displacement.above_lod`, the share above it before small patches are dropped; `displacement.changed_share`, `displacement.max` with its place; `displacement.plate_rotation` and
+//! `displacement.above_lod`, the share above it before patches are judged; `displacement.changed_share`, `displacement.max` with its place; `displacement.plate_rotation` and
 //! `displacement.plate_translation` that the alignment took away.
 //!
 //! Fields: `displacement` (3 components, scanner frame) and `displacement_normal` (towards the scanner), metres.

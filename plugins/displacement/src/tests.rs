@@ -202,10 +202,13 @@ fn null_pairs(seeds: std::ops::Range<u64>, amplitude: f64, sigma_correlated: f64
     changes.collect()
 }
 
-fn changed_share(pairs: &[detect::Changes]) -> f64 {
-    let changed =
-        pairs.iter().flat_map(|pair| &pair.state).filter(|state| **state == NodeState::Seen).count();
-    changed as f64 / (pairs.len() * PlateGrid::NODES) as f64
+/// Each pair scatters by 0.05, so 20 tell little; `PLATEN_NULL_PAIRS=200` takes a minute and tells more.
+fn wanted() -> u64 {
+    std::env::var("PLATEN_NULL_PAIRS").ok().and_then(|n| n.parse().ok()).unwrap_or(20)
+}
+
+fn share_above_lod(pairs: &[detect::Changes]) -> f64 {
+    pairs.iter().map(|pair| pair.above_lod).sum::<f64>() / pairs.len() as f64
 }
 
 /// What null pairs show in excess of what is stated, pooled over the plate, and the false change of other pairs with it, beside
@@ -217,8 +220,9 @@ fn calibrated(seeds: u64, amplitude: f64, judged: u64) -> [f64; 3] {
     let stated = pooled(|pair| pair.lod.iter().map(|lod| (lod / platen_shape::EXPANDED).powi(2)).sum());
     let nodes = (calibrating.len() * PlateGrid::NODES) as f64;
     let sigma_correlated = ((shown - stated) / nodes).max(0.0).sqrt();
-    let judged = changed_share(&null_pairs(seeds + 1000..seeds + 1000 + judged, amplitude, sigma_correlated));
-    let uncalibrated = changed_share(&calibrating);
+    let judged =
+        share_above_lod(&null_pairs(seeds + 1000..seeds + 1000 + judged, amplitude, sigma_correlated));
+    let uncalibrated = share_above_lod(&calibrating);
     println!(
         "wave of {:.2} mm: false change {uncalibrated:.3}; calibrated to {:.3} mm: {judged:.3}",
         amplitude * 1e3,
@@ -229,8 +233,7 @@ fn calibrated(seeds: u64, amplitude: f64, judged: u64) -> [f64; 3] {
 
 #[test]
 fn null_pairs_show_five_percent_of_the_area() {
-    // Each pair scatters by 0.05, so 20 tell little; PLATEN_NULL_PAIRS=200 takes a minute and tells more.
-    let wanted = std::env::var("PLATEN_NULL_PAIRS").ok().and_then(|n| n.parse().ok()).unwrap_or(20);
+    let wanted = wanted();
     let bound = if wanted < 200 { 0.02..0.08 } else { 0.04..0.06 };
     for (seeds, amplitude) in [(1000, 0.0), (3000, 0.1e-3)] {
         let [before, sigma, after] = calibrated(seeds, amplitude, wanted);
@@ -240,6 +243,17 @@ fn null_pairs_show_five_percent_of_the_area() {
         assert!(amplitude > 0.0 || bound.contains(&before), "{before}");
         assert!(bound.contains(&after), "wave of {amplitude}: {before} before, {after} after");
     }
+}
+
+#[test]
+fn no_patch_of_a_null_pair_is_a_change() {
+    let wanted = wanted();
+    let pairs = null_pairs(5000..5000 + wanted, 0.0, 0.0);
+    let n = pairs.iter().filter(|pair| pair.state.contains(&NodeState::Seen)).count();
+    println!("{n} of {wanted} null pairs show a patch of change");
+    // One in twenty at most; three standard deviations beyond it are 4 of 20, 20 of 200.
+    let most = 0.05 * wanted as f64;
+    assert!((n as f64) < most + 3.0 * (0.95 * most).sqrt(), "{n} of {wanted}");
 }
 
 #[test]

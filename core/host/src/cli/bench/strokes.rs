@@ -160,8 +160,8 @@ pub(super) fn errors(
         displacement(field, &after, [&before_shot.truth, &after_shot.truth]);
     let angle = figure(&bent, "bend.1.angle").ok_or_else(|| missing("bend.1.angle"))?;
     let gap = laid.findings.templates.first().ok_or_else(|| missing("template"))?.max_gap;
-    let false_change =
-        figure(&null, "displacement.changed_share").ok_or_else(|| missing("share of change"))?;
+    let false_change = figure(&null, "displacement.above_lod")
+        .ok_or_else(|| missing("share above the level of detection"))?;
     Ok(StrokeErrors {
         displacement_normal,
         displacement_vector,
