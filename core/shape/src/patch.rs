@@ -47,6 +47,8 @@ pub struct Crossing {
     pub normal: Vec3,
     /// The nearest and the farthest mixed pixel between them: their beams straddle the end of the face.
     pub mixed: Option<[Vec3; 2]>,
+    /// Range of the nearest of them minus that of the face's continuation there, metres; 0 without one.
+    pub mixed_excess: f32,
     /// True when every cell between them was measured: none but those is mixed.
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.

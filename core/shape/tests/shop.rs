@@ -88,6 +88,17 @@ fn an_edge_along_a_column_of_the_lattice() {
 }
 
 #[test]
+fn a_side_face_a_few_beams_wide_is_no_mixed_pixel() {
+    // The far edge v = H: its side face takes 7 mm of the face's continuation, one to five beams.
+    for sigma in [1e-5, 2e-4, 5e-4] {
+        for radius in [None, Some(9.0)] {
+            let scene = Scene { sigma, ..Scene::of(Plate { radius, ..plate() }) };
+            check(&format!("noise {} mm, {radius:?}", sigma * 1e3), &scene, 5e-4);
+        }
+    }
+}
+
+#[test]
 fn coarse_lattices() {
     // Samples 19 to 24 mm apart on the plate.
     for step_deg in [0.12_f64, 0.15] {

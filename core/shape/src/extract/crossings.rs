@@ -138,11 +138,12 @@ impl Scene<'_> {
         }
         let between = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
         let mixed = between.clone().filter(|(_, at)| self.pixels[*at] == Pixel::Mixed);
-        let mixed = match (mixed.clone().next(), mixed.clone().next_back()) {
-            (Some((near, _)), Some((far, _))) => {
-                Some([on_face(near as f64)?.point, on_face(far as f64)?.point])
-            }
-            _ => None,
+        let (mixed, mixed_excess) = match (mixed.clone().next(), mixed.clone().next_back()) {
+            (Some((near, at)), Some((far, _))) => (
+                Some([on_face(near as f64)?.point, on_face(far as f64)?.point]),
+                self.excess(fit, at, near.min(FIT_FAR), index, step)?,
+            ),
+            _ => (None, 0.0),
         };
         let (inside, outside) = (on_face(from)?, on_face(to)?);
         let crossing = Crossing {
@@ -153,6 +154,7 @@ impl Scene<'_> {
             outside: outside.point,
             normal: inside.normal,
             mixed,
+            mixed_excess: mixed_excess as f32,
             complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Untold),
             excess: excess as f32,
             beyond,

@@ -275,6 +275,7 @@ mod tests {
                     cells: 1,
                     mixed: None,
                     complete: true,
+                    mixed_excess: 0.0,
                     excess: 0.0,
                     beyond,
                 };

@@ -3,9 +3,10 @@
 //! A mixed beam sees both sides of the edge: the edge is within a footprint. One that is not has its centre on its own
 //! side, and most likely a footprint away: some beams are mixed so little that it does not show. Where the plate's side face is seen, it is the lower edge of the plate,
 //! of which the place beside the upper one is known from the thickness, that mixes the beams; and a beam on a side face
-//! of a few millimetres falls behind the face's continuation in proportion to its way from the edge. The last cell that was taken
-//! for one of the face may be such a beam too, of which noise hides how far it falls behind: both ranges count, the one
-//! that was taken and the one that was not, or the choice between them would move the edge outwards.
+//! of a few millimetres falls behind the face's continuation in proportion to its way from the edge, though it has too few
+//! neighbours on the side face to be told from a mixed one but by that. The last cell that was taken for one of the face may
+//! be such a beam too, of which noise hides how far it falls behind: both ranges count, the one that was taken and the one
+//! that was not, or the choice between them would move the edge outwards.
 
 use super::sheet::Settled;
 use super::strip::Strip;
@@ -53,6 +54,8 @@ pub(super) struct Line {
     side: f64,
     /// Distance inwards per range by which a beam falls behind the face's continuation on a square side face.
     per_range: f64,
+    /// The nearest cell off the face, and its range behind the face's continuation.
+    off: f64,
     excess: f64,
     /// The last cell of the face, and its range behind the face.
     cell: f64,
@@ -73,6 +76,10 @@ impl Line {
         // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
         // height / (height + thickness) of its way.
         let height = -normal.dot(&crossing.inside);
+        let (off, excess) = match mixed {
+            Some([near, _]) => (near, crossing.mixed_excess),
+            None => (inside.y.min(outside.y), crossing.excess),
+        };
         Self {
             along,
             low: inside.y.min(outside.y),
@@ -84,7 +91,8 @@ impl Line {
             per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
             side: (inward.dot(&crossing.inside) * thickness / (height + thickness)).max(0.0),
             per_range: inward.dot(&beam),
-            excess: f64::from(crossing.excess),
+            off,
+            excess: f64::from(excess),
             cell: strip.flatten(settled.cell).y,
             residual: settled.residual,
         }
@@ -108,13 +116,14 @@ impl Line {
             return bracket(Term::At { place: 0.5 * (self.low + self.high), soft }, last);
         }
         let on_side = self.excess * self.per_range;
+        // Of a side face a few beams wide each may pass for mixed.
         if self.side > 0.0
             && self.beyond == Beyond::Behind
-            && self.mixed.is_none()
+            && (self.mixed.is_none() || on_side > -3.0 * noise)
             && on_side < SIDE_SLACK * self.side + 3.0 * noise
         {
             let soft = soft.hypot(noise).hypot(SIDE_SLOPE * on_side);
-            return bracket(Term::At { place: self.low + on_side, soft }, last);
+            return bracket(Term::At { place: self.off + on_side, soft }, last);
         }
         let mut above = Bound { sure: self.low, likely: self.low, soft };
         let mut below = Bound { sure: self.high, likely: self.high, soft };

@@ -67,11 +67,13 @@ impl Sheet {
         let (cell, _) = self.meet(sample.point)?;
         let (mut inside, normal) = self.meet(crossing.inside)?;
         let (mut outside, _) = self.meet(crossing.outside)?;
-        let mixed = match crossing.mixed {
-            Some([near, far]) => Some([self.meet(near)?.0, self.meet(far)?.0]),
-            None => None,
-        };
         // What lies beyond falls behind the sheet by so much more than behind the face's continuation.
+        let (mut mixed, mut mixed_excess) = (None, crossing.mixed_excess);
+        if let Some([near, far]) = crossing.mixed {
+            let (nearest, farthest) = (self.meet(near)?.0, self.meet(far)?.0);
+            mixed = Some([nearest, farthest]);
+            mixed_excess += (near.norm() - nearest.norm()) as f32;
+        }
         let more = crossing.outside.norm() - outside.norm();
         if crossing.beyond == Beyond::SideFace {
             // From outside to inside are four standard deviations of a range on the side face.
@@ -81,7 +83,7 @@ impl Sheet {
         let excess = crossing.excess + more as f32;
         let residual = sample.point.norm() - cell.norm();
         Some(Settled {
-            crossing: Crossing { inside, outside, normal, mixed, excess, ..*crossing },
+            crossing: Crossing { inside, outside, normal, mixed, mixed_excess, excess, ..*crossing },
             cell,
             residual,
         })
