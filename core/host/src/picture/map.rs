@@ -156,7 +156,7 @@ impl Sheet<'_> {
         self.keys(page, field, (left, top + tall + 58.0))
     }
 
-    /// What gray and hatching mean, where the map has them.
+    /// What gray and hatching mean, where the map has them, and the numbers on it.
     fn keys(&self, page: &Page<'_>, field: &Field, (left, mut y): At) -> Result<(), PictureError> {
         let has = |state: NodeState| field.state.contains(&state);
         let side = 26.0;
@@ -174,8 +174,9 @@ impl Sheet<'_> {
             }
             page.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
             page.text("no data", (left + side + 10.0, y), Text::new(22.0))?;
+            y += 36.0;
         }
-        Ok(())
+        page.text("numbers: means", (left, y), Text::new(22.0))
     }
 }
 
@@ -185,12 +186,17 @@ fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Resul
     let (w, h) = (sheet.plate.width_mm / CODES[0] as f64, sheet.plate.height_mm / CODES[1] as f64);
     let parts: Vec<(usize, usize, f64)> = (0..CODES[0] * CODES[1])
         .map(|k| (k % CODES[0], k / CODES[0]))
-        .filter(|(i, k)| middle(field, *i, *k) != NodeState::Unseen)
+        .filter(|(i, k)| middle(field, *i, *k).0 != NodeState::Unseen)
         .filter_map(|(i, k)| Some((i, k, mean(field, i, k)? * sheet.scale.factor)))
         .collect();
     for (i, k, value) in &parts {
         let at = sheet.at((*i as f64 + 0.5) * w, (*k as f64 + 0.5) * h);
-        let colour = colour::text_on(sheet.scale.position(*value));
+        // Readable on the shade that lies under it, which in a narrow bend is not the mean's.
+        let beneath = match middle(field, *i, *k) {
+            (NodeState::Seen, value) => sheet.scale.position(value * sheet.scale.factor),
+            _ => 0.0,
+        };
+        let colour = colour::text_on(beneath);
         page.text(&sheet.scale.number(*value), at, Text::new(27.0).bold().centred().coloured(colour))?;
     }
     let Some(words) = sheet.scale.words.filter(|_| !done) else { return Ok(()) };
@@ -209,9 +215,9 @@ fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Resul
 }
 
 /// What is known in the middle of a part of the plate, where its number stands.
-fn middle(field: &Field, i: usize, k: usize) -> NodeState {
+fn middle(field: &Field, i: usize, k: usize) -> (NodeState, f64) {
     let share = |part: usize, parts: usize| (part as f64 + 0.5) / parts as f64;
-    field.sample(share(i, CODES[0]), share(k, CODES[1]), 0).0
+    field.sample(share(i, CODES[0]), share(k, CODES[1]), 0)
 }
 
 /// Mean over the known nodes of a part of the plate; `None` when fewer than half were seen, or most show no change.
