@@ -15,7 +15,8 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
             target.deficit(&nodes.curvature[i], u, v)
         })
         .collect();
-    let lod: Vec<f64> = (0..PlateGrid::NODES).map(|i| EXPANDED * sigma(nodes, target, i)).collect();
+    let sigma = (0..PlateGrid::NODES).map(|i| sigma(nodes, target, i)).collect::<Vec<f64>>();
+    let lod: Vec<f64> = (0..PlateGrid::NODES).map(|i| EXPANDED * evened(&sigma, i)).collect();
     let state: Vec<NodeState> = (0..PlateGrid::NODES)
         .map(|i| match (nodes.known[i], value[i].abs() < lod[i]) {
             (false, _) => NodeState::Unseen,
@@ -74,6 +75,19 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
 pub(crate) fn is_doubly_curved(nodes: &Nodes, target: &TargetSurface) -> bool {
     // 1e-9 1/m^2: a sphere of 30 km.
     nodes.grid.map(|u, v| target.curvature(u, v).gaussian).iter().any(|goal| goal.abs() >= 1e-9)
+}
+
+/// Nodes to each side over which a sigma is evened out: about a span of the surface's spline.
+const REACH: usize = 2;
+
+/// Root mean square about a node. A spline's curvature is known worst at its knots and best between them, by one and the
+/// same error: places side by side shall not differ in whether they are bent enough.
+fn evened(sigma: &[f64], node: usize) -> f64 {
+    let range = |k: usize| k.saturating_sub(REACH)..(k + REACH + 1).min(PlateGrid::SIDE);
+    let (rows, columns) = (range(node / PlateGrid::SIDE), range(node % PlateGrid::SIDE));
+    let count = rows.len() * columns.len();
+    let row = |row: usize| columns.clone().map(move |column| sigma[row * PlateGrid::SIDE + column].powi(2));
+    (rows.flat_map(row).sum::<f64>() / count as f64).sqrt()
 }
 
 /// One sigma of the deficit at a node.
