@@ -62,6 +62,9 @@ pub struct Serial {
     pub stop_bits: u8,
     /// The adapter hears what it sends: strip it.
     pub echo: bool,
+    /// The kernel's driver of the port switches the direction of a two-wire RS-485 line by RTS. Most adapters do it by
+    /// themselves and need nothing.
+    pub rs485: bool,
 }
 
 /// Parity bit of a serial line.
@@ -140,7 +143,7 @@ impl Link {
 impl Serial {
     /// A port with the Modbus defaults: even parity, one stop bit.
     pub fn new(device: impl Into<PathBuf>, baud: u32) -> Self {
-        Self { device: device.into(), baud, parity: Parity::Even, stop_bits: 1, echo: false }
+        Self { device: device.into(), baud, parity: Parity::Even, stop_bits: 1, echo: false, rs485: false }
     }
 
     /// Line time of `bytes` characters of 11 bits.

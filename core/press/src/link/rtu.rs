@@ -5,11 +5,13 @@
 
 use std::collections::VecDeque;
 use std::io;
+use std::path::Path;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use platen_plant::press::{Parity, Serial};
+use serial2::rs4xx::Rs485Config;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, ReadBuf};
 use tokio::time::timeout;
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
@@ -28,7 +30,24 @@ pub(super) fn open(serial: &Serial) -> io::Result<SerialStream> {
         if serial.stop_bits == 2 { tokio_serial::StopBits::Two } else { tokio_serial::StopBits::One };
     let port =
         tokio_serial::new(serial.device.to_string_lossy(), serial.baud).parity(parity).stop_bits(stop_bits);
+    // Held until the port is open: what a port was told may be lost when nobody has it open.
+    let _told = serial.rs485.then(|| switch_direction(&serial.device)).transpose()?;
     port.open_native_async().map_err(io::Error::from)
+}
+
+/// Lets the port's driver switch the direction of a two-wire line: RTS is high while it sends (Linux, `TIOCSRS485`,
+/// Documentation/driver-api/serial/serial-rs485.rst).
+fn switch_direction(device: &Path) -> io::Result<serial2::SerialPort> {
+    let port = serial2::SerialPort::open(device, serial2::KeepSettings)?;
+    let refused = |error: io::Error| {
+        io::Error::other(format!(
+            "the driver of {} cannot switch the direction of an RS-485 line ({error}); an adapter that does so itself \
+             needs no rs485 = true",
+            device.display()
+        ))
+    };
+    port.set_rs4xx_mode(Rs485Config::new()).map_err(refused)?;
+    Ok(port)
 }
 
 /// Throws away what arrives until nothing has arrived for `quiet`.
@@ -108,6 +127,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for EchoFree<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serialport::{SerialPort, TTYPort};
     use tokio::io::{AsyncWriteExt, duplex};
 
     #[tokio::test(start_paused = true)]
@@ -137,6 +157,18 @@ mod tests {
             }
         });
         assert!(drain(&mut host, Duration::from_millis(400)).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn a_port_that_cannot_switch_the_direction_says_so() {
+        let (_line, host) = TTYPort::pair().unwrap();
+        let serial = Serial::new(host.name().unwrap(), 38_400);
+        assert!(open(&serial).is_ok());
+        let refused = open(&Serial { rs485: true, ..serial }).unwrap_err().to_string();
+        assert!(
+            refused.contains("cannot switch the direction") && refused.contains("rs485 = true"),
+            "{refused}"
+        );
     }
 
     #[tokio::test]

@@ -123,6 +123,7 @@ fn read_serial(table: &mut Table<'_>) -> Result<Serial, Reported> {
     let parity = table.choice("parity", &parities).or(Parity::default());
     let stop_bits = table.integer("stop_bits").in_range(1..=2).map(|bits| bits as u8).or(1);
     let echo = table.bool("echo").or(false);
+    let rs485 = table.bool("rs485").or(false);
     let serial = Serial::new(device?, baud?);
-    Ok(Serial { parity: parity?, stop_bits: stop_bits?, echo: echo?, ..serial })
+    Ok(Serial { parity: parity?, stop_bits: stop_bits?, echo: echo?, rs485: rs485?, ..serial })
 }
