@@ -104,6 +104,15 @@ impl Bench {
         assert!(!(image.busy && image.ready), "busy and ready");
         assert!(!(image.busy && image.valid), "busy and valid");
         assert!(!image.valid || image.result.is_some(), "valid without a result");
+        if let (true, LinkState::Online, Some(Verdict::NotMeasured(code))) =
+            (image.valid, link, image.result.as_ref().map(|result| result.measurement.verdict))
+        {
+            assert_eq!(
+                image.error,
+                Some(code),
+                "another error under the number of a stroke that was not measured"
+            );
+        }
         assert!(!image.ready || self.synchronised, "ready before the press is known");
         let silent = matches!(link, LinkState::Boot | LinkState::Offline | LinkState::Sync);
         assert!(!silent || !self.machine.may_write(), "a write before the press is known");
@@ -459,4 +468,34 @@ fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
     bench.step(press(3, false, false));
     bench.step(press(3, false, true));
     assert!(!bench.machine.image().valid, "its own acknowledge");
+}
+
+/// The host comes back before its scanner does: what the press reads under the stroke's number is why that stroke was
+/// not measured; that the scanner is not ready keeps READY low, and is said once the result is taken.
+#[test]
+fn an_interrupted_stroke_says_so_while_the_scanner_is_not_ready() {
+    let mut bench = Bench::new(config());
+    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+    bench.calm_cycle(1);
+    let press = |trigger, ack| Event::Press(Box::new(PressImage { stroke_id: 2, trigger, ack, ..calm() }));
+    bench.step(press(true, false));
+    bench.journal(true);
+    assert!(bench.machine.image().busy);
+    let mut bench = bench.restarted(config());
+    bench.step(Event::Connected);
+    bench.step(press(true, false));
+    bench.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
+    while !bench.records.is_empty() {
+        bench.journal(true);
+    }
+    bench.step(Event::Written);
+    let image = bench.machine.image();
+    assert_eq!((image.valid, image.ready, image.error), (true, false, Some(Code::Interrupted)));
+    for ack in [true, false] {
+        bench.step(press(false, ack));
+    }
+    let image = bench.machine.image();
+    assert_eq!((image.valid, image.ready, image.error), (false, false, Some(Code::ScannerNotReady)));
+    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+    assert!(bench.machine.image().ready);
 }

@@ -42,10 +42,13 @@ impl Handshake {
 
     fn unpromised(&self, present: HostImage, before: HostImage) -> HostImage {
         let stopped = matches!(self.link, LinkState::Stopped { .. });
+        let (result, valid) = (before.result.as_ref(), before.valid && !stopped);
         HostImage {
             ready: self.link == LinkState::Online && !self.blocked(),
             busy: false,
-            valid: before.valid && !stopped,
+            valid,
+            error: self.error(result, valid).filter(|_| !stopped),
+            warning: self.present_warning(result).filter(|_| !stopped),
             scan_done: before.scan_done && !stopped,
             ack_stroke_id: before.ack_stroke_id,
             session: before.session,
@@ -63,11 +66,12 @@ impl Handshake {
         let waiting = self.work == Work::Publish && result.is_none();
         let busy = self.work.is_busy() && (self.work != Work::Publish || waiting);
         let standing = self.work == Work::Publish || self.unacked.is_some() && self.work != Work::Clear;
+        let valid = result.is_some() && standing && !stopped;
         let stroke = self.stroke().or(self.last);
         HostImage {
             ready: online && !busy && !self.blocked() && !self.held() && self.sees_the_next_stroke(),
             busy: busy && !stopped,
-            valid: result.is_some() && standing && !stopped,
+            valid,
             scan_done: self.job.as_ref().is_some_and(|job| job.acquired_at.is_some()) && !stopped,
             missed: self.missed && !stopped,
             missed_count: self.missed_count,
@@ -77,7 +81,7 @@ impl Handshake {
             ack_stroke_id: stroke.map_or(0, |key| key.stroke),
             session: stroke.map_or(0, |key| key.session),
             attempt: stroke.map_or(0, |key| key.attempt),
-            error: self.error(result).filter(|_| !stopped),
+            error: self.error(result, valid).filter(|_| !stopped),
             warning: self.present_warning(result).filter(|_| !stopped),
             result_seq: result.map_or(self.image.result_seq, |result| result.seq),
             result: result.cloned(),
@@ -98,8 +102,9 @@ impl Handshake {
         self.job.as_ref().filter(|_| !pending)?.publication.as_ref()
     }
 
-    /// The most urgent error: a fault, what keeps the host from being ready, why the last stroke was not measured.
-    fn error(&self, result: Option<&Publication>) -> Option<Code> {
+    /// The most urgent error: a fault; as long as its result is `valid`, why the stroke was not measured, so that no
+    /// code of another matter stands under its number; what keeps the host from being ready.
+    fn error(&self, result: Option<&Publication>, valid: bool) -> Option<Code> {
         let fault = if let LinkState::Fault(code) = self.link { Some(code) } else { None };
         let obstacle = self.obstacle().filter(|code| code.alarm().severity == Severity::Error);
         let missed = self.missed && self.config.policy.on_missed_stroke != OnMissed::Warn;
@@ -107,7 +112,8 @@ impl Handshake {
             Verdict::NotMeasured(code) => Some(code),
             Verdict::Pass | Verdict::Fail | Verdict::CannotTell => None,
         });
-        fault.or(obstacle).or(unmeasured).or(missed.then_some(Code::MissedStroke))
+        let urgent = fault.or(unmeasured.filter(|_| valid)).or(obstacle);
+        urgent.or(unmeasured).or(missed.then_some(Code::MissedStroke))
     }
 
     fn present_warning(&self, result: Option<&Publication>) -> Option<Code> {

@@ -175,8 +175,12 @@ pub(super) fn rules(press: &Press) -> Vec<String> {
         rules.push("Raise error_reset for at least 0.5 s to clear latched errors and missed_count.".into());
     }
     if map.outputs.contains_key(&Output::ErrorCode) {
-        rules
-            .push("The texts of error_code and warning_code: platen press map PLANT --format alarms.".into());
+        rules.push(
+            "As long as the result of a stroke that was not measured is valid, error_code says why it was not; else what \
+             keeps the host from being ready. The texts of error_code and warning_code: platen press map PLANT --format \
+             alarms."
+                .into(),
+        );
     }
     if has(Input::Heartbeat) {
         let limit = press.timeouts.heartbeat_in.as_secs_f64();
