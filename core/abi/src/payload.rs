@@ -216,6 +216,13 @@ header! {
     }
 }
 
+impl Surface {
+    /// Share of the covariance that is scatter of the scan: all of it where the writer does not tell.
+    pub fn scatter_share(&self) -> f32 {
+        if self.noise_share == 0.0 { 1.0 } else { self.noise_share }
+    }
+}
+
 header! {
     /// A named field on a (u, v) grid, comparison to host.
     Grid = c"platen.grid/1" {

@@ -44,6 +44,27 @@ pub struct Inputs {
     pub baseline: Option<Surface>,
 }
 
+impl Inputs {
+    /// The surface that a comparison goes against: `before` or `baseline`; `None` when there is no such scan.
+    ///
+    /// # Errors
+    /// When it is not of the same plate: scans of one plate agree on its size, which comes from the plate file.
+    pub fn earlier(&self, against: &str) -> Result<Option<&Surface>> {
+        const SAME_SIZE: f64 = 1e-6;
+        let earlier = if against == "before" { &self.before } else { &self.baseline };
+        let Some(earlier) = earlier else { return Ok(None) };
+        let size = |s: &Surface| [s.width(), s.height()];
+        let (now, then) = (size(&self.now), size(earlier));
+        if now.iter().zip(&then).all(|(a, b)| (a - b).abs() <= SAME_SIZE) {
+            return Ok(Some(earlier));
+        }
+        let mm = |[w, h]: [f64; 2]| format!("{:.0} x {:.0} mm", w * 1000.0, h * 1000.0);
+        let message =
+            format!("the plate measures {}, the one before {}: not the same plate", mm(now), mm(then));
+        Err(Error::new(ErrorKind::BadData, message).hint("give a scan of the same plate"))
+    }
+}
+
 /// What a comparison found.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
@@ -144,7 +165,7 @@ fn surface_parts(bytes: &[u8]) -> std::result::Result<SurfaceParts, payload::Mal
         thickness: head.thickness,
         precision_factor: payload::slice::<f64>(bytes, head.precision_factor)?.to_vec(),
         covariance: payload::slice::<[f64; 49]>(bytes, head.covariance)?.to_vec(),
-        noise_share: if head.noise_share == 0.0 { 1.0 } else { head.noise_share },
+        noise_share: head.scatter_share(),
         mask_cells: [head.mask_u as usize, head.mask_v as usize],
         seen: payload::slice::<u8>(bytes, head.seen)?.iter().map(|seen| *seen != 0).collect(),
     })

@@ -144,10 +144,8 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         }
     }
     check()?;
-    let earlier = if options.against == "before" { &inputs.before } else { &inputs.baseline };
-    match earlier {
+    match inputs.earlier(&options.against)? {
         Some(earlier) => {
-            same_plate(now, earlier)?;
             let before = Nodes::new(earlier, correlated, options.trusted);
             check()?;
             change::add(&mut report, &nodes, &before, [now, earlier], options);
@@ -162,20 +160,6 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         }
     }
     Ok(report)
-}
-
-/// Scans of one plate agree on its size, which comes from the plate file.
-const SAME_SIZE: f64 = 1e-6;
-
-fn same_plate(now: &Surface, earlier: &Surface) -> Result<()> {
-    let differs = |a: f64, b: f64| (a - b).abs() > SAME_SIZE;
-    if !differs(now.width(), earlier.width()) && !differs(now.height(), earlier.height()) {
-        return Ok(());
-    }
-    let mm = |s: &Surface| format!("{:.0} x {:.0} mm", s.width() * 1000.0, s.height() * 1000.0);
-    let message =
-        format!("the plate measures {}, the one before {}: not the same plate", mm(now), mm(earlier));
-    Err(Error::new(ErrorKind::BadData, message).hint("give a scan of the same plate"))
 }
 
 fn figure(name: impl Into<String>, value: f64, unit: &str) -> Figure {

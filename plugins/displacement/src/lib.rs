@@ -64,9 +64,6 @@ platen_sdk::options! {
 
 struct Displacement(Options);
 
-/// Scans of one plate agree on its size, which comes from the plate file.
-const SAME_SIZE: f64 = 1e-6;
-
 impl Comparison for Displacement {
     const INFO: Info = Info::new(
         c"displacement",
@@ -87,12 +84,10 @@ impl Comparison for Displacement {
 
 /// `check` fails when the job was cancelled.
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
-    let earlier = if options.against == "before" { &inputs.before } else { &inputs.baseline };
-    let Some(earlier) = earlier else {
+    let Some(earlier) = inputs.earlier(&options.against)? else {
         let says = vec![format!("no {} scan: displacement is not known", options.against)];
         return Ok(Report { findings: Findings { says, ..Findings::default() }, fields: Vec::new() });
     };
-    same_plate(&inputs.now, earlier)?;
     let nodes = Nodes::new(&inputs.now, earlier);
     let few = |motion| (motion, vec![0.0; PlateGrid::NODES]);
     let (motion, says) = match options.alignment.as_str() {
@@ -118,17 +113,6 @@ fn on_supports(inputs: &Inputs, earlier: &Surface) -> Result<Motion> {
         return Err(Error::new(ErrorKind::Config, message).hint("add [[support]] to the plate file"));
     }
     Ok(align::places(&nodes))
-}
-
-fn same_plate(now: &Surface, earlier: &Surface) -> Result<()> {
-    let differs = |a: f64, b: f64| (a - b).abs() > SAME_SIZE;
-    if differs(now.width(), earlier.width()) || differs(now.height(), earlier.height()) {
-        let mm = |s: &Surface| format!("{:.0} x {:.0} mm", s.width() * 1000.0, s.height() * 1000.0);
-        let message =
-            format!("the plate measures {}, the one before {}: not the same plate", mm(now), mm(earlier));
-        return Err(Error::new(ErrorKind::BadData, message).hint("give a scan of the same plate"));
-    }
-    Ok(())
 }
 
 fn report(

@@ -287,5 +287,7 @@ fn another_plate_is_refused_and_no_plate_is_said() {
     let mut parts = now.to_parts();
     parts.knots_v.iter_mut().for_each(|knot| *knot *= 1.1);
     let other = Surface::from_parts(parts).expect("sound");
-    assert!(same_plate(&now, &other).expect_err("refused").to_string().contains("not the same plate"));
+    let inputs = Inputs { task: task(0.0), now, before: Some(other), baseline: None };
+    assert!(inputs.earlier("before").expect_err("refused").to_string().contains("not the same plate"));
+    assert!(inputs.earlier("baseline").expect("nothing is wrong with none").is_none());
 }

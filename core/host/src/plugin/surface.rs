@@ -60,7 +60,7 @@ fn parts(bytes: &[u8]) -> Result<SurfaceParts, Malformed> {
         thickness: head.thickness,
         precision_factor: payload::slice::<f64>(bytes, head.precision_factor)?.to_vec(),
         covariance: payload::slice::<[f64; 49]>(bytes, head.covariance)?.to_vec(),
-        noise_share: if head.noise_share == 0.0 { 1.0 } else { head.noise_share },
+        noise_share: head.scatter_share(),
         mask_cells: [head.mask_u as usize, head.mask_v as usize],
         seen: payload::slice::<u8>(bytes, head.seen)?.iter().map(|seen| *seen != 0).collect(),
     })

@@ -108,12 +108,12 @@ impl Line {
         let noise = noise * self.per_range.abs();
         let soft = (SOFTNESS * step).hypot(FACE_NOISE * noise);
         let seen = footprint * self.per_radian;
-        let bracket = |above, below| Bracket { along: self.along, above, below };
-        let last = Term::Last { cell: self.cell, behind: self.residual * self.per_range, soft: noise };
+        let bracket = |terms| Bracket { along: self.along, terms };
+        let last = Says::Last { cell: self.cell, behind: self.residual * self.per_range }.within(noise);
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
             let soft = soft.hypot(0.25 * (self.high - self.low));
-            return bracket(Term::At { place: 0.5 * (self.low + self.high), soft }, last);
+            return bracket([Says::At(0.5 * (self.low + self.high)).within(soft), last]);
         }
         let on_side = self.excess * self.per_range;
         // Of a side face a few beams wide each may pass for mixed.
@@ -123,10 +123,10 @@ impl Line {
             && on_side < SIDE_SLACK * self.side + 3.0 * noise
         {
             let soft = soft.hypot(noise).hypot(SIDE_SLOPE * on_side);
-            return bracket(Term::At { place: self.off + on_side, soft }, last);
+            return bracket([Says::At(self.off + on_side).within(soft), last]);
         }
-        let mut above = Bound { sure: self.low, likely: self.low, soft };
-        let mut below = Bound { sure: self.high, likely: self.high, soft };
+        let mut above = Bound { sure: self.low, likely: self.low };
+        let mut below = Bound { sure: self.high, likely: self.high };
         if self.side == 0.0 {
             below.likely -= seen;
         }
@@ -136,12 +136,12 @@ impl Line {
         }
         if let Some((lowest, highest)) = self.mixed {
             let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
-            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least), soft };
-            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most), soft };
+            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
+            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
         } else if self.side > 0.0 && noise > 0.0 {
-            return bracket(Term::Above(above), last);
+            return bracket([Says::Above(above).within(soft), last]);
         }
-        bracket(Term::Above(above), Term::Below(below))
+        bracket([Says::Above(above), Says::Below(below)].map(|says| says.within(soft)))
     }
 }
 
@@ -191,25 +191,31 @@ pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64, 
     })
 }
 
-/// Where a line says the edge is: inside of one place and outside of another.
+/// Where a line says the edge is, in two terms that do not know of each other.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bracket {
     pub(super) along: f64,
-    above: Term,
-    below: Term,
+    terms: [Term; 2],
 }
 
-/// One thing that a line says of the edge. Distances inwards, metres.
+/// One thing that a line says of the edge, and its standard deviation, metres.
 #[derive(Debug, Clone, Copy)]
-enum Term {
-    /// It is here.
-    At { place: f64, soft: f64 },
-    /// It is inside of this.
+struct Term {
+    says: Says,
+    soft: f64,
+}
+
+/// Where the edge is said to be. Distances inwards, metres.
+#[derive(Debug, Clone, Copy)]
+enum Says {
+    /// Here.
+    At(f64),
+    /// Inside of this.
     Above(Bound),
-    /// It is outside of this.
+    /// Outside of this.
     Below(Bound),
-    /// It is outside of a cell, or the cell on the side face, `behind` outside of the edge as its noisy range has it.
-    Last { cell: f64, behind: f64, soft: f64 },
+    /// Outside of a cell, or the cell is on the side face, `behind` outside of the edge as its noisy range has it.
+    Last { cell: f64, behind: f64 },
 }
 
 /// A bound of the edge: it holds surely at one place and likely at another, farther in.
@@ -217,7 +223,6 @@ enum Term {
 struct Bound {
     sure: f64,
     likely: f64,
-    soft: f64,
 }
 
 impl Bound {
@@ -235,29 +240,32 @@ impl Bound {
     }
 }
 
+impl Says {
+    fn within(self, soft: f64) -> Term {
+        Term { says: self, soft }
+    }
+}
+
 impl Term {
     /// Likelihood of an edge at `at`, the slope of its logarithm, per metre, and its negative second derivative.
     fn likelihood(&self, at: f64, least_soft: f64) -> (f64, f64, f64) {
-        let (soft, sign, (likelihood, slope, bend)) = match *self {
-            Self::At { place, soft } => {
-                let soft = soft.max(least_soft);
+        let soft = self.soft.max(least_soft);
+        let (sign, (likelihood, slope, bend)) = match self.says {
+            Says::At(place) => {
                 let off = (place - at) / soft;
-                (soft, 1.0, ((-0.5 * off * off).exp(), off, 1.0))
+                (1.0, ((-0.5 * off * off).exp(), off, 1.0))
             }
-            Self::Above(Bound { sure, likely, soft }) => {
-                let soft = soft.max(least_soft);
-                (soft, 1.0, Bound::likelihood((at - sure) / soft, (at - likely) / soft))
+            Says::Above(Bound { sure, likely }) => {
+                (1.0, Bound::likelihood((at - sure) / soft, (at - likely) / soft))
             }
-            Self::Below(Bound { sure, likely, soft }) => {
-                let soft = soft.max(least_soft);
-                (soft, -1.0, Bound::likelihood((sure - at) / soft, (likely - at) / soft))
+            Says::Below(Bound { sure, likely }) => {
+                (-1.0, Bound::likelihood((sure - at) / soft, (likely - at) / soft))
             }
-            Self::Last { cell, behind, soft } => {
-                let soft = soft.max(least_soft);
+            Says::Last { cell, behind } => {
                 let (off, behind) = (((at - cell) / soft).max(0.0), behind / soft);
                 let bend = f64::from(off > 0.0);
                 let log = off * (behind - 0.5 * off);
-                (soft, 1.0, (log.min(0.0).exp(), bend * (behind - off), bend))
+                (1.0, (log.min(0.0).exp(), bend * (behind - off), bend))
             }
         };
         (likelihood, sign * slope / soft, bend / (soft * soft))
@@ -265,10 +273,20 @@ impl Term {
 
     /// The place nearest to the other side that the term allows, softness left aside.
     fn limit(&self) -> f64 {
-        match *self {
-            Self::At { place, .. } => place,
-            Self::Above(bound) | Self::Below(bound) => bound.likely,
-            Self::Last { cell, .. } => cell,
+        match self.says {
+            Says::At(place) => place,
+            Says::Above(bound) | Says::Below(bound) => bound.likely,
+            Says::Last { cell, .. } => cell,
+        }
+    }
+
+    /// True when an edge at `at` agrees with the term within `slack`.
+    fn agrees(&self, at: f64, slack: f64) -> bool {
+        match self.says {
+            Says::At(place) => (place - at).abs() < slack,
+            Says::Above(bound) => bound.sure - slack < at,
+            Says::Below(bound) => at < bound.sure + slack,
+            Says::Last { cell, behind } => at < cell + behind.max(0.0) + slack,
         }
     }
 }
@@ -276,10 +294,11 @@ impl Term {
 impl Bracket {
     /// (place, weight) of a pull to the middle with the variance of a uniform distribution.
     pub(super) fn middle(&self, step: f64) -> (f64, f64) {
-        if let Term::At { place, .. } = self.above {
+        let [first, second] = &self.terms;
+        if let Says::At(place) = first.says {
             return (place, 12.0 / (step * step));
         }
-        let (above, below) = (self.above.limit(), self.below.limit());
+        let (above, below) = (first.limit(), second.limit());
         (0.5 * (above + below), 12.0 / (below - above).max(step).powi(2))
     }
 
@@ -288,7 +307,7 @@ impl Bracket {
     ///
     /// `least_soft` widens the bracket, to reach it from far away.
     pub(super) fn pull(&self, at: f64, least_soft: f64) -> (f64, f64) {
-        let [a, b] = [self.above, self.below].map(|term| term.likelihood(at, least_soft));
+        let [a, b] = self.terms.map(|term| term.likelihood(at, least_soft));
         let mine = (1.0 - STRAY_PART) * a.0 * b.0;
         let belongs = mine / (mine + STRAY_PART * STRAY_LIKELIHOOD);
         // In the middle of a wide bracket nothing pulls: a small weight, of a tenth of a metre, keeps the step finite.
@@ -298,13 +317,7 @@ impl Bracket {
 
     /// True when an edge at `at` agrees with the bracket within `slack`.
     pub(super) fn agrees(&self, at: f64, slack: f64) -> bool {
-        let agrees = |term: Term| match term {
-            Term::At { place, .. } => (place - at).abs() < slack,
-            Term::Above(bound) => bound.sure - slack < at,
-            Term::Below(bound) => at < bound.sure + slack,
-            Term::Last { cell, behind, .. } => at < cell + behind.max(0.0) + slack,
-        };
-        agrees(self.above) && agrees(self.below)
+        self.terms.iter().all(|term| term.agrees(at, slack))
     }
 }
 
@@ -368,9 +381,9 @@ mod tests {
 
     #[test]
     fn a_bracket_pulls_from_outside_and_rests_within() {
-        let bound = |at: f64| Bound { sure: at, likely: at, soft: 3e-4 };
-        let bracket =
-            Bracket { along: 0.0, above: Term::Above(bound(-0.003)), below: Term::Below(bound(0.003)) };
+        let bound = |at: f64| Bound { sure: at, likely: at };
+        let terms = [Says::Above(bound(-0.003)), Says::Below(bound(0.003))].map(|says| says.within(3e-4));
+        let bracket = Bracket { along: 0.0, terms };
         let (to, weight) = bracket.pull(0.004, 2e-3);
         assert!(to < 0.004 && weight > 0.0);
         let (to, weight) = bracket.pull(0.001, 0.0);
