@@ -180,44 +180,54 @@ impl Sheet<'_> {
     }
 }
 
+/// One of the parts that the plate is divided into for numbers.
+struct Part {
+    column: usize,
+    row: usize,
+    /// In the legend's unit.
+    mean: f64,
+    /// Shade under its number.
+    beneath: f64,
+}
+
 /// The field's mean over each part of the plate, in digits. Unless the plate is done, the part that is farthest from it is
 /// framed and named: what passes under its boards may still be a little off beyond their ends, and asks for nothing.
 fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Result<(), PictureError> {
     let (w, h) = (sheet.plate.width_mm / CODES[0] as f64, sheet.plate.height_mm / CODES[1] as f64);
-    let parts: Vec<(usize, usize, f64)> = (0..CODES[0] * CODES[1])
-        .map(|k| (k % CODES[0], k / CODES[0]))
-        .filter(|(i, k)| middle(field, *i, *k).0 != NodeState::Unseen)
-        .filter_map(|(i, k)| Some((i, k, mean(field, i, k)? * sheet.scale.factor)))
-        .collect();
-    for (i, k, value) in &parts {
-        let at = sheet.at((*i as f64 + 0.5) * w, (*k as f64 + 0.5) * h);
-        // Readable on the shade that lies under it, which in a narrow bend is not the mean's.
-        let beneath = match middle(field, *i, *k) {
-            (NodeState::Seen, value) => sheet.scale.position(value * sheet.scale.factor),
-            _ => 0.0,
-        };
-        let colour = colour::text_on(beneath);
-        page.text(&sheet.scale.number(*value), at, Text::new(27.0).bold().centred().coloured(colour))?;
+    let part = |k: usize| {
+        let (column, row) = (k % CODES[0], k / CODES[0]);
+        let beneath = shade_at(field, &sheet.scale, (column as f64 + 0.5, row as f64 + 0.5))?;
+        let mean = mean(field, column, row)? * sheet.scale.factor;
+        Some(Part { column, row, mean, beneath })
+    };
+    let parts: Vec<Part> = (0..CODES[0] * CODES[1]).filter_map(part).collect();
+    let digits = Text::new(27.0).bold().centred();
+    for part in &parts {
+        let at = sheet.at((part.column as f64 + 0.5) * w, (part.row as f64 + 0.5) * h);
+        page.text(&sheet.scale.number(part.mean), at, digits.coloured(colour::text_on(part.beneath)))?;
     }
     let Some(words) = sheet.scale.words.filter(|_| !done) else { return Ok(()) };
-    let worst = parts.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
-    let Some((i, k, value)) = worst.filter(|(_, _, value)| value.abs() > sheet.scale.anchors[0]) else {
-        return Ok(());
-    };
+    let worst = parts.iter().max_by(|a, b| a.mean.abs().total_cmp(&b.mean.abs()));
+    let Some(worst) = worst.filter(|part| part.mean.abs() > sheet.scale.anchors[0]) else { return Ok(()) };
     let inset = 3.0 / sheet.pixel_per_mm;
-    let (i, k) = (*i as f64, *k as f64);
+    let (i, k) = (worst.column as f64, worst.row as f64);
     let (from, to) =
         (sheet.at(i * w + inset, (k + 1.0) * h - inset), sheet.at((i + 1.0) * w - inset, k * h + inset));
     page.frame(from, to, INK, 4)?;
-    let below = (0.5 * (from.0 + to.0), to.1 - 20.0);
-    let look = Text::new(22.0).bold().centred().coloured(colour::text_on(sheet.scale.position(*value)));
-    page.text(words[usize::from(*value > 0.0)], below, look)
+    // At the part's lower side, where the shade may be another than under its number.
+    let (below, row) = ((0.5 * (from.0 + to.0), to.1 - 20.0), k + (inset + 20.0 / sheet.pixel_per_mm) / h);
+    let beneath = shade_at(field, &sheet.scale, (i + 0.5, row)).unwrap_or(worst.beneath);
+    let look = Text::new(22.0).bold().centred().coloured(colour::text_on(beneath));
+    page.text(words[usize::from(worst.mean > 0.0)], below, look)
 }
 
-/// What is known in the middle of a part of the plate, where its number stands.
-fn middle(field: &Field, i: usize, k: usize) -> (NodeState, f64) {
-    let share = |part: usize, parts: usize| (part as f64 + 0.5) / parts as f64;
-    field.sample(share(i, CODES[0]), share(k, CODES[1]), 0)
+/// The shade at a place given in parts of the plate along u and v; `None` where nothing was seen.
+fn shade_at(field: &Field, scale: &Scale, (column, row): (f64, f64)) -> Option<f64> {
+    match field.sample(column / CODES[0] as f64, row / CODES[1] as f64, 0) {
+        (NodeState::Seen, value) => Some(scale.position(value * scale.factor)),
+        (NodeState::Unchanged, _) => Some(0.0),
+        (NodeState::Unseen, _) => None,
+    }
 }
 
 /// Mean over the known nodes of a part of the plate; `None` when fewer than half were seen, or most show no change.

@@ -11,7 +11,7 @@ pub struct Tape {
     end: Option<ScanEnd>,
 }
 
-/// Most cells that are held (29 bytes each): a full dome of the finest step that anyone measures plates with.
+/// Most cells that are held (`Column::SAMPLE_BYTES` each): a full dome of the finest step that anyone measures plates with.
 const TAPE_CELLS: usize = 50_000_000;
 
 impl Tape {
