@@ -23,6 +23,7 @@ int main(void) {
   SIZE(platen_scan_end), FIELD(platen_scan_end, points), FIELD(platen_scan_end, outcome);
   SIZE(platen_window), FIELD(platen_window, elevation_max);
   SIZE(platen_mesh), FIELD(platen_mesh, corners), FIELD(platen_mesh, edge_length), FIELD(platen_mesh, arc);
+  FIELD(platen_mesh, places);
   SIZE(platen_chart), FIELD(platen_chart, sigma);
   SIZE(platen_surface), FIELD(platen_surface, thickness), FIELD(platen_surface, seen);
   SIZE(platen_grid), FIELD(platen_grid, components), FIELD(platen_grid, state);

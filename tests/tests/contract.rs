@@ -68,7 +68,7 @@ fn the_header_and_the_rust_types_agree() {
         platen_column = p::Column { range_m, state }
         platen_scan_end = p::ScanEnd { points, outcome }
         platen_window = p::Window { elevation_max }
-        platen_mesh = p::Mesh { corners, edge_length, arc }
+        platen_mesh = p::Mesh { corners, edge_length, arc, places }
         platen_chart = p::Chart { sigma }
         platen_surface = p::Surface { thickness, seen }
         platen_grid = p::Grid { components, state }

@@ -183,7 +183,7 @@ typedef struct platen_span {
 #define PLATEN_FORMAT_COLUMN "platen.column/2"     /* driver -> host */
 #define PLATEN_FORMAT_SCAN_END "platen.scan-end/1" /* driver -> host, last */
 #define PLATEN_FORMAT_WINDOW "platen.window/1"     /* host -> driver, optional */
-#define PLATEN_FORMAT_MESH "platen.mesh/1"         /* host -> flattening */
+#define PLATEN_FORMAT_MESH "platen.mesh/2"         /* host -> flattening */
 #define PLATEN_FORMAT_CHART "platen.chart/1"       /* flattening -> host */
 #define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison; attribute role: now, before, baseline */
 #define PLATEN_FORMAT_TASK "platen.task/1"         /* host -> comparison, JSON */
@@ -229,6 +229,7 @@ typedef struct platen_mesh {
   platen_span triangles; /* u32, 3 each, counter-clockwise seen from the scanner */
   platen_span boundary;  /* u32, loop counter-clockwise from corner (0,0) */
   platen_span arc;       /* f64, arc length of each boundary vertex from its edge's first corner */
+  platen_span places;    /* f64, 2 each: (u, v) of the material at each boundary vertex */
 } platen_mesh;
 
 typedef struct platen_chart {

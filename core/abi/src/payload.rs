@@ -146,7 +146,7 @@ header! {
 
 header! {
     /// Mid-surface mesh of the plate, host to flattening.
-    Mesh = c"platen.mesh/1" {
+    Mesh = c"platen.mesh/2" {
         /// 0.
         reserved: u32,
         /// Extent of the rectangle along u.
@@ -171,6 +171,8 @@ header! {
         boundary: Span,
         /// f64, arc length of each boundary vertex from its edge's first corner.
         arc: Span,
+        /// f64, 2 a boundary vertex: (u, v) of the material there.
+        places: Span,
     }
 }
 

@@ -171,7 +171,10 @@ pub fn measure_scanned(
         }
     };
     let outline_time = start.elapsed();
-    let measurement = measure(&scanned.patch, &outline, spec, &mut rig.flattening, &mut || start.elapsed())?;
+    let measurement =
+        measure(&scanned.patch, &outline, spec, &spec.rectangle(), &mut rig.flattening, &mut || {
+            start.elapsed()
+        })?;
     match last.and_then(|last| turned(&measurement.surface, last.surface)) {
         Some(turned) => Err(NotMeasured::Turned(turned)),
         None => Ok(Measured { outline, measurement, outline_time }),

@@ -68,6 +68,7 @@ fn mesh_parts(bytes: &[u8]) -> std::result::Result<DiskParts, payload::Malformed
         corner_sigma: std::array::from_fn(|k| [sigma[2 * k], sigma[2 * k + 1]]),
         edge_sigma: head.edge_sigma,
         arc: payload::slice::<f64>(bytes, head.arc)?.to_vec(),
+        places: payload::slice::<[f64; 2]>(bytes, head.places)?.to_vec(),
         edge_length: head.edge_length,
         width: head.width,
         height: head.height,

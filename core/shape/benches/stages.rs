@@ -69,7 +69,7 @@ fn push(header: &ScanHeader, columns: &[Column], spec: &PlateSpec) -> Extractor 
 }
 
 fn whole(patch: &Patch, outline: &Outline, spec: &PlateSpec, flatten: &mut dyn Flatten) -> Measurement {
-    measure(patch, outline, spec, flatten, &mut Duration::default).expect("a measurement")
+    measure(patch, outline, spec, &spec.rectangle(), flatten, &mut Duration::default).expect("a measurement")
 }
 
 /// A flattening that is known already.
@@ -109,7 +109,9 @@ fn smooth_face(bencher: Bencher<'_, '_>) {
 fn mesh(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
     let face = Face::fit(&s.patch, &s.outline, &s.spec).expect("a face");
-    bencher.bench_local(|| face.mesh(&s.outline, &s.spec, platen_shape::measure::N_VERTICES));
+    bencher.bench_local(|| {
+        face.mesh(&s.outline, &s.spec, &s.spec.rectangle(), platen_shape::measure::N_VERTICES)
+    });
 }
 
 /// Smooth face, mesh and S, the flattening given.

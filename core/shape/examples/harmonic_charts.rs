@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use platen_shape::flatten::closed_form::{ClosedForm, cone, cylinder, half_bent, sphere_of_fibres};
-use platen_shape::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
+use platen_shape::flatten::{cotangents, fixed_boundary};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).ok_or("usage: harmonic_charts DIR")?;
@@ -39,7 +39,7 @@ fn write(folder: &Path, name: &str, plate: &ClosedForm) -> Result<(), Box<dyn Er
     let mut uv = Vec::new();
     for _ in 0..5 {
         let start = Instant::now();
-        uv = fixed_boundary(&mesh, &cotangents(&mesh), &boundary_by_arc_length(&mesh))?;
+        uv = fixed_boundary(&mesh, &cotangents(&mesh))?;
         best_ms = best_ms.min(start.elapsed().as_secs_f64() * 1e3);
     }
     let vertices: Vec<[f64; 3]> = mesh.vertices.iter().map(|&p| p.into()).collect();
@@ -48,7 +48,7 @@ fn write(folder: &Path, name: &str, plate: &ClosedForm) -> Result<(), Box<dyn Er
         "vertices_m": vertices,
         "triangles": mesh.triangles,
         "boundary": mesh.boundary,
-        "boundary_uv_m": boundary_by_arc_length(&mesh),
+        "boundary_uv_m": mesh.places,
         "uv_m": uv,
         "size_m": [mesh.width, mesh.height],
         "ms": best_ms,

@@ -3,12 +3,13 @@
 #[cfg(any(test, feature = "closed-form"))]
 pub mod closed_form;
 mod domain;
+mod free;
 mod laplace;
 
 pub use domain::{
-    UnfitMesh, boundary_by_arc_length, check_fit, edges_of_vertices, first_turned, interior, plane_picture,
-    signed_area,
+    UnfitMesh, check_fit, edges_of_vertices, first_turned, interior, plane_picture, signed_area,
 };
+pub use free::{LaidFlat, lay_flat, plane_stress};
 pub use laplace::{cotangents, fixed_boundary};
 
 use crate::mesh::DiskMesh;

@@ -15,7 +15,7 @@ use std::time::Duration;
 use crate::evaluate::Location;
 use crate::mesh::{Face, MeshError};
 use crate::surface::{Surface, Undetermined};
-use crate::{Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
+use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
 
 /// Vertices of the mesh: as many as the paper's.
 pub const N_VERTICES: usize = 10_000;
@@ -31,7 +31,7 @@ pub struct Measurement {
     pub chart: Chart,
     /// How well material points are located.
     pub location: Location,
-    /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, metres, scanner frame.
+    /// The blank's corners (0,0), (W,0), (W,H), (0,H) on the scanned face, metres, scanner frame.
     pub corners: [Vec3; 4],
     /// How good the scan was.
     pub quality: Quality,
@@ -81,7 +81,7 @@ pub enum MeasureError {
     Surface(#[from] Undetermined),
 }
 
-/// Measures the plate. `clock` tells the time since some fixed moment; it is read between the stages.
+/// Measures the plate, whose edges lie on the outline of `blank`. `clock` tells the time since some fixed moment; it is read between the stages.
 ///
 /// # Errors
 /// [`MeasureError`]: too few samples, a mesh that is no disk, or the flattening's own refusal.
@@ -89,12 +89,13 @@ pub fn measure(
     patch: &Patch,
     outline: &Outline,
     spec: &PlateSpec,
+    blank: &Blank,
     flatten: &mut dyn Flatten,
     clock: &mut dyn FnMut() -> Duration,
 ) -> Result<Measurement, MeasureError> {
     let start = clock();
     let face = Face::fit(patch, outline, spec)?;
-    let (mesh, places) = face.mesh(outline, spec, N_VERTICES)?;
+    let (mesh, places) = face.mesh(outline, spec, blank, N_VERTICES)?;
     let meshed = clock();
     let chart = flatten.flatten(&mesh)?;
     chart.check(&mesh)?;
@@ -102,9 +103,8 @@ pub fn measure(
     let settled = settle::settle(patch, &face, &places, &chart, spec)?;
     let fitted = clock();
     let surface = settled.surface;
-    let corners = [[0.0, 0.0], [spec.width, 0.0], [spec.width, spec.height], [0.0, spec.height]];
     Ok(Measurement {
-        corners: corners.map(|[u, v]| surface.face(u, v)),
+        corners: blank.corners.map(|[u, v]| surface.face(u, v)),
         location: Location::new(&mesh, &chart),
         surface,
         mesh,

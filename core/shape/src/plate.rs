@@ -1,6 +1,6 @@
 //! What is known of the plate before it is scanned.
 
-use crate::Vec3;
+use crate::{Blank, Vec3};
 
 /// The plate as ordered, and what tells its corners apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +17,14 @@ pub struct PlateSpec {
     pub u_axis: Option<Vec3>,
     /// Where the plate can be, scanner frame.
     pub region: Option<RegionOfInterest>,
+}
+
+impl PlateSpec {
+    /// The outline as ordered.
+    #[must_use]
+    pub fn rectangle(&self) -> Blank {
+        Blank::rectangle(self.width, self.height)
+    }
 }
 
 /// Axis-parallel box in the scanner frame, metres.

@@ -82,7 +82,8 @@ fn nothing_panics_and_all_numbers_are_finite() {
         outlines += 1;
         let mut clock = std::time::Duration::default;
         if scene.spec().thickness > 0.0
-            && let Ok(m) = measure(&patch, &outline, &scene.spec(), &mut Harmonic, &mut clock)
+            && let Ok(m) =
+                measure(&patch, &outline, &scene.spec(), &scene.spec().rectangle(), &mut Harmonic, &mut clock)
         {
             assert!(m.corners.iter().all(|p| p.iter().all(|c| c.is_finite())), "seed {seed}");
             assert!(m.surface.net().control.iter().flatten().all(|c| c.is_finite()), "seed {seed}");

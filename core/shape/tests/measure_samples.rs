@@ -16,7 +16,8 @@ fn measured(sample: &support::Sample) -> Measurement {
     let patch = support::extract(sample, 0..sample.columns.len()).unwrap();
     let outline = outline(&patch, &sample.spec).unwrap();
     let begin = std::time::Instant::now();
-    measure(&patch, &outline, &sample.spec, &mut Harmonic, &mut || begin.elapsed()).unwrap()
+    measure(&patch, &outline, &sample.spec, &sample.spec.rectangle(), &mut Harmonic, &mut || begin.elapsed())
+        .unwrap()
 }
 
 fn numbers(value: &Value) -> Vec<f64> {

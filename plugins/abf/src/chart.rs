@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use platen_sdk::{Error, ErrorKind, Result};
 use platen_shape::DiskMesh;
-use platen_shape::flatten::{boundary_by_arc_length, fixed_boundary, interior, plane_picture};
+use platen_shape::flatten::{fixed_boundary, interior, plane_picture};
 use platen_shape::sparse::{Graph, SparseError};
 
 use crate::angles::{Corners, Failing, targets};
@@ -23,7 +23,7 @@ const KEPT: f64 = 0.1;
 pub(crate) fn abf(mesh: &DiskMesh, go_on: impl Fn() -> Result<()>) -> Result<Vec<[f64; 2]>> {
     let angles = plane_angles(mesh, go_on)?;
     let cotangents: Vec<_> = angles.iter().map(|x| x.map(|x| 1.0 / x.tan())).collect();
-    fixed_boundary(mesh, &cotangents, &boundary_by_arc_length(mesh)).map_err(|e| unsolved(&e))
+    fixed_boundary(mesh, &cotangents).map_err(|e| unsolved(&e))
 }
 
 /// The angles of a plane mesh nearest to those of `mesh`.

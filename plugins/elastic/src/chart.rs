@@ -1,7 +1,7 @@
 //! From the mesh to the chart: start, minimum, strain, uncertainty.
 
 use platen_sdk::Result;
-use platen_shape::flatten::{boundary_by_arc_length, cotangents, first_turned, fixed_boundary};
+use platen_shape::flatten::{cotangents, first_turned, fixed_boundary};
 use platen_shape::{Chart, DiskMesh};
 
 use crate::hold::Hold;
@@ -24,10 +24,9 @@ pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, go_on: impl Fn() -> Result<
 
 /// The harmonic map, or Tutte's where obtuse angles fold it.
 fn start(mesh: &DiskMesh) -> Result<Vec<[f64; 2]>> {
-    let boundary = boundary_by_arc_length(mesh);
     let tutte = || vec![[1.0; 3]; mesh.triangles.len()];
     for weights in [&|| cotangents(mesh), &tutte as &dyn Fn() -> Vec<[f64; 3]>] {
-        let uv = fixed_boundary(mesh, &weights(), &boundary).map_err(|e| unsolved(&e))?;
+        let uv = fixed_boundary(mesh, &weights()).map_err(|e| unsolved(&e))?;
         if first_turned(&mesh.triangles, &uv).is_none() {
             return Ok(uv);
         }

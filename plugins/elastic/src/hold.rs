@@ -1,7 +1,8 @@
-//! How the known rectangle holds the material places of the boundary.
+//! How the known outline holds the material places of the boundary.
 //!
 //! An edge of the plate is seen at its place up to `edge_sigma`, a corner up to `corner_sigma`; the material may slide
-//! along an edge. Each is a spring across the edge, or at the corner along both of its edges. Read as statistics, the
+//! along an edge. Each is a spring along the outline's normal at the vertex, in a corner along the normals of both edges.
+//! Sliding by s along an edge of radius R leaves it by s^2 / 2R, nothing on a plate's edge. Read as statistics, the
 //! minimum of membrane energy plus springs is the likeliest chart when the membrane strain scatters by `strain` around
 //! zero and the edge's place by `edge_sigma`, the same all along the edge: the springs of one edge share
 //!
@@ -23,12 +24,20 @@ const MIN_SIGMA: f64 = 1e-6;
 /// No plate lies stiller than this: 1 K of heat.
 const MIN_STRAIN: f64 = 1e-5;
 
-/// One coordinate of a vertex drawn to its known value.
+/// A vertex drawn to its known place along one direction.
 struct Spring {
     vertex: u32,
-    axis: usize,
-    place: f64,
+    normal: [f64; 2],
+    place: [f64; 2],
     stiffness: f64,
+}
+
+impl Spring {
+    /// How far the vertex is off along the direction.
+    fn stretch(&self, x: &[[f64; 2]]) -> f64 {
+        let x = x[self.vertex as usize];
+        self.normal[0] * (x[0] - self.place[0]) + self.normal[1] * (x[1] - self.place[1])
+    }
 }
 
 /// All springs of a plate.
@@ -39,50 +48,57 @@ impl Hold {
     pub(crate) fn new(mesh: &DiskMesh, strain: f64) -> Self {
         let scale = strain.max(MIN_STRAIN).powi(2) * mesh.width * mesh.height;
         let stiffness = |sigma: f64| scale / sigma.max(MIN_SIGMA).powi(2);
-        // Edges v = 0, u = W, v = H, u = 0.
-        let lines = [(1, 0.0), (0, mesh.width), (1, mesh.height), (0, 0.0)];
+        let n = mesh.boundary.len();
+        let spring = |at: usize, normal: [f64; 2], stiffness: f64| {
+            let at = at % n;
+            Spring { vertex: mesh.boundary[at], normal, place: mesh.places[at], stiffness }
+        };
         let mut springs = Vec::new();
-        for (edge, &(axis, place)) in lines.iter().enumerate() {
+        for edge in 0..4 {
             let end = *mesh.edge(edge).end();
             let arc = |at: usize| if at == end { mesh.edge_length[edge] } else { mesh.arc[at] };
             for at in mesh.edge(edge) {
                 let from = arc(at.max(mesh.edge(edge).start() + 1) - 1);
                 let share = 0.5 * (arc((at + 1).min(end)) - from) / mesh.edge_length[edge];
-                let vertex = mesh.boundary[at % mesh.boundary.len()];
-                springs.push(Spring {
-                    vertex,
-                    axis,
-                    place,
-                    stiffness: share * stiffness(mesh.edge_sigma[edge]),
-                });
+                springs.push(spring(at, normal(mesh, edge, at), share * stiffness(mesh.edge_sigma[edge])));
             }
         }
         for (corner, [leaving, arriving]) in mesh.corner_sigma.iter().enumerate() {
-            let vertex = mesh.boundary[mesh.corners[corner] as usize];
             // Along the edge that leaves, the corner lies on the line of the edge that arrives, and the reverse.
-            for (line, sigma) in [((corner + 3) % 4, leaving), (corner, arriving)] {
-                let (axis, place) = lines[line];
-                springs.push(Spring { vertex, axis, place, stiffness: stiffness(*sigma) });
-            }
+            let before = (corner + 3) % 4;
+            let (start, end) = (*mesh.edge(corner).start(), *mesh.edge(before).end());
+            springs.push(spring(start, normal(mesh, before, end), stiffness(*leaving)));
+            springs.push(spring(start, normal(mesh, corner, start), stiffness(*arriving)));
         }
         Self(springs)
     }
 
     pub(crate) fn energy(&self, x: &[[f64; 2]]) -> f64 {
-        self.0.iter().map(|s| 0.5 * s.stiffness * (x[s.vertex as usize][s.axis] - s.place).powi(2)).sum()
+        self.0.iter().map(|s| 0.5 * s.stiffness * s.stretch(x).powi(2)).sum()
     }
 
     pub(crate) fn add_gradient(&self, x: &[[f64; 2]], gradient: &mut [[f64; 2]]) {
         for s in &self.0 {
-            gradient[s.vertex as usize][s.axis] += s.stiffness * (x[s.vertex as usize][s.axis] - s.place);
+            let force = s.stiffness * s.stretch(x);
+            let slot = &mut gradient[s.vertex as usize];
+            (0..2).for_each(|c| slot[c] += force * s.normal[c]);
         }
     }
 
     pub(crate) fn add_hessian(&self, spd: &mut Spd<2>) {
         for s in &self.0 {
-            let mut block = [[0.0; 2]; 2];
-            block[s.axis][s.axis] = s.stiffness;
+            let block = s.normal.map(|a| s.normal.map(|b| s.stiffness * a * b));
             spd.add(s.vertex, s.vertex, block);
         }
     }
+}
+
+/// Unit normal of the outline at position `at` of an edge: across the line of its neighbours there.
+fn normal(mesh: &DiskMesh, edge: usize, at: usize) -> [f64; 2] {
+    let range = mesh.edge(edge);
+    let place = |at: usize| mesh.places[at % mesh.places.len()];
+    let (from, to) = (place(at.max(range.start() + 1) - 1), place((at + 1).min(*range.end())));
+    let along = [to[0] - from[0], to[1] - from[1]];
+    let length = along[0].hypot(along[1]);
+    [along[1] / length, -along[0] / length]
 }

@@ -14,6 +14,7 @@
 //! E the strain of least energy, f the direction of the fibres. The field is smooth: a grid of 16 x 16 cells gives it to a
 //! percent or two.
 
+use platen_shape::flatten::plane_stress;
 use platen_shape::sparse::{Graph, SparseError, Spd};
 
 use crate::membrane::{Strained, Sym};
@@ -129,14 +130,4 @@ impl Grid {
         let [a, b, c, d] = [0, 1, self.n + 1, self.n + 2].map(|step| shifts[at + step]);
         [0, 1].map(|k| (1.0 - t) * ((1.0 - s) * a[k] + s * b[k]) + t * ((1.0 - s) * c[k] + s * d[k]))
     }
-}
-
-/// The block of two hat gradients in linear plane stress, per area, Young's modulus 1.
-fn plane_stress(a: [f64; 2], b: [f64; 2], poisson: f64) -> [[f64; 2]; 2] {
-    let young = 1.0 / (1.0 - poisson * poisson);
-    let shear = 0.5 * (1.0 - poisson) * young;
-    [
-        [young * a[0] * b[0] + shear * a[1] * b[1], young * poisson * a[0] * b[1] + shear * a[1] * b[0]],
-        [young * poisson * a[1] * b[0] + shear * a[0] * b[1], young * a[1] * b[1] + shear * a[0] * b[0]],
-    ]
 }

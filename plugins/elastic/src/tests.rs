@@ -5,7 +5,7 @@ mod membrane;
 use crate::chart::elastic;
 use least_energy::sphere_of_least_energy;
 use platen_shape::flatten::closed_form::*;
-use platen_shape::flatten::{boundary_by_arc_length, check_fit, cotangents, first_turned, fixed_boundary};
+use platen_shape::flatten::{check_fit, cotangents, first_turned, fixed_boundary};
 use platen_shape::{Chart, Vec3};
 
 fn chart(plate: &ClosedForm) -> Chart {
@@ -16,7 +16,7 @@ fn chart(plate: &ClosedForm) -> Chart {
 
 fn harmonic_errors(plate: &ClosedForm) -> [f64; 2] {
     let mesh = plate.mesh().unwrap();
-    plate.errors(&fixed_boundary(&mesh, &cotangents(&mesh), &boundary_by_arc_length(&mesh)).unwrap())
+    plate.errors(&fixed_boundary(&mesh, &cotangents(&mesh)).unwrap())
 }
 
 /// Mean and largest of the reported uncertainty, metres.

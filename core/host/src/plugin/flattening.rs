@@ -87,6 +87,7 @@ fn mesh_frame(mesh: &DiskMesh) -> InputFrame {
         triangles: layout.add::<[u32; 3]>(mesh.triangles.len()),
         boundary: layout.add::<u32>(mesh.boundary.len()),
         arc: layout.add::<f64>(mesh.arc.len()),
+        places: layout.add::<[f64; 2]>(mesh.places.len()),
     };
     let mut buffer = HostBuffer::new(layout.bytes());
     let bytes = buffer.bytes_mut();
@@ -95,6 +96,7 @@ fn mesh_frame(mesh: &DiskMesh) -> InputFrame {
     payload::put(bytes, head.triangles, &mesh.triangles);
     payload::put(bytes, head.boundary, &mesh.boundary);
     payload::put(bytes, head.arc, &mesh.arc);
+    payload::put(bytes, head.places, &mesh.places);
     InputFrame { format: payload::Mesh::FORMAT, role: None, buffer }
 }
 

@@ -1,7 +1,7 @@
 //! Meshes of closed-form plates whose material coordinates are known: for tests and benchmarks only.
 
-use crate::Vec3;
 use crate::mesh::{DiskMesh, DiskParts, MeshError};
+use crate::{Blank, Vec3};
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 /// A plate's mesh that knows where each of its vertices lies on the plate.
@@ -37,7 +37,9 @@ impl ClosedForm {
                 edge_length[edge] += arc_length(&point, uv[at as usize], uv[next as usize]);
             }
         }
+        let at = corners.map(|at| at as usize);
         let parts = DiskParts {
+            places: Blank::rectangle(size[0], size[1]).places(at, &arc, edge_length),
             vertices: uv.iter().map(|&p| point(p)).collect(),
             triangles: delaunay(&uv),
             boundary: (0..2 * (nu + nv)).collect(),

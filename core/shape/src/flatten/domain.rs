@@ -1,4 +1,4 @@
-//! The mesh against its rectangle: what can be flattened at all, and where the boundary goes.
+//! The mesh against its rectangle: what can be flattened at all.
 
 use crate::mesh::DiskMesh;
 
@@ -92,23 +92,6 @@ pub fn edges_of_vertices(mesh: &DiskMesh) -> Vec<u8> {
         }
     }
     edges
-}
-
-/// Where the boundary lies on the rectangle when every point keeps its share of its edge's arc length (paper, section
-/// 4.3): one place per boundary vertex, metres.
-pub fn boundary_by_arc_length(mesh: &DiskMesh) -> Vec<[f64; 2]> {
-    let (w, h) = (mesh.width, mesh.height);
-    let mut places = Vec::with_capacity(mesh.boundary.len());
-    for edge in 0..4 {
-        let edge_places = mesh.edge(edge).take_while(|&at| at < *mesh.edge(edge).end());
-        places.extend(edge_places.map(|at| mesh.arc[at] / mesh.edge_length[edge]).map(|s| match edge {
-            0 => [s * w, 0.0],
-            1 => [w, s * h],
-            2 => [(1.0 - s) * w, h],
-            _ => [0.0, (1.0 - s) * h],
-        }));
-    }
-    places
 }
 
 /// A rough plane picture of the mesh, to order eliminations by: the vertices along the plate's mean u and v.

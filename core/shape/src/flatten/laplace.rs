@@ -14,8 +14,7 @@ pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
     mesh.triangles.iter().map(of_triangle).collect()
 }
 
-/// The map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at `boundary`
-/// (one place per boundary vertex, in the loop's order); metres.
+/// The map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at its places; metres.
 ///
 /// `weights` has three numbers per triangle, one per corner; k_ij is the sum over the one or two triangles at the edge
 /// ij of the number at the corner opposite to it. Cotangents give the harmonic map (paper, equation 4), ones Tutte's.
@@ -23,16 +22,12 @@ pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
 ///
 /// # Errors
 /// [`SparseError::NotPositiveDefinite`] when the weights do not hold the interior.
-pub fn fixed_boundary(
-    mesh: &DiskMesh,
-    weights: &[[f64; 3]],
-    boundary: &[[f64; 2]],
-) -> Result<Vec<[f64; 2]>, SparseError> {
+pub fn fixed_boundary(mesh: &DiskMesh, weights: &[[f64; 3]]) -> Result<Vec<[f64; 2]>, SparseError> {
     let (node_of, inner) = interior(mesh);
     let picture = plane_picture(mesh);
     let points: Vec<_> = inner.iter().map(|&v| picture[v as usize]).collect();
     let mut uv = vec![[0.0; 2]; mesh.vertices.len()];
-    for (&v, &place) in mesh.boundary.iter().zip(boundary) {
+    for (&v, &place) in mesh.boundary.iter().zip(&mesh.places) {
         uv[v as usize] = place;
     }
     let mut spd = Spd::<1>::analyse(&Graph::of_elements(&mesh.triangles, &node_of, inner.len()), &points)?;

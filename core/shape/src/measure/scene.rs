@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3};
 
 use super::{Measurement, measure};
 use crate::flatten::closed_form::Random;
-use crate::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
+use crate::flatten::{cotangents, fixed_boundary};
 use crate::surface::Derivatives;
 use crate::{
     Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, Outline, Patch, PlateSpec, Sample, Vec3,
@@ -16,8 +16,7 @@ pub(super) struct Harmonic;
 impl Flatten for Harmonic {
     fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError> {
         let refused = |message| FlattenError::Refused { message, hint: "a test's own fault".into() };
-        let uv = fixed_boundary(mesh, &cotangents(mesh), &boundary_by_arc_length(mesh))
-            .map_err(|e| refused(e.to_string()))?;
+        let uv = fixed_boundary(mesh, &cotangents(mesh)).map_err(|e| refused(e.to_string()))?;
         Ok(Chart { uv, ..Chart::default() })
     }
 }
@@ -147,8 +146,15 @@ impl Scene {
 
     pub(super) fn measure(&self) -> Measurement {
         let mut clock = std::time::Duration::default;
-        measure(&self.patch(), &self.outline(), &self.spec(), &mut Harmonic, &mut clock)
-            .expect("a measurement")
+        measure(
+            &self.patch(),
+            &self.outline(),
+            &self.spec(),
+            &self.spec().rectangle(),
+            &mut Harmonic,
+            &mut clock,
+        )
+        .expect("a measurement")
     }
 }
 

@@ -137,7 +137,14 @@ fn an_empty_patch_is_refused() {
     let scene = Scene { pitch: 2.0, ..Scene::new(cylinder(8.0, 0.7), [3.0, 2.0]) };
     let mut clock = std::time::Duration::default;
     let mut flatten = super::scene::Harmonic;
-    let error = super::measure(&scene.patch(), &scene.outline(), &scene.spec(), &mut flatten, &mut clock);
+    let error = super::measure(
+        &scene.patch(),
+        &scene.outline(),
+        &scene.spec(),
+        &scene.spec().rectangle(),
+        &mut flatten,
+        &mut clock,
+    );
     let message = error.expect_err("refused").to_string();
     assert!(message.contains("points do not determine the surface"), "{message}");
 }

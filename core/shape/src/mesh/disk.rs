@@ -17,12 +17,15 @@ pub struct DiskParts {
     pub boundary: Vec<u32>,
     /// Positions of the corners (0,0), (W,0), (W,H), (0,H) in `boundary`; the first is 0.
     pub corners: [u32; 4],
-    /// Per corner: standard deviation along the edge that leaves it and along the one that arrives, metres.
+    /// Per corner: standard deviation of its place along the edge that leaves it and along the one that arrives, metres.
     pub corner_sigma: [[f64; 2]; 4],
     /// Per edge: standard deviation across the edge, in the surface, metres.
     pub edge_sigma: [f64; 4],
     /// Per boundary vertex: arc length from the first corner of its edge, metres; 0 in the corners.
     pub arc: Vec<f64>,
+    /// Per boundary vertex: (u, v) of the material there, metres. Across its edge known to `edge_sigma`; along it, between
+    /// the corners, only as well as material keeps its share of the edge's length.
+    pub places: Vec<[f64; 2]>,
     /// Arc length of the edges v = 0, u = W, v = H, u = 0, metres.
     pub edge_length: [f64; 4],
     /// Extent of the original rectangle along u, metres.
@@ -93,8 +96,13 @@ fn check_numbers(parts: &DiskParts) -> Result<(), MeshError> {
 
 fn check_loop(parts: &DiskParts) -> Result<(), MeshError> {
     let n = parts.boundary.len();
-    if parts.arc.len() != n {
-        return Err(malformed(format!("{} arc lengths for {n} boundary vertices", parts.arc.len())));
+    for (what, found) in [("arc lengths", parts.arc.len()), ("places", parts.places.len())] {
+        if found != n {
+            return Err(malformed(format!("{found} {what} for {n} boundary vertices")));
+        }
+    }
+    if let Some(i) = parts.places.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(malformed(format!("boundary vertex {i} has no finite place")));
     }
     let c = parts.corners.map(|c| c as usize);
     if c[0] != 0 || c[1] <= c[0] || c[2] <= c[1] || c[3] <= c[2] || c[3] >= n {
@@ -109,6 +117,13 @@ fn check_loop(parts: &DiskParts) -> Result<(), MeshError> {
         }
     }
     for k in 0..4 {
+        let places: Vec<_> =
+            (c[k]..=if k == 3 { n } else { c[k + 1] }).map(|at| parts.places[at % n]).collect();
+        let chord = between(places[0], places[places.len() - 1]);
+        let forward = |step: [f64; 2]| step[0] * chord[0] + step[1] * chord[1] > 0.0;
+        if !places.windows(2).all(|w| forward(between(w[0], w[1]))) {
+            return Err(malformed(format!("the places of edge {k} do not run from corner to corner")));
+        }
         let arc = &parts.arc[c[k]..if k == 3 { n } else { c[k + 1] }];
         let grows = arc.windows(2).all(|w| w[1] > w[0]) && parts.edge_length[k] > arc[arc.len() - 1];
         if arc[0] != 0.0 || !grows || !parts.edge_length[k].is_finite() {
@@ -120,9 +135,14 @@ fn check_loop(parts: &DiskParts) -> Result<(), MeshError> {
     Ok(())
 }
 
+fn between(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
+    [to[0] - from[0], to[1] - from[1]]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Blank;
 
     /// A unit square of four triangles around its centre.
     fn square() -> DiskParts {
@@ -134,6 +154,7 @@ mod tests {
             boundary: vec![0, 1, 2, 3],
             corners: [0, 1, 2, 3],
             arc: vec![0.0; 4],
+            places: Blank::rectangle(1.0, 1.0).corners.to_vec(),
             edge_length: [1.0; 4],
             width: 1.0,
             height: 1.0,
@@ -174,6 +195,9 @@ mod tests {
         assert!(refused(|p| p.vertices[3].y = f64::NAN).contains("vertex 3 is not finite"));
         assert!(refused(|p| p.corners = [0, 2, 1, 3]).contains("corners"));
         assert!(refused(|p| p.triangles[2][0] = 77).contains("names vertex 77"));
+        assert!(refused(|p| p.places[1][0] = f64::NAN).contains("boundary vertex 1 has no finite place"));
+        assert!(refused(|p| p.places[1] = p.places[0]).contains("the places of edge 0"));
+        assert!(refused(|p| p.places.truncate(3)).contains("3 places for 4"));
         assert!(refused(|p| p.edge_length[1] = 0.0).contains("edge 1"));
         assert!(refused(|p| p.thickness = 0.0).contains("thickness"));
         assert!(refused(|p| p.edge_sigma[0] = -1.0).contains("standard deviation"));

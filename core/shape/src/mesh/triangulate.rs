@@ -6,7 +6,7 @@
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 use super::{DiskMesh, DiskParts, Face, MeshError};
-use crate::{Outline, PlateSpec, Vec3};
+use crate::{Blank, Outline, PlateSpec, Vec3};
 
 /// A cell's vertex is the sample nearest to its middle, within this share of the cell's size; else the middle itself.
 /// It keeps vertices apart, above all from the boundary.
@@ -16,7 +16,7 @@ const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 impl Face {
-    /// The mid-surface as a mesh of about `n_vertices`, and the vertices' coordinates (a, b).
+    /// The mid-surface as a mesh of about `n_vertices`, its boundary on the outline of `blank`, and the vertices' coordinates (a, b).
     ///
     /// # Errors
     /// [`MeshError::NotADisk`] when the vertices could not be joined.
@@ -24,6 +24,7 @@ impl Face {
         &self,
         outline: &Outline,
         spec: &PlateSpec,
+        blank: &Blank,
         n_vertices: usize,
     ) -> Result<(DiskMesh, Vec<[f64; 2]>), MeshError> {
         let cell = (spec.width * spec.height / n_vertices.max(16) as f64).sqrt();
@@ -38,8 +39,12 @@ impl Face {
             triangles: delaunay(&places)?,
             boundary: (0..n_boundary as u32).collect(),
             corners: corners.map(|c| c as u32),
-            corner_sigma: outline.corners.map(|c| c.sigma),
-            edge_sigma: [0, 1, 2, 3].map(|k| outline.edges[k].sigma),
+            corner_sigma: [0, 1, 2, 3].map(|k| {
+                let (seen, cut) = (outline.corners[k].sigma, blank.corner_sigma[k]);
+                [0, 1].map(|d| seen[d].hypot(cut[d]))
+            }),
+            edge_sigma: [0, 1, 2, 3].map(|k| outline.edges[k].sigma.hypot(blank.edge_sigma[k])),
+            places: blank.places(corners, &arc, edge_length),
             arc,
             edge_length,
             width: spec.width,

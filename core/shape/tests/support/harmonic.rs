@@ -2,7 +2,7 @@
 
 #![allow(unreachable_pub, reason = "test code")]
 
-use platen_shape::flatten::{boundary_by_arc_length, cotangents, fixed_boundary};
+use platen_shape::flatten::{cotangents, fixed_boundary};
 use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
 
 pub struct Harmonic;
@@ -10,8 +10,7 @@ pub struct Harmonic;
 impl Flatten for Harmonic {
     fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError> {
         let refused = |message| FlattenError::Refused { message, hint: "a test's own fault".into() };
-        let uv = fixed_boundary(mesh, &cotangents(mesh), &boundary_by_arc_length(mesh))
-            .map_err(|e| refused(e.to_string()))?;
+        let uv = fixed_boundary(mesh, &cotangents(mesh)).map_err(|e| refused(e.to_string()))?;
         Ok(Chart { uv, ..Chart::default() })
     }
 }

@@ -152,7 +152,8 @@ fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -
     let patch = extractor.finish().map_err(|e| failed(&e))?;
     let extracted = machine::cpu_time();
     let outline = outline(&patch, &spec).map_err(|e| failed(&e))?;
-    measure(&patch, &outline, &spec, flattening, &mut machine::cpu_time).map_err(|e| failed(&e))?;
+    measure(&patch, &outline, &spec, &spec.rectangle(), flattening, &mut machine::cpu_time)
+        .map_err(|e| failed(&e))?;
     let measured = machine::cpu_time();
     Ok(Row {
         lattice: cells.name(),

@@ -131,7 +131,8 @@ fn meshes(
     let mut rows = Vec::new();
     for n in &command.meshes {
         progress::phase(&format!("flattening {n} vertices"));
-        let (mesh, _) = face.mesh(&one.seen.outline, &shot.spec, *n).map_err(|e| failed(&e))?;
+        let (mesh, _) =
+            face.mesh(&one.seen.outline, &shot.spec, &shot.spec.rectangle(), *n).map_err(|e| failed(&e))?;
         let repeat = if *n > LARGE_MESH { command.repeat.min(3) } else { command.repeat };
         let times = flattenings.iter_mut().map(|flattening| time(flattening, &mesh, repeat)).collect();
         rows.push((mesh.vertices.len(), times));

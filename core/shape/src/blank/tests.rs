@@ -1,0 +1,116 @@
+use super::*;
+use crate::flatten::closed_form::{ClosedForm, cone, cylinder, half_bent, sphere_of_fibres};
+
+/// A blank of 4004 x 2997 mm, its diagonals 5 mm apart, one edge bulging by 2 mm and one hollow by 1 mm.
+fn real() -> Blank {
+    let bow = |height: f64| {
+        let at = |k: usize| k as f64 / (BULGE_PLACES - 1) as f64;
+        (0..BULGE_PLACES).map(|k| 4.0 * height * at(k) * (1.0 - at(k))).collect()
+    };
+    let corners = [[0.0, 0.0], [4.004, 0.0], [4.0071, 2.997], [0.0031, 2.997]];
+    Blank { corners, bulge: [bow(0.0), bow(2e-3), bow(-1e-3), bow(0.0)], ..Blank::rectangle(4.0, 3.0) }
+}
+
+/// The mesh of a plate cut as `blank`, bent by `surface`; its boundary lies on the blank's outline, evenly.
+fn bent(blank: &Blank, surface: impl Fn([f64; 2]) -> [f64; 3]) -> ClosedForm {
+    let mut plate = ClosedForm::new(|[u, v]| [u, v, 0.0], [4.0, 3.0], [100, 75], 0.3, 1);
+    let (n, places) = (plate.parts.boundary.len(), plate.parts.places.clone());
+    for (uv, ordered) in plate.uv[..n].iter_mut().zip(&places) {
+        *uv = *ordered;
+    }
+    plate.uv.iter_mut().for_each(|p| *p = stretched(blank, *p));
+    plate.parts.vertices = plate.uv.iter().map(|&p| surface(p).into()).collect();
+    plate
+}
+
+/// From the rectangle to the blank: the four edges blended (Coons).
+fn stretched(blank: &Blank, [u, v]: [f64; 2]) -> [f64; 2] {
+    let (s, t) = (u / 4.0, v / 3.0);
+    let [bottom, right, top, left] =
+        [blank.place(0, s), blank.place(1, t), blank.place(2, 1.0 - s), blank.place(3, 1.0 - t)];
+    let [a, b, c, d] = blank.corners;
+    [0, 1].map(|k| {
+        (1.0 - t) * bottom[k] + t * top[k] + (1.0 - s) * left[k] + s * right[k]
+            - ((1.0 - s) * ((1.0 - t) * a[k] + t * d[k]) + s * ((1.0 - t) * b[k] + t * c[k]))
+    })
+}
+
+/// The largest distance between two outlines.
+fn apart(a: &Blank, b: &Blank) -> f64 {
+    let at = |k: usize| (k % 4, (k / 4) as f64 / 100.0);
+    let distance = |k: usize| {
+        let ((edge, share), [p, q]) = (at(k), [a, b].map(|blank| blank.place(at(k).0, at(k).1)));
+        debug_assert!(edge < 4 && share <= 1.0);
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    };
+    (0..404).map(distance).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_bulge_lies_outside_its_edge() {
+    let mut blank = Blank::rectangle(4.0, 2.0);
+    blank.bulge = [(); 4].map(|()| vec![0.0, 0.5, 0.0]);
+    let middles = [0, 1, 2, 3].map(|edge| blank.place(edge, 0.5));
+    assert_eq!(middles, [[2.0, -0.5], [4.5, 1.0], [2.0, 2.5], [-0.5, 1.0]]);
+    assert_eq!(blank.place(2, 0.25), [3.0, 2.25]);
+    assert_eq!([0, 1, 2, 3].map(|edge| blank.place(edge, 0.0)), blank.corners);
+    assert_eq!(blank.bows(), [0.5; 4]);
+}
+
+#[test]
+fn the_measures_of_a_real_blank() {
+    let blank = real();
+    let [width, height] = blank.size();
+    assert!((width - 4.004).abs() < 1e-6 && (height - 2.997).abs() < 1e-5, "{width} {height}");
+    assert!((blank.diagonal_difference() - 5e-3).abs() < 1e-4, "{}", blank.diagonal_difference());
+    assert_eq!(blank.bows().map(|bow| (bow * 1e6).round()), [0.0, 2000.0, -1000.0, 0.0]);
+}
+
+#[test]
+fn flat_and_rolled_blanks_tell_their_outline() {
+    let check = |name: &str, surface: &dyn Fn([f64; 2]) -> [f64; 3], bound: f64| {
+        let found = Blank::of_mesh(&bent(&real(), surface).mesh().unwrap()).unwrap();
+        let apart = apart(&found, &real());
+        println!("{name}: {:.4} mm", apart * 1e3);
+        assert!(apart < bound, "{name}: {apart:e} m");
+    };
+    check("flat", &|[u, v]| [0.6 * u - 0.8 * v, 1.0, 0.8 * u + 0.6 * v], 5e-6);
+    check("rolled to R 5 m", &cylinder(5.0, 0.4), 3e-5);
+    check("half bent to R 5 m", &half_bent(5.0, 2.0), 3e-5);
+    check("cone", &cone([-7.0, 1.0], 0.6), 3e-5);
+}
+
+/// Fibres that keep their length one way are as far from least energy as a law can be.
+#[test]
+fn a_blank_curved_two_ways_is_refused_when_the_law_of_the_material_matters() {
+    let sphere = |radius: f64| {
+        let plate = bent(&real(), sphere_of_fibres(radius, [4.0, 3.0])).mesh().unwrap();
+        Blank::of_mesh(&plate).map(|found| apart(&found, &real()))
+    };
+    let shallow = sphere(80.0).unwrap();
+    assert!((0.5e-3..0.9e-3).contains(&shallow), "{shallow:e}");
+    assert!(matches!(sphere(40.0), Err(BlankError::Curved { .. })), "{:?}", sphere(40.0));
+}
+
+#[test]
+fn another_plate_is_refused() {
+    let other = Blank { corners: [[0.0, 0.0], [4.0, 0.0], [4.03, 3.0], [0.03, 3.0]], ..real() };
+    let error = Blank::of_mesh(&bent(&other, |[u, v]| [u, v, 0.0]).mesh().unwrap()).unwrap_err();
+    assert!(matches!(error, BlankError::OffSize { off, .. } if (off - 0.03).abs() < 1e-5), "{error:?}");
+    assert_eq!(
+        error.to_string(),
+        "the blank is 4000.0 x 3000.1 mm and up to 30.0 mm off its rectangle as ordered, 20 mm at most; check width_mm and \
+         height_mm, or which plate was scanned"
+    );
+}
+
+#[test]
+fn a_mesh_lies_on_the_outline_it_is_given() {
+    let blank = real();
+    let plate = bent(&blank, cylinder(5.0, 0.4));
+    let (corners, arc) = (plate.parts.corners.map(|at| at as usize), &plate.parts.arc);
+    for (at, place) in blank.places(corners, arc, plate.parts.edge_length).into_iter().enumerate() {
+        let truth = plate.uv[at];
+        assert!((truth[0] - place[0]).hypot(truth[1] - place[1]) < 1e-9, "vertex {at}: {place:?} {truth:?}");
+    }
+}
