@@ -25,9 +25,9 @@ const CURVATURE: (f64, f64) = (0.003, 0.3);
 /// simulator of other make edges are 0.1 to 0.3 mm farther off than their lines' scatter tells.
 const COMMON: f64 = 1e-4;
 
-/// Newton steps at most, the first of which widen the brackets, and the movement that ends them, metres.
-const ROUNDS: i32 = 40;
+/// Newton steps with widened brackets, and then at most, and the movement that ends them, metres.
 const WIDENED_ROUNDS: i32 = 8;
+const ROUNDS: i32 = 32;
 const STILL: f64 = 1e-7;
 
 /// Rounds of fitting the curve and telling its footprint in turn.
@@ -90,12 +90,13 @@ impl Edge {
         let too_few = || OutlineError::Edge { crossings: lines.len() };
         let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(footprint, step, noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
-        let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
+        let start = first_curve(&prior, &used, step).ok_or_else(too_few)?;
+        let (mut curve, mut precision) = most_likely(&prior, &used, start).ok_or_else(too_few)?;
         for _ in 0..FOOTPRINT_ROUNDS {
             if footprint > 0.0 {
                 let own = bracket::footprint_at(&lines, |along| curve.at(along), footprint, step);
                 used = brackets(own).collect();
-                (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
+                (curve, precision) = most_likely(&prior, &used, curve).ok_or_else(too_few)?;
             }
         }
         let agreeing = used.iter().filter(|b| b.agrees(curve.at(b.along), step));
@@ -137,28 +138,44 @@ impl Edge {
     }
 }
 
-/// The most likely curve, by Newton's method from the middles of the brackets.
-fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Spline, Precision)> {
+/// A curve near the most likely one: through the middles of the brackets, then a Newton step for each of ever less widened
+/// ones, which pull from afar.
+fn first_curve(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<Spline> {
     let mut normal = prior.clone();
     for bracket in brackets {
         let (to, weight) = bracket.middle(step);
         normal.add(bracket.along, to, weight);
     }
-    let mut known = normal.solve()?;
-    for round in 0..ROUNDS {
-        let least_soft = if round < WIDENED_ROUNDS { 2.0 * step * 0.5_f64.powi(round) } else { 0.0 };
-        let mut normal = prior.clone();
-        for bracket in brackets {
-            let (to, weight) = bracket.pull(known.0.at(bracket.along), least_soft);
-            normal.add(bracket.along, to, weight);
+    let (middle, _) = normal.solve()?;
+    let mut widths = (0..WIDENED_ROUNDS).map(|round| 2.0 * step * 0.5_f64.powi(round));
+    widths.try_fold(middle, |curve, least_soft| Some(pulled(prior, brackets, &curve, least_soft)?.0))
+}
+
+/// The most likely curve, by Newton's method from one nearby.
+fn most_likely(prior: &Normal, brackets: &[Bracket], mut curve: Spline) -> Option<(Spline, Precision)> {
+    let mut rounds = 0;
+    loop {
+        let (next, precision) = pulled(prior, brackets, &curve, 0.0)?;
+        let moved = brackets.iter().map(|b| (curve.at(b.along) - next.at(b.along)).abs()).fold(0.0, f64::max);
+        rounds += 1;
+        if moved < STILL || rounds == ROUNDS {
+            return Some((next, precision));
         }
-        let next = normal.solve()?;
-        let moved = brackets.iter().map(|b| (known.0.at(b.along) - next.0.at(b.along)).abs());
-        let moved = moved.fold(0.0, f64::max);
-        known = next;
-        if round >= WIDENED_ROUNDS && moved < STILL {
-            break;
-        }
+        curve = next;
     }
-    Some(known)
+}
+
+/// One Newton step of a curve.
+fn pulled(
+    prior: &Normal,
+    brackets: &[Bracket],
+    curve: &Spline,
+    least_soft: f64,
+) -> Option<(Spline, Precision)> {
+    let mut normal = prior.clone();
+    for bracket in brackets {
+        let (to, weight) = bracket.pull(curve.at(bracket.along), least_soft);
+        normal.add(bracket.along, to, weight);
+    }
+    normal.solve()
 }
