@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use crate::patch::{Beyond, Patch};
+use crate::patch::{Beyond, Patch, Sample};
 
 /// A cell of the grid, by its index.
 type Cell = u32;
@@ -20,7 +20,6 @@ const ALL: u8 = 0b1111;
 /// to it; holes in the plate do not.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
-    n_columns: usize,
     n_rows: usize,
     /// Number of the sample plus one, 0 where there is none.
     sample: Vec<u32>,
@@ -29,58 +28,47 @@ pub(super) struct Grid {
 
 impl Grid {
     pub(super) fn of(patch: &Patch) -> Self {
-        let columns = patch.samples.iter().map(|s| s.column);
+        let ends = [patch.samples.first(), patch.samples.last()];
+        let [first_column, last_column] = ends.map(|sample| sample.map_or(0, |s| s.column));
         let rows = patch.samples.iter().map(|s| s.row);
-        let span = |low: Option<u32>, high: Option<u32>| (low.unwrap_or(0), high.unwrap_or(0));
-        let (first_column, last_column) = span(columns.clone().min(), columns.max());
-        let (first_row, last_row) = span(rows.clone().min(), rows.max());
+        let (first_row, last_row) =
+            rows.fold((u32::MAX, 0), |(low, high), row| (low.min(row), high.max(row)));
         let n_columns = (last_column - first_column) as usize + 3;
-        let n_rows = (last_row - first_row) as usize + 3;
-        let mut grid = Self {
-            n_columns,
-            n_rows,
-            sample: vec![0; n_columns * n_rows],
-            inside: vec![false; n_columns * n_rows],
+        let n_rows = last_row.saturating_sub(first_row) as usize + 3;
+        let n = n_columns * n_rows;
+        let mut grid = Self { n_rows, sample: vec![0; n], inside: vec![false; n] };
+        let cell = |sample: &Sample| {
+            let (column, row) = (sample.column - first_column + 1, sample.row - first_row + 1);
+            column as usize * n_rows + row as usize
         };
         for (number, sample) in (1..).zip(&patch.samples) {
-            let (column, row) = (sample.column - first_column + 1, sample.row - first_row + 1);
-            let cell = column as usize * n_rows + row as usize;
-            grid.sample[cell] = number;
-            grid.inside[cell] = true;
+            grid.sample[cell(sample)] = number;
+            grid.inside[cell(sample)] = true;
         }
-        grid.fill_hidden(patch);
+        grid.fill_hidden(patch, cell);
         grid
     }
 
-    /// Per sample its place on a loop, or that of a neighbour: a cell that sticks out alone belongs to no triangle.
-    pub(super) fn places(&self, cells: &[Cell], n_samples: usize) -> Vec<Option<u32>> {
-        let mut places = vec![None; n_samples];
+    /// Place on a loop of each sample there or next to it: a cell that sticks out alone belongs to no triangle.
+    pub(super) fn places(&self, cells: &[Cell]) -> BTreeMap<u32, u32> {
+        let n_rows = self.n_rows as isize;
+        let beside = [-n_rows - 1, -n_rows, -n_rows + 1, -1, 1, n_rows - 1, n_rows, n_rows + 1];
         let sample = |cell: isize| {
             let number = usize::try_from(cell).ok().and_then(|cell| self.sample.get(cell));
             number.and_then(|number| number.checked_sub(1))
         };
-        for (place, &cell) in (0..).zip(cells) {
-            let cell = cell as isize;
-            if let Some(sample) = sample(cell) {
-                places[sample as usize] = Some(place);
-            }
-        }
-        let on_loop = places.clone();
-        for (place, &cell) in (0..).zip(cells) {
-            let n_rows = self.n_rows as isize;
-            for beside in [-n_rows - 1, -n_rows, -n_rows + 1, -1, 1, n_rows - 1, n_rows, n_rows + 1] {
-                if let Some(sample) =
-                    sample(cell as isize + beside).filter(|s| on_loop[*s as usize].is_none())
-                {
-                    places[sample as usize] = Some(place);
-                }
-            }
-        }
-        places
+        let around = |offsets: &[isize]| {
+            let places = (0..).zip(cells).flat_map(|(place, &cell)| {
+                offsets.iter().filter_map(move |by| Some((sample(cell as isize + by)?, place)))
+            });
+            places.collect::<Vec<(u32, u32)>>()
+        };
+        // On the loop counts for more.
+        around(&beside).into_iter().chain(around(&[0])).collect()
     }
 
     /// Fills gaps along columns and rows, unless the plate is seen to end at one side of them.
-    fn fill_hidden(&mut self, patch: &Patch) {
+    fn fill_hidden(&mut self, patch: &Patch, cell: impl Fn(&Sample) -> usize) {
         let mut ends: Vec<[bool; 4]> = vec![[false; 4]; patch.samples.len()];
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
             ends[crossing.sample as usize][side(crossing.step)] = true;
@@ -91,16 +79,15 @@ impl Grid {
         };
         // The last cell with a sample on this column and on each row; the border has none.
         let mut on_row = vec![0; self.n_rows];
-        for column in 1..self.n_columns - 1 {
+        for samples in patch.samples.chunk_by(|a, b| a.column == b.column) {
             let mut on_column = 0;
-            for (row, on_row) in on_row.iter_mut().enumerate() {
-                let cell = column * self.n_rows + row;
-                let here = self.sample[cell];
-                if here == 0 {
-                    continue;
-                }
+            for cell in samples.iter().map(&cell) {
+                let on_row = &mut on_row[cell % self.n_rows];
                 for (last, stride, step) in [(on_column, 1, [0, 1]), (*on_row, self.n_rows, [1, 0])] {
-                    if last != 0 && cell - last > stride && goes_on(self.sample[last], here, step) {
+                    if last != 0
+                        && cell - last > stride
+                        && goes_on(self.sample[last], self.sample[cell], step)
+                    {
                         (last + stride..cell).step_by(stride).for_each(|gap| self.inside[gap] = true);
                     }
                 }
@@ -230,7 +217,7 @@ fn shortest_way(neighbours: &BTreeMap<Cell, Vec<(Cell, u32)>>, a: Cell, b: Cell)
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::patch::{Crossing, Sample};
+    use crate::patch::Crossing;
 
     fn patch(cells: impl Iterator<Item = (u32, u32)>) -> Patch {
         let sample = |(column, row)| Sample { point: Vec3::zeros(), column, row, sigma: 1e-3, intensity: 0 };

@@ -35,10 +35,10 @@ impl<'a> Rim<'a> {
             let (found_mm, expected_mm) = (cells.len() as f64 * step * 1000.0, circumference * 1000.0);
             return Err(OutlineError::Loop { found_mm, expected_mm });
         }
-        let place = grid.places(&cells, patch.samples.len());
+        let place = grid.places(&cells);
         let mut crossings = vec![Vec::new(); cells.len()];
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
-            if let Some(place) = place[crossing.sample as usize] {
+            if let Some(&place) = place.get(&crossing.sample) {
                 crossings[place as usize].push(crossing);
             }
         }
