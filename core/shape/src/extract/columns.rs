@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use platen_scan::{Column, ScanHeader, State, wrap_azimuth};
 
-use super::regions::Regions;
+use super::regions::{Regions, Run};
 
 /// Cells that are kept around those of a component, to tell what lies beside it.
 pub(super) const MARGIN: u32 = 4;
@@ -159,15 +159,17 @@ impl Columns {
 }
 
 fn alive_rows(column: &Kept, regions: &mut Regions, limit_mm2: u64) -> Vec<Range<u32>> {
-    let mut rows = Vec::new();
-    for number in column.runs.clone() {
-        let root = regions.root(number);
-        if regions.extent(root).area_mm2 <= limit_mm2 {
-            let run = regions.run(number);
-            rows.push(run.first_row.saturating_sub(MARGIN)..run.end_row + MARGIN);
-        }
-    }
-    rows
+    let alive = |number: &u32| {
+        let root = regions.root(*number);
+        regions.extent(root).area_mm2 <= limit_mm2
+    };
+    let alive: Vec<u32> = column.runs.clone().filter(alive).collect();
+    with_margin(alive.into_iter().map(|number| regions.run(number)))
+}
+
+/// Rows of the runs of a column and within [`MARGIN`] of them: hardly more than one range, as dropouts are bridged.
+pub(super) fn with_margin(runs: impl Iterator<Item = Run>) -> Vec<Range<u32>> {
+    union(runs.map(|run| run.first_row.saturating_sub(MARGIN)..run.end_row + MARGIN))
 }
 
 /// Sorted, non-overlapping union of ranges.

@@ -20,39 +20,10 @@ const PAIRS: usize = 10;
 /// Smoothed inverse ranges of the cells where `usable` holds; those of the others are left as they are.
 pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity) -> Vec<f32> {
     let n_rows = window.n_rows;
-    let n = window.cells.len();
     // The first and the last column are margin and stay as they are.
     let spans: Vec<(usize, Range<usize>)> =
         (1..window.n_columns - 1).map(|c| (c, window.spans[c].clone())).collect();
-    // Weight of the link to the cell below, and to the cell in the next column.
-    let mut down = vec![0.0_f32; n];
-    let mut across = vec![0.0_f32; n];
-    for (column, rows) in &spans {
-        for row in rows.clone() {
-            let index = column * n_rows + row;
-            if !usable[index] {
-                continue;
-            }
-            let range = |i: usize| window.cells[i].range_m;
-            let known = |i: usize| usable[i].then(|| range(i));
-            if row + 1 < n_rows && usable[index + 1] {
-                let before = || if row > 0 { known(index - 1) } else { None };
-                let beyond = || [before(), if row + 2 < n_rows { known(index + 2) } else { None }];
-                down[index] = continuity.joins_down([range(index), range(index + 1)], beyond).into();
-            }
-            let link = continuity.across[window.first_row as usize + row];
-            if usable[index + n_rows] && link.joins(range(index), range(index + n_rows)) {
-                across[index] = 1.0;
-            }
-        }
-    }
-    let mut per_link = vec![1.0_f32; n];
-    for (column, rows) in &spans {
-        for i in column * n_rows + rows.start..column * n_rows + rows.end {
-            per_link[i] = 1.0 / (down[i] + across[i] + down[i - 1] + across[i - n_rows]).max(1.0);
-        }
-    }
-    let links = Links { down, across, per_link };
+    let links = Links::of(window, usable, continuity, &spans);
     let mut copies = [window.inverse.clone(), window.inverse.clone()];
     // A half step of a column needs the one before of its two neighbours, so the half steps follow each other through
     // the columns, one column apart: what a column needs is still in the cache.
@@ -82,6 +53,54 @@ struct Links {
 }
 
 impl Links {
+    /// The links of the usable cells of columns, each with its rows.
+    fn of(
+        window: &Window,
+        usable: &[bool],
+        continuity: &Continuity,
+        columns: &[(usize, Range<usize>)],
+    ) -> Self {
+        let (n, n_rows) = (window.cells.len(), window.n_rows);
+        // A range of 0 is joined to none.
+        let mut ranges = vec![0.0_f32; n];
+        for (column, rows) in columns {
+            let cells = column * n_rows + rows.start..column * n_rows + rows.end;
+            let of_cells = window.cells[cells.clone()].iter().zip(&usable[cells.clone()]);
+            let of_cells = of_cells.map(|(cell, usable)| if *usable { cell.range_m } else { 0.0 });
+            ranges[cells].iter_mut().zip(of_cells).for_each(|(range, of_cell)| *range = of_cell);
+        }
+        let (mut down, mut across) = (vec![0.0_f32; n], vec![0.0_f32; n]);
+        let known = |i: usize| Some(ranges[i]).filter(|range| *range > 0.0);
+        for (column, rows) in columns {
+            let first = column * n_rows;
+            let cells = first + rows.start..first + rows.end;
+            let links = &continuity.across[window.first_row as usize + rows.start..];
+            let pairs = ranges[cells.clone()].iter().zip(&ranges[cells.start + n_rows..]);
+            for ((across, (a, b)), link) in across[cells.clone()].iter_mut().zip(pairs).zip(links) {
+                *across = link.joins(*a, *b).into();
+            }
+            let last = first + n_rows - 1;
+            for i in cells.start..cells.end.min(last) {
+                if let (Some(here), Some(below)) = (known(i), known(i + 1)) {
+                    let before = || if i > first { known(i - 1) } else { None };
+                    let beyond = || [before(), if i + 1 < last { known(i + 2) } else { None }];
+                    down[i] = continuity.joins_down([here, below], beyond).into();
+                }
+            }
+        }
+        let mut per_link = vec![1.0_f32; n];
+        for (column, rows) in columns {
+            let cells = column * n_rows + rows.start..column * n_rows + rows.end;
+            let start = cells.start;
+            let of_cell = down[start..].iter().zip(&across[start..]);
+            let of_others = down[start - 1..].iter().zip(&across[start - n_rows..]);
+            for ((per_link, a), b) in per_link[cells].iter_mut().zip(of_cell).zip(of_others) {
+                *per_link = 1.0 / (a.0 + a.1 + b.0 + b.1).max(1.0);
+            }
+        }
+        Self { down, across, per_link }
+    }
+
     /// One half step of some cells of a column.
     #[inline(always)]
     fn diffuse(&self, from: &[f32], to: &mut [f32], cells: Range<usize>, n_rows: usize, factor: f32) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use platen_scan::ScanHeader;
 
-use super::columns::{Cell, Columns, MARGIN, union};
+use super::columns::{Cell, Columns, MARGIN, union, with_margin};
 use super::regions::{Regions, Run};
 use super::sight::{Sight, Turn};
 use crate::Vec3;
@@ -67,10 +67,10 @@ impl Window {
         let own: Vec<Vec<Run>> = (first_column..end_column)
             .map(|index| regions.runs_of(roots, columns.get(index).map_or(0..0, |c| c.runs.clone())))
             .collect();
+        let near: Vec<Vec<Range<u32>>> = own.iter().map(|runs| with_margin(runs.iter().copied())).collect();
         for i in 0..n_columns {
-            let around = &own[i.saturating_sub(MARGIN as usize)..(i + MARGIN as usize + 1).min(n_columns)];
-            let rows = |run: &Run| run.first_row.saturating_sub(MARGIN)..(run.end_row + MARGIN).min(end_row);
-            let wanted = union(around.iter().flatten().map(rows));
+            let around = &near[i.saturating_sub(MARGIN as usize)..(i + MARGIN as usize + 1).min(n_columns)];
+            let wanted = union(around.iter().flatten().map(|rows| rows.start..rows.end.min(end_row)));
             let at = |row: Option<u32>| row.map_or(0, |row| (row - first_row) as usize);
             window.spans.push(at(wanted.first().map(|r| r.start))..at(wanted.last().map(|r| r.end)));
             window.fill(i, &wanted, columns);
