@@ -37,6 +37,9 @@ pub(crate) struct Device {
     /// Amplitude of the cyclic range error of period 1.2 m, millimetres
     #[arg(long, default_value_t = 0.0)]
     cyclic_mm: f64,
+    /// Half width of the plate's mirror lobe, in which echoes are lost, degrees; 0: mill scale, which has none
+    #[arg(long, default_value_t = 0.0)]
+    mirror_lobe_deg: f64,
     /// Seed of all errors
     #[arg(long, default_value_t = 1)]
     pub(crate) scan_seed: u64,
@@ -97,6 +100,7 @@ impl Device {
                 period: CYCLIC_PERIOD,
                 phase: 0.0,
             }),
+            specular_lobe: (self.mirror_lobe_deg > 0.0).then_some(self.mirror_lobe_deg.to_radians()),
             seed: self.scan_seed.wrapping_add(number << 32),
             ..Instrument::default()
         };

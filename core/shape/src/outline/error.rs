@@ -42,6 +42,21 @@ pub enum OutlineError {
         /// Angle to the nearest edge, degrees.
         angle_deg: f64,
     },
+    /// A side comes out wrong where an edge beside it is hidden.
+    #[error(
+        "{seen_percent:.0} % of one edge of the plate is seen, too little to tell the plate's {side}: it comes out at \
+         {found_mm:.0} mm, the plate file says {expected_mm:.0} mm; clear what hides it, or tilt it where it mirrors the beam"
+    )]
+    Hidden {
+        /// Part of the edge that was seen, percent.
+        seen_percent: f64,
+        /// `width` or `height`.
+        side: &'static str,
+        /// Millimetres.
+        found_mm: f64,
+        /// Millimetres.
+        expected_mm: f64,
+    },
     /// A side differs from the plate file.
     #[error(
         "the plate's {side} measures {found_mm:.0} mm on its mid-surface, the plate file says {expected_mm:.0} mm; check \

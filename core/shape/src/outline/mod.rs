@@ -75,6 +75,9 @@ const LARGEST_HINT_ANGLE: f64 = 35.0;
 /// millimetres, bending changes edges of the mid-surface by up to 11 mm.
 const SIZE_TOLERANCE: f64 = 0.01;
 
+/// A wrong size is believed where at least this part of the edges that make it was seen.
+const TELLING_PART: f64 = 0.75;
+
 /// The outline of a plate's face.
 ///
 /// Corners and edges are those of the scanned face as it is seen, not of the rectangle; the known size is used to
@@ -113,8 +116,8 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let first = first_corner(&points, &rim.plane, spec.u_axis)?;
     edges.rotate_left(first);
     points.rotate_left(first);
-    check_size(&edges, spec)?;
     let reach = SEEN_STEPS * rim.step;
+    check_size(&edges, spec, reach)?;
     let corner = |k: usize| {
         let (arriving, leaving) = (&edges[(k + 3) % 4], &edges[k]);
         Corner {
@@ -163,18 +166,32 @@ fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result
 }
 
 /// Compares the edges of the mid-surface with the plate file.
-fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
-    for (edge, (side, size)) in
-        edges.iter().zip([("width", spec.width), ("height", spec.height)].into_iter().cycle())
+fn check_size(edges: &[Edge; 4], spec: &PlateSpec, reach: f64) -> Result<(), OutlineError> {
+    for (k, (side, size)) in
+        [("width", spec.width), ("height", spec.height)].into_iter().cycle().take(4).enumerate()
     {
         let expected = size - 2.0 * spec.face_inset;
-        let found = edge.length_below(0.5 * spec.thickness);
+        let found = edges[k].length_below(0.5 * spec.thickness);
         if (found - expected).abs() > SIZE_TOLERANCE * expected {
             let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);
-            return Err(OutlineError::WrongSize { side, found_mm, expected_mm });
+            // An edge ends where those beside it cross it.
+            let beside = [&edges[(k + 3) % 4], &edges[k], &edges[(k + 1) % 4]];
+            let seen = beside.map(|edge| share_seen(edge, reach)).into_iter().fold(1.0, f64::min);
+            return Err(if seen < TELLING_PART {
+                OutlineError::Hidden { seen_percent: 100.0 * seen, side, found_mm, expected_mm }
+            } else {
+                OutlineError::WrongSize { side, found_mm, expected_mm }
+            });
         }
     }
     Ok(())
+}
+
+/// Part of an edge that was seen.
+fn share_seen(edge: &Edge, reach: f64) -> f64 {
+    const PLACES: usize = 200;
+    let place = |i: usize| edge.from + (edge.to - edge.from) * (i as f64 + 0.5) / PLACES as f64;
+    (0..PLACES).filter(|&i| edge.is_seen(place(i), reach)).count() as f64 / PLACES as f64
 }
 
 fn curve(edge: &Edge, ends: [Vec3; 2], reach: f64) -> EdgeCurve {
