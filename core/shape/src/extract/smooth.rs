@@ -80,11 +80,11 @@ impl Links {
                 *across = link.joins(*a, *b).into();
             }
             let last = first + n_rows - 1;
-            for i in cells.start..cells.end.min(last) {
+            for (i, down) in (cells.start..).zip(&mut down[cells.start..cells.end.min(last)]) {
                 if let (Some(here), Some(below)) = (known(i), known(i + 1)) {
                     let before = || if i > first { known(i - 1) } else { None };
                     let beyond = || [before(), if i + 1 < last { known(i + 2) } else { None }];
-                    down[i] = continuity.joins_down([here, below], beyond).into();
+                    *down = continuity.joins_down([here, below], beyond).into();
                 }
             }
         }
