@@ -102,13 +102,13 @@ fn outline_of_the_face(bencher: Bencher<'_, '_>) {
 #[divan::bench(sample_count = 10)]
 fn smooth_face(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
-    bencher.bench_local(|| Face::fit(&s.patch, &s.outline, &s.spec));
+    bencher.bench_local(|| Face::of(&s.patch, &s.outline, &s.spec));
 }
 
 #[divan::bench(sample_count = 10)]
 fn mesh(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
-    let face = Face::fit(&s.patch, &s.outline, &s.spec).expect("a face");
+    let face = Face::of(&s.patch, &s.outline, &s.spec);
     bencher.bench_local(|| {
         face.mesh(&s.outline, &s.spec, &s.spec.rectangle(), platen_shape::measure::N_VERTICES)
     });

@@ -89,7 +89,7 @@ impl Blank {
     /// # Errors
     /// [`BlankError`].
     pub fn of_scan(patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Result<Self, BlankError> {
-        let face = Face::fit(patch, outline, spec)?;
+        let face = Face::of(patch, outline, spec);
         let (mesh, _) = face.mesh(outline, spec, &spec.rectangle(), N_VERTICES)?;
         Self::of_mesh(&mesh)
     }

@@ -55,19 +55,20 @@ impl ShapeChecks {
     pub fn new(outline: &Outline, surface: &Surface) -> Self {
         let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
         let sigma = |u: f64, v: f64| surface.sigma_point(u * surface.width(), v * surface.height());
-        Self::with(outline, 0.5 * surface.thickness(), &normal, &sigma)
+        Self::with(&outline.corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma)
     }
 
     /// `normal` and `sigma`, the standard deviation along it, at shares of the plate's sides.
     fn with(
-        outline: &Outline,
+        outlined: &[Corner; 4],
+        curves: &[EdgeCurve; 4],
         half_thickness: f64,
         normal: &dyn Fn(f64, f64) -> Vec3,
         sigma: &dyn Fn(f64, f64) -> f64,
     ) -> Self {
         let corners = [0, 1, 2, 3].map(|k| {
             let [u, v] = CORNERS[k];
-            Known::new(outline, k, normal(u, v), sigma(u, v))
+            Known::new(&outlined[k], [&curves[k], &curves[(k + 3) % 4]], normal(u, v), sigma(u, v))
         });
         let straight = |from: usize, to: usize| {
             let way = corners[to].at - corners[from].at;
@@ -80,7 +81,7 @@ impl ShapeChecks {
                 let ([u0, v0], [u1, v1]) = (CORNERS[k], CORNERS[next]);
                 normal(u0 + share * (u1 - u0), v0 + share * (v1 - v0))
             };
-            let curve = &outline.edges[k];
+            let curve = &curves[k];
             let chord = straight(k, next);
             let length = |depth: f64| Check { value: arc(curve, &along, depth), ..chord };
             EdgeCheck { face: length(0.0), mid: length(half_thickness), chord }
@@ -117,12 +118,10 @@ struct Known {
 }
 
 impl Known {
-    fn new(outline: &Outline, k: usize, normal: Vec3, sigma: f64) -> Self {
-        let Corner { point, sigma: [leaving, arriving], seen } = outline.corners[k];
-        let arms = [
-            Arm::new(&outline.edges[k], false, point, normal),
-            Arm::new(&outline.edges[(k + 3) % 4], true, point, normal),
-        ];
+    /// A corner with the edges that leave it and arrive at it.
+    fn new(corner: &Corner, edges: [&EdgeCurve; 2], normal: Vec3, sigma: f64) -> Self {
+        let Corner { point, sigma: [leaving, arriving], seen } = *corner;
+        let arms = [Arm::new(edges[0], false, point, normal), Arm::new(edges[1], true, point, normal)];
         let axes = [arms[0].direction, arms[1].direction, normal];
         Self { at: point, axes, sigma: [leaving, arriving, sigma], tilt: arms.map(|arm| arm.tilt), seen }
     }
@@ -223,14 +222,14 @@ mod tests {
                 (0..=300).map(|i| face(u0 + at(i) * (u1 - u0), v0 + at(i) * (v1 - v0))).collect();
             EdgeCurve { seen: vec![true; points.len()], points, sigma }
         };
-        let outline = Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(edge) };
         let normal = |u: f64, v: f64| {
             let d = 1e-5;
             let along_u = face(u + d, v) - face(u - d, v);
             let along_v = face(u, v + d) - face(u, v - d);
             along_u.cross(&along_v).normalize()
         };
-        ShapeChecks::with(&outline, HALF, &normal, &|_, _| 3.0 * sigma)
+        let (corners, edges) = ([0, 1, 2, 3].map(corner), [0, 1, 2, 3].map(edge));
+        ShapeChecks::with(&corners, &edges, HALF, &normal, &|_, _| 3.0 * sigma)
     }
 
     fn near(found: f64, expected: f64, within: f64) {

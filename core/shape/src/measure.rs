@@ -59,7 +59,7 @@ pub struct Quality {
 /// Time spent in each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// Smooth face, mid-surface and mesh.
+    /// Face, mid-surface and mesh.
     pub mesh: Duration,
     /// Flattening.
     pub flatten: Duration,
@@ -94,7 +94,7 @@ pub fn measure(
     clock: &mut dyn FnMut() -> Duration,
 ) -> Result<Measurement, MeasureError> {
     let start = clock();
-    let face = Face::fit(patch, outline, spec)?;
+    let face = Face::of(patch, outline, spec);
     let (mesh, places) = face.mesh(outline, spec, blank, N_VERTICES)?;
     let meshed = clock();
     let chart = flatten.flatten(&mesh)?;

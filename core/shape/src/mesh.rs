@@ -11,5 +11,4 @@ mod triangulate;
 pub use disk::{DiskMesh, DiskParts};
 pub use error::MeshError;
 pub use face::Face;
-pub(crate) use face::{Heights, biweight, per_sigma_across, thinned};
 pub(crate) use facets::Facets;

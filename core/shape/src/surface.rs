@@ -17,6 +17,7 @@ mod smoothing;
 pub use axis::Axis;
 pub use fit::{Fit, Fitted, Undetermined};
 pub use mask::Mask;
+pub(crate) use net::approximate;
 pub use net::{Jet, Net};
 pub use parts::{SurfaceError, SurfaceParts};
 pub(crate) use smoothing::Penalty;

@@ -7,7 +7,7 @@ use crate::flatten::closed_form::Random;
 use crate::flatten::{cotangents, fixed_boundary};
 use crate::surface::Derivatives;
 use crate::{
-    Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, Outline, Patch, PlateSpec, Sample, Vec3,
+    Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, Outline, Patch, PlateSpec, Sample, Sheet, Vec3,
 };
 
 /// The paper's harmonic map.
@@ -141,7 +141,8 @@ impl Scene {
             }
             EdgeCurve { points, seen, sigma: 0.1 * self.sigma }
         });
-        Outline { corners, edges }
+        let sheet = Sheet::between(corners.map(|c| c.point), &self.patch()).expect("a sheet");
+        Outline { corners, edges, sheet }
     }
 
     pub(super) fn measure(&self) -> Measurement {

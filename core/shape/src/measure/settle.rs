@@ -5,7 +5,8 @@
 //! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
 
 use super::Quality;
-use crate::mesh::{Face, Facets, biweight, per_sigma_across};
+use crate::mesh::{Face, Facets};
+use crate::sheet::{biweight, per_sigma_across};
 use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 

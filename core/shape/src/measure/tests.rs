@@ -134,12 +134,14 @@ fn lines_and_grid_lie_on_the_face() {
 
 #[test]
 fn an_empty_patch_is_refused() {
-    let scene = Scene { pitch: 2.0, ..Scene::new(cylinder(8.0, 0.7), [3.0, 2.0]) };
+    let full = Scene::new(cylinder(8.0, 0.7), [3.0, 2.0]);
+    let outline = full.outline();
+    let scene = Scene { pitch: 2.0, ..full };
     let mut clock = std::time::Duration::default;
     let mut flatten = super::scene::Harmonic;
     let error = super::measure(
         &scene.patch(),
-        &scene.outline(),
+        &outline,
         &scene.spec(),
         &scene.spec().rectangle(),
         &mut flatten,

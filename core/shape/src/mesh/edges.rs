@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::surface::{Axis, Net};
+use crate::surface::{Axis, Net, approximate};
 use crate::{EdgeCurve, Outline, Vec3};
 
 /// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
@@ -73,14 +73,26 @@ impl Edge {
 /// surface of second order, however it is bent or turned. With an inset the outline lies that far inside of the
 /// rectangle, and the patch goes on beyond it.
 pub(crate) fn coons(outline: &Outline, width: f64, height: f64, inset: f64, axes: [Axis; 2]) -> Net<3> {
-    let edges = [0, 1, 2, 3].map(|k| Edge::fit(&outline.edges[k]));
     let corner = |k: usize| outline.corners[k].point;
-    Net::approximate(axes[0], axes[1], |a, b| {
-        let (x, y) = ((a - inset) / (width - 2.0 * inset), (b - inset) / (height - 2.0 * inset));
-        let along_v = edges[0].point(x) * (1.0 - y) + edges[2].point(1.0 - x) * y;
-        let along_u = edges[3].point(1.0 - y) * (1.0 - x) + edges[1].point(y) * x;
+    let share = |d: usize, at: f64| (at - inset) / ([width, height][d] - 2.0 * inset);
+    // Control values along u of the edges v = 0 and v = H, along v of those at u = W and u = 0.
+    let control = |k: usize| {
+        let edge = Edge::fit(&outline.edges[k]);
+        let share = |at: f64| if k < 2 { share(k % 2, at) } else { 1.0 - share(k % 2, at) };
+        approximate(axes[k % 2], |at| edge.point(share(at)))
+    };
+    let [bottom, right, top, left] = [0, 1, 2, 3].map(control);
+    // Blending is linear: so are the control values, in the abscissas of the B-splines.
+    let mut net = Net::zeros(axes[0], axes[1]);
+    let n_u = axes[0].n_coefficients();
+    for (c, slot) in net.control.iter_mut().enumerate() {
+        let (i, k) = (c % n_u, c / n_u);
+        let (x, y) = (share(0, axes[0].abscissa(i)), share(1, axes[1].abscissa(k)));
+        let along_v = bottom[i] * (1.0 - y) + top[i] * y;
+        let along_u = left[k] * (1.0 - x) + right[k] * x;
         let twice =
             (corner(0) * (1.0 - x) + corner(1) * x) * (1.0 - y) + (corner(3) * (1.0 - x) + corner(2) * x) * y;
-        (along_v + along_u - twice).into()
-    })
+        *slot = (along_v + along_u - twice).into();
+    }
+    net
 }

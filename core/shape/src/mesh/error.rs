@@ -1,7 +1,5 @@
 //! What can be wrong with a mesh.
 
-use crate::surface::Undetermined;
-
 /// Why a set of parts is no disk. Each is a fault of the program that made the parts.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
@@ -11,9 +9,6 @@ pub enum MeshError {
         /// The first fault found.
         what: String,
     },
-    /// Too few samples lie on the plate.
-    #[error(transparent)]
-    Undetermined(#[from] Undetermined),
     /// The triangles do not form a disk.
     #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
     NotADisk {

@@ -8,7 +8,7 @@
 //! be such a beam too, of which noise hides how far it falls behind: both ranges count, the one that was taken and the one
 //! that was not, or the choice between them would move the edge outwards.
 
-use super::sheet::Settled;
+use super::settled::Settled;
 use super::strip::Strip;
 use crate::patch::Beyond;
 

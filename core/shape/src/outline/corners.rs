@@ -4,7 +4,6 @@
 use nalgebra::Vector2;
 
 use super::OutlineError;
-use crate::Vec3;
 
 type Vec2 = Vector2<f64>;
 
@@ -30,51 +29,6 @@ const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
 
 /// Seen along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
 const BULGE: f64 = 0.03;
-
-/// The plate's principal plane.
-#[derive(Debug, Clone)]
-pub(super) struct Plane {
-    origin: Vec3,
-    axes: [Vec3; 2],
-}
-
-impl Plane {
-    /// The plane of points of which `normal` is the mean normal. Seen against `normal` its axes turn
-    /// counter-clockwise.
-    pub(super) fn new(origin: Vec3, normal: Vec3) -> Self {
-        let along = if normal.z.abs() < 0.9 { Vec3::z() } else { Vec3::x() };
-        let first = along.cross(&normal).normalize();
-        Self { origin, axes: [first, normal.normalize().cross(&first)] }
-    }
-
-    /// The same plane with its first axis along `direction`.
-    pub(super) fn along(&self, direction: Vec2) -> Self {
-        let first = self.lift_direction(direction).normalize();
-        Self { origin: self.origin, axes: [first, self.normal().cross(&first)] }
-    }
-
-    /// Unit normal towards the scanner.
-    pub(super) fn normal(&self) -> Vec3 {
-        self.axes[0].cross(&self.axes[1])
-    }
-
-    /// Height of a point over the plane.
-    pub(super) fn height(&self, point: Vec3) -> f64 {
-        self.normal().dot(&(point - self.origin))
-    }
-
-    pub(super) fn project(&self, point: Vec3) -> Vec2 {
-        self.direction(point - self.origin)
-    }
-
-    pub(super) fn direction(&self, vector: Vec3) -> Vec2 {
-        Vec2::new(self.axes[0].dot(&vector), self.axes[1].dot(&vector))
-    }
-
-    pub(super) fn lift_direction(&self, vector: Vec2) -> Vec3 {
-        self.axes[0] * vector.x + self.axes[1] * vector.y
-    }
-}
 
 /// A corner in the plane, and the place on the loop where its two edges part.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 
 use super::OutlineError;
 use super::bracket::{self, Bracket, Line};
-use super::sheet::Settled;
+use super::settled::Settled;
 use super::spline::{Normal, Precision, Roughness, Spline};
 use super::strip::Strip;
 use crate::Vec3;

@@ -3,7 +3,7 @@
 //! As in the paper's 3.2: the mesh of lattice neighbours and its longest boundary loop (`boundary`), corner candidates by
 //! the angle to the k-th neighbours, lines near them by RANSAC and their intersections (`corners`), a spline
 //! along each edge (`edge`). Beyond the paper: the edge is located between the lattice's samples, from the places
-//! where rows and columns leave the face, brought onto the face smoothed as a whole (`sheet`), in the strip along it rolled
+//! where rows and columns leave the face, brought onto the face smoothed as a whole (`settled`), in the strip along it rolled
 //! out into the plane (`strip`). What hides a part of an edge or a corner's neighbourhood takes its crossings out (`rim`);
 //! the curve goes through what is left.
 
@@ -13,18 +13,18 @@ mod corners;
 mod edge;
 mod error;
 mod rim;
-mod sheet;
+mod settled;
 mod spline;
 mod strip;
 
 pub use error::OutlineError;
 
 use crate::patch::Patch;
-use crate::{PlateSpec, Vec3};
-use corners::Plane;
+use crate::plane::Plane;
+use crate::{PlateSpec, Sheet, Vec3};
 use edge::{Edge, EdgeData};
 use rim::Rim;
-use sheet::{Settled, Sheet};
+use settled::Settled;
 
 /// A corner of the scanned face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +57,8 @@ pub struct Outline {
     pub corners: [Corner; 4],
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeCurve; 4],
+    /// The scanned face smoothed as a whole, on which they lie.
+    pub sheet: Sheet,
 }
 
 /// Crossings nearer to a corner than this many lattice steps may belong to either edge.
@@ -95,7 +97,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         let margin = CORNER_STEPS * rim.step;
         let crossings: Vec<Settled> = rim
             .between(corners[k].at, corners[(k + 1) % 4].at)
-            .filter_map(|crossing| sheet.settle(patch, crossing))
+            .filter_map(|crossing| Settled::of(crossing, patch, &sheet))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
         EdgeData::new(&crossings, [from, to], spec.thickness, rim.step, patch.noise)
@@ -127,7 +129,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         }
     };
     let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]], reach);
-    Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve) })
+    Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), sheet })
 }
 
 /// Where two edges meet, and where that is along each.

@@ -4,8 +4,9 @@ use nalgebra::Vector2;
 
 use super::OutlineError;
 use super::boundary::Grid;
-use super::corners::{Corner, Plane};
+use super::corners::Corner;
 use crate::patch::{Beyond, Crossing, Patch};
+use crate::plane::Plane;
 use crate::{PlateSpec, Vec3};
 
 /// The plate's loop is at least this part of its circumference long, counted in lattice steps.

@@ -8,7 +8,7 @@
 use nalgebra::Vector2;
 
 use super::OutlineError;
-use super::sheet::Settled;
+use super::settled::Settled;
 use super::spline::{Normal, Roughness, Spline};
 use crate::Vec3;
 use crate::surface::Axis;

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::axis::{Axis, BASIS};
+use crate::Vec3;
 
 /// A bicubic spline map from (u, v) to `D` components.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,6 +142,14 @@ impl<const D: usize> Net<D> {
         }
         bicubic
     }
+}
+
+/// Coefficients of the spline curve nearest to `f`, as [`Net::approximate`] finds those of a surface.
+pub(crate) fn approximate(axis: Axis, f: impl FnMut(f64) -> Vec3) -> Vec<Vec3> {
+    let (at, projection) = grid_projection(&axis);
+    let samples: Vec<Vec3> = at.into_iter().map(f).collect();
+    let coefficient = |row: usize| projection.row(row).iter().zip(&samples).map(|(w, p)| p * *w).sum();
+    (0..axis.n_coefficients()).map(coefficient).collect()
 }
 
 /// Sample places of an axis, two per span and the end, and the matrix from samples to least-squares coefficients.

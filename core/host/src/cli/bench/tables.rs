@@ -127,7 +127,7 @@ fn meshes(
     command: &Command,
 ) -> Result<Vec<MeshRow>, CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(e.to_string());
-    let face = Face::fit(&one.seen.patch, &one.seen.outline, &shot.spec).map_err(|e| failed(&e))?;
+    let face = Face::of(&one.seen.patch, &one.seen.outline, &shot.spec);
     let mut rows = Vec::new();
     for n in &command.meshes {
         progress::phase(&format!("flattening {n} vertices"));
