@@ -1,10 +1,11 @@
 //! Scans over TCP: the bridge that `scanner --serve` and `cell --serve` run.
 
+use crate::device::Device;
 use crate::error::Error;
 use crate::line::Line;
-use crate::scanner::Device;
 use clap::Args;
 use platen_sim_plate::PlateState;
+use platen_sim_scanner::Instrument;
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, Fault, Head, PlateSource, Recording, Shop};
 use std::io::Write;
 use std::net::SocketAddr;
@@ -58,9 +59,10 @@ impl Serve {
 
     fn shop(&self, device: &Device, plate: PlateSource) -> Shop {
         let shop = Shop::new(plate);
+        let warm_up_columns = shop.instrument.warm_up_columns;
         Shop {
             surroundings: device.surroundings(),
-            instrument: platen_sim_scanner::Instrument { seed: device.scan_seed, ..shop.instrument },
+            instrument: Instrument { warm_up_columns, ..device.instrument() },
             noise: device.noise_mm.map(|mm| mm * 1e-3),
             margin: (!self.dome).then(|| device.margin_deg.to_radians()),
             ..shop

@@ -5,10 +5,10 @@
 //! `SESSION-STROKE-ATTEMPT.e57` and appears whole, but for a late one (`--late-file`). The scanner knows the press only by its second port.
 
 use crate::bridge;
+use crate::device::Device;
 use crate::error::Error;
 use crate::line::{Line, Wanted};
 use crate::press;
-use crate::scanner::Device;
 use clap::Args;
 use platen_sim_press::SimPress;
 use platen_sim_scanner::FileFormat;
@@ -54,6 +54,8 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
     let press = press::start(&command.press).await?;
     let control = press.control().to_string();
     let bridge = command.serve.start(&command.device, bridge::plate_of(control.clone()))?;
+    // What is announced can be used.
+    command.drop.as_ref().map_or(Ok(()), std::fs::create_dir_all)?;
     press::announce(Some(&press), bridge.as_ref().map(Bridge::address))?;
     match command.drop {
         Some(drop) => {
@@ -75,7 +77,6 @@ async fn dropping(
     scanner: Scanner,
     ending: &AtomicBool,
 ) -> Result<(), Error> {
-    std::fs::create_dir_all(&scanner.drop)?;
     let mut scans = tokio::task::spawn_blocking(move || scanner.run());
     tokio::select! {
         ended = press::until_told(press, command) => {

@@ -15,6 +15,7 @@
 
 mod bridge;
 mod cell;
+mod device;
 mod document;
 mod error;
 mod line;

@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use serde_json::json;
 
 use super::disturb::Step;
+use super::event::Event;
 use super::fault::FaultKind;
 use super::frame::{self, Frame, FrameError};
 use super::message::{
@@ -26,17 +27,6 @@ const STATUS: Duration = Duration::from_millis(900);
 
 /// Columns sent between two looks at what the driver says.
 const ROUND: usize = 16;
-
-/// What a connection waits for.
-#[derive(Debug)]
-pub(super) enum Event {
-    /// The driver says this.
-    Frame(Frame),
-    /// The driver has gone, or what it says is no frame.
-    Gone,
-    /// A scan has grown or ended.
-    Grown,
-}
 
 /// The connection ends.
 struct Hangup;

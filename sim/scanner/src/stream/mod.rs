@@ -12,6 +12,7 @@ mod bridge;
 mod config;
 mod connection;
 mod disturb;
+mod event;
 mod fault;
 mod frame;
 mod head;

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::connection::Event;
+use super::event::Event;
 use super::frame::{self, Frame};
 use super::message::{Begin, Outcome, ScanBegin, ScanEnd};
 use super::payload;
