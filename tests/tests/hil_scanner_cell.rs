@@ -64,7 +64,7 @@ impl Cell {
         let mut plate = None;
         until("the end of the strokes", || {
             if let Reply::Plate(Some(state)) = self.ask(r#"{"get":"plate"}"#) {
-                plate = Some(state);
+                plate = Some(*state);
             }
             let mut stats: Json = self.ask(r#"{"get":"stats"}"#);
             let done = stats["stats"]["done"] == true;

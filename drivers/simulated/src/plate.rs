@@ -72,7 +72,7 @@ fn ask(address: &str) -> Result<Option<PlateState>, Error> {
     let failed = |source| Error::Cell { address: address.into(), source };
     let line = exchange(address).map_err(failed)?;
     match serde_json::from_str(&line) {
-        Ok(Reply::Plate(state)) => Ok(state),
+        Ok(Reply::Plate(state)) => Ok(state.map(|state| *state)),
         Ok(Reply::Error(reason)) => Err(Error::Busy { address: address.into(), reason }),
         Err(source) => {
             let line = line.trim_end().chars().take(80).collect();

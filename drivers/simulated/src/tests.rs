@@ -181,7 +181,8 @@ fn a_stopped_scan_has_no_end() {
 fn the_press_says_what_lies_in_it() {
     let state =
         PlateState { shape: Shape::Sphere { radius_mm: 12_345.6 }, ..PlateState::flat(2000.0, 1500.0, 30.0) };
-    let (address, served) = press(serde_json::to_string(&Reply::Plate(Some(state.clone()))).unwrap() + "\n");
+    let (address, served) =
+        press(serde_json::to_string(&Reply::Plate(Some(state.clone().into()))).unwrap() + "\n");
     let fetched = plate::fetch(&Options { cell: Some(address), ..options() }).unwrap().unwrap();
     assert_eq!(served.join().unwrap(), "{\"get\":\"plate\"}\n");
     assert_eq!(fetched.shape, state.shape);

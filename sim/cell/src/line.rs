@@ -46,7 +46,7 @@ impl Line {
     pub(crate) fn plate(&mut self) -> Result<Option<PlateState>, Error> {
         let request = serde_json::to_string(&Request::Plate).unwrap_or_default();
         match self.ask(&request)? {
-            Reply::Plate(state) => Ok(state),
+            Reply::Plate(state) => Ok(state.map(|state| *state)),
             Reply::Error(_) => Ok(None),
         }
     }

@@ -11,12 +11,18 @@
 //! the membrane energy of an elastic sheet (plane stress, Poisson's ratio 0.3, free edges) is least. Either way
 //! the shape itself is exact.
 //!
+//! ## The cut
+//! A blank may be cut off its rectangle by millimetres (`corners_off_mm`, `bows_mm`). (u, v) stay metric on the steel: a place (a, b) of
+//! the ordered rectangle is then material point [`Plate::material`]`(a, b)`. A tape laid from corner (0,0) along the first edge reads u as
+//! long as that corner is not moved and the next one only along u.
+//!
 //! Frames and units: (u, v) in [0, width] x [0, height], metres; the local frame has its origin in the middle of
 //! the mid-surface, x along u there and z along the upper normal; the pose takes it to the scanner frame. Documents are in
 //! millimetres and degrees. Curvature is positive when the centre lies above the plate.
 //! This crate shares no code with the product: what it says is the truth that the product is judged by.
 
 mod cone;
+mod cut;
 mod error;
 mod material;
 mod plate;

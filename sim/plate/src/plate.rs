@@ -1,6 +1,7 @@
 //! The prepared geometry of one state of a plate.
 
 use crate::cone::Cone;
+use crate::cut::Cut;
 use crate::material::MaterialMap;
 use crate::profile::Profile;
 use crate::shape::{band_profile, curvature, step_profile};
@@ -51,6 +52,7 @@ enum Surface {
 #[derive(Debug, Clone)]
 pub struct Plate {
     blank: Blank,
+    cut: Option<Cut>,
     width: f64,
     height: f64,
     thickness: f64,
@@ -77,6 +79,7 @@ impl Plate {
             height,
             thickness: blank.thickness_mm * 1e-3,
             markers: blank.markers_mm.iter().map(|m| m.map(|c| c * 1e-3)).collect(),
+            cut: Cut::new(&blank),
             blank,
             surface,
             axis,
@@ -91,12 +94,12 @@ impl Plate {
         Ok(plate)
     }
 
-    /// Extent along u, metres.
+    /// Extent along u as ordered, metres.
     pub fn width(&self) -> f64 {
         self.width
     }
 
-    /// Extent along v, metres.
+    /// Extent along v as ordered, metres.
     pub fn height(&self) -> f64 {
         self.height
     }
@@ -189,18 +192,30 @@ impl Plate {
 
     /// Corners (0,0), (W,0), (W,H), (0,H) of the upper face.
     pub fn corners(&self) -> [Vec3; 4] {
-        [(0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height)]
-            .map(|(u, v)| self.top(u, v))
+        [(0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height)].map(|(a, b)| {
+            let ([u, v], _) = self.material(a, b);
+            self.top(u, v)
+        })
+    }
+
+    /// Material point (u, v) at the place (a, b) of the rectangle as ordered, and its derivatives
+    /// `[[du/da, du/db], [dv/da, dv/db]]`: the place itself unless the blank was cut off it.
+    pub fn material(&self, a: f64, b: f64) -> ([f64; 2], [[f64; 2]; 2]) {
+        match &self.cut {
+            Some(cut) => cut.material(a, b),
+            None => ([a, b], [[1.0, 0.0], [0.0, 1.0]]),
+        }
     }
 
     /// Material point (u, v) at `along` in 0..1 of a side face.
     pub fn side_uv(&self, side: Side, along: f64) -> [f64; 2] {
-        match side {
+        let [a, b] = match side {
             Side::Bottom => [along * self.width, 0.0],
             Side::Right => [self.width, along * self.height],
             Side::Top => [along * self.width, self.height],
             Side::Left => [0.0, along * self.height],
-        }
+        };
+        self.material(a, b).0
     }
 
     /// Curvature `h` metres above the mid-surface (0: the mid-surface's own).

@@ -19,7 +19,7 @@ pub enum Request {
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
     /// The plate, `None` while there is none.
-    Plate(Option<PlateState>),
+    Plate(Option<Box<PlateState>>),
     /// The question was not understood, or the plate is moving; says which.
     Error(String),
 }

@@ -20,8 +20,15 @@ pub struct PlateState {
     pub strokes: u32,
 }
 
-/// The rectangle and the painted markers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A cut further off than this is another plate.
+const MOST_OFF_MM: f64 = 100.0;
+
+fn is_nothing<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// The rectangle, how far it was cut off it, and the painted markers.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blank {
     /// Extent along u.
@@ -30,6 +37,12 @@ pub struct Blank {
     pub height_mm: f64,
     /// Thickness.
     pub thickness_mm: f64,
+    /// How far the corners (0,0), (W,0), (W,H), (0,H) were cut off those of the rectangle, (u, v).
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub corners_off_mm: [[f64; 2]; 4],
+    /// How far the edges v = 0, u = W, v = H, u = 0 bulge in their middles, outwards.
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub bows_mm: [f64; 4],
     /// Middles of dark discs painted on the upper face, (u, v).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub markers_mm: Vec<[f64; 2]>,
@@ -89,7 +102,7 @@ impl PlateState {
     /// A flat plate of these measures in the default pose.
     pub fn flat(width_mm: f64, height_mm: f64, thickness_mm: f64) -> Self {
         Self {
-            blank: Blank { width_mm, height_mm, thickness_mm, markers_mm: Vec::new() },
+            blank: Blank { width_mm, height_mm, thickness_mm, ..Blank::default() },
             shape: Shape::Flat,
             pose: Pose::default(),
             strokes: 0,
@@ -107,6 +120,11 @@ impl PlateState {
             if !(found.is_finite() && found >= least && found <= 1e5) {
                 return Err(PlateError::Description { key, found, advice: "write a length in millimetres" });
             }
+        }
+        let off = blank.corners_off_mm.iter().flatten().chain(&blank.bows_mm);
+        if let Some(found) = off.copied().find(|off| off.is_nan() || off.abs() > MOST_OFF_MM) {
+            let advice = "write how far the cut is off the rectangle, 100 mm at most";
+            return Err(PlateError::Description { key: "blank.corners_off_mm or bows_mm", found, advice });
         }
         let pose = &self.pose;
         let angles = [pose.yaw_deg, pose.pitch_deg, pose.roll_deg];

@@ -107,8 +107,8 @@ fn programmes_and_places_repeat_with_their_seed() {
 #[test]
 fn documents_survive_json_bit_for_bit() {
     let state = bent(&Shape::Sphere { radius_mm: 11_000.0 }, &Plan::default());
-    let line = serde_json::to_string(&Reply::Plate(Some(state.clone()))).unwrap();
-    assert_eq!(serde_json::from_str::<Reply>(&line).unwrap(), Reply::Plate(Some(state)));
+    let line = serde_json::to_string(&Reply::Plate(Some(state.clone().into()))).unwrap();
+    assert_eq!(serde_json::from_str::<Reply>(&line).unwrap(), Reply::Plate(Some(state.into())));
     assert_eq!(serde_json::to_string(&Request::Plate).unwrap(), r#"{"get":"plate"}"#);
     assert_eq!(serde_json::from_str::<Reply>(r#"{"plate":null}"#).unwrap(), Reply::Plate(None));
 }

@@ -108,7 +108,7 @@ impl Press {
                 Reply::Error(String::from("the plate is moving: wait for the ram"))
             }
             Phase::PartEnd { .. } | Phase::Done => Reply::Plate(None),
-            _ => Reply::Plate(Some(self.steel.state().clone())),
+            _ => Reply::Plate(Some(self.steel.state().clone().into())),
         }
     }
 

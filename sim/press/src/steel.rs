@@ -54,7 +54,7 @@ pub struct PlateConfig {
 impl Default for PlateConfig {
     fn default() -> Self {
         Self {
-            blank: Blank { width_mm: 4000.0, height_mm: 4000.0, thickness_mm: 35.0, markers_mm: Vec::new() },
+            blank: Blank { width_mm: 4000.0, height_mm: 4000.0, thickness_mm: 35.0, ..Blank::default() },
             target: Shape::Cylinder { radius_mm: 12_017.5, axis_deg: 90.0 },
             share: 1.0,
             plan: Plan::default(),

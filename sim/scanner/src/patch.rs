@@ -25,7 +25,8 @@ enum Face {
     Side(Side),
 }
 
-/// A rectangle in the two parameters of a face: (u, v), or (u or v, height above the mid-surface) on a side.
+/// A rectangle in the two parameters of a face: (a, b) of the rectangle as ordered, or one of them and the height above the
+/// mid-surface on a side.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
     face: Face,
@@ -50,8 +51,8 @@ impl Face {
         }
     }
 
-    /// Material point and height of the parameters (a, b).
-    fn material(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
+    /// Place on the rectangle as ordered, and height, of the parameters (a, b).
+    fn place(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
         let (width, height, half) = (plate.width(), plate.height(), plate.thickness() / 2.0);
         match self {
             Self::Top => [a, b, half],
@@ -73,12 +74,14 @@ impl Face {
 
     /// Point and derivatives by (a, b).
     fn point(self, plate: &Plate, a: f64, b: f64) -> (Vec3, Vec3, Vec3) {
-        let [u, v, h] = self.material(plate, a, b);
+        let [a, b, h] = self.place(plate, a, b);
+        let ([u, v], [[u_a, u_b], [v_a, v_b]]) = plate.material(a, b);
         let Jet { point, du, dv, normal, .. } = plate.jet(u, v, h);
+        let (da, db) = (du * u_a + dv * v_a, du * u_b + dv * v_b);
         match self {
-            Self::Top | Self::Underside => (point, du, dv),
-            Self::Side(Side::Bottom | Side::Top) => (point, du, normal),
-            Self::Side(Side::Right | Side::Left) => (point, dv, normal),
+            Self::Top | Self::Underside => (point, da, db),
+            Self::Side(Side::Bottom | Side::Top) => (point, da, normal),
+            Self::Side(Side::Right | Side::Left) => (point, db, normal),
         }
     }
 }
@@ -150,8 +153,9 @@ impl Patch {
         if !inside(a, 0) || !inside(b, 1) || root.range <= 0.0 || self.leaves(&root, ray) {
             return None;
         }
-        let [u, v, _] = self.face.material(plate, a, b);
-        Some(PatchHit { range: root.range, normal: root.normal.normalize(), uv: [u, v] })
+        let [a, b, _] = self.face.place(plate, a, b);
+        let (uv, _) = plate.material(a, b);
+        Some(PatchHit { range: root.range, normal: root.normal.normalize(), uv })
     }
 
     fn leaves(&self, root: &Root, ray: &Ray) -> bool {
