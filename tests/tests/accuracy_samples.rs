@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use platen_host::accuracy::{Accuracy, Truth, rms};
 use platen_host::plugin::{Catalogue, JobSpec, Scanner};
 use platen_host::rig::{self, Rig};
-use platen_host::stroke::{self, Measured};
+use platen_host::stroke::{self, Baseline, Measured};
 use platen_plant::{PlantFile, Value};
 use platen_shape::PlateSpec;
 use platen_sim_plate::Pose;
@@ -109,7 +109,7 @@ impl Lab {
         let scanner = Scanner::create(&library, &values).unwrap();
         scanner.instance().open(LIMIT).unwrap();
         let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec, None).unwrap();
-        stroke::measure_scanned(&mut self.rig, &scanned, spec, None).unwrap()
+        stroke::measure_scanned(&mut self.rig, &scanned, spec, None, Baseline::None).unwrap()
     }
 
     /// Corners rms and markers mean of the sample itself, millimetres.

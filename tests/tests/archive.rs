@@ -57,7 +57,7 @@ fn a_kept_scan_measured_again_gives_the_same_result() {
     let scan = |k: usize| runs[k].join("scan.e57");
     let (blank, first) = (scan(0), scan(1));
     for (k, more) in [
-        (0, vec![]),
+        (0, vec![("--baseline", blank.as_path())]),
         (1, vec![("--before", blank.as_path()), ("--baseline", &blank)]),
         (2, vec![("--before", first.as_path()), ("--baseline", &blank)]),
     ] {

@@ -24,7 +24,7 @@ use std::f64::consts::PI;
 
 use platen_host::plugin::{Catalogue, JobSpec};
 use platen_host::rig::Rig;
-use platen_host::stroke::{self, NotMeasured};
+use platen_host::stroke::{self, Baseline, NotMeasured};
 use platen_plant::PlantFile;
 use platen_scan::Window;
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
@@ -89,7 +89,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     // Those that come last in the host's order are emptied by the driver.
     let left_out = if scene.clockwise { 0 } else { scene.instrument.warm_up_columns };
     assert_eq!(scanned.warm_up_columns, left_out);
-    let measured = stroke::measure_scanned(&mut rig, &scanned, &spec, None)?;
+    let measured = stroke::measure_scanned(&mut rig, &scanned, &spec, None, Baseline::None)?;
 
     let corner = |k: usize| (measured.outline.corners[k].point - truth.corners()[k]).norm();
     let surface = &measured.measurement.surface;

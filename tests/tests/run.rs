@@ -22,6 +22,7 @@ fn strokes_are_measured_recorded_and_answered() {
 
     let history = Host::history(&plant);
     assert_eq!(history.len(), 6);
+    let mut outlines = Vec::new();
     for (record, taken) in history.iter().zip(taken) {
         assert_eq!(record["key"]["stroke"], taken["stroke_id"]);
         assert_eq!(record["ack"], "explicit");
@@ -35,12 +36,29 @@ fn strokes_are_measured_recorded_and_answered() {
         let document = std::path::Path::new(record["document"].as_str().unwrap());
         let result: serde_json::Value = serde_json::from_slice(&std::fs::read(document).unwrap()).unwrap();
         assert_eq!(result["verdict"], record["verdict"]);
+        outlines.push(result["outline"].clone());
     }
+    strokes_are_mapped_to_their_blank(&outlines);
     let status = host.status().unwrap();
     assert_eq!(status["status"]["measured"], 6, "{status}");
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     assert_eq!(press.host_status(), 0, "nothing is left valid");
     two_plates_are_compared(&plant);
+}
+
+/// Each plate's first scan tells the outline of its blank, and its strokes keep it.
+fn strokes_are_mapped_to_their_blank(outlines: &[serde_json::Value]) {
+    for plate in outlines.chunks(3) {
+        let blank = &plate[0];
+        assert_eq!(blank["from"], "baseline");
+        assert!(plate[1] == *blank && plate[2] == *blank, "{plate:#?}");
+        for (name, cut) in [("width_mm", 3004.0), ("height_mm", 2497.0), ("diagonal_difference_mm", 5.0)] {
+            let found = blank[name].as_f64().unwrap();
+            // Cells are 12 mm apart here.
+            assert!((found - cut).abs() < 1.5, "{name} {found}, cut {cut}");
+        }
+    }
+    assert_ne!(outlines[0], outlines[3], "two scans of two blanks");
 }
 
 /// Two strokes of different plates in (u, v).

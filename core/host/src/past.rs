@@ -4,10 +4,11 @@ use std::path::Path;
 
 use platen_history::{Archive, Error, Filter, Stroke};
 use platen_plant::PlateFile;
+use platen_shape::Blank;
 use platen_shape::task::Verdict;
 
 use crate::picture::StripPoint;
-use crate::record::{ResultRecord, TemplateRecord};
+use crate::record::{OutlineRecord, ResultRecord, TemplateRecord};
 use crate::units::mm;
 
 /// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
@@ -83,6 +84,16 @@ pub fn supports(document: &Path) -> Option<String> {
     }
     let text = std::fs::read(document).ok()?;
     serde_json::from_slice::<Supports>(&text).ok()?.supports
+}
+
+/// The outline of the blank, as the result document of a scan of it has it.
+pub fn blank(document: &Path) -> Option<Blank> {
+    #[derive(serde::Deserialize)]
+    struct Outline {
+        outline: Option<OutlineRecord>,
+    }
+    let text = std::fs::read(document).ok()?;
+    serde_json::from_slice::<Outline>(&text).ok()?.outline?.blank()
 }
 
 /// Whether the plate rests on other supports than it did `before`; what is not known is not called a change.

@@ -6,11 +6,13 @@
 mod checks;
 mod grid;
 mod lines;
+mod outline;
 mod plate;
 
 pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
 pub use grid::GridRecord;
 pub use lines::{LineRecord, PointRecord, TemplateRecord};
+pub use outline::{OutlineRecord, OutlineSource};
 pub use plate::PlateRecord;
 
 use serde::{Deserialize, Serialize};
@@ -47,6 +49,9 @@ pub struct ResultRecord {
     pub supports: Option<String>,
     /// The plate as its file had it at this stroke.
     pub plate_file: PlateRecord,
+    /// The outline that (u, v) refer to; null in documents of before it could be another than the rectangle.
+    #[serde(default)]
+    pub outline: Option<OutlineRecord>,
     /// How far the scanner was calibrated.
     pub calibration: CalibrationRecord,
     /// The scan.
@@ -198,6 +203,10 @@ impl ResultRecord {
             says: sentences(context.reports),
             supports: context.plate.plate.supports.clone(),
             plate_file: PlateRecord::new(context.plate, &measurement.surface, context.press),
+            outline: Some(OutlineRecord::new(
+                measured.blank.as_ref(),
+                [context.plate.plate.width, context.plate.plate.height],
+            )),
             calibration: CalibrationRecord {
                 sigma_correlated_mm: mm(context.task.sigma_correlated),
                 sigma_true_mm: context.task.sigma_true.map(mm),

@@ -19,7 +19,7 @@ use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, Measurement, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
 use platen_shape::task::{Task, Verdict};
-use platen_shape::{Patch, PlateSpec, Turned, turned};
+use platen_shape::{Blank, BlankError, Patch, PlateSpec, Turned, turned};
 
 use crate::plugin::{JobSpec, PluginError, Report, ScanEvent, Scanner, Surfaces};
 use crate::rig::Rig;
@@ -56,6 +56,9 @@ pub enum NotMeasured {
         "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
     )]
     Turned(Turned),
+    /// The scan of the blank tells no outline.
+    #[error("baseline: {0}")]
+    Blank(#[from] BlankError),
     /// The plate could not be flattened or fitted.
     #[error("plate: {0}")]
     Shape(#[from] MeasureError),
@@ -137,11 +140,24 @@ pub fn scan(
     })
 }
 
+/// What is known of the outline that the plate was really cut with.
+#[derive(Debug, Clone, Copy)]
+pub enum Baseline<'a> {
+    /// Nothing: it counts as the rectangle of its plate file.
+    None,
+    /// What an earlier scan of the blank told.
+    Earlier(&'a Blank),
+    /// What this scan tells: it is the blank's.
+    This,
+}
+
 /// The plate's shape, from its scanned face.
 #[derive(Debug)]
 pub struct Measured {
     /// Corners and edges.
     pub outline: Outline,
+    /// The blank's outline, which (u, v) refer to; without one it is the rectangle as ordered.
+    pub blank: Option<Blank>,
     /// Mid-surface, mesh, chart, S(u, v).
     pub measurement: Measurement,
     /// From patch to outline.
@@ -149,7 +165,7 @@ pub struct Measured {
 }
 
 /// From the plate's face to its shape. At its first scan the hint of `spec` tells its corners apart, later the way
-/// that it lay at the `last` one.
+/// that it lay at the `last` one. Its edges lie where the `baseline` tells.
 ///
 /// # Errors
 /// Why the plate was not measured.
@@ -158,6 +174,7 @@ pub fn measure_scanned(
     scanned: &Scanned,
     spec: &PlateSpec,
     last: Option<Last<'_>>,
+    baseline: Baseline<'_>,
 ) -> Result<Measured, NotMeasured> {
     let start = Instant::now();
     let outline = match last {
@@ -171,13 +188,18 @@ pub fn measure_scanned(
         }
     };
     let outline_time = start.elapsed();
+    let blank = match baseline {
+        Baseline::None => None,
+        Baseline::Earlier(blank) => Some(*blank),
+        Baseline::This => Some(Blank::of_scan(&scanned.patch, &outline, spec)?),
+    };
+    let ordered = spec.rectangle();
+    let cut = blank.as_ref().unwrap_or(&ordered);
     let measurement =
-        measure(&scanned.patch, &outline, spec, &spec.rectangle(), &mut rig.flattening, &mut || {
-            start.elapsed()
-        })?;
+        measure(&scanned.patch, &outline, spec, cut, &mut rig.flattening, &mut || start.elapsed())?;
     match last.and_then(|last| turned(&measurement.surface, last.surface)) {
         Some(turned) => Err(NotMeasured::Turned(turned)),
-        None => Ok(Measured { outline, measurement, outline_time }),
+        None => Ok(Measured { outline, blank, measurement, outline_time }),
     }
 }
 

@@ -1,36 +1,42 @@
 //! The outline of the plate as it was cut, in its own plane.
 //!
 //! As ordered it is a rectangle, exactly. A scan of the blank, flat or a little curved, tells more: laid flat
-//! ([`lay_flat`]), its boundary is the outline that all later strokes of the same plate are mapped to. (u, v) are then
-//! metric on the real plate: corner (0,0) in the origin, u along the straight line to corner (W,0). S(u, v) keeps the rectangle as
+//! ([`lay_flat`]), each of its edges is a line with a bow, the parabola of least squares; where two of them meet is a
+//! corner. Shorter waves than a bow, which every scan shows of an edge, are its own error of some tenths of a millimetre.
+//! This is the outline that all later strokes of the same plate are mapped to.
+//!
+//! (u, v) are then metric on the real plate: the rectangle as ordered lies on it so that its corners are off those of the blank
+//! with no mean shift and no turn. Both corners of an edge share in what it is too long, as they do without a baseline; and four
+//! corners tell the place and turn of the plate better than one of them and its edge. S(u, v) keeps the rectangle as
 //! ordered, and goes on beyond it where the plate is larger by millimetres.
+
+use nalgebra::{Matrix3, Vector3};
 
 use crate::flatten::lay_flat;
 use crate::measure::N_VERTICES;
 use crate::mesh::{DiskMesh, Face, MeshError};
 use crate::{Outline, Patch, PlateSpec};
 
-/// Places along an edge at which its bulge is kept: 130 mm apart on 4 m, 4 um from a bow of 2 mm.
-const BULGE_PLACES: usize = 33;
+/// Steps of a rounded outline.
+const PER_METRE: f64 = (1_u64 << 30) as f64;
 /// A corner or an edge further from its place as ordered than this, metres, is not cut badly but mistaken, or another plate's.
 /// S reads on beyond its rectangle by as much without harm.
 const MOST_OFF: f64 = 0.02;
 /// More strain than this in a plate laid flat, and the law of the material, which nobody knows once it was pressed, decides where its
 /// outline was: on a sphere of 80 m radius (4 x 3 m, strain 3.6e-5) it is right to 0.02 mm for steel that was bent elastically, and
-/// off by up to 0.8 mm for fibres that kept their length one way.
+/// off by up to 0.45 mm for fibres that kept their length one way.
 const MOST_STRAIN: f64 = 5e-5;
 
 /// Where the material of the four edges lies in (u, v).
 ///
 /// Edges v = 0, u = W, v = H, u = 0, each from corner to corner counter-clockwise as the boundary of a
-/// [`DiskMesh`]. What an edge bulges is given at equal shares of its length; in between it is straight.
-#[derive(Debug, Clone, PartialEq)]
+/// [`DiskMesh`].
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Corners (0,0), (W,0), (W,H), (0,H), metres.
     pub corners: [[f64; 2]; 4],
-    /// Per edge, at equal shares from its first corner to its last: how far it lies outside the straight line between them, metres.
-    /// Empty: nowhere.
-    pub bulge: [Vec<f64>; 4],
+    /// Per edge: how far its middle lies outside the straight line between its corners, metres; a parabola.
+    pub bows: [f64; 4],
     /// Per corner: standard deviation along the edge that leaves it and along the one that arrives, metres.
     pub corner_sigma: [[f64; 2]; 4],
     /// Per edge: standard deviation across it, metres.
@@ -78,7 +84,7 @@ impl Blank {
     pub fn rectangle(width: f64, height: f64) -> Self {
         Self {
             corners: [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]],
-            bulge: Default::default(),
+            bows: [0.0; 4],
             corner_sigma: [[0.0; 2]; 4],
             edge_sigma: [0.0; 4],
         }
@@ -102,15 +108,25 @@ impl Blank {
         let rough = |reason: &str| BlankError::Rough { reason: reason.to_owned() };
         let flat = lay_flat(mesh).map_err(|e| rough(&e.to_string()))?;
         let flat = flat.ok_or_else(|| rough("its mesh folds over"))?;
-        let place = |at: usize| flat.uv[mesh.boundary[at % mesh.boundary.len()] as usize];
-        let corners = mesh.corners.map(|at| place(at as usize));
-        let bulge = [0, 1, 2, 3].map(|edge| {
-            let line = Line { from: corners[edge], to: corners[(edge + 1) % 4] };
-            at_equal_shares(&mesh.edge(edge).map(|at| line.share_and_height(place(at))).collect::<Vec<_>>())
+        let curves = [0, 1, 2, 3].map(|edge| {
+            let vertices = mesh.edge(edge).map(|at| mesh.boundary[at % mesh.boundary.len()] as usize);
+            Curve::fit(&vertices.map(|vertex| flat.uv[vertex]).collect::<Vec<_>>())
         });
-        let (corner_sigma, edge_sigma) = (mesh.corner_sigma, mesh.edge_sigma);
-        let blank = Self { corners, bulge, corner_sigma, edge_sigma };
-        let off = blank.off(mesh.width, mesh.height);
+        let [Some(bottom), Some(right), Some(top), Some(left)] = curves else {
+            return Err(rough("an edge has too few vertices"));
+        };
+        let curves = [bottom, right, top, left];
+        let corners = [0, 1, 2, 3].map(|k| curves[(k + 3) % 4].meets(&curves[k]));
+        let ordered = Self::rectangle(mesh.width, mesh.height);
+        let blank = Self {
+            corners: laid_on(corners, ordered.corners),
+            bows: curves.each_ref().map(Curve::bow),
+            corner_sigma: mesh.corner_sigma,
+            // What an edge does besides bowing is not known either.
+            edge_sigma: [0, 1, 2, 3].map(|edge| mesh.edge_sigma[edge].max(curves[edge].rms)),
+        };
+        let blank = blank.rounded();
+        let off = blank.off(&ordered);
         if off.is_nan() || off > MOST_OFF {
             return Err(BlankError::OffSize { size: blank.size(), off });
         }
@@ -118,6 +134,16 @@ impl Blank {
             return Err(BlankError::Curved { strain: flat.strain });
         }
         Ok(blank)
+    }
+
+    /// To whole nanometres (2^-30 m): what was rounded comes back to the last bit from text in millimetres, rounded again.
+    #[must_use]
+    pub fn rounded(mut self) -> Self {
+        let sigmas = self.corner_sigma.iter_mut().flatten().chain(&mut self.edge_sigma);
+        for x in self.corners.iter_mut().flatten().chain(&mut self.bows).chain(sigmas) {
+            *x = (*x * PER_METRE).round() / PER_METRE;
+        }
+        self
     }
 
     /// Mean lengths of opposite edges, straight from corner to corner: along u, along v, metres.
@@ -133,18 +159,10 @@ impl Blank {
         self.distance(0, 2) - self.distance(1, 3)
     }
 
-    /// The furthest that each edge lies outside the straight line between its corners, negative: inside; metres.
-    #[must_use]
-    pub fn bows(&self) -> [f64; 4] {
-        let furthest = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
-        self.bulge.each_ref().map(|bulge| bulge.iter().fold(0.0, furthest))
-    }
-
     /// How far a corner or an edge lies from its place on the rectangle, at most.
-    fn off(&self, width: f64, height: f64) -> f64 {
-        let ordered = Self::rectangle(width, height).corners;
-        let corners = self.corners.iter().zip(ordered).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
-        corners.chain(self.bows().map(f64::abs)).fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+    fn off(&self, ordered: &Self) -> f64 {
+        let corners = self.corners.iter().zip(ordered.corners).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+        corners.chain(self.bows.map(f64::abs)).fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
     }
 
     fn distance(&self, a: usize, b: usize) -> f64 {
@@ -158,15 +176,15 @@ impl Blank {
         let next = (edge + 1) % 4;
         // Opposite edges are both walked towards growing u or v: on a rectangle they then agree to the last bit.
         let (from, to, along) = if edge < 2 { (edge, next, share) } else { (next, edge, 1.0 - share) };
-        let line = Line { from: self.corners[from], to: self.corners[to] };
-        let bulge = &self.bulge[edge];
-        if bulge.len() < 2 {
-            return line.at(along, 0.0);
+        let (from, to) = (self.corners[from], self.corners[to]);
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let on_line = [from[0] + along * way[0], from[1] + along * way[1]];
+        if self.bows[edge] == 0.0 {
+            return on_line;
         }
-        let at = share.clamp(0.0, 1.0) * (bulge.len() - 1) as f64;
-        let first = (at as usize).min(bulge.len() - 2);
-        let height = bulge[first] + (at - first as f64) * (bulge[first + 1] - bulge[first]);
-        line.at(along, if edge < 2 { height } else { -height })
+        let out = 4.0 * self.bows[edge] * share * (1.0 - share) / way[0].hypot(way[1]);
+        let out = if edge < 2 { out } else { -out };
+        [on_line[0] + way[1] * out, on_line[1] - way[0] * out]
     }
 
     /// Where the vertices of a boundary loop lie when every one keeps its share of its edge's arc length (paper, section
@@ -183,48 +201,87 @@ impl Blank {
     }
 }
 
-/// A straight line in the plane.
-struct Line {
-    from: [f64; 2],
-    to: [f64; 2],
+/// An edge in the plane: a parabola over the line from its first point to its last.
+struct Curve {
+    middle: [f64; 2],
+    /// Half the way from end to end.
+    half: [f64; 2],
+    /// Height to the right of the line, metres, by powers of the place t, -1 to 1.
+    height: [f64; 3],
+    /// Root mean square distance of the points from it.
+    rms: f64,
 }
 
-impl Line {
-    fn way(&self) -> [f64; 2] {
-        [self.to[0] - self.from[0], self.to[1] - self.from[1]]
-    }
-
-    /// The place at a share of its length, and a height to its right.
-    fn at(&self, share: f64, height: f64) -> [f64; 2] {
-        let way = self.way();
-        let on_line = [self.from[0] + share * way[0], self.from[1] + share * way[1]];
-        if height == 0.0 {
-            return on_line;
+impl Curve {
+    /// Least squares; `None` for fewer than three points.
+    fn fit(points: &[[f64; 2]]) -> Option<Self> {
+        let (from, to) = (points.first()?, points.last()?);
+        let middle = [0, 1].map(|c| 0.5 * (from[c] + to[c]));
+        let half = [0, 1].map(|c| 0.5 * (to[c] - from[c]));
+        let square = half[0] * half[0] + half[1] * half[1];
+        let place = |p: &[f64; 2]| {
+            let off = [p[0] - middle[0], p[1] - middle[1]];
+            let height = (off[0] * half[1] - off[1] * half[0]) / square.sqrt();
+            let t = (off[0] * half[0] + off[1] * half[1]) / square;
+            (Vector3::new(1.0, t, t * t), height)
+        };
+        let (mut normal, mut rhs) = (Matrix3::zeros(), Vector3::zeros());
+        for (powers, height) in points.iter().map(place) {
+            normal += powers * powers.transpose();
+            rhs += powers * height;
         }
-        let outwards = height / way[0].hypot(way[1]);
-        [on_line[0] + way[1] * outwards, on_line[1] - way[0] * outwards]
+        let height = normal.cholesky()?.solve(&rhs);
+        let residual = |p| {
+            let (powers, seen): (Vector3<f64>, f64) = place(p);
+            (seen - powers.dot(&height)).powi(2)
+        };
+        let rms = (points.iter().map(residual).sum::<f64>() / points.len() as f64).sqrt();
+        Some(Self { middle, half, height: height.into(), rms })
     }
 
-    /// The reverse.
-    fn share_and_height(&self, place: [f64; 2]) -> [f64; 2] {
-        let (way, off) = (self.way(), [place[0] - self.from[0], place[1] - self.from[1]]);
-        let square = way[0] * way[0] + way[1] * way[1];
-        let height = (off[0] * way[1] - off[1] * way[0]) / square.sqrt();
-        [(off[0] * way[0] + off[1] * way[1]) / square, height]
+    /// Place and derivative by t.
+    fn at(&self, t: f64) -> ([f64; 2], [f64; 2]) {
+        let [h, k] = self.half;
+        let [a, b, c] = self.height.map(|x| x / h.hypot(k));
+        let (out, slope) = (a + t * (b + t * c), b + 2.0 * t * c);
+        ([self.middle[0] + t * h + out * k, self.middle[1] + t * k - out * h], [h + slope * k, k - slope * h])
+    }
+
+    /// Where its end meets the beginning of the next edge: Newton's method, edges are nearly straight.
+    fn meets(&self, next: &Self) -> [f64; 2] {
+        const STEPS: usize = 4;
+        let (mut s, mut t) = (1.0, -1.0);
+        for _ in 0..STEPS {
+            let ((p, along), (q, other)) = (self.at(s), next.at(t));
+            let off = [q[0] - p[0], q[1] - p[1]];
+            let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
+            let turn = cross(along, other);
+            s += cross(off, other) / turn;
+            t += cross(off, along) / turn;
+        }
+        next.at(t).0
+    }
+
+    fn bow(&self) -> f64 {
+        -self.height[2]
     }
 }
 
-/// Heights at equal shares from 0 to 1, straight between the given ones, whose shares grow.
-fn at_equal_shares(given: &[[f64; 2]]) -> Vec<f64> {
-    let height = |k: usize| {
-        let share = k as f64 / (BULGE_PLACES - 1) as f64;
-        let next = given.partition_point(|g| g[0] < share).clamp(1, given.len() - 1);
-        let ([s0, h0], [s1, h1]) = (given[next - 1], given[next]);
-        h0 + (share - s0) / (s1 - s0) * (h1 - h0)
-    };
-    let mut heights: Vec<f64> = (0..BULGE_PLACES).map(height).collect();
-    (heights[0], heights[BULGE_PLACES - 1]) = (0.0, 0.0);
-    heights
+/// The corners moved and turned, as one, to where they are off the ordered ones by least squares.
+fn laid_on(corners: [[f64; 2]; 4], ordered: [[f64; 2]; 4]) -> [[f64; 2]; 4] {
+    let middle = |of: &[[f64; 2]; 4]| [0, 1].map(|c| 0.25 * of.iter().map(|p| p[c]).sum::<f64>());
+    let (from, to) = (middle(&corners), middle(&ordered));
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (p, q) in corners.iter().zip(&ordered) {
+        let (p, q) = ([p[0] - from[0], p[1] - from[1]], [q[0] - to[0], q[1] - to[1]]);
+        dot += p[0] * q[0] + p[1] * q[1];
+        cross += p[0] * q[1] - p[1] * q[0];
+    }
+    let (cos, sin) = (dot / dot.hypot(cross), cross / dot.hypot(cross));
+    corners.map(|p| {
+        let p = [p[0] - from[0], p[1] - from[1]];
+        [to[0] + cos * p[0] - sin * p[1], to[1] + sin * p[0] + cos * p[1]]
+    })
 }
 
 #[cfg(test)]

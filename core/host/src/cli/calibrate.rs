@@ -14,6 +14,7 @@ use super::{CliError, Common, measure, output};
 use crate::calibration::Calibration;
 use crate::plugin::{PluginError, Surfaces};
 use crate::rig::{self, Rig};
+use crate::stroke::Baseline;
 use crate::units::mm;
 use crate::{files, progress};
 
@@ -104,7 +105,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let mut instrument = String::new();
     for scan in &command.scans {
         let last = surfaces.last();
-        let (scanned, measured) = measure::measure_file(&catalogue, &mut rig, scan, &plate, last)?;
+        let (scanned, measured) =
+            measure::measure_file(&catalogue, &mut rig, scan, &plate, last, Baseline::None)?;
         instrument = scanned.header.instrument;
         surfaces.push(measured.measurement.surface);
     }

@@ -15,12 +15,13 @@ use super::{CliError, Common, output};
 use crate::plugin::{Catalogue, JobSpec, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
-use crate::stroke::{self, Last, Measured, Scanned};
+use crate::stroke::{self, Baseline, Last, Measured, Scanned};
 use crate::{calibration, files, progress};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
                         platen measure after.e57 --before before.e57 --plate plate.toml --plant plant.toml --out results/a17\n  \
+                        platen measure bent.e57 --baseline flat.e57 --plate plate.toml\n  \
                         platen measure scan.ptx --plate plate.toml --json | jq .markers\n\n\
                         The exit code is 0 when the plate was measured, whatever the verdict.")]
 pub(super) struct Command {
@@ -31,7 +32,7 @@ pub(super) struct Command {
     /// Scan of the same plate at the stroke before
     #[arg(long, value_name = "SCAN")]
     before: Option<PathBuf>,
-    /// Scan of the same plate before the first stroke
+    /// Scan of the same plate before the first stroke: its outline is what (u, v) of all scans then refer to
     #[arg(long, value_name = "SCAN")]
     baseline: Option<PathBuf>,
     /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)
@@ -52,15 +53,17 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     });
     let mut rig = Rig::of(&plant, &catalogue)?;
     // In the order in which they were taken: which corner is (0, 0) goes on from one to the next.
-    let mut measure =
-        |scan: &Path, last: Option<&Surface>| measure_file(&catalogue, &mut rig, scan, &plate, last);
-    let mut earlier = |scan: &Option<PathBuf>, last: Option<&Surface>| {
-        let measured = scan.as_deref().map(|scan| measure(scan, last)).transpose()?;
-        Ok::<_, CliError>(measured.map(|(_, measured)| measured.measurement.surface))
+    let mut measure = |scan: &Path, last: Option<&Surface>, baseline: Baseline<'_>| {
+        measure_file(&catalogue, &mut rig, scan, &plate, last, baseline)
     };
-    let baseline = earlier(&command.baseline, None)?;
-    let before = earlier(&command.before, baseline.as_ref())?;
-    let (scanned, now) = measure(&command.scan, before.as_ref().or(baseline.as_ref()))?;
+    let mut earlier = |scan: &Option<PathBuf>, last: Option<&Surface>, baseline: Baseline<'_>| {
+        let measured = scan.as_deref().map(|scan| measure(scan, last, baseline)).transpose()?;
+        Ok::<_, CliError>(measured.map(|(_, measured)| (measured.measurement.surface, measured.blank)))
+    };
+    let (baseline, blank) = earlier(&command.baseline, None, Baseline::This)?.unzip();
+    let cut = blank.as_ref().and_then(Option::as_ref).map_or(Baseline::None, Baseline::Earlier);
+    let before = earlier(&command.before, baseline.as_ref(), cut)?.map(|(surface, _)| surface);
+    let (scanned, now) = measure(&command.scan, before.as_ref().or(baseline.as_ref()), cut)?;
 
     progress::phase("comparing");
     let surfaces =
@@ -107,6 +110,7 @@ pub(super) fn measure_file(
     scan: &Path,
     plate: &PlateFile,
     last: Option<&Surface>,
+    baseline: Baseline<'_>,
 ) -> Result<(Scanned, Measured), CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
     let scanner = scan_source::open(catalogue, scan, None)?;
@@ -115,7 +119,7 @@ pub(super) fn measure_file(
     let job = JobSpec::untriggered(READ_LIMIT);
     let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
     let last = last.map(|surface| Last { surface, fed_by: None });
-    let measured = stroke::measure_scanned(rig, &scanned, &spec, last).map_err(|e| failed(&e))?;
+    let measured = stroke::measure_scanned(rig, &scanned, &spec, last, baseline).map_err(|e| failed(&e))?;
     Ok((scanned, measured))
 }
 
@@ -138,9 +142,14 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     for note in &record.scan.notes {
         output::line(&format!("  {note}"))?;
     }
+    if let Some(outline) = &record.outline {
+        output::line(&outline.words())?;
+    }
     let mut rows = vec![["place", "u mm", "v mm", "x m", "y m", "z m", "+- mm"].map(str::to_owned).to_vec()];
     let (w, h) = record.extent_mm();
-    for (corner, (u, v)) in record.corners_m.iter().zip([(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]) {
+    let ordered = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
+    let corners_mm = record.outline.as_ref().map_or(ordered, |outline| outline.corners_mm);
+    for (corner, [u, v]) in record.corners_m.iter().zip(corners_mm) {
         rows.push(row("corner", u, v, corner, None));
     }
     for marker in &record.markers {

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::setup::Setup;
 use super::{CliError, Common, measure, output};
 use crate::rig::Rig;
-use crate::stroke::{Measured, Scanned};
+use crate::stroke::{Baseline, Measured, Scanned};
 use crate::units::{metres, mm};
 use crate::{files, progress};
 
@@ -84,7 +84,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     }
     plant.comparisons = Vec::new();
     let mut rig = Rig::of(&plant, &catalogue)?;
-    let (scanned, measured) = measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None)?;
+    let (scanned, measured) =
+        measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None, Baseline::None)?;
     progress::done();
 
     let discs = look(command, &plate, &scanned, &measured);

@@ -22,7 +22,7 @@ use crate::calibration::{self, Calibration};
 use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Report, Scanner, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
-use crate::stroke::{self, Last, NotMeasured, Scanned, Tape};
+use crate::stroke::{self, Baseline, Last, NotMeasured, Scanned, Tape};
 use crate::{files, past, report};
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
@@ -360,7 +360,21 @@ impl Bench {
             surface: &last.surface,
             fed_by: last.plate_rot.zip(stroke.data.plate_rot).map(|(then, now)| now - then),
         });
-        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last)?;
+        let blank = earlier.baseline.as_ref().and_then(|baseline| baseline.blank.as_ref());
+        let baseline = match blank {
+            _ if stroke.data.baseline => Baseline::This,
+            Some(blank) => Baseline::Earlier(blank),
+            None => Baseline::None,
+        };
+        let mut measure =
+            |baseline| stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last, baseline);
+        let measured = match measure(baseline) {
+            Err(NotMeasured::Blank(why)) => {
+                tracing::warn!(key = %stroke.key, "{why}; the plate counts as the rectangle of its plate file");
+                measure(Baseline::None)?
+            }
+            measured => measured?,
+        };
         self.region.saw(&measured.outline);
         let surfaces = Surfaces {
             now: &measured.measurement.surface,
@@ -452,7 +466,7 @@ fn refusal(error: &NotMeasured) -> (Code, String, bool) {
         NotMeasured::Scanner(_) | NotMeasured::Column(_) | NotMeasured::NoHeader => Code::ScanFailed,
         NotMeasured::Plate(_) => Code::PlateNotFound,
         NotMeasured::Askew { .. } | NotMeasured::Turned(_) => Code::PlateTurned,
-        NotMeasured::Outline(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
+        NotMeasured::Outline(_) | NotMeasured::Blank(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
     };
     (code, error.to_string(), hung)
 }

@@ -2,7 +2,7 @@
 
 use platen_history::{Archive, Error, Stroke};
 use platen_press::StrokeData;
-use platen_shape::Surface;
+use platen_shape::{Blank, Surface};
 
 use crate::{files, past};
 
@@ -10,6 +10,8 @@ use crate::{files, past};
 #[derive(Debug)]
 pub(super) struct Earlier {
     pub(super) surface: Surface,
+    /// The outline that its (u, v) refer to, where a scan of the blank told it.
+    pub(super) blank: Option<Blank>,
     /// Where the plate rested.
     pub(super) supports: Option<String>,
     /// Feed rotation that the press told, radians.
@@ -46,5 +48,10 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
     let surface = files::surface_beside(&document)
         .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
         .ok()?;
-    Some(Earlier { surface, supports: past::supports(&document), plate_rot: data.plate_rot })
+    Some(Earlier {
+        surface,
+        blank: past::blank(&document),
+        supports: past::supports(&document),
+        plate_rot: data.plate_rot,
+    })
 }

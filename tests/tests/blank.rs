@@ -1,0 +1,135 @@
+//! A blank that was cut off its rectangle: the plate bent of it, with and without a scan of the blank.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::Value as Json;
+
+/// 4 mm too long, 3 mm too narrow, its diagonals 5 mm apart, the edge u = W bowed by 2 mm. The corners are off those of the rectangle with no
+/// mean shift and no turn, so that (u, v) of the simulator are those that a baseline gives.
+const CUT: &str = "corners_off_mm = [[-3.0, 0.75], [1.0, 2.25], [3.0, -0.75], [-1.0, -2.25]]\nbows_mm = [0.0, 2.0, 0.0, 0.0]\n";
+const MARKERS: [[f64; 2]; 5] =
+    [[2000.0, 1500.0], [400.0, 300.0], [3600.0, 300.0], [3600.0, 2700.0], [400.0, 2700.0]];
+
+const FLAT: &str = "shape = \"flat\"";
+const ROLLED: &str = "shape = \"cylinder\"\nradius_mm = 5000.0\naxis_deg = 90.0";
+const SPHERE: &str = "shape = \"sphere\"\nradius_mm = 15000.0";
+
+/// Scans a plate of 4000 x 3000 mm; writes `NAME.xyb` and `NAME.json`, its truth.
+fn scan(folder: &Path, name: &str, cut: &str, shape: &str, step_deg: &str) {
+    let file = folder.join(name);
+    let plate = format!(
+        "[blank]\nwidth_mm = 4000.0\nheight_mm = 3000.0\nthickness_mm = 36.0\n{cut}markers_mm = {MARKERS:?}\n[shape]\n{shape}\n\
+         [pose]\ncentre_mm = [6500.0, 0.0, -3600.0]\nyaw_deg = 20.0\n"
+    );
+    std::fs::write(file.with_extension("toml"), plate).unwrap();
+    let mut program = platen_tests::program("platen-sim");
+    program.arg("scanner").arg(file.with_extension("toml"));
+    program.arg("--out").arg(file.with_extension("xyb")).arg("--truth").arg(file.with_extension("json"));
+    program.args([
+        "--step-deg",
+        step_deg,
+        "--noise-mm",
+        "0.8",
+        "--margin-deg",
+        "1",
+        "--scan-seed",
+        &name.len().to_string(),
+    ]);
+    let output = program.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn measure(folder: &Path, name: &str, flattening: &str, baseline: Option<&str>) -> std::process::Output {
+    let mut plate =
+        "[plate]\nid = \"A\"\nwidth_mm = 4000.0\nheight_mm = 3000.0\nthickness_mm = 36.0\n".to_owned();
+    for (k, at) in MARKERS.iter().enumerate() {
+        write!(plate, "[[marker]]\nname = \"M{k}\"\nat_mm = {at:?}\n").unwrap();
+    }
+    std::fs::write(folder.join("plate.toml"), plate).unwrap();
+    let mut program = platen_tests::program("platen");
+    program.arg("measure").arg(folder.join(name).with_extension("xyb"));
+    program.arg("--plate").arg(folder.join("plate.toml"));
+    program.args(["--u-axis", "0.94,0.34,0", "--flattening", flattening, "--json"]);
+    if let Some(baseline) = baseline {
+        program.arg("--baseline").arg(folder.join(baseline).with_extension("xyb"));
+    }
+    program.output().unwrap()
+}
+
+/// Distances of corners (rms) and markers (mean) from the truth, millimetres; and the outline in use.
+fn errors(folder: &Path, name: &str, flattening: &str, baseline: Option<&str>) -> (f64, f64, Json) {
+    let output = measure(folder, name, flattening, baseline);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut result: Json = serde_json::from_slice(&output.stdout).unwrap();
+    let truth: Json =
+        serde_json::from_slice(&std::fs::read(folder.join(name).with_extension("json")).unwrap()).unwrap();
+    let place = |json: &Json| [0, 1, 2].map(|k| json[k].as_f64().unwrap());
+    let apart = |a: &Json, b: &Json| {
+        let (a, b) = (place(a), place(b));
+        1e3 * (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    let corners = (0..4).map(|k| apart(&result["corners_m"][k], &truth["corners_m"][k]).powi(2)).sum::<f64>();
+    let n = MARKERS.len();
+    let marker = |k: usize| apart(&result["markers"][k]["position_m"], &truth["markers"][k]["position_m"]);
+    let markers = (0..n).map(marker).sum::<f64>() / n as f64;
+    let (corners, outline) = ((corners / 4.0).sqrt(), result["outline"].take());
+    println!(
+        "{name} {flattening} {baseline:?}: corners {corners:.3}, markers {markers:.3} mm; {}",
+        outline["from"]
+    );
+    (corners, markers, outline)
+}
+
+#[test]
+fn a_baseline_makes_uv_metric_on_a_blank_cut_off_its_rectangle() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    scan(folder, "flat", CUT, FLAT, "0.05");
+    scan(folder, "rolled", CUT, ROLLED, "0.05");
+    scan(folder, "sphere", CUT, SPHERE, "0.05");
+    // Largest error of corners and of markers: what is called excellent of each shape; the harmonic map's own on a sphere is 0.5.
+    for (name, flattening, bounds) in [
+        ("rolled", "elastic", [0.5, 0.25]),
+        ("rolled", "harmonic", [0.5, 0.25]),
+        ("sphere", "elastic", [0.5, 0.4]),
+        ("sphere", "harmonic", [0.5, 0.7]),
+    ] {
+        let (corners, markers, outline) = errors(folder, name, flattening, Some("flat"));
+        assert!(corners < bounds[0] && markers < bounds[1], "{name} {flattening}: {corners} {markers}");
+        assert_eq!(outline["from"], "baseline");
+        for (figure, cut) in [("width_mm", 4004.0), ("height_mm", 2997.0), ("diagonal_difference_mm", 5.0)] {
+            let found = outline[figure].as_f64().unwrap();
+            assert!((found - cut).abs() < 0.8, "{figure} {found}, cut {cut}");
+        }
+        let bow = outline["bows_mm"][1].as_f64().unwrap();
+        assert!((bow - 2.0).abs() < 0.5, "bow {bow}");
+    }
+    let (_, markers, outline) = errors(folder, "rolled", "elastic", None);
+    assert!(markers > 1.5, "{markers} mm: the comparison would say nothing");
+    assert_eq!((&outline["from"], &outline["width_mm"]), (&"nominal".into(), &4000.0.into()));
+}
+
+#[test]
+fn a_baseline_that_tells_no_outline_is_refused_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    scan(folder, "flat", "", FLAT, "0.1");
+    scan(folder, "sphere", "", SPHERE, "0.1");
+    scan(
+        folder,
+        "other",
+        "corners_off_mm = [[-20.0, -10.0], [20.0, -10.0], [20.0, 10.0], [-20.0, 10.0]]\n",
+        FLAT,
+        "0.1",
+    );
+    for (baseline, says) in
+        [("sphere", "the blank is curved two ways"), ("other", "20 mm at most; check width_mm")]
+    {
+        let output = measure(folder, "flat", "harmonic", Some(baseline));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.trim_end().lines().count()), (Some(1), 1), "{said}");
+        assert!(said.contains(&format!("{baseline}.xyb: baseline: ")) && said.contains(says), "{said}");
+    }
+}
