@@ -4,6 +4,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use nalgebra::Vector3;
+use platen_shape::{Blank, DiskMesh, DiskParts};
+use platen_sim_plate::{Plate, PlateState, Shape};
 use serde_json::Value as Json;
 
 /// 4 mm too long, 3 mm too narrow, its diagonals 5 mm apart, the edge u = W bowed by 2 mm. The corners are off those of the rectangle with no
@@ -131,5 +134,60 @@ fn a_baseline_that_tells_no_outline_is_refused_in_one_sentence() {
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!((output.status.code(), said.trim_end().lines().count()), (Some(1), 1), "{said}");
         assert!(said.contains(&format!("{baseline}.xyb: baseline: ")) && said.contains(says), "{said}");
+    }
+}
+
+/// The simulator's plate of 4000 x 3000 mm as a mesh without error, `n` cells each way.
+fn mesh(shape: Shape, n: u32) -> DiskMesh {
+    let plate = Plate::new(&PlateState { shape, ..PlateState::flat(4000.0, 3000.0, 36.0) }).unwrap();
+    let at = |i: u32, j: u32| [4.0 * f64::from(i) / f64::from(n), 3.0 * f64::from(j) / f64::from(n)];
+    let vertex = |i: u32, j: u32| j * (n + 1) + i;
+    let cells = (0..n * n).map(|k| (k % n, k / n));
+    let triangles = cells.flat_map(|(i, j)| {
+        let [a, b, c, d] = [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
+        if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+    });
+    let ways = [|k, _| (k, 0), |k, n| (n, k), |k, n| (n - k, n), |k, n| (0, n - k)]
+        as [fn(u32, u32) -> (u32, u32); 4];
+    let around: Vec<(u32, u32)> = ways.iter().flat_map(|way| (0..n).map(move |k| way(k, n))).collect();
+    let arc = |k: u32, side: f64| side * f64::from(k) / f64::from(n);
+    DiskMesh::new(DiskParts {
+        vertices: (0..(n + 1) * (n + 1))
+            .map(|k| at(k % (n + 1), k / (n + 1)))
+            .map(|[u, v]| Vector3::from(<[f64; 3]>::from(plate.mid(u, v))))
+            .collect(),
+        triangles: triangles.collect(),
+        boundary: around.iter().map(|&(i, j)| vertex(i, j)).collect(),
+        corners: [0, n, 2 * n, 3 * n],
+        arc: [4.0, 3.0, 4.0, 3.0].iter().flat_map(|&side| (0..n).map(move |k| arc(k, side))).collect(),
+        places: around.iter().map(|&(i, j)| at(i, j)).collect(),
+        edge_length: [4.0, 3.0, 4.0, 3.0],
+        width: 4.0,
+        height: 3.0,
+        thickness: 0.036,
+        ..DiskParts::default()
+    })
+    .unwrap()
+}
+
+/// The simulator lays the flat sheet on the shape with its own series of least energy; here the way leads back.
+#[test]
+fn a_blank_a_little_curved_tells_its_outline() {
+    for (shape, bound_mm) in [
+        (Shape::Sphere { radius_mm: 80_000.0 }, 0.02),
+        (Shape::Torus { axis_deg: 30.0, radius_mm: 60_000.0, cross_radius_mm: -150_000.0 }, 0.02),
+        (Shape::Cylinder { radius_mm: 5000.0, axis_deg: 60.0 }, 0.05),
+    ] {
+        let name = shape.name();
+        let found = Blank::of_mesh(&mesh(shape, 80)).unwrap();
+        let ordered = Blank::rectangle(4.0, 3.0);
+        let places = (0..400).map(|k| (k / 100, f64::from(k % 100) / 100.0));
+        let apart = places.map(|(edge, share)| {
+            let (p, q) = (found.place(edge as usize, share), ordered.place(edge as usize, share));
+            1e3 * (p[0] - q[0]).hypot(p[1] - q[1])
+        });
+        let worst = apart.fold(0.0, f64::max);
+        println!("{name}: {worst:.4} mm");
+        assert!(worst < bound_mm, "{name}: {worst} mm");
     }
 }

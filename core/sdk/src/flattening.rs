@@ -10,7 +10,7 @@ use crate::shim::{Input, Plugin, describe, malformed};
 use crate::sink::Payload;
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 
-/// Gives every vertex of the mid-surface mesh its place on the original rectangle.
+/// Gives every vertex of the mid-surface mesh its place on the original plate; the mesh says where the boundary lies.
 pub trait Flattening: Send + Sized + 'static {
     /// What it is.
     const INFO: Info;

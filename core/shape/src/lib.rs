@@ -2,7 +2,7 @@
 //!
 //! The modules follow the data: `extract` finds the plate's scanned face among the samples of a scan,
 //! `outline` its boundary loop, four corners and four edge curves, `mesh` the mid-surface mesh, a flattening
-//! (a plugin, seen here only as the trait `Flatten`) gives every vertex its place on the original rectangle,
+//! (a plugin, seen here only as the trait `Flatten`) gives every vertex its place on the original plate (`Blank`: its outline),
 //! `surface` fits S(u, v), `evaluate` reads lines, markers and grids off it.
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! with b the measured angles, at interior vertices scaled to 2 pi in sum. Then the vertices are laid out by least squares
-//! in these angles, the boundary held on the rectangle by its share of each edge's arc length; that sets the scale too.
+//! in these angles, the boundary held where the mesh says, on the outline by its share of each edge's arc length; that sets the scale too.
 //!
 //! # How it is solved
 //!

@@ -1,7 +1,7 @@
-//! Flattening by least membrane energy onto the known rectangle: the default.
+//! Flattening by least membrane energy onto the known outline, that of the blank or the rectangle as ordered: the default.
 //!
 //! A plate that is pressed to a sphere or a torus must stretch and shrink in its own plane. This flattening looks for the
-//! places (u, v) at which the plate, drawn from its flat rectangle onto the measured mid-surface, has stored the least
+//! places (u, v) at which the plate, drawn from its flat shape onto the measured mid-surface, has stored the least
 //! membrane energy (St. Venant and Kirchhoff, plane stress). It starts from the harmonic map and takes Newton's steps
 //! with a Hessian made positive triangle by triangle; no triangle is ever turned over.
 //!
@@ -10,7 +10,7 @@
 //! The material slides along the plate's edges. Across an edge, and in the corners along both of their edges, it is held
 //! by springs as stiff as the outline is known (`edge_sigma` and `corner_sigma` of the mesh). Where the plate must be
 //! strained the springs are as good as rigid; on a rolled plate they let a wrong inset of the outline go to both sides
-//! evenly instead of into the lengths between them. So the chart may leave the rectangle by about the uncertainty of
+//! evenly instead of into the lengths between them. So the chart may leave the outline by about the uncertainty of
 //! the edge. A boundary without springs is not safe: up to 11 mm wrong.
 //!
 //! # What it answers
@@ -67,7 +67,7 @@ impl Flattening for Elastic {
     const INFO: Info = Info::new(
         c"elastic",
         c"Least membrane energy",
-        c"Least membrane energy onto the known rectangle: right on double curvature, with strain and uncertainty.",
+        c"Least membrane energy onto the known outline: right on double curvature, with strain and uncertainty.",
         c"1.0.0",
     );
     type Options = Options;

@@ -1,6 +1,6 @@
 //! Flattening by harmonic map: the paper's second method (HM, section 4.3, equation 4), its fastest.
 //!
-//! The boundary is laid on the rectangle by its share of each edge's arc length; the interior follows by minimising
+//! The boundary is laid where the mesh says, on the plate's outline by its share of each edge's arc length; the interior follows by minimising
 //! sum k_ij |p_i - p_j|^2 with k_ij = cot a_ij + cot b_ij, the cotangents of the angles opposite to the edge ij. One
 //! sparse Cholesky factorisation serves both coordinates.
 //!
