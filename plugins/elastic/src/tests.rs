@@ -31,6 +31,31 @@ fn with_sigma(mut plate: ClosedForm, sigma: f64) -> ClosedForm {
     plate
 }
 
+/// A plate cut out of square, its edges bowed, rolled: the springs act across its real edges, wherever they run.
+#[test]
+fn a_plate_cut_off_its_rectangle_keeps_its_places() {
+    let size = [4.0, 3.0];
+    let mut plate = with_sigma(ClosedForm::new(|[u, v]| [u, v, 0.0], size, [60, 45], 0.3, 3), 1e-5);
+    let cut = |[u, v]: [f64; 2]| {
+        let (s, t) = (u / size[0], v / size[1]);
+        [u + 4e-3 * s + 3e-3 * t + 8e-3 * s * t * (1.0 - t), v - 3e-3 * t - 4e-3 * t * s * (1.0 - s)]
+    };
+    let rolled = cylinder(5.0, 0.4);
+    plate.uv.iter_mut().for_each(|p| *p = cut(*p));
+    plate.parts.vertices = plate.uv.iter().map(|&p| rolled(p).into()).collect();
+    let n = plate.parts.boundary.len();
+    plate.parts.places.copy_from_slice(&plate.uv[..n]);
+    let [mean, max] = plate.errors(&chart(&plate).uv);
+    assert!(mean < 1e-5 && max < 2e-5, "mean {mean:e}, max {max:e}");
+    // On the rectangle the corner (W, H) alone is 7 mm off.
+    plate.parts.places = platen_shape::Blank::rectangle(size[0], size[1]).places(
+        plate.parts.corners.map(|at| at as usize),
+        &plate.parts.arc,
+        plate.parts.edge_length,
+    );
+    assert!(plate.errors(&chart(&plate).uv)[0] > 1e-3);
+}
+
 #[test]
 fn a_flat_plate_keeps_its_places() {
     let plate = ClosedForm::new(|[u, v]| [1.0, u, v], [5.0, 2.0], [50, 20], 0.3, 3);
