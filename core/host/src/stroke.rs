@@ -56,7 +56,7 @@ pub enum NotMeasured {
         "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
     )]
     Turned(Turned),
-    /// The scan of the blank tells no outline.
+    /// The scan of the blank is that of another plate.
     #[error("baseline: {0}")]
     Blank(#[from] BlankError),
     /// The plate could not be flattened or fitted.
@@ -147,7 +147,7 @@ pub enum Baseline<'a> {
     None,
     /// What an earlier scan of the blank told.
     Earlier(&'a Blank),
-    /// What this scan tells: it is the blank's.
+    /// What this scan tells: it is the blank's. Where it tells no outline, the log says why, and it counts as [`None`](Self::None).
     This,
 }
 
@@ -191,7 +191,14 @@ pub fn measure_scanned(
     let blank = match baseline {
         Baseline::None => None,
         Baseline::Earlier(blank) => Some(*blank),
-        Baseline::This => Some(Blank::of_scan(&scanned.patch, &outline, spec)?),
+        Baseline::This => match Blank::of_scan(&scanned.patch, &outline, spec) {
+            Ok(blank) => Some(blank),
+            Err(another @ BlankError::OffSize { .. }) => return Err(another.into()),
+            Err(why) => {
+                tracing::warn!("baseline: {why}; the plate counts as the rectangle of its plate file");
+                None
+            }
+        },
     };
     let ordered = spec.rectangle();
     let cut = blank.as_ref().unwrap_or(&ordered);

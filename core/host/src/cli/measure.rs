@@ -61,7 +61,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         Ok::<_, CliError>(measured.map(|(_, measured)| (measured.measurement.surface, measured.blank)))
     };
     let (baseline, blank) = earlier(&command.baseline, None, Baseline::This)?.unzip();
-    let cut = blank.as_ref().and_then(Option::as_ref).map_or(Baseline::None, Baseline::Earlier);
+    let blank = blank.flatten();
+    let cut = blank.as_ref().map_or(Baseline::None, Baseline::Earlier);
     let before = earlier(&command.before, baseline.as_ref(), cut)?.map(|(surface, _)| surface);
     let (scanned, now) = measure(&command.scan, before.as_ref().or(baseline.as_ref()), cut)?;
 

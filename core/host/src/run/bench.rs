@@ -366,15 +366,7 @@ impl Bench {
             Some(blank) => Baseline::Earlier(blank),
             None => Baseline::None,
         };
-        let mut measure =
-            |baseline| stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last, baseline);
-        let measured = match measure(baseline) {
-            Err(NotMeasured::Blank(why)) => {
-                tracing::warn!(key = %stroke.key, "{why}; the plate counts as the rectangle of its plate file");
-                measure(Baseline::None)?
-            }
-            measured => measured?,
-        };
+        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last, baseline)?;
         self.region.saw(&measured.outline);
         let surfaces = Surfaces {
             now: &measured.measurement.surface,
