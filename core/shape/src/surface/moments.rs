@@ -92,8 +92,10 @@ impl<const D: usize> Moments<D> {
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
     pub(crate) fn normal_equations(&self) -> (BandMatrix, Vec<[f64; D]>) {
-        let mut matrix = BandMatrix::zeros(self.u.n_coefficients(), self.v.n_coefficients());
-        let mut rhs = vec![[0.0; D]; self.u.n_coefficients() * self.v.n_coefficients()];
+        let (n_u, n_v) = (self.u.n_coefficients(), self.v.n_coefficients());
+        // Per coefficient the sums with those up to three further along v and along u.
+        let mut sums = vec![[[0.0; 4]; 4]; n_u * n_v];
+        let mut rhs = vec![[0.0; D]; n_u * n_v];
         let products: Vec<((usize, usize), [f64; 7])> =
             pairs().map(|(i, j)| ((i, j), multiply(&BASIS[i], &BASIS[j]))).collect();
         // By power, the coefficients of all pairs side by side; some more than pairs, for whole vector registers.
@@ -115,7 +117,16 @@ impl<const D: usize> Moments<D> {
                     values.iter_mut().zip(pairs).for_each(|(value, f)| *value += x * f);
                 }
                 for (((c, d), _), value) in products.iter().zip(values) {
-                    matrix.add_pair([i + c, i + d], [k + a, k + b], value);
+                    sums[(k + a) * n_u + i + c][b - a][d - c] += value;
+                }
+            }
+        }
+        let mut matrix = BandMatrix::zeros(n_u, n_v);
+        for (c, sums) in sums.iter().enumerate() {
+            let (i, k) = (c % n_u, c / n_u);
+            for (dk, along_u) in sums.iter().enumerate().take(n_v - k) {
+                for (di, value) in along_u.iter().enumerate().take(n_u - i) {
+                    matrix.add_pair([i, i + di], [k, k + dk], *value);
                 }
             }
         }

@@ -101,15 +101,21 @@ impl<const D: usize> Net<D> {
         let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
         let mut jet = Jet { p: [0.0; D], u: [0.0; D], v: [0.0; D], uu: [0.0; D], uv: [0.0; D], vv: [0.0; D] };
         for row in 0..4 {
+            let (mut along, mut slope, mut bend) = ([0.0; D], [0.0; D], [0.0; D]);
             for (i, c) in self.row(su.first, sv.first + row).iter().enumerate() {
-                for (d, x) in c.iter().enumerate() {
-                    jet.p[d] += su.value[i] * sv.value[row] * x;
-                    jet.u[d] += su.d1[i] * sv.value[row] * x;
-                    jet.v[d] += su.value[i] * sv.d1[row] * x;
-                    jet.uu[d] += su.d2[i] * sv.value[row] * x;
-                    jet.uv[d] += su.d1[i] * sv.d1[row] * x;
-                    jet.vv[d] += su.value[i] * sv.d2[row] * x;
+                for d in 0..D {
+                    along[d] += su.value[i] * c[d];
+                    slope[d] += su.d1[i] * c[d];
+                    bend[d] += su.d2[i] * c[d];
                 }
+            }
+            for d in 0..D {
+                jet.p[d] += sv.value[row] * along[d];
+                jet.u[d] += sv.value[row] * slope[d];
+                jet.v[d] += sv.d1[row] * along[d];
+                jet.uu[d] += sv.value[row] * bend[d];
+                jet.uv[d] += sv.d1[row] * slope[d];
+                jet.vv[d] += sv.d2[row] * along[d];
             }
         }
         jet
