@@ -24,8 +24,10 @@ const CUT_OFF: f64 = 5.0;
 /// The cosine of the incidence never counts below this one: beyond 87 degrees a sample tells nothing.
 const LEAST_COSINE: f64 = 0.05;
 
-/// Newton steps from a point near the face; each squares an error of a few parts in a hundred.
+/// Newton steps from a point near the face, at most; each squares an error of a few parts in a hundred, and one of less than
+/// this, metres, is the last.
 const STEPS: usize = 4;
+const STILL: f64 = 1e-8;
 
 /// A point that would move by more than this, metres, is none of the face.
 const REACH: f64 = 0.5;
@@ -103,7 +105,11 @@ impl Sheet {
             if approach.is_nan() || approach >= 0.0 {
                 return None;
             }
-            at += direction * ((height - self.plane.height(at)) / approach);
+            let step = (height - self.plane.height(at)) / approach;
+            at += direction * step;
+            if step.abs() < STILL {
+                break;
+            }
         }
         ((at - point).norm() < REACH).then(|| (at, normal.normalize()))
     }

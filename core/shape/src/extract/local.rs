@@ -19,8 +19,10 @@ const REACH: usize = 6;
 /// Fewest cells that carry a fit of six coefficients.
 const LEAST_CELLS: usize = 16;
 
-/// Newton steps to where a beam meets the face; each squares an error of a few parts in a hundred.
+/// Newton steps to where a beam meets the face, at most; each squares an error of a few parts in a hundred, and one of less
+/// than this, metres, is the last.
 const STEPS: usize = 4;
+const STILL: f64 = 1e-8;
 
 /// Height over the tangent plane: c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2, all in metres, x and y in units of the
 /// cells' own spacing along two axes of the plane.
@@ -100,10 +102,16 @@ impl Points {
         Self { n: 0, by_axis: [[0.0; MOST]; 3] }
     }
 
+    /// Adds those points that are `wanted`: all are written, and the next one goes over one that is not.
     #[inline(always)]
-    fn push(&mut self, point: &[f64; 3]) {
-        (0..3).for_each(|d| self.by_axis[d][self.n] = point[d]);
-        self.n += 1;
+    fn extend<'p>(&mut self, points: impl Iterator<Item = (&'p [f64; 3], bool)>) {
+        for (point, wanted) in points {
+            (0..3).for_each(|d| self.by_axis[d][self.n] = point[d]);
+            self.n += usize::from(wanted);
+        }
+        if self.n < MOST {
+            (0..3).for_each(|d| self.by_axis[d][self.n] = 0.0);
+        }
     }
 
     #[inline(always)]
@@ -157,8 +165,7 @@ impl LocalFace {
         let mut points = Points::new();
         for column in span(tile.0, window.n_columns) {
             let cells = column * window.n_rows + rows.start..column * window.n_rows + rows.end;
-            let on_face = face[cells.clone()].iter().zip(&window.points[cells]);
-            on_face.filter(|(on_face, _)| **on_face).for_each(|(_, point)| points.push(point));
+            points.extend(window.points[cells.clone()].iter().zip(face[cells].iter().copied()));
         }
         if points.n < LEAST_CELLS {
             return None;
@@ -214,10 +221,14 @@ impl LocalFace {
             let above = self.up.dot(&off) - basis(at).dot(c);
             let approach =
                 self.up.dot(&beam) - by_x * self.along[0].dot(&beam) - by_y * self.along[1].dot(&beam);
-            range -= above / approach;
+            let step = above / approach;
+            range -= step;
             // Behind the horizon of a bend the beam passes above the face or meets it from below.
             if approach.is_nan() || approach >= 0.0 || range.is_nan() || range <= 0.0 {
                 return None;
+            }
+            if step.abs() < STILL {
+                break;
             }
         }
         let [by_x, by_y] = slopes(at);
@@ -264,9 +275,10 @@ mod tests {
             Vec3::new(6.0 + radius * sin, y, -3.6 - radius * (1.0 - cos))
         };
         let mut points = Points::new();
-        (0..160).for_each(|i| {
-            points.push(&point(0.8 + 0.04 * f64::from(i % 10), 0.02 * f64::from(i / 10)).into())
-        });
+        let bend: Vec<[f64; 3]> = (0..160)
+            .map(|i| point(0.8 + 0.04 * f64::from(i % 10), 0.02 * f64::from(i / 10)).into())
+            .collect();
+        points.extend(bend.iter().map(|point| (point, true)));
         let face = LocalFace::through(&mut points).expect("a face");
         let beyond = point(1.24, 0.1);
         let off = beyond - face.centre;

@@ -14,6 +14,8 @@ pub(crate) const BASIS: [[f64; 4]; 4] = [
 pub struct Axis {
     start: f64,
     step: f64,
+    /// One over the step.
+    per_step: f64,
     n_spans: usize,
 }
 
@@ -32,7 +34,8 @@ impl Axis {
     #[must_use]
     pub fn new(start: f64, end: f64, n_spans: usize) -> Self {
         let n_spans = n_spans.max(1);
-        Self { start, step: (end - start) / n_spans as f64, n_spans }
+        let step = (end - start) / n_spans as f64;
+        Self { start, step, per_step: 1.0 / step, n_spans }
     }
 
     /// From 0 to `length` in spans of about `span`: at least 8, at most 128.
@@ -94,7 +97,7 @@ impl Axis {
     /// Span of `x` and its place t in [-1/2, 1/2] there; beyond the ends the last span goes on.
     #[inline(always)]
     pub(crate) fn locate(&self, x: f64) -> (usize, f64) {
-        let s = (x - self.start) / self.step;
+        let s = (x - self.start) * self.per_step;
         let span = (s.max(0.0) as usize).min(self.n_spans - 1);
         (span, s - span as f64 - 0.5)
     }
@@ -109,7 +112,7 @@ impl Axis {
     #[inline(always)]
     pub(crate) fn stencil(&self, x: f64) -> Stencil {
         let (first, t) = self.locate(x);
-        let (h1, h2) = (1.0 / self.step, 1.0 / (self.step * self.step));
+        let (h1, h2) = (self.per_step, self.per_step * self.per_step);
         Stencil {
             first,
             value: BASIS.map(|[a, b, c, d]| a + t * (b + t * (c + t * d))),
