@@ -258,19 +258,20 @@ impl BandFactor {
     /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
     pub(crate) fn local_inverse(&self) -> Vec<[f64; 49]> {
         let band = apart(|| self.inverse_band());
-        let layout = self.layout;
-        let (n_u, n_v) = (layout.n_u, layout.n_v);
-        let mut local = vec![[0.0; 49]; n_u * n_v];
+        let (layout, m) = (self.layout, self.layout.block());
+        let around = |at: usize, n: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(n);
+        let mut local = vec![[0.0; 49]; layout.n_u * layout.n_v];
         for (c, slots) in local.iter_mut().enumerate() {
-            let (i, k) = (c % n_u, c / n_u);
-            for (slot, value) in slots.iter_mut().enumerate() {
-                let (di, dk) = (i + slot % 7, k + slot / 7);
-                if di < 3 || dk < 3 || di - 3 >= n_u || dk - 3 >= n_v {
-                    continue;
+            let (row, inner) = layout.place(c % layout.n_u, c / layout.n_u);
+            for other in around(row, layout.n_rows()) {
+                // A block couples the later row, down, to the earlier one, across.
+                let block = &band[layout.range(row.max(other), row.abs_diff(other))];
+                for next in around(inner, m) {
+                    let (down, across) = if other <= row { (inner, next) } else { (next, inner) };
+                    let (by_row, by_inner) = (other + REACH - row, next + REACH - inner);
+                    let (dv, du) = if layout.v_is_outer() { (by_row, by_inner) } else { (by_inner, by_row) };
+                    slots[dv * 7 + du] = block[across * m + down];
                 }
-                let (a, b) = (layout.place(i, k), layout.place(di - 3, dk - 3));
-                let (high, low) = if a >= b { (a, b) } else { (b, a) };
-                *value = band[layout.range(high.0, high.0 - low.0).start + low.1 * layout.block() + high.1];
             }
         }
         local
