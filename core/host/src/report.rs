@@ -172,6 +172,7 @@ fn summary(pages: &[Page<'_>], page: &Page<'_>, record: &ResultRecord) -> Markup
             dt { "Size" } dd { (format!("{:.0} \u{d7} {:.0} \u{d7} {:.0} mm", plate.width_mm, plate.height_mm, plate.thickness_mm)) }
             dt { "Target" } dd { (plate.target.as_deref().unwrap_or("none: nothing can be judged")) }
             dt { "Boards" } dd { @if boards.is_empty() { "none: nothing can be judged" } @for board in &boards { div { (board) } } }
+            @if let Some(outline) = &record.outline { dt { "Outline" } dd { (outline.words()) } }
             dt { "Rests on" } dd { (record.supports.as_deref().unwrap_or("not recorded")) }
             dt { "Scanner" } dd { (record.scan.instrument) (seen(record)) }
             dt { "Calibration" } dd { (calibration(&record.calibration)) }

@@ -144,7 +144,7 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
         output::line(&format!("  {note}"))?;
     }
     if let Some(outline) = &record.outline {
-        output::line(&outline.words())?;
+        output::line(&format!("outline: {}", outline.words()))?;
     }
     let mut rows = vec![["place", "u mm", "v mm", "x m", "y m", "z m", "+- mm"].map(str::to_owned).to_vec()];
     let (w, h) = record.extent_mm();

@@ -71,10 +71,10 @@ impl OutlineRecord {
     pub fn words(&self) -> String {
         match self.from {
             OutlineSource::Nominal => {
-                format!("outline: nominal, {:.1} x {:.1} mm as ordered", self.width_mm, self.height_mm)
+                format!("nominal, {:.1} x {:.1} mm as ordered", self.width_mm, self.height_mm)
             }
             OutlineSource::Baseline => format!(
-                "outline: baseline, the blank is {:.1} x {:.1} mm, its diagonals differ by {:.1} mm, its edges bow by {:.1} mm at most",
+                "baseline, the blank is {:.1} x {:.1} mm, its diagonals differ by {:.1} mm, its edges bow by {:.1} mm at most",
                 self.width_mm,
                 self.height_mm,
                 self.diagonal_difference_mm,
@@ -91,13 +91,13 @@ mod tests {
     #[test]
     fn a_blank_comes_back_from_its_record_and_a_rectangle_is_none() {
         let nominal = OutlineRecord::new(None, [4.0, 3.0]);
-        assert_eq!(nominal.words(), "outline: nominal, 4000.0 x 3000.0 mm as ordered");
+        assert_eq!(nominal.words(), "nominal, 4000.0 x 3000.0 mm as ordered");
         assert_eq!(nominal.blank(), None);
         let mut blank = Blank::rectangle(4.0, 3.0);
         (blank.corners[2], blank.bows[1]) = ([4.0, 2.996], -0.002);
         assert_eq!(
             OutlineRecord::new(Some(&blank), [4.0, 3.0]).words(),
-            "outline: baseline, the blank is 4000.0 x 2998.0 mm, its diagonals differ by -2.4 mm, its edges bow by 2.0 mm at most"
+            "baseline, the blank is 4000.0 x 2998.0 mm, its diagonals differ by -2.4 mm, its edges bow by 2.0 mm at most"
         );
         for k in 0..1000 {
             let x = 1e-3 * (f64::from(k) * 0.618_033_988_749_895).fract();
