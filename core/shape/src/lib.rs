@@ -7,6 +7,7 @@
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
 
+mod baseline;
 mod blank;
 pub mod calibration;
 mod checks;
@@ -29,7 +30,8 @@ mod target;
 pub mod task;
 mod turned;
 
-pub use blank::{Blank, BlankError};
+pub use baseline::BlankError;
+pub use blank::Blank;
 pub use checks::{Check, EdgeCheck, ShapeChecks};
 pub use flatten::{Chart, Flatten, FlattenError};
 pub use forming::Forming;

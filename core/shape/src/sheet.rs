@@ -13,7 +13,7 @@ use crate::{Patch, Sample, Vec3};
 
 /// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
 /// all samples.
-const SPAN: f64 = 0.1;
+pub(crate) const SPAN: f64 = 0.1;
 
 /// Samples used, at least, where there are as many: every n-th of every n-th column.
 const ENOUGH: usize = 30_000;

@@ -6,12 +6,10 @@
 
 use super::edges::coons;
 use super::facets::Facets;
-use crate::sheet::thinned;
+use crate::sheet::{SPAN, thinned};
 use crate::surface::{Axis, Net};
 use crate::{Outline, Patch, PlateSpec, Vec3};
 
-/// Length of a span, metres: that of the sheet.
-const SPAN: f64 = 0.1;
 /// Facets along a span of the first picture: 50 mm; it has no finer detail than its edges.
 const FACETS: usize = 2;
 
