@@ -76,24 +76,25 @@ pub fn worst_board(record: &ResultRecord) -> Option<&TemplateRecord> {
     boards.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
-/// Where the plate rested, as a result document has it.
-pub fn supports(document: &Path) -> Option<String> {
-    #[derive(serde::Deserialize)]
-    struct Supports {
-        supports: Option<String>,
-    }
-    let text = std::fs::read(document).ok()?;
-    serde_json::from_slice::<Supports>(&text).ok()?.supports
+/// What a result document has of a plate for its later strokes.
+#[derive(Debug, Default, serde::Deserialize)]
+pub struct Kept {
+    /// Where the plate rested.
+    pub supports: Option<String>,
+    outline: Option<OutlineRecord>,
 }
 
-/// The outline of the blank, as the result document of a scan of it has it.
-pub fn blank(document: &Path) -> Option<Blank> {
-    #[derive(serde::Deserialize)]
-    struct Outline {
-        outline: Option<OutlineRecord>,
+impl Kept {
+    /// The outline of the blank that its (u, v) refer to, where a scan of it told one.
+    pub fn blank(&self) -> Option<Blank> {
+        self.outline.as_ref().and_then(OutlineRecord::blank)
     }
-    let text = std::fs::read(document).ok()?;
-    serde_json::from_slice::<Outline>(&text).ok()?.outline?.blank()
+}
+
+/// Reads that of a document; nothing is known from one that cannot be read.
+pub fn kept(document: &Path) -> Kept {
+    let text = std::fs::read(document).unwrap_or_default();
+    serde_json::from_slice(&text).unwrap_or_default()
 }
 
 /// Whether the plate rests on other supports than it did `before`; what is not known is not called a change.

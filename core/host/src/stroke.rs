@@ -151,6 +151,23 @@ pub enum Baseline<'a> {
     This,
 }
 
+impl Baseline<'_> {
+    fn blank(self, patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Result<Option<Blank>, BlankError> {
+        match self {
+            Self::None => Ok(None),
+            Self::Earlier(blank) => Ok(Some(*blank)),
+            Self::This => match Blank::of_scan(patch, outline, spec) {
+                Ok(blank) => Ok(Some(blank)),
+                Err(another @ BlankError::OffSize { .. }) => Err(another),
+                Err(why) => {
+                    tracing::warn!("baseline: {why}; the plate counts as the rectangle of its plate file");
+                    Ok(None)
+                }
+            },
+        }
+    }
+}
+
 /// The plate's shape, from its scanned face.
 #[derive(Debug)]
 pub struct Measured {
@@ -188,18 +205,7 @@ pub fn measure_scanned(
         }
     };
     let outline_time = start.elapsed();
-    let blank = match baseline {
-        Baseline::None => None,
-        Baseline::Earlier(blank) => Some(*blank),
-        Baseline::This => match Blank::of_scan(&scanned.patch, &outline, spec) {
-            Ok(blank) => Some(blank),
-            Err(another @ BlankError::OffSize { .. }) => return Err(another.into()),
-            Err(why) => {
-                tracing::warn!("baseline: {why}; the plate counts as the rectangle of its plate file");
-                None
-            }
-        },
-    };
+    let blank = baseline.blank(&scanned.patch, &outline, spec)?;
     let ordered = spec.rectangle();
     let cut = blank.as_ref().unwrap_or(&ordered);
     let measurement =

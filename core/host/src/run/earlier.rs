@@ -48,10 +48,6 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
     let surface = files::surface_beside(&document)
         .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
         .ok()?;
-    Some(Earlier {
-        surface,
-        blank: past::blank(&document),
-        supports: past::supports(&document),
-        plate_rot: data.plate_rot,
-    })
+    let kept = past::kept(&document);
+    Some(Earlier { surface, blank: kept.blank(), supports: kept.supports, plate_rot: data.plate_rot })
 }

@@ -43,7 +43,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     same_size(&first, &before, &second, &now)?;
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
-    let rested = first.document.as_deref().and_then(past::supports);
+    let rested = first.document.as_deref().and_then(|document| past::kept(document).supports);
     // What the record is compared by today, however old it is.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
     let task = rig::task(&plate, calibration.as_ref(), past::moved(rested.as_deref(), &plate));
