@@ -121,11 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn the_supports_are_read_from_the_document_alone() {
+    fn supports_and_blank_are_read_from_the_document_and_nothing_from_one_that_is_gone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("result.json");
         std::fs::write(&path, r#"{"schema": "platen.result/1", "supports": "bed", "grid": [1, 2]}"#).unwrap();
-        assert_eq!(supports(&path).as_deref(), Some("bed"));
-        assert_eq!(supports(&folder.path().join("gone.json")), None);
+        assert_eq!(kept(&path).supports.as_deref(), Some("bed"));
+        assert!(kept(&path).blank().is_none());
+        let gone = kept(&folder.path().join("gone.json"));
+        assert!(gone.supports.is_none() && gone.blank().is_none());
     }
 }
