@@ -188,6 +188,14 @@ mod tests {
             p.triangles.extend([[5, 6, 7], [5, 8, 6], [6, 8, 7], [7, 8, 5]]);
         };
         assert!(refused(shell).contains("9 vertices"));
+        // A torus of seven vertices leaves V - E + F as it is: it only does not hang together with the square.
+        let torus = |p: &mut DiskParts| {
+            p.vertices.extend([Vec3::zeros(); 7]);
+            let at = |k: u32| 5 + k % 7;
+            let pair = |i| [[at(i), at(i + 1), at(i + 3)], [at(i), at(i + 3), at(i + 2)]];
+            p.triangles.extend((0..7).flat_map(pair));
+        };
+        assert!(refused(torus).contains("12 vertices, 29 edges, 18 faces"));
     }
 
     #[test]

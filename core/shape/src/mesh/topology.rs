@@ -10,6 +10,7 @@ pub(super) fn check_topology(
     n_vertices: usize,
 ) -> Result<(), MeshError> {
     let fans = Fans::of(triangles, n_vertices)?;
+    let mut parts = Parts::new(triangles.len());
     let mut n_open = 0;
     for vertex in 0..n_vertices as u32 {
         let fan = fans.at(vertex);
@@ -23,8 +24,11 @@ pub(super) fn check_topology(
                     side.next
                 )));
             }
+            match fan.iter().find(|other| other.last == side.next) {
+                Some(other) => parts.join(side.triangle, other.triangle),
+                None => n_open += 1,
+            }
         }
-        n_open += fan.iter().filter(|side| fans.is_open(vertex, side.next)).count();
     }
     let followers = boundary.iter().skip(1).chain(boundary.first());
     let n_matched = boundary.iter().zip(followers).filter(|(a, b)| fans.is_open(**a, **b)).count();
@@ -34,7 +38,7 @@ pub(super) fn check_topology(
     }
     let n_faces = triangles.len();
     let n_edges = (3 * n_faces + n_open) / 2;
-    if n_vertices + n_faces != n_edges + 1 || n_reached(triangles, &fans) != n_faces {
+    if n_vertices + n_faces != n_edges + 1 || parts.n != 1 {
         return Err(not_a_disk(format!("{n_vertices} vertices, {n_edges} edges, {n_faces} faces")));
     }
     Ok(())
@@ -85,20 +89,31 @@ impl Fans {
     }
 }
 
-/// Number of triangles that hang together with the first one through edges.
-fn n_reached(triangles: &[[u32; 3]], fans: &Fans) -> usize {
-    let mut seen = vec![false; triangles.len()];
-    let mut open: Vec<u32> = (0..triangles.len().min(1) as u32).collect();
-    let mut count = 0;
-    while let Some(t) = open.pop() {
-        if std::mem::replace(&mut seen[t as usize], true) {
-            continue;
+/// Triangles that hang together, as they are joined.
+struct Parts {
+    parent: Vec<u32>,
+    n: usize,
+}
+
+impl Parts {
+    fn new(n: usize) -> Self {
+        Self { parent: (0..n as u32).collect(), n }
+    }
+
+    fn root(&mut self, mut triangle: u32) -> u32 {
+        while self.parent[triangle as usize] != triangle {
+            let above = self.parent[triangle as usize];
+            self.parent[triangle as usize] = self.parent[above as usize];
+            triangle = above;
         }
-        count += 1;
-        let [a, b, c] = triangles[t as usize];
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            open.extend(fans.at(to).iter().filter(|side| side.next == from).map(|side| side.triangle));
+        triangle
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a != b {
+            self.parent[a.max(b) as usize] = a.min(b);
+            self.n -= 1;
         }
     }
-    count
 }
