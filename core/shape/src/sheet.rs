@@ -7,6 +7,7 @@
 
 use nalgebra::Vector2;
 
+use crate::kernels::wide;
 use crate::plane::Plane;
 use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
 use crate::{Patch, Sample, Vec3};
@@ -118,14 +119,7 @@ impl Sheet {
 impl Heights {
     /// The spline through the heights, and how much larger than stated their noise is.
     fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
-        let gather = |weight: &dyn Fn(usize) -> f64| {
-            let mut fit = Fit::new(axes[0], axes[1]);
-            for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
-                fit.add(*a, *b, [*height], weight(i));
-            }
-            fit
-        };
-        let all = gather(&|i| self.per_sigmas[i].powi(2));
+        let all = self.weighted(axes, |i| self.per_sigmas[i].powi(2));
         let penalty = all.choose_penalty([1.0]).penalty;
         let first = all.solve_with(penalty)?;
         let residuals: Vec<f64> = (0..self.places.len())
@@ -136,9 +130,22 @@ impl Heights {
             .collect();
         let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
         // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
-        let robust =
-            gather(&|i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2)).solve_with(penalty)?;
-        Ok((robust, scale))
+        let robust = self.weighted(axes, |i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2));
+        Ok((robust.solve_with(penalty)?, scale))
+    }
+
+    /// The heights as points of a fit, each with its weight.
+    fn weighted(&self, axes: [Axis; 2], weight: impl Fn(usize) -> f64) -> Fit<1> {
+        let mut fit = Fit::new(axes[0], axes[1]);
+        wide(
+            #[inline(always)]
+            || {
+                for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
+                    fit.add(*a, *b, [*height], weight(i));
+                }
+            },
+        );
+        fit
     }
 }
 

@@ -91,12 +91,18 @@ impl Edge {
         let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(footprint, step, noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
+        let mut own = footprint;
         for _ in 0..FOOTPRINT_ROUNDS {
+            let last = own;
             if footprint > 0.0 {
-                let own = bracket::footprint_at(&lines, |along| curve.at(along), footprint, step);
-                used = brackets(own).collect();
-                (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
+                own = bracket::footprint_at(&lines, |along| curve.at(along), footprint, step);
             }
+            // The same footprint gives the same curve, and that one the same footprint.
+            if own == last {
+                break;
+            }
+            used = brackets(own).collect();
+            (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         }
         let agreeing = used.iter().filter(|b| b.agrees(curve.at(b.along), step));
         let mut seen: Vec<f64> = agreeing.map(|b| b.along).collect();
@@ -153,9 +159,8 @@ fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Splin
     let mut rounds = 0;
     loop {
         let (next, precision) = pulled(prior, brackets, &curve, 0.0)?;
-        let moved = brackets.iter().map(|b| (curve.at(b.along) - next.at(b.along)).abs()).fold(0.0, f64::max);
         rounds += 1;
-        if moved < STILL || rounds == ROUNDS {
+        if next.distance(&curve) < STILL || rounds == ROUNDS {
             return Some((next, precision));
         }
         curve = next;

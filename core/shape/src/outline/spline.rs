@@ -20,6 +20,11 @@ impl Spline {
         let (first, values) = self.axis.values(x);
         (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
     }
+
+    /// How far a spline over the same axis lies from this one, at most: between the places of the coefficients less than there.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        (&self.coefficients - &other.coefficients).amax()
+    }
 }
 
 /// Normal equations of a spline: sums over data, and what is known of the curve before any.
@@ -63,7 +68,8 @@ impl Normal {
     pub(super) fn add(&mut self, x: f64, y: f64, w: f64) {
         let (first, values) = self.axis.values(x);
         for i in 0..4 {
-            for j in 0..4 {
+            // The factorisation reads the lower triangle.
+            for j in 0..=i {
                 self.matrix[(first + i, first + j)] += w * values[i] * values[j];
             }
             self.right[first + i] += w * values[i] * y;
