@@ -108,6 +108,7 @@ impl Seen {
         Self { mask, column: 0, before: Vec::new(), current: Vec::new(), cursor: 0 }
     }
 
+    #[inline(always)]
     fn add(&mut self, sample: &Sample, at: [f64; 2]) {
         if sample.column != self.column {
             std::mem::swap(&mut self.before, &mut self.current);

@@ -50,6 +50,25 @@ impl Layout {
         row * self.block() + inner
     }
 
+    /// Copies what lies inside the band along both axes, of the block that couples row `row + ahead`, down, to row `row`,
+    /// across, into the 49 slots of each coefficient, from both sides.
+    fn spread(self, row: usize, ahead: usize, block: MatRef<'_, f64>, local: &mut [[f64; 49]]) {
+        let number = |row: usize, inner: usize| {
+            if self.v_is_outer() { row * self.n_u + inner } else { inner * self.n_u + row }
+        };
+        let slot = |by_row: usize, by_inner: usize| {
+            if self.v_is_outer() { by_row * 7 + by_inner } else { by_inner * 7 + by_row }
+        };
+        for across in 0..self.block() {
+            let around = across.saturating_sub(REACH)..(across + REACH + 1).min(self.block());
+            for down in around {
+                let value = block[(down, across)];
+                local[number(row + ahead, down)][slot(REACH - ahead, across + REACH - down)] = value;
+                local[number(row, across)][slot(REACH + ahead, down + REACH - across)] = value;
+            }
+        }
+    }
+
     fn len(self) -> usize {
         self.n_rows() * (REACH + 1) * self.block() * self.block()
     }
@@ -97,11 +116,19 @@ impl BandMatrix {
 
     /// Adds `weight` times the Kronecker product of two banded matrices given by their upper diagonals.
     pub(crate) fn add_kronecker(&mut self, along_u: &[[f64; 4]], along_v: &[[f64; 4]], weight: f64) {
-        for (k, v) in along_v.iter().enumerate() {
-            for (dk, fv) in v.iter().enumerate().filter(|(dk, _)| k + dk < along_v.len()) {
-                for (i, u) in along_u.iter().enumerate() {
-                    for (di, fu) in u.iter().enumerate().filter(|(di, _)| i + di < along_u.len()) {
-                        self.add_pair([i, i + di], [k, k + dk], weight * fv * fu);
+        let (layout, m) = (self.layout, self.layout.block());
+        let (outer, inner) = if layout.v_is_outer() { (along_v, along_u) } else { (along_u, along_v) };
+        for row in 0..layout.n_rows() {
+            for back in 0..=REACH.min(row) {
+                let factor = weight * outer[row - back][back];
+                let block = &mut self.blocks[layout.range(row, back)];
+                for (low, diagonals) in inner.iter().enumerate() {
+                    for (high, value) in (low..m).zip(diagonals) {
+                        block[low * m + high] += factor * value;
+                        // Of a block on the diagonal the lower triangle counts.
+                        if back > 0 && high > low {
+                            block[high * m + low] += factor * value;
+                        }
                     }
                 }
             }
@@ -257,30 +284,13 @@ impl BandFactor {
     /// The inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
     /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
     pub(crate) fn local_inverse(&self) -> Vec<[f64; 49]> {
-        let band = apart(|| self.inverse_band());
-        let (layout, m) = (self.layout, self.layout.block());
-        let around = |at: usize, n: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(n);
-        let mut local = vec![[0.0; 49]; layout.n_u * layout.n_v];
-        for (c, slots) in local.iter_mut().enumerate() {
-            let (row, inner) = layout.place(c % layout.n_u, c / layout.n_u);
-            for other in around(row, layout.n_rows()) {
-                // A block couples the later row, down, to the earlier one, across.
-                let block = &band[layout.range(row.max(other), row.abs_diff(other))];
-                for next in around(inner, m) {
-                    let (down, across) = if other <= row { (inner, next) } else { (next, inner) };
-                    let (by_row, by_inner) = (other + REACH - row, next + REACH - inner);
-                    let (dv, du) = if layout.v_is_outer() { (by_row, by_inner) } else { (by_inner, by_row) };
-                    slots[dv * 7 + du] = block[across * m + down];
-                }
-            }
-        }
-        local
+        apart(|| self.local_inverse_here())
     }
 
-    /// Blocks (row, row - 0..=3) of the inverse, diagonal blocks in full.
-    fn inverse_band(&self) -> Vec<f64> {
+    fn local_inverse_here(&self) -> Vec<[f64; 49]> {
         let (layout, m) = (self.layout, self.layout.block());
-        let mut inverse = vec![0.0; self.blocks.len()];
+        let mut local = vec![[0.0; 49]; layout.n_u * layout.n_v];
+        let mut recent = Recent::new(m);
         let mut work = Mat::<f64>::zeros(m, m);
         for row in (0..layout.n_rows()).rev() {
             let reach = REACH.min(layout.n_rows() - 1 - row);
@@ -300,19 +310,18 @@ impl BandFactor {
             for j in (1..=reach).rev() {
                 work.fill(0.0);
                 for (k, u) in (1..=reach).zip(&scaled) {
-                    let (high, low) = (j.max(k), j.min(k));
-                    let known = view(&inverse[layout.range(row + high, high - low)], m);
+                    let known = recent.block(row + j.min(k), j.abs_diff(k));
                     let known = if j >= k { known } else { known.transpose() };
                     matmul(work.as_mut(), Accum::Add, known, u.as_ref(), -1.0, Par::Seq);
                 }
-                view_mut(&mut inverse[layout.range(row + j, j)], m).copy_from(&work);
+                recent.put(row, j, &work);
             }
             let mut own = Mat::<f64>::identity(m, m);
             solve_lower_triangular_in_place(diagonal, own.as_mut(), Par::Seq);
             matmul(work.as_mut(), Accum::Replace, own.transpose(), own.as_ref(), 1.0, Par::Seq);
             for (k, u) in (1..=reach).zip(&scaled) {
-                let known = view(&inverse[layout.range(row + k, k)], m);
-                matmul(work.as_mut(), Accum::Add, known.transpose(), u.as_ref(), -1.0, Par::Seq);
+                let known = recent.block(row, k).transpose();
+                matmul(work.as_mut(), Accum::Add, known, u.as_ref(), -1.0, Par::Seq);
             }
             // Rounding leaves a skew part, and the recursion, which takes blocks for their transposes, makes it grow.
             for c in 0..m {
@@ -321,9 +330,33 @@ impl BandFactor {
                     (work[(r, c)], work[(c, r)]) = (mean, mean);
                 }
             }
-            view_mut(&mut inverse[layout.range(row, 0)], m).copy_from(&work);
+            recent.put(row, 0, &work);
+            (0..=reach).for_each(|ahead| layout.spread(row, ahead, recent.block(row, ahead), &mut local));
         }
-        inverse
+        local
+    }
+}
+/// Blocks of the inverse that couple the last rows of the recursion with each other: more of it would only fill memory.
+struct Recent {
+    blocks: Vec<Mat<f64>>,
+}
+
+impl Recent {
+    fn new(m: usize) -> Self {
+        Self { blocks: vec![Mat::zeros(m, m); (REACH + 1) * (REACH + 1)] }
+    }
+
+    fn place(row: usize, ahead: usize) -> usize {
+        row % (REACH + 1) * (REACH + 1) + ahead
+    }
+
+    /// The block that couples row `row + ahead`, down, to row `row`, across.
+    fn block(&self, row: usize, ahead: usize) -> MatRef<'_, f64> {
+        self.blocks[Self::place(row, ahead)].as_ref()
+    }
+
+    fn put(&mut self, row: usize, ahead: usize, block: &Mat<f64>) {
+        self.blocks[Self::place(row, ahead)].copy_from(block);
     }
 }
 

@@ -8,6 +8,7 @@ use super::axis::{Axis, BASIS, multiply, pairs};
 use super::band::BandMatrix;
 use super::net::Net;
 use super::smoothing::{GAUSS, GridValues};
+use crate::kernels::wide;
 use nalgebra::{Matrix4, Vector4};
 
 /// Weighted sums over the points of one cell.
@@ -68,7 +69,8 @@ impl<const D: usize> Moments<D> {
             return;
         }
         let ((i, s), (k, t)) = (self.u.locate(u), self.v.locate(v));
-        let (p, q) = (powers(s), powers(t));
+        // Were the 1 in it known, the loops over slots would fall apart into scalars.
+        let (p, q) = (std::hint::black_box(powers(s)), powers(t));
         let cell = &mut self.cells[k * self.u.n_spans() + i];
         cell.n_points += 1;
         for (row, tq) in cell.gram.iter_mut().zip(q) {
@@ -92,6 +94,14 @@ impl<const D: usize> Moments<D> {
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
     pub(crate) fn normal_equations(&self) -> (BandMatrix, Vec<[f64; D]>) {
+        wide(
+            #[inline(always)]
+            || self.normal_equations_here(),
+        )
+    }
+
+    #[inline(always)]
+    fn normal_equations_here(&self) -> (BandMatrix, Vec<[f64; D]>) {
         let (n_u, n_v) = (self.u.n_coefficients(), self.v.n_coefficients());
         // Per coefficient the sums with those up to three further along v and along u.
         let mut sums = vec![[[0.0; 4]; 4]; n_u * n_v];
@@ -179,6 +189,7 @@ impl<const D: usize> Moments<D> {
         }
     }
 
+    #[inline(always)]
     fn add_right_hand_side(&self, cell: &Cell<D>, i: usize, k: usize, rhs: &mut [[f64; D]]) {
         for (b, bv) in BASIS.iter().enumerate() {
             for (a, bu) in BASIS.iter().enumerate() {
