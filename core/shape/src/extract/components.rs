@@ -95,6 +95,6 @@ impl Extractor {
                 }
             }
         }
-        roots.into_iter().partition(|root| self.is_near_size(*root))
+        roots.into_iter().partition(|root| self.closed.contains_key(root) || self.is_near_size(*root))
     }
 }

@@ -94,9 +94,16 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: 
         (window.n_columns, n_rows, window.first_column, window.first_row)
     };
     let index = |line: usize, place: usize| if rows { place * n_rows + line } else { line * n_rows + place };
-    let ends = (0..n_lines).map(|line| {
-        let mine = |place: &usize| labels[index(line, *place)] == label;
-        let (low, high) = ((0..n_places).find(mine)?, (0..n_places).rfind(mine)?);
+    // First and last place of each line, from one pass through the cells as they lie.
+    let mut spans: Vec<Option<[usize; 2]>> = vec![None; n_lines];
+    for (column, labels) in labels.chunks_exact(n_rows.max(1)).enumerate() {
+        for (row, _) in labels.iter().enumerate().filter(|(_, of_cell)| **of_cell == label) {
+            let (line, place) = if rows { (row, column) } else { (column, row) };
+            spans[line].get_or_insert([place; 2])[1] = place;
+        }
+    }
+    let ends = spans.into_iter().enumerate().map(|(line, span)| {
+        let [low, high] = span?;
         let end = |place: usize, outward: isize| {
             let inner = place.saturating_add_signed(-outward * INSET as isize).clamp(low, high);
             let at = index(line, place);

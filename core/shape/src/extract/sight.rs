@@ -24,8 +24,9 @@ impl Turn {
     pub(super) fn by(self, angle: f64) -> Self {
         let by = if angle.abs() < SMALL {
             let x2 = angle * angle;
-            let sin = angle * (1.0 - x2 / 6.0 * (1.0 - x2 / 20.0));
-            Self { sin, cos: 1.0 - 0.5 * x2 * (1.0 - x2 / 12.0 * (1.0 - x2 / 30.0)) }
+            let sin = angle * (1.0 - x2 * (1.0 / 6.0) * (1.0 - x2 * (1.0 / 20.0)));
+            let cos = 1.0 - 0.5 * x2 * (1.0 - x2 * (1.0 / 12.0) * (1.0 - x2 * (1.0 / 30.0)));
+            Self { sin, cos }
         } else {
             Self::of(angle)
         };

@@ -7,7 +7,6 @@ use platen_scan::ScanHeader;
 use super::columns::{Cell, Columns, MARGIN, union, with_margin};
 use super::regions::{Regions, Run};
 use super::sight::{Sight, Turn};
-use crate::Vec3;
 
 /// Cells of one or more components with a margin, column after column: index `column * n_rows + row`, both counted from
 /// the window's own corner. Only cells within [`MARGIN`] of the component are filled.
@@ -98,18 +97,28 @@ impl Window {
 
     fn fill(&mut self, i: usize, wanted: &[Range<u32>], columns: &Columns) {
         let Some(column) = columns.get(self.first_column + i as u32) else { return };
+        let azimuth = self.azimuths[i];
         for segment in &column.segments {
             for rows in wanted {
                 let start = rows.start.max(segment.first_row);
                 let end = rows.end.min(segment.first_row + segment.cells.len() as u32);
-                for row in start..end {
-                    let cell = segment.cells[(row - segment.first_row) as usize];
-                    let at = i * self.n_rows + (row - self.first_row) as usize;
-                    self.cells[at] = cell;
-                    if cell.valid {
-                        self.inverse[at] = 1.0 / cell.range_m;
-                        self.points[at] = self.point(at).into();
-                    }
+                if start >= end {
+                    continue;
+                }
+                let cells =
+                    &segment.cells[(start - segment.first_row) as usize..(end - segment.first_row) as usize];
+                let row = (start - self.first_row) as usize;
+                let at = i * self.n_rows + row..i * self.n_rows + row + cells.len();
+                self.cells[at.clone()].copy_from_slice(cells);
+                let places = self.inverse[at.clone()].iter_mut().zip(&mut self.points[at]);
+                let cells = cells.iter().zip(&self.elevations[row..]).zip(places);
+                for ((cell, elevation), (inverse, point)) in cells.filter(|((cell, _), _)| cell.valid) {
+                    let sight = Sight {
+                        azimuth: azimuth.by(f64::from(cell.azimuth_off)),
+                        elevation: elevation.by(f64::from(cell.elevation_off)),
+                    };
+                    *inverse = 1.0 / cell.range_m;
+                    *point = (sight.unit() * f64::from(cell.range_m)).into();
                 }
             }
         }
@@ -152,16 +161,5 @@ impl Window {
     /// The same of a cell by its index.
     pub(super) fn place_of(&self, index: usize) -> (f64, f64) {
         self.place(index / self.n_rows, index % self.n_rows)
-    }
-
-    /// Position of a valid cell, metres.
-    fn point(&self, index: usize) -> Vec3 {
-        let cell = &self.cells[index];
-        let nominal = self.nominal(index / self.n_rows, index % self.n_rows);
-        let sight = Sight {
-            azimuth: nominal.azimuth.by(f64::from(cell.azimuth_off)),
-            elevation: nominal.elevation.by(f64::from(cell.elevation_off)),
-        };
-        sight.unit() * f64::from(cell.range_m)
     }
 }
