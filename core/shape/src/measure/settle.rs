@@ -10,7 +10,7 @@ use crate::sheet::{biweight, per_sigma_across};
 use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
-/// Length of a span of S, metres: a fifth of the width of a narrow bend.
+/// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without one gets spans of twice the length.
 const SPAN: f64 = 0.06;
 /// Facets along a span of the smooth face: 25 mm.
 const FACETS: usize = 4;
@@ -36,7 +36,11 @@ pub(super) fn settle(
     let carried = carry(face, places, chart)?;
     // Around its middle the plate's coordinates are small, and so are the rounding errors of their squares.
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
-    let mut fit = Fit::<3>::new(Axis::of_length(spec.width, SPAN), Axis::of_length(spec.height, SPAN));
+    let [u, v] = [spec.width, spec.height].map(|length| {
+        let n_spans = Axis::of_length(length, SPAN).n_spans();
+        Axis::new(0.0, length, n_spans.next_multiple_of(2))
+    });
+    let mut fit = Fit::<3>::new(u, v);
     let mut seen = Seen::new(spec);
     let per_scale = 1.0 / face.noise_scale;
     let mut variance = 0.0;

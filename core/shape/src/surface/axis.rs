@@ -56,6 +56,11 @@ impl Axis {
         self.n_spans + 3
     }
 
+    /// The same interval in half as many spans.
+    pub(crate) fn coarser(&self) -> Self {
+        Self::new(self.start, self.end(), self.n_spans / 2)
+    }
+
     /// First parameter.
     #[must_use]
     pub fn start(&self) -> f64 {

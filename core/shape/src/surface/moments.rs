@@ -57,7 +57,8 @@ pub(crate) struct Moments<const D: usize> {
 }
 
 impl<const D: usize> Moments<D> {
-    pub(crate) fn new(u: Axis, v: Axis) -> Self {
+    /// No points yet.
+    pub(crate) fn empty(u: Axis, v: Axis) -> Self {
         let empty = Cell { gram: [[0.0; 8]; 7], rhs: [[[0.0; 4]; D]; 4], n_points: 0 };
         Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, weight: 0.0, n_points: 0 }
     }
@@ -90,6 +91,55 @@ impl<const D: usize> Moments<D> {
         self.square += w * y.iter().map(|x| x * x).sum::<f64>();
         self.weight += w;
         self.n_points += 1;
+    }
+
+    /// Axes of u and v.
+    pub(crate) fn axes(&self) -> (Axis, Axis) {
+        (self.u, self.v)
+    }
+
+    /// The same sums over cells of twice the length along u, to the last bits.
+    pub(crate) fn joined_along_u(&self) -> Self {
+        let mut joined = Self::empty(self.u.coarser(), self.v);
+        for (index, cell) in self.cells.iter().enumerate() {
+            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
+            let shift = &HALVES[i % 2];
+            let to = &mut joined.cells[k * joined.u.n_spans() + i / 2];
+            to.n_points += cell.n_points;
+            for (row, of_half) in to.gram.iter_mut().zip(&cell.gram) {
+                moved(row, of_half, shift);
+            }
+            for (row, of_half) in to.rhs.iter_mut().flatten().zip(cell.rhs.iter().flatten()) {
+                moved(row, of_half, shift);
+            }
+        }
+        joined.with_totals_of(self)
+    }
+
+    /// The same along v.
+    pub(crate) fn joined_along_v(&self) -> Self {
+        let mut joined = Self::empty(self.u, self.v.coarser());
+        for (index, cell) in self.cells.iter().enumerate() {
+            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
+            let shift = &HALVES[k % 2];
+            let to = &mut joined.cells[k / 2 * joined.u.n_spans() + i];
+            to.n_points += cell.n_points;
+            for p in 0..7 {
+                let mut column = to.gram.map(|row| row[p]);
+                moved(&mut column, &cell.gram.map(|row| row[p]), shift);
+                to.gram.iter_mut().zip(column).for_each(|(row, sum)| row[p] = sum);
+            }
+            for (d, p) in (0..D).flat_map(|d| (0..4).map(move |p| (d, p))) {
+                let mut column = to.rhs.map(|rows| rows[d][p]);
+                moved(&mut column, &cell.rhs.map(|rows| rows[d][p]), shift);
+                to.rhs.iter_mut().zip(column).for_each(|(rows, sum)| rows[d][p] = sum);
+            }
+        }
+        joined.with_totals_of(self)
+    }
+
+    fn with_totals_of(self, other: &Self) -> Self {
+        Self { square: other.square, weight: other.weight, n_points: other.n_points, ..self }
     }
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
@@ -201,6 +251,34 @@ impl<const D: usize> Moments<D> {
                 }
             }
         }
+    }
+}
+
+/// Powers of a place in a cell by those of the place in its first or second half: s = t / 2 -+ 1/4, `[half][p][q]` is the
+/// coefficient of t^q in s^p.
+const HALVES: [[[f64; 7]; 7]; 2] = [halved(-0.25), halved(0.25)];
+
+const fn halved(middle: f64) -> [[f64; 7]; 7] {
+    let mut powers = [[0.0; 7]; 7];
+    powers[0][0] = 1.0;
+    let mut p = 1;
+    while p < 7 {
+        // Row p is row p - 1 times t / 2 + middle.
+        let mut q = 0;
+        while q < 7 {
+            let shifted = if q > 0 { powers[p - 1][q - 1] } else { 0.0 };
+            powers[p][q] = 0.5 * shifted + middle * powers[p - 1][q];
+            q += 1;
+        }
+        p += 1;
+    }
+    powers
+}
+
+/// Adds the sums over the points of a half to those of the cell; as many powers as `sums` has, up to six.
+fn moved(sums: &mut [f64], of_half: &[f64], shift: &[[f64; 7]; 7]) {
+    for (sum, row) in sums.iter_mut().zip(shift) {
+        *sum += row.iter().zip(of_half).map(|(f, moment)| f * moment).sum::<f64>();
     }
 }
 

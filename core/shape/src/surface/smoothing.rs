@@ -29,6 +29,8 @@ pub(crate) struct Chosen {
     pub(crate) penalty: Penalty,
     /// Share of the covariance that is scatter: see [`Fitted::noise_share`](super::Fitted::noise_share).
     pub(crate) noise_share: f64,
+    /// Along u and along v: the penalty leaves nothing that spans of twice the length could not follow.
+    pub(crate) coarse: [bool; 2],
 }
 
 /// The two Gauss places of a span, from its middle: a function of degree 1 fitted to evenly spread noise has
@@ -53,6 +55,9 @@ const NULLITY: usize = 3;
 const EXPONENTS: (f64, f64) = (-1.0, 10.0);
 /// Exponents of a spline that hardly does more than a quadratic.
 const STIFF: [f64; 2] = [9.0, 9.0];
+/// From this exponent on spans of twice the length will do: a wave over four of them is damped to 1/240, and it is
+/// the shortest that they follow to a hundredth.
+const COARSE: f64 = 6.0;
 /// Rounds of filling gaps with the smoothed values; each takes up what the gaps' values still bend the spline.
 const ROUNDS: usize = 5;
 /// The values' variance is taken to be at least this part of what the weights state: data without noise would ask for a
@@ -81,7 +86,11 @@ impl GridValues {
             u: scale_u / (noise * 0.5 * self.v.step()),
             v: scale_v / (noise * 0.5 * self.u.step()),
         };
-        Chosen { penalty, noise_share: criterion.noise_share(best) }
+        Chosen {
+            penalty,
+            noise_share: criterion.noise_share(best),
+            coarse: best.map(|exponent| exponent >= COARSE),
+        }
     }
 
     /// The values with gaps filled by the seen values around them, weighted by distance; and the gaps.
