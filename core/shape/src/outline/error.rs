@@ -24,10 +24,11 @@ pub enum OutlineError {
     },
     /// An edge is hidden.
     #[error(
-        "too little of one edge of the plate is seen ({crossings} lattice lines cross it); clear what hides it"
+        "too little of one edge of the plate is seen to tell where it is: {crossings} lattice lines end there, too few of them on \
+         one curve; clear what hides it, or tilt it where it mirrors the beam"
     )]
     Edge {
-        /// Rows and columns that are seen to cross it.
+        /// Rows and columns that are seen to end there, at the edge or at what hides it.
         crossings: usize,
     },
     /// The face has too few samples to be smoothed.
