@@ -128,10 +128,12 @@ impl Column {
             return Err(ColumnError::Rows { index: self.index, first_row: self.first_row, end, n_rows });
         }
         let angles = self.azimuth.iter().zip(&self.elevation);
-        let mut cells = self.state.iter().zip(&self.range_m).zip(angles);
-        // Nearly always all are sound, and without a way out of the loop vector registers tell so.
-        let sound = cells.clone().fold(true, |sound, cell| sound & is_sound(cell));
-        if !sound && let Some(i) = cells.position(|cell| !is_sound(cell)) {
+        let unsound = |((state, r), (az, el)): ((&State, &f64), (&f64, &f64))| match state {
+            State::Valid => !(r.is_finite() && *r > 0.0 && az.is_finite() && el.is_finite()),
+            State::DirectionOnly => !(az.is_finite() && el.is_finite()),
+            State::NoReturn => false,
+        };
+        if let Some(i) = self.state.iter().zip(&self.range_m).zip(angles).position(unsound) {
             return Err(ColumnError::NotFinite {
                 index: self.index,
                 row: self.first_row + i as u32,
@@ -142,14 +144,6 @@ impl Column {
         }
         Ok(())
     }
-}
-
-/// Whether a cell holds what a scanner measures; of one without echo nothing is asked.
-#[inline]
-fn is_sound(((state, range_m), (azimuth, elevation)): ((&State, &f64), (&f64, &f64))) -> bool {
-    let direction = azimuth.is_finite() & elevation.is_finite();
-    let range = range_m.is_finite() & (*range_m > 0.0);
-    (*state == State::NoReturn) | direction & (range | (*state == State::DirectionOnly))
 }
 
 #[cfg(test)]

@@ -249,30 +249,17 @@ impl LocalFace {
 fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
     let [x, y, z] = points.axes();
     let (xy, xz, yz) = (dot(x, y), dot(x, z), dot(y, z));
-    let (xx, yy, zz) = (dot(x, x), dot(y, y), dot(z, z));
-    // Least squares along the coordinate nearest to the normal; what that leaves of a tilt, the quadratic function takes up.
-    let planes = [
-        Vec3::new(yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy),
-        Vec3::new(xz * yz - xy * zz, xx * zz - xz * xz, xy * xz - yz * xx),
-        Vec3::new(xy * yz - xz * yy, xy * xz - yz * xx, xx * yy - xy * xy),
-    ];
-    let nearest = (0..3).max_by(|a, b| planes[*a][*a].total_cmp(&planes[*b][*b]))?;
-    let up = planes[nearest].try_normalize(0.0)?;
+    let eigen = Matrix3::new(dot(x, x), xy, xz, xy, dot(y, y), yz, xz, yz, dot(z, z)).symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let up = eigen.eigenvectors.column(least).into_owned();
     let up = if up.dot(&centre) > 0.0 { -up } else { up };
-    // In the plane, turned to where the points spread most.
-    let side = up.cross(&Vec3::ith((nearest + 1) % 3, 1.0)).normalize();
-    let other = up.cross(&side);
-    let spread = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let (by_side, by_other) = (spread * side, spread * other);
-    let (a, b, c) = (side.dot(&by_side), side.dot(&by_other), other.dot(&by_other));
-    let (sin, cos) = (0.5 * (2.0 * b).atan2(a - c)).sin_cos();
-    let axis = |by_side: f64, by_other: f64| {
-        let spread = by_side * by_side * a + 2.0 * by_side * by_other * b + by_other * by_other * c;
+    let axis = |k: usize| {
+        let k = (least + k) % 3;
         // k even steps have a mean square of k^2 / 12; as many along one axis as along the other.
-        let spacing = (12.0 * spread).sqrt() / points.n as f64;
-        (spacing > 0.0).then(|| (side * by_side + other * by_other) / spacing)
+        let spacing = (12.0 * eigen.eigenvalues[k]).sqrt() / points.n as f64;
+        (spacing > 0.0).then(|| eigen.eigenvectors.column(k) / spacing)
     };
-    Some(([axis(cos, sin)?, axis(-sin, cos)?], up))
+    Some(([axis(1)?, axis(2)?], up))
 }
 
 #[cfg(test)]

@@ -36,6 +36,7 @@ pub(super) fn settle(
     let carried = carry(face, places, chart)?;
     // Around its middle the plate's coordinates are small, and so are the rounding errors of their squares.
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
+    // Of even numbers of spans the fit may join two each.
     let [u, v] = [spec.width, spec.height].map(|length| {
         let n_spans = Axis::of_length(length, SPAN).n_spans();
         Axis::new(0.0, length, n_spans.next_multiple_of(2))
@@ -112,7 +113,6 @@ impl Seen {
         Self { mask, column: 0, before: Vec::new(), current: Vec::new(), cursor: 0 }
     }
 
-    #[inline(always)]
     fn add(&mut self, sample: &Sample, at: [f64; 2]) {
         if sample.column != self.column {
             std::mem::swap(&mut self.before, &mut self.current);

@@ -37,15 +37,15 @@ impl Grid {
         let n_rows = last_row.saturating_sub(first_row) as usize + 3;
         let n = n_columns * n_rows;
         let mut grid = Self { n_rows, sample: vec![0; n], inside: vec![false; n] };
-        let place = |sample: &Sample| {
-            let (column, row) = (sample.column - first_column + 1, (sample.row - first_row + 1) as usize);
-            (column as usize * n_rows + row, row)
+        let cell = |sample: &Sample| {
+            let (column, row) = (sample.column - first_column + 1, sample.row - first_row + 1);
+            column as usize * n_rows + row as usize
         };
-        for (number, (cell, _)) in (1..).zip(patch.samples.iter().map(place)) {
-            grid.sample[cell] = number;
-            grid.inside[cell] = true;
+        for (number, sample) in (1..).zip(&patch.samples) {
+            grid.sample[cell(sample)] = number;
+            grid.inside[cell(sample)] = true;
         }
-        grid.fill_hidden(patch, place);
+        grid.fill_hidden(patch, cell);
         grid
     }
 
@@ -67,9 +67,8 @@ impl Grid {
         around(&beside).into_iter().chain(around(&[0])).collect()
     }
 
-    /// Fills gaps along columns and rows, unless the plate is seen to end at one side of them. `place` gives the cell of a
-    /// sample, and its row.
-    fn fill_hidden(&mut self, patch: &Patch, place: impl Fn(&Sample) -> (usize, usize)) {
+    /// Fills gaps along columns and rows, unless the plate is seen to end at one side of them.
+    fn fill_hidden(&mut self, patch: &Patch, cell: impl Fn(&Sample) -> usize) {
         let mut ends: Vec<[bool; 4]> = vec![[false; 4]; patch.samples.len()];
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
             ends[crossing.sample as usize][side(crossing.step)] = true;
@@ -82,8 +81,8 @@ impl Grid {
         let mut on_row = vec![0; self.n_rows];
         for samples in patch.samples.chunk_by(|a, b| a.column == b.column) {
             let mut on_column = 0;
-            for (cell, row) in samples.iter().map(&place) {
-                let on_row = &mut on_row[row];
+            for cell in samples.iter().map(&cell) {
+                let on_row = &mut on_row[cell % self.n_rows];
                 for (last, stride, step) in [(on_column, 1, [0, 1]), (*on_row, self.n_rows, [1, 0])] {
                     if last != 0
                         && cell - last > stride

@@ -56,24 +56,17 @@ impl Mask {
     }
 
     /// Marks the cell around (u, v).
-    #[inline]
     pub fn mark(&mut self, u: f64, v: f64) {
         let index = self.index(u, v);
         self.seen[index] = true;
     }
 
     /// Marks the cells between two neighbouring samples.
-    #[inline]
     pub fn mark_between(&mut self, from: [f64; 2], to: [f64; 2]) {
-        let cells = |d: usize| ((to[d] - from[d]) * self.per_metre[d]).abs();
-        if cells(0) > 0.5 || cells(1) > 0.5 {
-            self.mark_along(from, to, cells(0).max(cells(1)));
+        let cells = (0..2).map(|d| ((to[d] - from[d]) * self.per_metre[d]).abs()).fold(0.0, f64::max);
+        if cells <= 0.5 {
+            return;
         }
-    }
-
-    /// Marks the cells of a line that is `cells` long, twice in each.
-    #[inline(never)]
-    fn mark_along(&mut self, from: [f64; 2], to: [f64; 2], cells: f64) {
         let n = (2.0 * cells).ceil().min(256.0) as usize;
         for k in 1..n {
             let f = k as f64 / n as f64;
@@ -81,7 +74,6 @@ impl Mask {
         }
     }
 
-    #[inline]
     fn index(&self, u: f64, v: f64) -> usize {
         let cell = |x: f64, n: usize| (x.max(0.0) as usize).min(n - 1);
         cell(v * self.per_metre[1], self.n_v) * self.n_u + cell(u * self.per_metre[0], self.n_u)
