@@ -8,6 +8,7 @@ use nalgebra::Vector2;
 
 use super::OutlineError;
 use super::bracket::{self, Bracket, Line};
+use super::seen::Seen;
 use super::settled::Settled;
 use super::spline::{Normal, Precision, Roughness, Spline};
 use super::strip::Strip;
@@ -70,8 +71,8 @@ pub(super) struct Edge {
     strip: Strip,
     curve: Spline,
     precision: Precision,
-    /// Places along the edge of crossings that agree with it, sorted.
-    seen: Vec<f64>,
+    /// Where crossings agree with it.
+    pub(super) seen: Seen,
     pub(super) from: f64,
     pub(super) to: f64,
 }
@@ -87,7 +88,7 @@ impl Edge {
         let (start, end) = strip.span();
         let axis = Axis::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = Normal::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
-        let too_few = || OutlineError::Edge { crossings: lines.len() };
+        let too_few = || strip.too_few();
         let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(footprint, step, noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
@@ -105,8 +106,7 @@ impl Edge {
             (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         }
         let agreeing = used.iter().filter(|b| b.agrees(curve.at(b.along), step));
-        let mut seen: Vec<f64> = agreeing.map(|b| b.along).collect();
-        seen.sort_by(f64::total_cmp);
+        let seen = Seen::new(agreeing.map(|b| b.along), step);
         let (from, to) = (strip.flatten(from).x, strip.flatten(to).x);
         Ok(Self { strip, curve, precision, seen, from, to })
     }
@@ -134,12 +134,6 @@ impl Edge {
     /// Standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
         self.precision.variance(along).sqrt().hypot(COMMON)
-    }
-
-    /// True when the edge was seen within `reach` of a place along it.
-    pub(super) fn is_seen(&self, along: f64, reach: f64) -> bool {
-        let next = self.seen.partition_point(|s| *s < along - reach);
-        self.seen.get(next).is_some_and(|s| *s <= along + reach)
     }
 }
 

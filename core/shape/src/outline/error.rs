@@ -24,12 +24,12 @@ pub enum OutlineError {
     },
     /// An edge is hidden.
     #[error(
-        "too little of one edge of the plate is seen to tell where it is: {crossings} lattice lines end there, too few of them on \
-         one curve; clear what hides it, or tilt it where it mirrors the beam"
+        "{seen_percent:.0} % of one edge of the plate is seen, too little to tell where it is; clear what hides it, or tilt it \
+         where it mirrors the beam"
     )]
     Edge {
-        /// Rows and columns that are seen to end there, at the edge or at what hides it.
-        crossings: usize,
+        /// Part of the edge that was seen, percent.
+        seen_percent: f64,
     },
     /// The face has too few samples to be smoothed.
     #[error(transparent)]

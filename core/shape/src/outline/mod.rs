@@ -13,6 +13,7 @@ mod corners;
 mod edge;
 mod error;
 mod rim;
+mod seen;
 mod settled;
 mod spline;
 mod strip;
@@ -67,9 +68,6 @@ const CORNER_STEPS: f64 = 2.5;
 /// Spacing of the points of an edge curve, metres.
 const POINT_SPACING: f64 = 0.01;
 
-/// An edge counts as seen where a crossing lies within so many lattice steps.
-const SEEN_STEPS: f64 = 6.0;
-
 /// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not tell corners apart.
 const LARGEST_HINT_ANGLE: f64 = 35.0;
 
@@ -118,17 +116,16 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let first = first_corner(&points, &rim.plane, spec.u_axis)?;
     edges.rotate_left(first);
     points.rotate_left(first);
-    let reach = SEEN_STEPS * rim.step;
-    check_size(&edges, spec, reach)?;
+    check_size(&edges, spec)?;
     let corner = |k: usize| {
         let (arriving, leaving) = (&edges[(k + 3) % 4], &edges[k]);
         Corner {
             point: points[k],
             sigma: [arriving.sigma(arriving.to), leaving.sigma(leaving.from)],
-            seen: arriving.is_seen(arriving.to, reach) && leaving.is_seen(leaving.from, reach),
+            seen: arriving.seen.at(arriving.to) && leaving.seen.at(leaving.from),
         }
     };
-    let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]], reach);
+    let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]]);
     Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), sheet })
 }
 
@@ -168,7 +165,7 @@ fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result
 }
 
 /// Compares the edges of the mid-surface with the plate file.
-fn check_size(edges: &[Edge; 4], spec: &PlateSpec, reach: f64) -> Result<(), OutlineError> {
+fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
     for (k, (side, size)) in
         [("width", spec.width), ("height", spec.height)].into_iter().cycle().take(4).enumerate()
     {
@@ -178,7 +175,7 @@ fn check_size(edges: &[Edge; 4], spec: &PlateSpec, reach: f64) -> Result<(), Out
             let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);
             // An edge ends where those beside it cross it.
             let beside = [&edges[(k + 3) % 4], &edges[k], &edges[(k + 1) % 4]];
-            let seen = beside.map(|edge| share_seen(edge, reach)).into_iter().fold(1.0, f64::min);
+            let seen = beside.map(|edge| edge.seen.share(edge.from, edge.to)).into_iter().fold(1.0, f64::min);
             return Err(if seen < TELLING_PART {
                 OutlineError::Hidden { seen_percent: 100.0 * seen, side, found_mm, expected_mm }
             } else {
@@ -189,20 +186,13 @@ fn check_size(edges: &[Edge; 4], spec: &PlateSpec, reach: f64) -> Result<(), Out
     Ok(())
 }
 
-/// Part of an edge that was seen.
-fn share_seen(edge: &Edge, reach: f64) -> f64 {
-    const PLACES: usize = 200;
-    let place = |i: usize| edge.from + (edge.to - edge.from) * (i as f64 + 0.5) / PLACES as f64;
-    (0..PLACES).filter(|&i| edge.is_seen(place(i), reach)).count() as f64 / PLACES as f64
-}
-
-fn curve(edge: &Edge, ends: [Vec3; 2], reach: f64) -> EdgeCurve {
+fn curve(edge: &Edge, ends: [Vec3; 2]) -> EdgeCurve {
     let length = edge.to - edge.from;
     let n = (length / POINT_SPACING).ceil().max(1.0) as usize;
     let places: Vec<f64> = (0..=n).map(|i| edge.from + length * i as f64 / n as f64).collect();
     let mut points: Vec<Vec3> = places.iter().map(|&at| edge.point(at)).collect();
     (points[0], points[n]) = (ends[0], ends[1]);
     let mean_variance = places.iter().map(|&at| edge.sigma(at).powi(2)).sum::<f64>() / places.len() as f64;
-    let seen = places.iter().map(|&at| edge.is_seen(at, reach)).collect();
+    let seen = places.iter().map(|&at| edge.seen.at(at)).collect();
     EdgeCurve { points, seen, sigma: mean_variance.sqrt() }
 }

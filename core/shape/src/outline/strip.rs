@@ -8,6 +8,7 @@
 use nalgebra::Vector2;
 
 use super::OutlineError;
+use super::seen::Seen;
 use super::settled::Settled;
 use super::spline::{Normal, Roughness, Spline};
 use crate::Vec3;
@@ -33,6 +34,9 @@ const CURVATURE_CHANGE: (f64, f64) = (8.0, 0.1);
 /// Normals turn as the plate bends: second derivative of their components, 1/m^2, over a length of, metres.
 const NORMAL_CHANGE: (f64, f64) = (8.0, 0.1);
 
+/// Crossings on a common curve, at least.
+const LEAST_WEIGHT: f64 = 8.0;
+
 /// Rounds of reweighting against what is no edge.
 const ROUNDS: usize = 8;
 
@@ -55,6 +59,9 @@ pub(super) struct Strip {
     along: Vec3,
     first: f64,
     stations: Vec<Station>,
+    /// Where crossings lie on the common curve, along the chord from its beginning to its end.
+    seen: Seen,
+    length: f64,
 }
 
 impl Strip {
@@ -87,8 +94,14 @@ impl Strip {
                 (local(0.5 * (c.inside + c.outside)), n)
             })
             .collect();
-        let too_few = || OutlineError::Edge { crossings: crossings.len() };
-        let (across, weights) = robust_across(axis(SPAN_ACROSS), &data, step).ok_or_else(too_few)?;
+        let none = OutlineError::Edge { seen_percent: 0.0 };
+        let (across, weights) = robust_across(axis(SPAN_ACROSS), &data, step).ok_or(none)?;
+        let on_it = data.iter().zip(&weights).filter(|(_, w)| **w > 0.5).map(|((p, _), _)| p.x);
+        let seen = Seen::new(on_it, step);
+        let too_few = || too_few(&seen, length);
+        if weights.iter().sum::<f64>() <= LEAST_WEIGHT {
+            return Err(too_few());
+        }
         let mut height = Normal::with_prior(
             axis(SPAN_NORMAL),
             Roughness::CurvatureChange,
@@ -119,7 +132,12 @@ impl Strip {
                 (point, (along * n_x.at(x) + inward * n_y.at(x) + up).normalize())
             })
             .collect();
-        Ok(Self { from, along, first: start, stations: roll_out(&points, depth) })
+        Ok(Self { from, along, first: start, stations: roll_out(&points, depth), seen, length })
+    }
+
+    /// Why no edge can be told from the crossings of this strip.
+    pub(super) fn too_few(&self) -> OutlineError {
+        too_few(&self.seen, self.length)
     }
 
     /// A point near the edge, on the face, as (along, inwards) in the plane, metres.
@@ -182,7 +200,11 @@ fn robust_across(axis: Axis, data: &[(Vec3, Vec3)], step: f64) -> Option<(Spline
         weights = off.iter().map(|r| (1.0 - (r / (3.0 * spread)).powi(2)).max(0.0).powi(2)).collect();
         curve = Some(spline);
     }
-    (weights.iter().sum::<f64>() > 8.0).then_some((curve?, weights))
+    Some((curve?, weights))
+}
+
+fn too_few(seen: &Seen, length: f64) -> OutlineError {
+    OutlineError::Edge { seen_percent: 100.0 * seen.share(0.0, length) }
 }
 
 /// Develops the curve `depth` below one with the normals of its surface: the direction turns in the plane as it turns in
