@@ -12,6 +12,7 @@ mod blank;
 pub mod calibration;
 mod checks;
 pub mod discs;
+mod disjoint;
 pub mod evaluate;
 pub mod extract;
 pub mod flatten;

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::disjoint::Disjoint;
+
 /// Label of a cell that is part of none.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -9,17 +11,17 @@ pub(super) const NONE: u32 = u32::MAX;
 /// number of parts. Margins are not set, so columns do not run into each other.
 pub(super) fn parts(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut runs: Vec<Range<usize>> = Vec::new();
-    let mut parent: Vec<u32> = Vec::new();
+    let mut sets = Disjoint::default();
     let mut before = 0..0;
     for (column, cells) in mask.chunks_exact(n_rows.max(1)).enumerate() {
         let first = runs.len();
         push_runs(cells, column * n_rows, &mut runs);
-        parent.extend(first as u32..runs.len() as u32);
+        (first..runs.len()).for_each(|_| _ = sets.push());
         let (mut i, mut j) = (before.start, first);
         while i < before.end && j < runs.len() {
             let (left_end, right_end) = (runs[i].end + n_rows, runs[j].end);
             if runs[i].start + n_rows < right_end && runs[j].start < left_end {
-                join(&mut parent, i as u32, j as u32);
+                sets.join(i as u32, j as u32);
             }
             if left_end <= right_end {
                 i += 1;
@@ -34,7 +36,7 @@ pub(super) fn parts(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut n = 0;
     for (run, cells) in runs.into_iter().enumerate() {
         // The root is the first run of its part.
-        let root = root(&mut parent, run as u32) as usize;
+        let root = sets.root(run as u32) as usize;
         if root == run {
             number[run] = n;
             n += 1;
@@ -52,19 +54,6 @@ fn push_runs(cells: &[bool], offset: usize, runs: &mut Vec<Range<usize>>) {
         at = cells[start..].iter().position(|set| !*set).map_or(cells.len(), |length| start + length);
         runs.push(offset + start..offset + at);
     }
-}
-
-fn root(parent: &mut [u32], mut run: u32) -> u32 {
-    while parent[run as usize] != run {
-        parent[run as usize] = parent[parent[run as usize] as usize];
-        run = parent[run as usize];
-    }
-    run
-}
-
-fn join(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parent, a), root(parent, b));
-    parent[a.max(b) as usize] = a.min(b);
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! Connected components of the lattice, grown while columns arrive.
 //!
 //! A column falls into *runs* of cells that are continuous downwards; runs of neighbouring columns are joined
-//! when any of their cells are continuous across. Components are sets of runs (union-find). What is summed over
+//! when any of their cells are continuous across. Components are sets of runs. What is summed over
 //! a component is integer, so that neither the sums nor the components depend on the order of arrival.
 
 use std::ops::Range;
 
 use super::continuity::Link;
+use crate::disjoint::Disjoint;
 
 /// Cells `rows` of one column, each continuous with the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,27 +37,25 @@ impl Extent {
     }
 }
 
-/// Union-find over runs.
+/// Runs and the sets that they form.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Regions {
     runs: Vec<Run>,
-    parent: Vec<u32>,
+    sets: Disjoint,
     extent: Vec<Extent>,
 }
 
 impl Regions {
     /// Adds a run as a component of its own and returns its number.
     pub(super) fn add(&mut self, run: Run, area_mm2: u64) -> u32 {
-        let number = self.runs.len() as u32;
         self.runs.push(run);
-        self.parent.push(number);
         self.extent.push(Extent {
             area_mm2,
             cells: u64::from(run.end_row - run.first_row),
             columns: (run.column, run.column),
             rows: (run.first_row, run.end_row - 1),
         });
-        number
+        self.sets.push()
     }
 
     pub(super) fn run(&self, number: u32) -> Run {
@@ -78,14 +77,9 @@ impl Regions {
         own
     }
 
-    /// The component of a run, as the number of its root. Halves paths on the way.
-    pub(super) fn root(&mut self, mut number: u32) -> u32 {
-        while self.parent[number as usize] != number {
-            let grandparent = self.parent[self.parent[number as usize] as usize];
-            self.parent[number as usize] = grandparent;
-            number = grandparent;
-        }
-        number
+    /// The component of a run, as the number of its root.
+    pub(super) fn root(&mut self, number: u32) -> u32 {
+        self.sets.root(number)
     }
 
     pub(super) fn extent(&self, root: u32) -> Extent {
@@ -102,15 +96,10 @@ impl Regions {
     }
 
     fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        if a == b {
-            return;
+        if let Some((root, joined)) = self.sets.join(a, b) {
+            let joined = self.extent[joined as usize];
+            self.extent[root as usize].merge(joined);
         }
-        let (into, from) =
-            if self.extent[a as usize].cells >= self.extent[b as usize].cells { (a, b) } else { (b, a) };
-        self.parent[from as usize] = into;
-        let joined = self.extent[from as usize];
-        self.extent[into as usize].merge(joined);
     }
 
     /// Joins the runs of a column and of the next one where `across` says that their cells are continuous.

@@ -1,5 +1,7 @@
 //! Whether triangles form a disk: a question of indices alone.
 
+use crate::disjoint::Disjoint;
+
 use super::error::{MeshError, malformed, not_a_disk};
 
 /// One disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
@@ -10,7 +12,7 @@ pub(super) fn check_topology(
     n_vertices: usize,
 ) -> Result<(), MeshError> {
     let fans = Fans::of(triangles, n_vertices)?;
-    let mut parts = Parts::new(triangles.len());
+    let (mut parts, mut n_parts) = (Disjoint::of(triangles.len()), triangles.len());
     let mut n_open = 0;
     for vertex in 0..n_vertices as u32 {
         let fan = fans.at(vertex);
@@ -25,7 +27,7 @@ pub(super) fn check_topology(
                 )));
             }
             match fan.iter().find(|other| other.last == side.next) {
-                Some(other) => parts.join(side.triangle, other.triangle),
+                Some(other) => n_parts -= usize::from(parts.join(side.triangle, other.triangle).is_some()),
                 None => n_open += 1,
             }
         }
@@ -38,7 +40,7 @@ pub(super) fn check_topology(
     }
     let n_faces = triangles.len();
     let n_edges = (3 * n_faces + n_open) / 2;
-    if n_vertices + n_faces != n_edges + 1 || parts.n != 1 {
+    if n_vertices + n_faces != n_edges + 1 || n_parts != 1 {
         return Err(not_a_disk(format!("{n_vertices} vertices, {n_edges} edges, {n_faces} faces")));
     }
     Ok(())
@@ -86,34 +88,5 @@ impl Fans {
     fn is_open(&self, a: u32, b: u32) -> bool {
         let fan = self.at(a);
         fan.iter().any(|side| side.next == b) && fan.iter().all(|side| side.last != b)
-    }
-}
-
-/// Triangles that hang together, as they are joined.
-struct Parts {
-    parent: Vec<u32>,
-    n: usize,
-}
-
-impl Parts {
-    fn new(n: usize) -> Self {
-        Self { parent: (0..n as u32).collect(), n }
-    }
-
-    fn root(&mut self, mut triangle: u32) -> u32 {
-        while self.parent[triangle as usize] != triangle {
-            let above = self.parent[triangle as usize];
-            self.parent[triangle as usize] = self.parent[above as usize];
-            triangle = above;
-        }
-        triangle
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        if a != b {
-            self.parent[a.max(b) as usize] = a.min(b);
-            self.n -= 1;
-        }
     }
 }

@@ -21,7 +21,7 @@ impl Spline {
         (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
     }
 
-    /// How far a spline over the same axis lies from this one, at most: between the places of the coefficients less than there.
+    /// An upper bound of the distance from a spline over the same axis: the largest between their coefficients.
     pub(super) fn distance(&self, other: &Self) -> f64 {
         (&self.coefficients - &other.coefficients).amax()
     }

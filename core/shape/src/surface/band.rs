@@ -44,6 +44,12 @@ impl Layout {
         if self.v_is_outer() { (k, i) } else { (i, k) }
     }
 
+    /// Index in the net's order of the coefficient at an (outer, inner) place.
+    fn coefficient(self, outer: usize, inner: usize) -> usize {
+        let (i, k) = if self.v_is_outer() { (inner, outer) } else { (outer, inner) };
+        k * self.n_u + i
+    }
+
     /// Index in block order of the coefficient with index `c` in the net's order (v outer).
     fn index(self, c: usize) -> usize {
         let (row, inner) = self.place(c % self.n_u, c / self.n_u);
@@ -53,9 +59,6 @@ impl Layout {
     /// Copies what lies inside the band along both axes, of the block that couples row `row + ahead`, down, to row `row`,
     /// across, into the 49 slots of each coefficient, from both sides.
     fn spread(self, row: usize, ahead: usize, block: MatRef<'_, f64>, local: &mut [[f64; 49]]) {
-        let number = |row: usize, inner: usize| {
-            if self.v_is_outer() { row * self.n_u + inner } else { inner * self.n_u + row }
-        };
         let slot = |by_row: usize, by_inner: usize| {
             if self.v_is_outer() { by_row * 7 + by_inner } else { by_inner * 7 + by_row }
         };
@@ -63,8 +66,9 @@ impl Layout {
             let around = across.saturating_sub(REACH)..(across + REACH + 1).min(self.block());
             for down in around {
                 let value = block[(down, across)];
-                local[number(row + ahead, down)][slot(REACH - ahead, across + REACH - down)] = value;
-                local[number(row, across)][slot(REACH + ahead, down + REACH - across)] = value;
+                local[self.coefficient(row + ahead, down)][slot(REACH - ahead, across + REACH - down)] =
+                    value;
+                local[self.coefficient(row, across)][slot(REACH + ahead, down + REACH - across)] = value;
             }
         }
     }
@@ -336,6 +340,7 @@ impl BandFactor {
         local
     }
 }
+
 /// Blocks of the inverse that couple the last rows of the recursion with each other: more of it would only fill memory.
 struct Recent {
     blocks: Vec<Mat<f64>>,

@@ -12,8 +12,6 @@ const LEAST_SPANS: usize = 8;
 /// Points being gathered for a fit of `D` components over two axes.
 #[derive(Debug, Clone)]
 pub struct Fit<const D: usize> {
-    u: Axis,
-    v: Axis,
     moments: Moments<D>,
 }
 
@@ -47,7 +45,7 @@ impl<const D: usize> Fit<D> {
     /// Starts a fit over two axes.
     #[must_use]
     pub fn new(u: Axis, v: Axis) -> Self {
-        Self { u, v, moments: Moments::empty(u, v) }
+        Self { moments: Moments::empty(u, v) }
     }
 
     /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points a little outside count for the
@@ -72,15 +70,12 @@ impl<const D: usize> Fit<D> {
         Ok(Fitted { noise_share, ..fitted })
     }
 
-    /// The same points over spans of twice the length, as far as there are twice as many as a net needs.
-    fn coarser(&self, [along_u, along_v]: [bool; 2]) -> Option<Self> {
+    /// The same points over spans of twice the length along those of (u, v) that are `wanted` and have twice as many as a net
+    /// needs; `None` when there is no such axis.
+    fn coarser(&self, wanted: [bool; 2]) -> Option<Self> {
         let can = |axis: &Axis| axis.n_spans().is_multiple_of(2) && axis.n_spans() >= 2 * LEAST_SPANS;
-        let along_u = (along_u && can(&self.u)).then(|| self.moments.joined_along_u());
-        let moments = along_u.as_ref().unwrap_or(&self.moments);
-        let along_v = (along_v && can(&self.v)).then(|| moments.joined_along_v());
-        let moments = along_v.or(along_u)?;
-        let (u, v) = moments.axes();
-        Some(Self { u, v, moments })
+        let coarser = [wanted[0] && can(&self.moments.u), wanted[1] && can(&self.moments.v)];
+        coarser.contains(&true).then(|| Self { moments: self.moments.joined(coarser) })
     }
 
     /// The penalty that the data make most likely.
@@ -90,13 +85,13 @@ impl<const D: usize> Fit<D> {
 
     /// Solves with the given penalty.
     pub(crate) fn solve_with(&self, penalty: Penalty) -> Result<Fitted<D>, Undetermined> {
-        let n_points = self.moments.n_points;
+        let Moments { u, v, n_points, .. } = self.moments;
         let (mut matrix, mut control) = self.moments.normal_equations();
-        matrix.add_kronecker(&self.u.roughness(), &self.v.gram(), penalty.u);
-        matrix.add_kronecker(&self.u.gram(), &self.v.roughness(), penalty.v);
+        matrix.add_kronecker(&u.roughness(), &v.gram(), penalty.u);
+        matrix.add_kronecker(&u.gram(), &v.roughness(), penalty.v);
         let precision = matrix.factor().map_err(|_| Undetermined { n_points })?;
         precision.solve(&mut control);
-        let net = Net { u: self.u, v: self.v, control };
+        let net = Net { u, v, control };
         let residual_square = self.moments.residual_square(&net);
         Ok(Fitted {
             net,

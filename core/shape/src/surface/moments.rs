@@ -45,8 +45,8 @@ impl<const D: usize> Cell<D> {
 /// Sums over all points of a fit of `D` components.
 #[derive(Debug, Clone)]
 pub(crate) struct Moments<const D: usize> {
-    u: Axis,
-    v: Axis,
+    pub(crate) u: Axis,
+    pub(crate) v: Axis,
     cells: Vec<Cell<D>>,
     /// Sum of w y^2 over points and components.
     pub(crate) square: f64,
@@ -93,53 +93,27 @@ impl<const D: usize> Moments<D> {
         self.n_points += 1;
     }
 
-    /// Axes of u and v.
-    pub(crate) fn axes(&self) -> (Axis, Axis) {
-        (self.u, self.v)
-    }
-
-    /// The same sums over cells of twice the length along u, to the last bits.
-    pub(crate) fn joined_along_u(&self) -> Self {
-        let mut joined = Self::empty(self.u.coarser(), self.v);
+    /// The same sums, to the last bits, over cells of twice the length along those of (u, v) that are named `coarser`.
+    pub(crate) fn joined(&self, coarser: [bool; 2]) -> Self {
+        let axis = |axis: Axis, coarser: bool| if coarser { (axis.coarser(), 2) } else { (axis, 1) };
+        let ((u, of_u), (v, of_v)) = (axis(self.u, coarser[0]), axis(self.v, coarser[1]));
+        let shift = |coarser: bool, cell: usize| if coarser { &HALVES[cell % 2] } else { &WHOLE };
+        let mut cells = Self::empty(u, v).cells;
         for (index, cell) in self.cells.iter().enumerate() {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
-            let shift = &HALVES[i % 2];
-            let to = &mut joined.cells[k * joined.u.n_spans() + i / 2];
-            to.n_points += cell.n_points;
-            for (row, of_half) in to.gram.iter_mut().zip(&cell.gram) {
-                moved(row, of_half, shift);
-            }
-            for (row, of_half) in to.rhs.iter_mut().flatten().zip(cell.rhs.iter().flatten()) {
-                moved(row, of_half, shift);
-            }
-        }
-        joined.with_totals_of(self)
-    }
-
-    /// The same along v.
-    pub(crate) fn joined_along_v(&self) -> Self {
-        let mut joined = Self::empty(self.u, self.v.coarser());
-        for (index, cell) in self.cells.iter().enumerate() {
-            let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
-            let shift = &HALVES[k % 2];
-            let to = &mut joined.cells[k / 2 * joined.u.n_spans() + i];
-            to.n_points += cell.n_points;
-            for p in 0..7 {
-                let mut column = to.gram.map(|row| row[p]);
-                moved(&mut column, &cell.gram.map(|row| row[p]), shift);
-                to.gram.iter_mut().zip(column).for_each(|(row, sum)| row[p] = sum);
-            }
-            for (d, p) in (0..D).flat_map(|d| (0..4).map(move |p| (d, p))) {
-                let mut column = to.rhs.map(|rows| rows[d][p]);
-                moved(&mut column, &cell.rhs.map(|rows| rows[d][p]), shift);
-                to.rhs.iter_mut().zip(column).for_each(|(rows, sum)| rows[d][p] = sum);
+            let shifts = [shift(coarser[0], i), shift(coarser[1], k)];
+            let joined = &mut cells[k / of_v * u.n_spans() + i / of_u];
+            joined.n_points += cell.n_points;
+            add_moved(joined.gram.each_mut(), cell.gram, shifts);
+            for d in 0..D {
+                add_moved(
+                    joined.rhs.each_mut().map(|rows| &mut rows[d]),
+                    cell.rhs.map(|rows| rows[d]),
+                    shifts,
+                );
             }
         }
-        joined.with_totals_of(self)
-    }
-
-    fn with_totals_of(self, other: &Self) -> Self {
-        Self { square: other.square, weight: other.weight, n_points: other.n_points, ..self }
+        Self { u, v, cells, ..*self }
     }
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
@@ -254,20 +228,25 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// Powers of a place in a cell by those of the place in its first or second half: s = t / 2 -+ 1/4, `[half][p][q]` is the
-/// coefficient of t^q in s^p.
-const HALVES: [[[f64; 7]; 7]; 2] = [halved(-0.25), halved(0.25)];
+/// Powers of a place s in a cell by those of the place t in a part of it: `[p][q]` is the coefficient of t^q in s^p.
+type Shift = [[f64; 7]; 7];
 
-const fn halved(middle: f64) -> [[f64; 7]; 7] {
+/// The part is the cell.
+const WHOLE: Shift = shift(1.0, 0.0);
+
+/// The first and the second half of the cell.
+const HALVES: [Shift; 2] = [shift(0.5, -0.25), shift(0.5, 0.25)];
+
+/// Of s = `scale` t + `middle`.
+const fn shift(scale: f64, middle: f64) -> Shift {
     let mut powers = [[0.0; 7]; 7];
     powers[0][0] = 1.0;
     let mut p = 1;
     while p < 7 {
-        // Row p is row p - 1 times t / 2 + middle.
         let mut q = 0;
         while q < 7 {
             let shifted = if q > 0 { powers[p - 1][q - 1] } else { 0.0 };
-            powers[p][q] = 0.5 * shifted + middle * powers[p - 1][q];
+            powers[p][q] = scale * shifted + middle * powers[p - 1][q];
             q += 1;
         }
         p += 1;
@@ -275,10 +254,22 @@ const fn halved(middle: f64) -> [[f64; 7]; 7] {
     powers
 }
 
-/// Adds the sums over the points of a half to those of the cell; as many powers as `sums` has, up to six.
-fn moved(sums: &mut [f64], of_half: &[f64], shift: &[[f64; 7]; 7]) {
-    for (sum, row) in sums.iter_mut().zip(shift) {
-        *sum += row.iter().zip(of_half).map(|(f, moment)| f * moment).sum::<f64>();
+/// Adds the sums over the points of a part of a cell, `[q][p]`, to those of the cell.
+fn add_moved<const P: usize, const Q: usize>(
+    sums: [&mut [f64; P]; Q],
+    of_part: [[f64; P]; Q],
+    [by_u, by_v]: [&Shift; 2],
+) {
+    let mut moved = [[0.0; P]; Q];
+    for (row, of_part) in moved.iter_mut().zip(of_part) {
+        for (slot, by_u) in row.iter_mut().zip(by_u) {
+            *slot = by_u.iter().zip(of_part).map(|(f, sum)| f * sum).sum();
+        }
+    }
+    for (sums, by_v) in sums.into_iter().zip(by_v) {
+        for (f, row) in by_v.iter().zip(moved) {
+            sums.iter_mut().zip(row).for_each(|(slot, sum)| *slot += f * sum);
+        }
     }
 }
 
