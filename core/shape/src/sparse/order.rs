@@ -7,7 +7,7 @@ use super::Graph;
 
 /// Parts up to this size are eliminated along their longer extent. Larger leaves are quicker to order, but 48 gives
 /// an eighth more fill.
-const LEAF: usize = 8;
+const LEAF: usize = 20;
 
 /// The nodes of `graph` in elimination order. `points` has one point per node.
 pub(super) fn nested_dissection(graph: &Graph, points: &[[f64; 2]]) -> Vec<u32> {
