@@ -166,6 +166,7 @@ fn specular_hole() {
 fn an_edge_in_the_mirror_lobe() {
     let refused = measure(before_the_mirror(5.0)).unwrap_err().to_string();
     assert!(refused.contains("% of one edge of the plate is seen"), "{refused}");
+    assert!(refused.contains("or tilt it where it mirrors the beam"), "{refused}");
 }
 
 #[test]
