@@ -84,8 +84,8 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
-/// A cell is judged once, when it first touches the face, by a quadratic fit to the face around it. The last rings
-/// have no part in the fit: a side face whose first cells lie within the noise must not bend it. And no cell may have
+/// A cell is judged when it first touches the face, by a quadratic fit to the face around it, and again when it touches
+/// it elsewhere if the fit did not know its place and yet refused it. The last rings have no part in the fit: a side face whose first cells lie within the noise must not bend it. And no cell may have
 /// the normal of another face than the cell of the core from which it was reached.
 pub(super) fn grow_back(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {
     let n_rows = window.n_rows;
@@ -113,7 +113,9 @@ pub(super) fn grow_back(window: &Window, noise: &Noise, normals: &[Normal], core
         ring.clear();
         for (tile, cells) in &by_tile {
             if let Some(fit) = LocalFace::fit(window, &trusted, *tile) {
-                ring.extend(continuing(window, noise, &fit, cells));
+                let judgement = judge(window, noise, &fit, cells);
+                ring.extend(judgement.continuing);
+                judgement.open.into_iter().for_each(|cell| judged[cell] = false);
             }
         }
         for &cell in &ring {
@@ -134,24 +136,37 @@ fn is_other_face(normals: &[Normal], cell: usize, core: usize) -> bool {
     cos_between(&normals[cell], &normals[core]).is_some_and(|cos| cos < COS_OTHER_FACE)
 }
 
+/// What a fit says of cells.
+struct Judgement {
+    /// Those to which it continues.
+    continuing: Vec<usize>,
+    /// Those that it refuses without knowing their place.
+    open: Vec<usize>,
+}
+
 /// The cells that a fit continues to: each within its noise, and all together within theirs, since a side face whose
 /// first row is within the noise is not so as a row.
-fn continuing(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) -> Vec<usize> {
+fn judge(window: &Window, noise: &Noise, fit: &LocalFace, cells: &[usize]) -> Judgement {
     let residuals = cells.iter().filter_map(|&cell| {
         let (x, y) = window.place_of(cell);
         let predicted = fit.at(window, x, y)?;
         let sigma = f64::from(noise.at(cell));
         let residual = (f64::from(window.cells[cell].range_m) - predicted.range) / sigma;
-        let known = fit.leverage(&predicted).min(MOST_LEVERAGE);
-        let within = residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt();
-        within.then_some((cell, residual, known))
+        Some((cell, residual, fit.leverage(&predicted).min(MOST_LEVERAGE)))
     });
-    let residuals: Vec<(usize, f64, f64)> = residuals.collect();
-    let n = residuals.len() as f64;
-    let mean = residuals.iter().map(|(_, residual, _)| residual).sum::<f64>() / n;
-    let known = residuals.iter().map(|(_, _, known)| known).sum::<f64>() / n;
-    if mean.abs() > RESIDUAL_BOUND * (1.0 / n + known).sqrt() {
-        return Vec::new();
+    let (within, outside): (Vec<_>, Vec<_>) =
+        residuals.partition(|(_, residual, known)| residual.abs() <= RESIDUAL_BOUND * (1.0 + known).sqrt());
+    let n = within.len() as f64;
+    let mean = within.iter().map(|(_, residual, _)| residual).sum::<f64>() / n;
+    let known = within.iter().map(|(_, _, known)| known).sum::<f64>() / n;
+    let (continuing, refused) = if mean.abs() > RESIDUAL_BOUND * (1.0 / n + known).sqrt() {
+        (Vec::new(), [within, outside].concat())
+    } else {
+        (within, outside)
+    };
+    let open = refused.into_iter().filter(|(_, _, known)| *known >= MOST_LEVERAGE);
+    Judgement {
+        continuing: continuing.into_iter().map(|(cell, _, _)| cell).collect(),
+        open: open.map(|(cell, _, _)| cell).collect(),
     }
-    residuals.into_iter().map(|(cell, _, _)| cell).collect()
 }

@@ -12,8 +12,8 @@ use super::settled::Settled;
 use super::strip::Strip;
 use crate::patch::Beyond;
 
-/// Softness of a bracket in parts of the lattice step: pointing of the beam, shape of the footprint.
-const SOFTNESS: f64 = 0.03;
+/// Softness of a bracket in parts of the angle between beams: pointing of the beam, shape of the footprint.
+pub(super) const SOFTNESS: f64 = 0.03;
 
 /// Noise of the smooth face near its edges in parts of that of a sample.
 const FACE_NOISE: f64 = 0.03;
@@ -33,13 +33,34 @@ const HIDDEN_PART: f64 = 0.25;
 const SIDE_SLACK: f64 = 1.1;
 const SIDE_SLOPE: f64 = 0.1;
 
+/// The direction of an edge is known to about this, radians: a side face seen under less is none.
+const DIRECTION: f64 = 0.02;
+
 /// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
-const FOOTPRINT_SPREAD: f64 = 0.3;
+pub(super) const FOOTPRINT_SPREAD: f64 = 0.3;
+
+/// What is known of the beams.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Beam {
+    /// Half the angle that a beam sees, radians.
+    pub(super) footprint: f64,
+    /// Softness of what it says, in parts of the angle between beams.
+    pub(super) softness: f64,
+}
+
+impl Beam {
+    /// Beams of an edge that lies anyhow among them.
+    pub(super) fn dithered(footprint: f64) -> Self {
+        Self { footprint, softness: SOFTNESS }
+    }
+}
 
 /// A crossing in the strip of its edge. Distances inwards, metres.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     pub(super) along: f64,
+    /// Column and row of the last cell of the face.
+    pub(super) place: [u32; 2],
     low: f64,
     high: f64,
     /// Lowest and highest mixed pixel.
@@ -48,6 +69,8 @@ pub(super) struct Line {
     beyond: Beyond,
     /// Distance inwards on the face per radian of footprint.
     per_radian: f64,
+    /// The same per angle between beams.
+    per_angle: f64,
     /// Distance inwards per lattice step.
     per_step: f64,
     /// How far outside of the edge the plate's lower edge is seen, on the face's continuation; 0 where it is hidden.
@@ -63,7 +86,8 @@ pub(super) struct Line {
 }
 
 impl Line {
-    pub(super) fn new(strip: &Strip, settled: &Settled, thickness: f64) -> Self {
+    /// `angle` is that between beams, radians.
+    pub(super) fn new(strip: &Strip, settled: &Settled, thickness: f64, angle: f64) -> Self {
         let crossing = &settled.crossing;
         let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
         let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
@@ -73,23 +97,27 @@ impl Line {
         // inward part of that, over all e across the beam, is the length of this vector.
         let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
         let across = lever - beam * lever.dot(&beam);
+        let per_radian = crossing.inside.norm() * across.norm();
         // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
         // height / (height + thickness) of its way.
         let height = -normal.dot(&crossing.inside);
+        let side = inward.dot(&crossing.inside) * thickness / (height + thickness);
         let (off, excess) = match mixed {
             Some([near, _]) => (near, crossing.mixed_excess),
             None => (inside.y.min(outside.y), crossing.excess),
         };
         Self {
             along,
+            place: settled.place,
             low: inside.y.min(outside.y),
             high: inside.y.max(outside.y),
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
             complete: crossing.complete,
             beyond: crossing.beyond,
-            per_radian: crossing.inside.norm() * across.norm(),
+            per_radian,
+            per_angle: angle * per_radian,
             per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
-            side: (inward.dot(&crossing.inside) * thickness / (height + thickness)).max(0.0),
+            side: if side > DIRECTION * thickness { side } else { 0.0 },
             per_range: inward.dot(&beam),
             off,
             excess: f64::from(excess),
@@ -103,16 +131,21 @@ impl Line {
         self.complete && self.beyond == Beyond::Behind && self.side == 0.0
     }
 
-    /// What the line says, for beams that see `footprint` radians to each side.
-    pub(super) fn bracket(&self, footprint: f64, step: f64, noise: f64) -> Bracket {
+    /// True when an edge at `at` is within `slack` of where the face ends.
+    pub(super) fn is_near(&self, at: f64, slack: f64) -> bool {
+        self.low - slack < at && at < self.high + slack
+    }
+
+    /// What the line says; `noise` is that of ranges, metres.
+    pub(super) fn bracket(&self, beam: Beam, noise: f64) -> Bracket {
         let noise = noise * self.per_range.abs();
-        let soft = (SOFTNESS * step).hypot(FACE_NOISE * noise);
-        let seen = footprint * self.per_radian;
+        let soft = norm(beam.softness * self.per_angle, FACE_NOISE * noise);
+        let seen = beam.footprint * self.per_radian;
         let bracket = |terms| Bracket { along: self.along, terms };
         let last = Says::Last { cell: self.cell, behind: self.residual * self.per_range }.within(noise);
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
-            let soft = soft.hypot(0.25 * (self.high - self.low));
+            let soft = norm(soft, 0.25 * (self.high - self.low));
             return bracket([Says::At(0.5 * (self.low + self.high)).within(soft), last]);
         }
         let on_side = self.excess * self.per_range;
@@ -122,14 +155,13 @@ impl Line {
             && (self.mixed.is_none() || on_side > -3.0 * noise)
             && on_side < SIDE_SLACK * self.side + 3.0 * noise
         {
-            let soft = soft.hypot(noise).hypot(SIDE_SLOPE * on_side);
+            let soft = norm(norm(soft, noise), SIDE_SLOPE * on_side);
             return bracket([Says::At(self.off + on_side).within(soft), last]);
         }
         let mut above = Bound { sure: self.low, likely: self.low };
-        let mut below = Bound { sure: self.high, likely: self.high };
-        if self.side == 0.0 {
-            below.likely -= seen;
-        }
+        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that.
+        let mut below =
+            Bound { sure: self.high + self.side.min(seen), likely: self.high - (seen - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
             above.sure += self.side;
             above.likely += self.side + seen;
@@ -138,7 +170,7 @@ impl Line {
             let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
             above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
             below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
-        } else if self.side > 0.0 && noise > 0.0 {
+        } else if self.side > seen && noise > 0.0 {
             return bracket([Says::Above(above).within(soft), last]);
         }
         bracket([Says::Above(above), Says::Below(below)].map(|says| says.within(soft)))
@@ -163,17 +195,18 @@ pub(super) fn footprint<'a>(lines: impl Iterator<Item = &'a Line>, step: f64) ->
 
 /// The footprint at an edge that is known, near that of all edges: the one that best parts its mixed pixels from the
 /// sound ones.
-pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64, step: f64) -> f64 {
+pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64) -> f64 {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
     /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
     const TOGETHER: usize = 16;
-    let soft = SOFTNESS * step;
     let telling: Vec<(&Line, f64)> =
         lines.iter().filter(|l| l.tells_footprint()).map(|l| (l, edge(l.along))).collect();
     let likelihood = |line: &Line, edge: f64, footprint: f64| {
         let seen = footprint * line.per_radian;
-        let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / soft);
+        let is_mixed = |off: f64| {
+            (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / (SOFTNESS * line.per_angle))
+        };
         let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
         line.mixed
             .map_or(sound, |(low, high)| sound * (is_mixed(low) + STRAY_PART) * (is_mixed(high) + STRAY_PART))
@@ -271,6 +304,18 @@ impl Term {
         (likelihood, sign * slope / soft, bend / (soft * soft))
     }
 
+    /// Likelihood of an edge at `at` alone.
+    fn value(&self, at: f64) -> f64 {
+        let bound = |sure: f64, likely: f64| {
+            HIDDEN_PART * normal_cdf(sure / self.soft) + (1.0 - HIDDEN_PART) * normal_cdf(likely / self.soft)
+        };
+        match self.says {
+            Says::Above(Bound { sure, likely }) => bound(at - sure, at - likely),
+            Says::Below(Bound { sure, likely }) => bound(sure - at, likely - at),
+            Says::At(_) | Says::Last { .. } => self.likelihood(at, 0.0).0,
+        }
+    }
+
     /// The place nearest to the other side that the term allows, softness left aside.
     fn limit(&self) -> f64 {
         match self.says {
@@ -302,6 +347,12 @@ impl Bracket {
         (0.5 * (above + below), 12.0 / (below - above).max(step).powi(2))
     }
 
+    /// Likelihood of an edge at `at`, but for a constant.
+    pub(super) fn likelihood(&self, at: f64) -> f64 {
+        let [a, b] = self.terms.map(|term| term.value(at));
+        (1.0 - STRAY_PART) * a * b + STRAY_PART * STRAY_LIKELIHOOD
+    }
+
     /// One Newton step of the likelihood of an edge at `at`: the place to which the bracket pulls it, and with which
     /// weight. The weight fades where the bracket more likely has nothing to do with the edge.
     ///
@@ -323,6 +374,11 @@ impl Bracket {
 
 /// Beyond so many standard deviations the distribution function is 0 or 1, to a hundred-millionth.
 const CERTAIN: f64 = 5.6;
+
+/// Length of (a, b), of metres as of micrometres: faster than `hypot`, which heeds what f64 cannot square.
+fn norm(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
+}
 
 /// The normal distribution function, its logarithm's slope and negative second derivative.
 fn normal(z: f64) -> (f64, f64, f64) {

@@ -4,6 +4,7 @@
 use nalgebra::Vector2;
 
 use super::OutlineError;
+use super::random::Random;
 
 type Vec2 = Vector2<f64>;
 
@@ -218,21 +219,4 @@ fn intersect(a: &Line, b: &Line) -> Option<Vec2> {
     CROSSING_ANGLE
         .contains(&angle)
         .then(|| a.point + a.direction * ((b.point - a.point).perp(&b.direction) / sine))
-}
-
-/// Random choices from a fixed seed (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn new(seed: u64) -> Self {
-        Self(seed ^ 0x706c_6174_656e)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % n as u64) as usize
-    }
 }

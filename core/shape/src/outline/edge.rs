@@ -2,16 +2,17 @@
 //!
 //! The likelihood of the curve is the product of those of its brackets. It is unbiased where the middle of a
 //! bracket is not: where the edge runs along a lattice row its brackets are all alike but for the few cells where it
-//! changes rows, and those few locate it.
+//! changes rows, and those few locate it. Where it changes none, it says so (`posterior`).
 
-use nalgebra::Vector2;
+use nalgebra::{Cholesky, Dyn, Vector2};
 
-use super::OutlineError;
-use super::bracket::{self, Bracket, Line};
+use super::bracket::{self, Beam, Bracket, Line};
+use super::posterior::Posterior;
 use super::seen::Seen;
 use super::settled::Settled;
-use super::spline::{Normal, Precision, Roughness, Spline};
+use super::spline::{Normal, Roughness, Spline};
 use super::strip::Strip;
+use super::{OutlineError, Sampling};
 use crate::Vec3;
 use crate::surface::Axis;
 
@@ -31,6 +32,9 @@ const WIDENED_ROUNDS: i32 = 8;
 const ROUNDS: i32 = 32;
 const STILL: f64 = 1e-7;
 
+/// Columns and rows of the lattice from which on an edge that crosses them is dithered.
+const DITHERED: u32 = 6;
+
 /// Rounds of fitting the curve and telling its footprint in turn.
 const FOOTPRINT_ROUNDS: usize = 3;
 
@@ -39,12 +43,13 @@ const FOOTPRINT_ROUNDS: usize = 3;
 pub(super) struct EdgeData {
     strip: Strip,
     lines: Vec<Line>,
+    dithered: bool,
     from: Vec3,
     to: Vec3,
 }
 
 impl EdgeData {
-    /// Rolls out the crossings along the edge from `from` to `to`. `step` is the spacing of samples, metres.
+    /// Rolls out the crossings along the edge from `from` to `to`.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
@@ -52,25 +57,39 @@ impl EdgeData {
         crossings: &[Settled],
         [from, to]: [Vec3; 2],
         thickness: f64,
-        step: f64,
-        noise: f64,
+        sampling: Sampling,
     ) -> Result<Self, OutlineError> {
-        let strip = Strip::new(crossings, from, to, 0.5 * thickness, step, noise)?;
-        let lines = crossings.iter().map(|c| Line::new(&strip, c, thickness)).collect();
-        Ok(Self { strip, lines, from, to })
+        let strip = Strip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
+        let line = |crossing| Line::new(&strip, crossing, thickness, sampling.angle);
+        let lines: Vec<Line> = crossings.iter().map(line).collect();
+        let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
+        Ok(Self { strip, lines, dithered, from, to })
     }
+}
 
-    pub(super) fn lines(&self) -> &[Line] {
-        &self.lines
-    }
+/// Half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges; of those that are not
+/// dithered, all beams may be mixed or none, and they count only where no other edge tells.
+pub(super) fn footprint(edges: &[EdgeData], sampling: Sampling) -> f64 {
+    let any = edges.iter().any(|edge| edge.dithered);
+    let telling = edges.iter().filter(|edge| edge.dithered || !any);
+    bracket::footprint(telling.flat_map(|edge| &edge.lines), sampling.angle)
+}
+
+/// True when the edge, about at `base`, crosses so many columns and rows of the lattice that where it lies between them
+/// is as good as random.
+fn is_dithered(lines: &[Line], base: impl Fn(f64) -> f64, step: f64) -> bool {
+    let on_it = lines.iter().filter(|l| l.is_near(base(l.along), step));
+    let (low, high) = on_it.fold(([u32::MAX; 2], [0; 2]), |(low, high), l| {
+        ([0, 1].map(|k| low[k].min(l.place[k])), [0, 1].map(|k| high[k].max(l.place[k])))
+    });
+    [0, 1].into_iter().all(|k| high[k].saturating_sub(low[k]) >= DITHERED)
 }
 
 /// An edge as a curve in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
     strip: Strip,
-    curve: Spline,
-    precision: Precision,
+    posterior: Posterior,
     /// Where crossings agree with it.
     pub(super) seen: Seen,
     pub(super) from: f64,
@@ -78,25 +97,26 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians, `step` the spacing of
-    /// samples, metres.
+    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
-    pub(super) fn fit(data: EdgeData, footprint: f64, step: f64, noise: f64) -> Result<Self, OutlineError> {
-        let EdgeData { strip, lines, from, to } = data;
+    pub(super) fn fit(data: EdgeData, footprint: f64, sampling: Sampling) -> Result<Self, OutlineError> {
+        let Sampling { step, noise, .. } = sampling;
+        let EdgeData { strip, lines, dithered, from, to } = data;
         let (start, end) = strip.span();
         let axis = Axis::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = Normal::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
-        let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(footprint, step, noise));
+        let brackets =
+            |footprint: f64| lines.iter().map(move |l| l.bracket(Beam::dithered(footprint), noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         let mut own = footprint;
         for _ in 0..FOOTPRINT_ROUNDS {
             let last = own;
             if footprint > 0.0 {
-                own = bracket::footprint_at(&lines, |along| curve.at(along), footprint, step);
+                own = bracket::footprint_at(&lines, |along| curve.at(along), footprint);
             }
             // The same footprint gives the same curve, and that one the same footprint.
             if own == last {
@@ -105,15 +125,20 @@ impl Edge {
             used = brackets(own).collect();
             (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         }
-        let agreeing = used.iter().filter(|b| b.agrees(curve.at(b.along), step));
-        let seen = Seen::new(agreeing.map(|b| b.along), step);
         let (from, to) = (strip.flatten(from).x, strip.flatten(to).x);
-        Ok(Self { strip, curve, precision, seen, from, to })
+        let posterior = if dithered {
+            Posterior::laplace(curve, &precision)
+        } else {
+            Posterior::sampled(&curve, &prior, &lines, [from, to], footprint, sampling).ok_or_else(too_few)?
+        };
+        let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
+        let seen = Seen::new(agreeing.map(|b| b.along), step);
+        Ok(Self { strip, posterior, seen, from, to })
     }
 
     /// The point of the edge at a distance along it.
     pub(super) fn point(&self, along: f64) -> Vec3 {
-        self.strip.lift(Vector2::new(along, self.curve.at(along)))
+        self.strip.lift(Vector2::new(along, self.posterior.curve.at(along)))
     }
 
     /// Place along the edge nearest to a point.
@@ -133,14 +158,14 @@ impl Edge {
 
     /// Standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
-        self.precision.variance(along).sqrt().hypot(COMMON)
+        self.posterior.variance(along).sqrt().hypot(COMMON)
     }
 }
 
 /// The most likely curve, by Newton's method from the middles of the brackets: first a step for each of ever less widened ones,
 /// which pull from afar. It never goes on from the curve of another footprint: with 2 mm of noise that one may lie at a
 /// lesser maximum of the likelihood, 1 mm off, and the footprint that it tells would keep it there.
-fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Spline, Precision)> {
+fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Spline, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
     for bracket in brackets {
         let (to, weight) = bracket.middle(step);
@@ -167,7 +192,7 @@ fn pulled(
     brackets: &[Bracket],
     curve: &Spline,
     least_soft: f64,
-) -> Option<(Spline, Precision)> {
+) -> Option<(Spline, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
     for bracket in brackets {
         let (to, weight) = bracket.pull(curve.at(bracket.along), least_soft);

@@ -9,9 +9,12 @@
 
 mod boundary;
 mod bracket;
+mod chain;
 mod corners;
 mod edge;
 mod error;
+mod posterior;
+mod random;
 mod rim;
 mod seen;
 mod settled;
@@ -62,6 +65,17 @@ pub struct Outline {
     pub sheet: Sheet,
 }
 
+/// How the beams sample the plate.
+#[derive(Debug, Clone, Copy)]
+struct Sampling {
+    /// Spacing of the samples, metres.
+    step: f64,
+    /// Angle between beams, radians.
+    angle: f64,
+    /// Noise of the range, metres.
+    noise: f64,
+}
+
 /// Crossings nearer to a corner than this many lattice steps may belong to either edge.
 const CORNER_STEPS: f64 = 2.5;
 
@@ -90,6 +104,11 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let corners = corners::find(&rim.flat, rim.step, spec.width.min(spec.height))?;
     let near = corners.map(|corner| rim.lift(&corner));
     let sheet = Sheet::fit(patch, rim.plane.along(corners[1].point - corners[0].point))?;
+    let sampling = Sampling {
+        step: rim.step,
+        angle: (patch.azimuth_step * patch.elevation_step).sqrt(),
+        noise: patch.noise,
+    };
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * rim.step;
@@ -98,12 +117,11 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
             .filter_map(|crossing| Settled::of(crossing, patch, &sheet))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
-        EdgeData::new(&crossings, [from, to], spec.thickness, rim.step, patch.noise)
+        EdgeData::new(&crossings, [from, to], spec.thickness, sampling)
     };
     let data = [side(0)?, side(1)?, side(2)?, side(3)?];
-    let angle = (patch.azimuth_step * patch.elevation_step).sqrt();
-    let footprint = bracket::footprint(data.iter().flat_map(EdgeData::lines), angle);
-    let [a, b, c, d] = data.map(|data| Edge::fit(data, footprint, rim.step, patch.noise));
+    let footprint = edge::footprint(&data, sampling);
+    let [a, b, c, d] = data.map(|data| Edge::fit(data, footprint, sampling));
     let mut edges = [a?, b?, c?, d?];
     let mut points = near;
     for k in 0..4 {

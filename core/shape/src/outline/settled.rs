@@ -12,6 +12,8 @@ pub(super) struct Settled {
     pub(super) cell: Vec3,
     /// ... and its own range behind it, metres.
     pub(super) residual: f64,
+    /// Its column and row.
+    pub(super) place: [u32; 2],
 }
 
 impl Settled {
@@ -40,6 +42,7 @@ impl Settled {
             crossing: Crossing { inside, outside, normal, mixed, mixed_excess, excess, ..*crossing },
             cell,
             residual,
+            place: [sample.column, sample.row],
         })
     }
 }

@@ -16,6 +16,26 @@ impl Spline {
         Self { axis, coefficients }
     }
 
+    /// A spline over the same axis.
+    pub(super) fn with(&self, coefficients: DVector<f64>) -> Self {
+        Self { axis: self.axis, coefficients }
+    }
+
+    /// The spline with its coefficients moved.
+    pub(super) fn moved(&self, by: &DVector<f64>) -> Self {
+        self.with(&self.coefficients + by)
+    }
+
+    /// The value at `x` as a linear functional of the coefficients.
+    pub(super) fn functional(&self, x: f64) -> DVector<f64> {
+        let (first, values) = self.axis.values(x);
+        let mut functional = DVector::zeros(self.axis.n_coefficients());
+        for i in 0..4 {
+            functional[first + i] = values[i];
+        }
+        functional
+    }
+
     pub(super) fn at(&self, x: f64) -> f64 {
         let (first, values) = self.axis.values(x);
         (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
@@ -76,29 +96,20 @@ impl Normal {
         }
     }
 
+    /// Half the square of a spline's distance from what is known, in standard deviations, without data.
+    pub(super) fn roughness(&self, spline: &Spline) -> f64 {
+        0.5 * spline.coefficients.dot(&(&self.matrix * &spline.coefficients))
+    }
+
+    /// Adds the value 0 of a functional with the weight `w` (one over its variance).
+    pub(super) fn hold(&mut self, functional: &DVector<f64>, w: f64) {
+        self.matrix += functional * functional.transpose() * w;
+    }
+
     /// The spline, and the factor of its precision. `None` when the data leave it open.
-    pub(super) fn solve(self) -> Option<(Spline, Precision)> {
+    pub(super) fn solve(self) -> Option<(Spline, Cholesky<f64, Dyn>)> {
         let factor = Cholesky::new(self.matrix)?;
         let coefficients = factor.solve(&self.right);
-        Some((Spline::new(self.axis, coefficients), Precision { axis: self.axis, factor }))
-    }
-}
-
-/// How well a spline is known.
-#[derive(Debug, Clone)]
-pub(super) struct Precision {
-    axis: Axis,
-    factor: Cholesky<f64, Dyn>,
-}
-
-impl Precision {
-    /// Variance of the spline at `x`.
-    pub(super) fn variance(&self, x: f64) -> f64 {
-        let (first, values) = self.axis.values(x);
-        let mut basis = DVector::zeros(self.axis.n_coefficients());
-        for i in 0..4 {
-            basis[first + i] = values[i];
-        }
-        basis.dot(&self.factor.solve(&basis))
+        Some((Spline::new(self.axis, coefficients), factor))
     }
 }

@@ -7,10 +7,10 @@
 
 use nalgebra::Vector2;
 
-use super::OutlineError;
 use super::seen::Seen;
 use super::settled::Settled;
 use super::spline::{Normal, Roughness, Spline};
+use super::{OutlineError, Sampling};
 use crate::Vec3;
 use crate::surface::Axis;
 
@@ -67,18 +67,17 @@ pub(super) struct Strip {
 impl Strip {
     /// The strip along the edge from `from` to `to`, through the crossings that lie on a common curve.
     ///
-    /// `depth` is that of the mid-surface, `step` the spacing of the crossings, `noise` that of the range, metres.
+    /// `depth` is that of the mid-surface, metres.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of the edge is seen.
     pub(super) fn new(
         crossings: &[Settled],
-        from: Vec3,
-        to: Vec3,
+        [from, to]: [Vec3; 2],
         depth: f64,
-        step: f64,
-        noise: f64,
+        sampling: Sampling,
     ) -> Result<Self, OutlineError> {
+        let Sampling { step, noise, .. } = sampling;
         let along = (to - from).normalize();
         let mean_normal: Vec3 = crossings.iter().map(|s| s.crossing.normal).sum();
         let inward = mean_normal.cross(&along).normalize();
@@ -155,6 +154,11 @@ impl Strip {
         let off = place - station.flat;
         let n = Vector2::new(-station.flat_tangent.y, station.flat_tangent.x);
         station.point + station.tangent * off.dot(&station.flat_tangent) + station.inward * off.dot(&n)
+    }
+
+    /// The base curve in the plane.
+    pub(super) fn base(&self, along: f64) -> f64 {
+        self.station(Vector2::new(along, 0.0)).flat.y
     }
 
     /// Unit vector within the face across the edge, into the plate.
