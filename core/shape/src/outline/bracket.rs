@@ -49,8 +49,8 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// Beams of an edge that lies anyhow among them.
-    pub(super) fn dithered(footprint: f64) -> Self {
+    /// Beams of the usual softness.
+    pub(super) fn of(footprint: f64) -> Self {
         Self { footprint, softness: SOFTNESS }
     }
 }
@@ -178,14 +178,14 @@ impl Line {
 }
 
 /// Half the angle over which a beam sees both sides of an edge, from the number of mixed pixels on all edges; 0 where
-/// too few lines tell. `step` is the angle between beams.
-pub(super) fn footprint<'a>(lines: impl Iterator<Item = &'a Line>, step: f64) -> f64 {
+/// too few lines tell. `angle` is that between beams.
+pub(super) fn footprint<'a>(lines: impl Iterator<Item = &'a Line>, angle: f64) -> f64 {
     /// Lines that tell the number to a tenth.
     const LEAST_LINES: usize = 100;
     /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
     const MOST_CELLS: f64 = 3.0;
     let (mut n, mut mixed, mut expected) = (0, 0.0, 0.0);
-    for line in lines.filter(|l| l.tells_footprint() && l.per_radian * step < MOST_CELLS * l.per_step) {
+    for line in lines.filter(|l| l.tells_footprint() && l.per_radian * angle < MOST_CELLS * l.per_step) {
         n += 1;
         mixed += line.mixed.map_or(0.0, |(low, high)| (high - low) / line.per_step + 1.0);
         expected += 2.0 * (1.0 - HIDDEN_PART) * line.per_radian / line.per_step;

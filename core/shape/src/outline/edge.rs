@@ -108,8 +108,7 @@ impl Edge {
         let axis = Axis::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = Normal::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
-        let brackets =
-            |footprint: f64| lines.iter().map(move |l| l.bracket(Beam::dithered(footprint), noise));
+        let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(Beam::of(footprint), noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         let mut own = footprint;
