@@ -8,7 +8,7 @@ use super::random::Random;
 const TAKEN: f64 = 0.234;
 
 /// Steps of a chain while it finds its stride, and then. Places of an edge scatter by a tenth of their standard
-/// deviation between chains; with a quarter of the steps some are stuck.
+/// deviation between chains; with two fifths of the steps some are stuck.
 const STRIDE: u32 = 2000;
 const STEPS: u32 = 10_000;
 
