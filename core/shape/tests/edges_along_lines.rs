@@ -59,15 +59,7 @@ fn check(name: &str, scene: &Scene, edge: usize) {
 }
 
 fn plate() -> Plate {
-    Plate {
-        width: 3.0,
-        height: 2.5,
-        thickness: 0.036,
-        radius: Some(9.0),
-        centre: Vec3::new(6.0, 1.25, -3.6),
-        turn: 0.0,
-        tilt: 0.0,
-    }
+    Plate { centre: Vec3::new(6.0, 1.25, -3.6), turn: 0.0, ..Plate::rolled() }
 }
 
 #[test]

@@ -12,15 +12,7 @@ use platen_shape::{Outline, Patch, PlateSpec, RegionOfInterest, Vec3};
 use synthetic::{Plate, Scene};
 
 fn plate() -> Plate {
-    Plate {
-        width: 3.0,
-        height: 2.5,
-        thickness: 0.036,
-        radius: Some(9.0),
-        centre: Vec3::new(6.0, 0.4, -3.6),
-        turn: 0.4,
-        tilt: 0.0,
-    }
+    Plate::rolled()
 }
 
 /// A scan's face, with the outcome that tells a test more than a panic.

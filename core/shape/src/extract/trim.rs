@@ -85,8 +85,9 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
 /// A cell is judged when it first touches the face, by a quadratic fit to the face around it, and again when it touches
-/// it elsewhere if the fit did not know its place and yet refused it. The last rings have no part in the fit: a side face whose first cells lie within the noise must not bend it. And no cell may have
-/// the normal of another face than the cell of the core from which it was reached.
+/// it elsewhere if the fit did not know its place and yet refused it. The last rings have no part in the fit: a side
+/// face whose first cells lie within the noise must not bend it. And no cell may have the normal of another face than
+/// the cell of the core from which it was reached.
 pub(super) fn grow_back(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {
     let n_rows = window.n_rows;
     let mut rings: VecDeque<Vec<usize>> = VecDeque::new();

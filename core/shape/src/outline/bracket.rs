@@ -259,8 +259,13 @@ struct Bound {
 }
 
 impl Bound {
-    /// Likelihood of an edge by its distances inside of the two places, in units of softness, the slope of its
-    /// logarithm and the negative second derivative of a lower bound of that (expectation maximisation).
+    /// Likelihood of an edge by its distances inside of the two places, in units of softness.
+    fn value(sure: f64, likely: f64) -> f64 {
+        HIDDEN_PART * normal_cdf(sure) + (1.0 - HIDDEN_PART) * normal_cdf(likely)
+    }
+
+    /// The same, with the slope of its logarithm and the negative second derivative of a lower bound of that (expectation
+    /// maximisation).
     fn likelihood(sure: f64, likely: f64) -> (f64, f64, f64) {
         if sure.min(likely) > CERTAIN {
             return (1.0, 0.0, 0.0);
@@ -306,9 +311,7 @@ impl Term {
 
     /// Likelihood of an edge at `at` alone.
     fn value(&self, at: f64) -> f64 {
-        let bound = |sure: f64, likely: f64| {
-            HIDDEN_PART * normal_cdf(sure / self.soft) + (1.0 - HIDDEN_PART) * normal_cdf(likely / self.soft)
-        };
+        let bound = |sure: f64, likely: f64| Bound::value(sure / self.soft, likely / self.soft);
         match self.says {
             Says::Above(Bound { sure, likely }) => bound(at - sure, at - likely),
             Says::Below(Bound { sure, likely }) => bound(sure - at, likely - at),

@@ -67,8 +67,8 @@ impl EdgeData {
     }
 }
 
-/// Half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges; of those that are not
-/// dithered, all beams may be mixed or none, and they count only where no other edge tells.
+/// Half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges. Of one that is
+/// not dithered all beams may be mixed or none: it counts only where no other edge tells.
 pub(super) fn footprint(edges: &[EdgeData], sampling: Sampling) -> f64 {
     let any = edges.iter().any(|edge| edge.dithered);
     let telling = edges.iter().filter(|edge| edge.dithered || !any);

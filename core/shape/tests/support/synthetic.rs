@@ -45,6 +45,19 @@ pub struct Plate {
 }
 
 impl Plate {
+    /// A plate rolled to a radius of 9 m, concave face up, obliquely before the scanner.
+    pub fn rolled() -> Self {
+        Self {
+            width: 3.0,
+            height: 2.5,
+            thickness: 0.036,
+            radius: Some(9.0),
+            centre: Vec3::new(6.0, 0.4, -3.6),
+            turn: 0.4,
+            tilt: 0.0,
+        }
+    }
+
     fn to_local(self, v: Vec3) -> Vec3 {
         let (s, c) = self.turn.sin_cos();
         let v = Vec3::new(c * v.x + s * v.y, c * v.y - s * v.x, v.z);
