@@ -8,8 +8,9 @@ mod rig;
 
 use std::time::Duration;
 
+use platen_model::Code;
 use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
-use platen_press::{Code, LinkState};
+use platen_press::LinkState;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
 use platen_sim_press::{Command, Config, SimPress, Tally};

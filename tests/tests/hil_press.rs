@@ -4,7 +4,8 @@ mod rig;
 
 use std::time::Duration;
 
-use platen_press::{Code, LinkState};
+use platen_model::Code;
+use platen_press::LinkState;
 use platen_sim_press::faults::StrokeFaults;
 use platen_sim_press::registers::status;
 use platen_sim_press::{Cause, Command, Config, SimPress};

@@ -8,10 +8,10 @@ use rusqlite::{Connection, OptionalExtension, Transaction, named_params};
 
 use crate::archive::{self, Archive, text};
 use crate::lock::Lock;
-use crate::{Error, Stroke, StrokeKey, Verdict, schema};
+use crate::{Error, StrokeKey, Verdict, schema};
 
 /// A press counts strokes to 65535 and begins again: the same key within half a turn is the same stroke, later another.
-const RECENT_RUNS: u32 = 32_768;
+pub(crate) const RECENT_RUNS: u32 = 32_768;
 
 /// The writer of a history, for the strokes of one press. Its methods block until the disk has what they record.
 #[derive(Debug)]
@@ -61,22 +61,6 @@ pub struct Finished {
     pub publication: String,
 }
 
-/// What a host must know when it starts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recalled {
-    /// Random number of this installation, drawn once per press, never 0.
-    pub owner: u16,
-    /// `seq` of the last result, 0 before the first.
-    pub result_seq: u16,
-    /// Run id of the last stroke of any press, 0 before the first.
-    pub run_id: u32,
-    /// The last stroke accepted.
-    pub last: Option<Stroke>,
-    /// Highest attempt per stroke number in the session of [`last`](Self::last), over the last half turn of the press's
-    /// counter: the strokes not to scan again.
-    pub attempts: BTreeMap<u16, u16>,
-}
-
 impl History {
     /// Opens the history of `press` for writing and makes it, with its folder, when it is new.
     ///
@@ -97,35 +81,6 @@ impl History {
     /// The same history for reading.
     pub fn archive(&self) -> &Archive {
         &self.archive
-    }
-
-    /// What was recorded last.
-    ///
-    /// # Errors
-    /// [`Error::Storage`], [`Error::Damaged`].
-    pub fn recall(&self) -> Result<Recalled, Error> {
-        let connection = self.archive.connection();
-        let journal = "SELECT owner, result_seq, (SELECT ifnull(max(run_id), 0) FROM stroke) \
-                       FROM journal WHERE press = ?1";
-        let (owner, result_seq, run_id) = connection
-            .query_row(journal, [self.press], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-            .map_err(self.storage())?;
-        let last = self.archive.last(self.press)?;
-        let attempts = match &last {
-            Some(last) => self.attempts(last).map_err(self.storage())?,
-            None => BTreeMap::new(),
-        };
-        Ok(Recalled { owner, result_seq, run_id, last, attempts })
-    }
-
-    fn attempts(&self, last: &Stroke) -> rusqlite::Result<BTreeMap<u16, u16>> {
-        let sql = "SELECT stroke, max(attempt) FROM stroke \
-                   WHERE press = ?1 AND session = ?2 AND run_id > ?3 GROUP BY stroke";
-        let mut statement = self.archive.connection().prepare_cached(sql)?;
-        let oldest = i64::from(last.run_id) - i64::from(RECENT_RUNS);
-        let rows = statement
-            .query_map((last.key.press, last.key.session, oldest), |row| Ok((row.get(0)?, row.get(1)?)))?;
-        rows.collect()
     }
 
     /// Records that a stroke is going to be echoed as accepted, then scanned. The same again changes nothing.
@@ -302,7 +257,11 @@ impl History {
         Err(Error::Contradiction { key, why: format!("this history was opened for press {}", self.press) })
     }
 
-    fn storage(&self) -> impl Fn(rusqlite::Error) -> Error + use<'_> {
+    pub(crate) fn press(&self) -> u16 {
+        self.press
+    }
+
+    pub(crate) fn storage(&self) -> impl Fn(rusqlite::Error) -> Error + use<'_> {
         Error::storage(self.archive.path())
     }
 }

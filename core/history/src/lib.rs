@@ -15,6 +15,7 @@ mod compare;
 mod error;
 mod export;
 mod history;
+mod journal;
 mod lock;
 mod schema;
 mod stroke;
@@ -23,5 +24,7 @@ pub use archive::{Archive, Filter};
 pub use compare::{Difference, compare};
 pub use error::Error;
 pub use export::StrokeTable;
-pub use history::{Accepted, Finished, History, Recalled};
-pub use stroke::{Event, PlateRecord, Stage, Stroke, StrokeKey, Verdict};
+pub use history::{Accepted, Finished, History};
+pub use stroke::{Event, PlateRecord, Stroke};
+
+use platen_model::{StrokeKey, Verdict};

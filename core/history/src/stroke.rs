@@ -1,77 +1,11 @@
 //! What is on record about a stroke and a plate.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::PathBuf;
 
 use jiff::Timestamp;
-use serde::{Deserialize, Serialize};
-
-/// Identity of a measurement: each is scanned at most once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct StrokeKey {
-    /// Plant number of the press.
-    pub press: u16,
-    /// Number that the press changes when it restarts or the part changes; 0 where it has none.
-    pub session: u16,
-    /// Number of the stroke.
-    pub stroke: u16,
-    /// 0 for the first measurement of a stroke.
-    pub attempt: u16,
-}
-
-impl fmt::Display for StrokeKey {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "press {} session {} stroke {}", self.press, self.session, self.stroke)?;
-        if self.attempt > 0 { write!(f, " attempt {}", self.attempt) } else { Ok(()) }
-    }
-}
-
-/// How far a stroke has come, in this order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// Echoed to the press, not scanned.
-    Accepted,
-    /// Scanned, not judged.
-    Scanned,
-    /// Judged; the press may not have it.
-    Finished,
-    /// Done with.
-    Acked,
-}
-
-/// Judgement of a stroke.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The plate has its target shape.
-    Pass,
-    /// It has not.
-    Fail,
-    /// Measured, but too uncertain to judge.
-    CannotTell,
-    /// Nothing can be said.
-    NotMeasured,
-}
-
-impl Verdict {
-    const ALL: [Self; 4] = [Self::Pass, Self::Fail, Self::CannotTell, Self::NotMeasured];
-
-    /// `pass`, `fail`, `cannot_tell` or `not_measured`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Fail => "fail",
-            Self::CannotTell => "cannot_tell",
-            Self::NotMeasured => "not_measured",
-        }
-    }
-
-    pub(crate) fn from_text(text: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|verdict| verdict.as_str() == text)
-    }
-}
+use platen_model::{Stage, StrokeData, StrokeKey, Verdict};
+use serde::Serialize;
 
 /// Everything on record about one stroke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,6 +53,11 @@ pub struct Stroke {
 }
 
 impl Stroke {
+    /// Returns the press's data about the stroke; empty where the record cannot be read any more.
+    pub fn press_data(&self) -> StrokeData {
+        serde_json::from_str(&self.data).unwrap_or_default()
+    }
+
     /// How far it has come.
     pub fn stage(&self) -> Stage {
         match (self.scanned, self.finished, self.acked) {

@@ -11,7 +11,8 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use jiff::Timestamp;
-use platen_history::{Accepted, Finished, History, Recalled, Stage, Stroke, StrokeKey, Verdict};
+use platen_history::{Accepted, Finished, History};
+use platen_model::{Entry, Recalled, Stage, StrokeKey, Verdict};
 
 const PRESS: u16 = 1;
 const SESSION: u16 = 5;
@@ -240,7 +241,7 @@ fn the_host_that_is_killed() {
 
 /// At the start: a stroke that was accepted and has no result is reported as interrupted, never scanned again.
 fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
-    let unfinished = |last: &&Stroke| last.stage() < Stage::Finished;
+    let unfinished = |last: &&Entry| last.stage < Stage::Finished;
     if let Some(last) = recalled.last.as_ref().filter(unfinished) {
         *seq += 1;
         let result = result(last.key, last.run_id, *seq, Verdict::NotMeasured, "interrupted");

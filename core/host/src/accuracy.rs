@@ -10,7 +10,7 @@ use serde::Deserialize;
 use platen_shape::measure::Measurement;
 use platen_shape::{Surface, Vec3};
 
-use crate::units::metres;
+use platen_model::units::metres;
 
 /// Width of the strip along the edges whose surface is judged apart, metres.
 pub const EDGE_STRIP: f64 = 0.1;

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use platen_plant::plant::CalibrationUse;
 use platen_plant::{Document, Error as PlantError, Reported, Table};
 
-use crate::units::{metres, mm};
+use platen_model::units::{metres, mm};
 
 /// Standard deviations above this are no scanner's: a plate was bent, or the scanner moved. Millimetres.
 const LARGEST_SIGMA_MM: f64 = 20.0;

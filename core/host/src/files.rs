@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use platen_shape::Surface;
 
 use crate::picture::{self, Caption, PictureError, StripPoint};
-use crate::plugin::{Report, surface_bytes, surface_from_bytes};
+use crate::plugin::{surface_bytes, surface_from_bytes};
 use crate::record::{LineRecord, PlateRecord, ResultRecord};
 use crate::table::{PlateTable, csv_cell};
+use platen_model::Report;
 
 /// Name of the surface's file: what comparisons are given, a `platen.surface/1` buffer of `platen.h`.
 pub const SURFACE: &str = "surface.platen";

@@ -16,4 +16,3 @@ pub mod scan_file;
 pub mod sequence;
 pub mod stroke;
 pub mod table;
-mod units;

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use platen_history::{Archive, Error, Filter, Stroke};
+use platen_model::Verdict;
 use platen_plant::PlateFile;
 use platen_shape::Blank;
-use platen_shape::task::Verdict;
 
 use crate::picture::StripPoint;
 use crate::record::{OutlineRecord, ResultRecord, TemplateRecord};
-use crate::units::mm;
+use platen_model::units::mm;
 
 /// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
 ///
@@ -48,7 +48,7 @@ pub fn of_stroke(stroke: &Stroke) -> StripPoint {
 
 /// The judgement on record; none is no measurement.
 pub fn verdict(stroke: &Stroke) -> Verdict {
-    use platen_history::Verdict as Kept;
+    use platen_model::Verdict as Kept;
     match stroke.verdict {
         Some(Kept::Pass) => Verdict::Pass,
         Some(Kept::Fail) => Verdict::Fail,

@@ -17,7 +17,7 @@ pub use scale::Yardstick;
 pub use section::section;
 pub use strip::{StripPoint, strip};
 
-use platen_shape::task::Verdict;
+use platen_model::Verdict;
 
 /// The picture could not be drawn.
 #[derive(Debug, thiserror::Error)]

@@ -17,7 +17,7 @@ mod surface;
 mod values;
 
 pub use catalogue::{Catalogue, Listed};
-pub use comparison::{Comparison, Field, NodeState, Report, Surfaces};
+pub use comparison::{Comparison, Surfaces};
 pub use descriptor::{Descriptor, Kind};
 pub use error::PluginError;
 pub use flattening::Flattening;

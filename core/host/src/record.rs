@@ -18,14 +18,15 @@ pub use plate::PlateRecord;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json, json};
 
+use platen_model::{Figure, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::task::{Figure, Task, Verdict};
 use platen_shape::{EXPANDED, ShapeChecks, Vec3};
 
-use crate::plugin::{PluginError, Report};
+use crate::plugin::PluginError;
 use crate::stroke::{Measured, Scanned};
-use crate::units::{mm, mm_pair, readable};
+use platen_model::Report;
+use platen_model::units::{mm, mm_pair, readable};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.result/1";
@@ -263,7 +264,7 @@ fn sentences(reports: &[Result<Report, PluginError>]) -> Vec<String> {
 }
 
 fn markers(measured: &Measured, plate: &PlateFile) -> Vec<MarkerRecord> {
-    let record = |marker: &platen_plant::plate::Marker| {
+    let record = |marker: &platen_model::Marker| {
         let Place { u, v, position, sigma, seen } = evaluate::place(
             &measured.measurement.surface,
             &measured.measurement.location,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord as KeptPlate, Stroke};
-use platen_shape::task::Verdict;
+use platen_model::Verdict;
 
 use crate::files::{self, FilesError};
 use crate::past;
@@ -309,7 +309,8 @@ fn footer(record: Option<&ResultRecord>) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use platen_history::{Accepted, Finished, History, StrokeKey, Verdict as Kept};
+    use platen_history::{Accepted, Finished, History};
+    use platen_model::{StrokeKey, Verdict as Kept};
 
     use super::*;
 

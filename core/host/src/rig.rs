@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use platen_model::{Plate, Task};
+use platen_plant::PlateFile;
 use platen_plant::plant::RigidTransform;
-use platen_plant::plate::{self, PlateFile};
 use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, Value, check_options};
-use platen_shape::task::{self, Task};
 use platen_shape::{PlateSpec, RegionOfInterest, TargetError, TargetSurface, Vec3};
 
 use crate::calibration::Calibration;
@@ -142,21 +142,13 @@ pub fn task(plate: &PlateFile, calibration: Option<&Calibration>, supports_chang
         width: plate.plate.width,
         height: plate.plate.height,
         thickness: plate.plate.thickness,
-        target: plate.target.map(|target| target_of(&target)),
-        reference_lines: plate
-            .reference_lines
-            .iter()
-            .map(|line| task::ReferenceLine { name: line.name.clone(), from: line.from, to: line.to })
-            .collect(),
-        templates: plate.templates.iter().map(template).collect(),
-        stations: plate
-            .stations
-            .iter()
-            .map(|s| task::Station { name: s.name.clone(), at: s.at, quantity: quantity(s.quantity) })
-            .collect(),
+        target: plate.target,
+        reference_lines: plate.reference_lines.clone(),
+        templates: plate.templates.clone(),
+        stations: plate.stations.clone(),
         sigma_correlated: calibration.map_or(0.0, |calibration| calibration.sigma_correlated),
         sigma_true: calibration.and_then(|calibration| calibration.sigma_true),
-        supports: plate.supports.iter().map(|support| support.at).collect(),
+        supports: plate.supports.clone(),
         supports_changed,
     }
 }
@@ -166,55 +158,6 @@ pub fn task(plate: &PlateFile, calibration: Option<&Calibration>, supports_chang
 /// # Errors
 /// The target does not fit the plate.
 pub fn target(plate: &PlateFile) -> Result<Option<TargetSurface>, TargetError> {
-    let plate::Plate { width, height, thickness, .. } = plate.plate;
-    plate.target.map(|target| TargetSurface::new(&target_of(&target), width, height, thickness)).transpose()
-}
-
-fn target_of(target: &plate::Target) -> task::Target {
-    use plate::TargetShape as From;
-    use task::TargetShape as To;
-    task::Target {
-        shape: match target.shape {
-            From::Flat => To::Flat,
-            From::Cylinder { radius, axis } => To::Cylinder { radius, axis },
-            From::Cone { axis, radius_start, radius_end } => To::Cone { axis, radius_start, radius_end },
-            From::Sphere { radius } => To::Sphere { radius },
-            From::Torus { axis, radius, cross_radius } => To::Torus { axis, radius, cross_radius },
-        },
-        radius_of: match target.radius_of {
-            plate::RadiusOf::Inside => task::RadiusOf::Inside,
-            plate::RadiusOf::Outside => task::RadiusOf::Outside,
-            plate::RadiusOf::Mid => task::RadiusOf::Mid,
-        },
-        scanned_face: match target.scanned_face {
-            plate::Facing::Inside => task::Facing::Inside,
-            plate::Facing::Outside => task::Facing::Outside,
-        },
-    }
-}
-
-fn template(template: &plate::Template) -> task::Template {
-    task::Template {
-        name: template.name.clone(),
-        line: template.line.clone(),
-        chord: template.chord,
-        centre: match template.centre {
-            plate::Centre::At(at) => task::Centre::At(at),
-            plate::Centre::Worst => task::Centre::Worst,
-        },
-        limit: template.limit,
-        seat: match template.seat {
-            plate::Seat::Gravity => task::Seat::Gravity,
-            plate::Seat::Balanced => task::Seat::Balanced,
-            plate::Seat::Held => task::Seat::Held,
-        },
-    }
-}
-
-fn quantity(quantity: plate::Quantity) -> task::Quantity {
-    match quantity {
-        plate::Quantity::Deviation => task::Quantity::Deviation,
-        plate::Quantity::Gap => task::Quantity::Gap,
-        plate::Quantity::CurvatureDeficit => task::Quantity::CurvatureDeficit,
-    }
+    let Plate { width, height, thickness, .. } = plate.plate;
+    plate.target.map(|target| TargetSurface::new(&target, width, height, thickness)).transpose()
 }

@@ -20,9 +20,10 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_history::{Error as HistoryError, History};
+use platen_model::{Language, StrokeKey};
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
-use platen_press::{Language, Order, PressLink, RunError, StrokeKey, channels, run_press};
+use platen_press::{Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
 pub use bench::StrokeReport;
@@ -93,7 +94,8 @@ pub async fn run(
         status::Beside { alarm: Arc::clone(&alarm), lost },
         host.answers.clone(),
     ));
-    let mut press_side = tokio::spawn(run_press(press, link, journal::Adapter(Arc::clone(&history)), side));
+    let mut press_side =
+        tokio::spawn(run_press(press, link, journal::HistoryJournal(Arc::clone(&history)), side));
     let mut scanning: Option<(StrokeKey, CancelToken)> = None;
     let mut hung = None;
     let ended = loop {

@@ -18,16 +18,15 @@ use jiff::Timestamp;
 use serde::Serialize;
 
 use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
+use platen_model::{Figure, Verdict};
 use platen_plant::{PlantFile, PlateFile, PluginUse};
-use platen_press::StrokeData;
-use platen_shape::task::{Figure, Verdict};
 use platen_shape::{Forming, Surface};
 
 use crate::picture::Yardstick;
 use crate::plugin::{Catalogue, PluginError, Surfaces};
 use crate::rig::{self, RigError};
-use crate::units::{mm, mm_pair};
 use crate::{files, past};
+use platen_model::units::{mm, mm_pair};
 
 /// Why there is no sequence.
 #[derive(Debug, thiserror::Error)]
@@ -188,8 +187,7 @@ impl Sequence {
 
 impl SequenceStroke {
     fn of(stroke: &Stroke) -> Self {
-        // Written by this program as JSON; what cannot be read any more is as good as nothing said.
-        let told: StrokeData = serde_json::from_str(&stroke.data).unwrap_or_default();
+        let told = stroke.press_data();
         let point = past::of_stroke(stroke);
         Self {
             run_id: stroke.run_id,

@@ -14,15 +14,16 @@ pub use tape::Tape;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use platen_model::{Task, Verdict};
 use platen_scan::{ColumnError, ScanHeader, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, Measurement, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
-use platen_shape::task::{Task, Verdict};
 use platen_shape::{Blank, BlankError, Patch, PlateSpec, Turned, turned};
 
-use crate::plugin::{JobSpec, PluginError, Report, ScanEvent, Scanner, Surfaces};
+use crate::plugin::{JobSpec, PluginError, ScanEvent, Scanner, Surfaces};
 use crate::rig::Rig;
+use platen_model::Report;
 
 /// Why a stroke was not measured, by who must act.
 #[derive(Debug, thiserror::Error)]

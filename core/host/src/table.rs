@@ -11,8 +11,8 @@ use ply_rs_bw::writer::Writer;
 
 use platen_shape::Surface;
 
-use crate::plugin::{Field, NodeState, Report};
-use crate::units::{mm, mm_pair, readable};
+use platen_model::units::{mm, mm_pair, readable};
+use platen_model::{Field, NodeState, Report};
 
 /// Nodes along u and v: those at which our comparisons give their fields.
 const NODES: [usize; 2] = [101, 101];
@@ -184,33 +184,6 @@ fn columns(field: &Field) -> Vec<Column> {
         }
     };
     (0..field.components).map(one).collect()
-}
-
-impl Field {
-    /// One component at a share of the plate's sides: interpolated between seen nodes, in the state of the nearest.
-    pub fn sample(&self, u: f64, v: f64, component: usize) -> (NodeState, f64) {
-        let [n_u, n_v] = self.nodes;
-        let place = |share: f64, n: usize| {
-            let at = share.clamp(0.0, 1.0) * n.saturating_sub(1) as f64;
-            let from = (at as usize).min(n.saturating_sub(2));
-            (from, (from + 1).min(n.saturating_sub(1)), at - from as f64)
-        };
-        let ((i0, i1, f), (k0, k1, g)) = (place(u, n_u), place(v, n_v));
-        let nearest = (if g >= 0.5 { k1 } else { k0 }) * n_u + if f >= 0.5 { i1 } else { i0 };
-        let (mut weights, mut sum) = (0.0, 0.0);
-        for (node, weight) in [
-            (k0 * n_u + i0, (1.0 - f) * (1.0 - g)),
-            (k0 * n_u + i1, f * (1.0 - g)),
-            (k1 * n_u + i0, (1.0 - f) * g),
-            (k1 * n_u + i1, f * g),
-        ] {
-            if self.state[node] != NodeState::Unseen {
-                weights += weight;
-                sum += weight * self.values[node * self.components + component];
-            }
-        }
-        (self.state[nearest], if weights > 0.0 { sum / weights } else { 0.0 })
-    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
+use platen_model::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
 use platen_plant::plant::{KeepScans, RegionOfInterest};
-use platen_plant::plate::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
 use platen_plant::{PlantFile, PlateFile, ScanWindow};
 
 fn config() -> PathBuf {

@@ -1,6 +1,5 @@
 //! Register map, Modbus link and handshake with the press.
 
-mod alarm;
 mod codec;
 mod handshake;
 mod journal;
@@ -11,21 +10,23 @@ mod program;
 mod reconcile;
 mod replay;
 mod runner;
-mod stroke;
 
-pub use alarm::{Alarm, Code, Language, Severity, alarms_csv};
 pub use codec::{HostImage, PressImage, Torn, Wrong, describe_inputs, describe_outputs, saturates};
 pub use handshake::{Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
-pub use journal::{Acked, Entry, Journal, MemoryJournal, Recalled, Record, Stage};
+pub use journal::{Journal, MemoryJournal};
 pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,
     Response, ServedLink, TransportError, consequence,
 };
-pub use page::{MapPage, MapRow, map_csv, map_markdown, map_page};
+pub use page::{MapPage, MapRow, alarms_csv, map_csv, map_markdown, map_page};
 pub use probe::{Reading, readings};
 pub use program::reference_program;
 pub use replay::{Replayed, Sample, Side, replay};
 pub use runner::{
     Answer, Durations, HostSide, Metrics, Order, PressSide, RunError, Status, channels, run_press,
 };
-pub use stroke::{Figures, Measurement, Publication, StrokeData, StrokeKey, Timestamp, Verdict};
+
+use platen_model::{
+    Acknowledgement, Code, Entry, Figures, Measurement, Publication, Recalled, Record, Severity, Stage,
+    StrokeData, StrokeKey, Timestamp, Verdict,
+};

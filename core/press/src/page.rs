@@ -1,6 +1,9 @@
 //! The register map in force as a page for the programmer of the press: Markdown, CSV, and the program to write.
 
+mod alarms;
 mod rules;
+
+pub use alarms::alarms_csv;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -127,7 +130,7 @@ impl Row {
             notes.push("0 = yes".into());
         }
         if let Some(measure) = field.from {
-            notes.push(format!("shows {measure}"));
+            notes.push(format!("shows {}", measure.name()));
         }
         notes.join("; ")
     }

@@ -156,7 +156,13 @@ impl Player {
 }
 
 fn stand_in() -> Measurement {
-    Measurement { verdict: Verdict::CannotTell, figures: Figures::default(), scanned_at: None, warning: None }
+    Measurement {
+        verdict: Verdict::CannotTell,
+        reason: None,
+        figures: Figures::default(),
+        scanned_at: None,
+        warning: None,
+    }
 }
 
 /// The number in a field of the host's block.

@@ -5,10 +5,11 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use platen_plant::press::{Input, Link, Measure, NoAck, OnInterrupted, OnMissed, OnStorageFull, Press};
+use platen_model::Measure;
+use platen_model::{Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
+use platen_plant::press::{Input, Link, NoAck, OnInterrupted, OnMissed, OnStorageFull, Press};
 use platen_press::{
-    Code, Config, Effect, Event, Figures, Handshake, HostImage, LinkState, Measurement, PressImage, Recalled,
-    Record, StrokeKey, Transition, Verdict, Work, Wrong,
+    Config, Effect, Event, Handshake, HostImage, LinkState, PressImage, Transition, Work, Wrong,
 };
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -104,8 +105,8 @@ impl Bench {
         assert!(!(image.busy && image.ready), "busy and ready");
         assert!(!(image.busy && image.valid), "busy and valid");
         assert!(!image.valid || image.result.is_some(), "valid without a result");
-        if let (true, LinkState::Online, Some(Verdict::NotMeasured(code))) =
-            (image.valid, link, image.result.as_ref().map(|result| result.measurement.verdict))
+        if let (true, LinkState::Online, Some(code)) =
+            (image.valid, link, image.result.as_ref().and_then(|result| result.measurement.reason))
         {
             assert_eq!(
                 image.error,
@@ -187,6 +188,7 @@ impl Bench {
 fn measurement() -> Measurement {
     Measurement {
         verdict: Verdict::Pass,
+        reason: None,
         figures: Figures { values: [(Measure::GapMax, 0.001)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,

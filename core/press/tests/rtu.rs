@@ -10,8 +10,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bench::{Memory, Plc, SharedPlc};
+use platen_model::StrokeKey;
 use platen_plant::press::{Block, Link, Press, Quiet, Serial, Table, Transport};
-use platen_press::{Answer, Client, ModbusLink, StrokeKey, channels, run_press};
+use platen_press::{Answer, Client, ModbusLink, channels, run_press};
 use serialport::{SerialPort, TTYPort};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpListener;

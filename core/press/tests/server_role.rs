@@ -10,8 +10,9 @@ use std::time::Duration;
 
 use bench::plc::{H, P};
 use bench::{Memory, Plc, SharedPlc};
+use platen_model::StrokeKey;
 use platen_plant::press::{Link, Press, Role};
-use platen_press::{Answer, PressLink, StrokeKey, channels, run_press};
+use platen_press::{Answer, PressLink, channels, run_press};
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::*;
 

@@ -11,8 +11,9 @@ use std::time::Duration;
 use bench::memory::{Chaos, MemoryLink};
 use bench::plc::{Habits, P};
 use bench::{Memory, Plc, SharedPlc};
+use platen_model::{Acknowledgement, Code, StrokeKey};
 use platen_plant::press::{Link, Mode, Press};
-use platen_press::{Acked, Answer, Code, HostSide, RunError, StrokeKey, channels, run_press};
+use platen_press::{Answer, HostSide, RunError, channels, run_press};
 use tokio::task::JoinHandle;
 
 const MS: fn(u64) -> Duration = Duration::from_millis;
@@ -145,7 +146,7 @@ async fn a_press_that_never_acknowledges_still_gets_every_result() {
     let cell = habit(0, Habits { no_ack: true, ..Habits::default() }, 40).await;
     let acked = cell.journal.acked();
     assert_eq!(acked.len(), 39);
-    assert!(acked.iter().all(|(_, how)| *how == Acked::NextStroke));
+    assert!(acked.iter().all(|(_, how)| *how == Acknowledgement::NextStroke));
 }
 
 #[tokio::test(start_paused = true)]

@@ -4,8 +4,8 @@ use std::ffi::c_char;
 
 use platen_abi::payload::{self, Header, Layout};
 use platen_abi::{desc_flag, frame_flag};
+use platen_model::{Field, Findings, Report, Task};
 use platen_shape::surface::{Surface, SurfaceParts};
-use platen_shape::task::{Findings, Task};
 
 use crate::shim::{Input, Plugin, describe, malformed};
 use crate::sink::Payload;
@@ -63,46 +63,6 @@ impl Inputs {
             format!("the plate measures {}, the one before {}: not the same plate", mm(now), mm(then));
         Err(Error::new(ErrorKind::BadData, message).hint("give a scan of the same plate"))
     }
-}
-
-/// What a comparison found.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Report {
-    /// Figures, judgement, sentences.
-    pub findings: Findings,
-    /// Fields over the plate.
-    pub fields: Vec<Field>,
-}
-
-/// A field on an even grid over the whole plate, v outer, u inner.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Field {
-    /// Name, e.g. `displacement`.
-    pub name: String,
-    /// Unit, e.g. `m`.
-    pub unit: String,
-    /// Nodes along u.
-    pub n_u: usize,
-    /// Nodes along v.
-    pub n_v: usize,
-    /// Numbers a node.
-    pub components: usize,
-    /// `n_u * n_v * components` numbers.
-    pub values: Vec<f64>,
-    /// One a node.
-    pub state: Vec<NodeState>,
-}
-
-/// What is known at a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum NodeState {
-    /// The plate was not seen here.
-    Unseen = 0,
-    /// A value.
-    Seen = 1,
-    /// A value below the level of detection: nothing changed.
-    Unchanged = 2,
 }
 
 /// A comparison as a plugin.
@@ -172,7 +132,7 @@ fn surface_parts(bytes: &[u8]) -> std::result::Result<SurfaceParts, payload::Mal
 }
 
 fn emit_field(job: &Job<'_>, field: &Field) -> Result<()> {
-    let nodes = field.n_u * field.n_v;
+    let nodes = field.nodes[0] * field.nodes[1];
     if field.values.len() != nodes * field.components || field.state.len() != nodes {
         return Err(Error::new(ErrorKind::Internal, format!("field {} does not fit its grid", field.name)));
     }
@@ -181,8 +141,8 @@ fn emit_field(job: &Job<'_>, field: &Field) -> Result<()> {
     let head = payload::Grid {
         struct_size: size_of::<payload::Grid>() as u32,
         reserved: 0,
-        n_u: field.n_u as u32,
-        n_v: field.n_v as u32,
+        n_u: field.nodes[0] as u32,
+        n_v: field.nodes[1] as u32,
         components: field.components as u32,
         reserved_2: 0,
         name: layout.add::<u8>(field.name.len()),

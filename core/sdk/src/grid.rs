@@ -2,7 +2,7 @@
 
 use platen_shape::Surface;
 
-use crate::comparison::{Field, NodeState};
+use platen_model::{Field, NodeState};
 
 /// Even nodes over the whole plate, v outer, u inner; every fifth is a node of the result's own grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ impl PlateGrid {
         state: Vec<NodeState>,
     ) -> Field {
         let (name, unit) = (name.into(), unit.into());
-        Field { name, unit, n_u: Self::SIDE, n_v: Self::SIDE, components, values, state }
+        Field { name, unit, nodes: [Self::SIDE; 2], components, values, state }
     }
 
     /// Nodes that hang together (by their sides) and share a label; nodes with label 0 belong to none.

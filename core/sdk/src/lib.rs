@@ -66,7 +66,7 @@ mod flattening;
 mod grid;
 
 #[cfg(feature = "comparison")]
-pub use comparison::{Comparison, Field, Inputs, NodeState, Report};
+pub use comparison::{Comparison, Inputs};
 pub use error::{Error, ErrorKind, Result};
 #[cfg(feature = "flattening")]
 pub use flattening::Flattening;
@@ -76,4 +76,6 @@ pub use info::Info;
 pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};
 pub use platen_abi as abi;
+#[cfg(feature = "comparison")]
+pub use platen_model::{Field, NodeState, Report};
 pub use scanner::{ScanSink, Scanner};

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
     use crate::Vec3;
     use crate::surface::{Axis, Fit, Mask};
-    use crate::task::{Facing, RadiusOf, Target, TargetShape};
+    use platen_model::{Facing, RadiusOf, Target, TargetShape};
 
     const W: f64 = 3.0;
     const H: f64 = 2.0;

@@ -28,7 +28,6 @@ mod sheet;
 pub mod sparse;
 pub mod surface;
 mod target;
-pub mod task;
 mod turned;
 
 pub use baseline::BlankError;

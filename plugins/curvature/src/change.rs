@@ -1,8 +1,9 @@
 //! What a stroke bent.
 
-use platen_sdk::{NodeState, PlateGrid, Report};
+use platen_model::Figure;
+use platen_model::{NodeState, Report};
+use platen_sdk::PlateGrid;
 use platen_shape::surface::Curvature;
-use platen_shape::task::Figure;
 use platen_shape::{EXPANDED, Surface};
 
 use crate::bands::{self, Band};

@@ -1,7 +1,8 @@
 //! What is still to bend.
 
-use platen_sdk::{NodeState, PlateGrid, Report};
-use platen_shape::task::Figure;
+use platen_model::Figure;
+use platen_model::{NodeState, Report};
+use platen_sdk::PlateGrid;
 use platen_shape::{EXPANDED, TargetSurface};
 
 use crate::{Nodes, figure, place};

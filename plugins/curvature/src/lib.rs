@@ -46,11 +46,10 @@ mod change;
 mod deficit;
 mod strain;
 
-use platen_sdk::{
-    Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, PlateGrid, Report, Result,
-};
+use platen_model::{Field, NodeState, Report};
+use platen_model::{Figure, Findings};
+use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::surface::Curvature;
-use platen_shape::task::{Figure, Findings};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 platen_sdk::options! {
@@ -133,7 +132,7 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let correlated = correlated * (std::f64::consts::TAU / options.wavelength).powi(2);
     let nodes = Nodes::new(now, correlated, options.trusted);
     check()?;
-    let mut report = Report { findings: Findings::default(), fields: nodes.fields() };
+    let mut report = Report::new(Findings::default(), nodes.fields());
 
     if let Some(target) = &task.target {
         let target = TargetSurface::new(target, task.width, task.height, task.thickness)

@@ -1,8 +1,9 @@
 //! What the plate stretched.
 
-use platen_sdk::{NodeState, PlateGrid, Report};
+use platen_model::Figure;
+use platen_model::{NodeState, Report};
+use platen_sdk::PlateGrid;
 use platen_shape::Surface;
-use platen_shape::task::Figure;
 
 use crate::{Nodes, figure};
 

@@ -1,8 +1,8 @@
 //! Maps, bands and null pairs on plates of closed form.
 
+use platen_model::{Facing, RadiusOf, Target, TargetShape, Task};
 use platen_shape::Vec3;
 use platen_shape::surface::{Axis, Fit, Mask};
-use platen_shape::task::{Facing, RadiusOf, Target, TargetShape, Task};
 
 use super::*;
 

@@ -1,6 +1,7 @@
 //! What changed beyond doubt.
 
-use platen_sdk::{NodeState, PlateGrid};
+use platen_model::NodeState;
+use platen_sdk::PlateGrid;
 use platen_shape::{EXPANDED, Vec3};
 
 use crate::align::Alignment;

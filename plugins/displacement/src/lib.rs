@@ -43,9 +43,10 @@ mod align;
 mod detect;
 mod grid;
 
-use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, NodeState, PlateGrid, Report, Result};
+use platen_model::{Figure, Findings};
+use platen_model::{NodeState, Report};
+use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::Surface;
-use platen_shape::task::{Figure, Findings};
 
 use align::{Alignment, Motion};
 use grid::Nodes;
@@ -86,7 +87,7 @@ impl Comparison for Displacement {
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let Some(earlier) = inputs.earlier(&options.against)? else {
         let says = vec![format!("no {} scan: displacement is not known", options.against)];
-        return Ok(Report { findings: Findings { says, ..Findings::default() }, fields: Vec::new() });
+        return Ok(Report::new(Findings { says, ..Findings::default() }, Vec::new()));
     };
     let nodes = Nodes::new(&inputs.now, earlier);
     let few = |motion| (motion, vec![0.0; PlateGrid::NODES]);
@@ -103,7 +104,8 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
 
 /// The plate lies on its supports as it lay.
 fn on_supports(inputs: &Inputs, earlier: &Surface) -> Result<Motion> {
-    let nodes = Nodes::at(&inputs.now, earlier, &inputs.task.supports);
+    let supports: Vec<[f64; 2]> = inputs.task.supports.iter().map(|support| support.at).collect();
+    let nodes = Nodes::at(&inputs.now, earlier, &supports);
     let in_sight = nodes.seen.iter().filter(|seen| **seen).count();
     if in_sight < 3 {
         let given = nodes.seen.len();
@@ -183,7 +185,7 @@ fn report(
     let vectors = changes.vectors.iter().flat_map(|d| [d.x, d.y, d.z]).collect();
     let fields =
         vec![field("displacement", 3, vectors), field("displacement_normal", 1, changes.normal.clone())];
-    Report { findings: Findings { verdict: None, says, figures, templates: Vec::new() }, fields }
+    Report::new(Findings { verdict: None, says, figures, templates: Vec::new() }, fields)
 }
 
 platen_sdk::export!(comparison Displacement);

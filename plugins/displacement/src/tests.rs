@@ -1,9 +1,9 @@
 //! Known movements, bands and null pairs on plates of closed form.
 
 use nalgebra::Rotation3;
+use platen_model::{Support, Task};
 use platen_shape::Vec3;
 use platen_shape::surface::{Axis, Fit, Mask};
-use platen_shape::task::Task;
 
 use super::*;
 
@@ -103,7 +103,7 @@ fn a_plate_on_its_supports_is_aligned_by_them() {
     let turn = Rotation3::from_euler_angles(0.01, -0.02, 0.1);
     let now = moved(&plate(SIGMA, 12, 0.02, none), turn, Vec3::new(0.2, 0.1, 0.05));
     let task = |supports: &[[f64; 2]]| {
-        let task = Task { supports: supports.to_vec(), ..task(0.0) };
+        let task = Task { supports: supports.iter().map(|&at| Support { at }).collect(), ..task(0.0) };
         Inputs { task, now: now.clone(), before: Some(before.clone()), baseline: None }
     };
     let options = Options { against: "before".into(), alignment: "supports".into(), min_patch: 0.02 };

@@ -1,6 +1,6 @@
 //! The named figures, in the words of the press's register map.
 
-use platen_shape::task::{Figure, Quantity, Task};
+use platen_model::{Figure, Quantity, Task};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::deviation::Deviation;

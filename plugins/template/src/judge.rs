@@ -1,6 +1,6 @@
 //! What one board says: its gap, the uncertainty, the verdict and the sentence.
 
-use platen_shape::task::{Contact, Seat, Template, TemplateFinding, Verdict};
+use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::seat::{Profile, Rest};

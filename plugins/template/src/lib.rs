@@ -43,11 +43,10 @@ mod programme;
 mod seat;
 mod section;
 
-use platen_sdk::{
-    Comparison, Error, ErrorKind, Field, Info, Inputs, Job, NodeState, PlateGrid, Report, Result,
-};
+use platen_model::{Centre, Figure, Findings, Task, Template, Verdict};
+use platen_model::{Field, NodeState, Report};
+use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::TargetSurface;
-use platen_shape::task::{Centre, Figure, Findings, Task, Template, Verdict};
 
 use deviation::Deviation;
 use judge::{Judge, Judged};
@@ -127,13 +126,13 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let verdict = judged.iter().map(|j| j.finding.verdict).max().unwrap_or(Verdict::CannotTell);
     let templates = judged.into_iter().map(|j| j.finding).collect();
     let findings = Findings { verdict: Some(verdict), says, figures: found, templates };
-    Ok(Report { findings, fields: vec![field(PlateGrid::new(now), deviation)] })
+    Ok(Report::new(findings, vec![field(PlateGrid::new(now), deviation)]))
 }
 
 fn unjudged(why: &str) -> Report {
     let findings =
         Findings { verdict: Some(Verdict::CannotTell), says: vec![why.into()], ..Findings::default() };
-    Report { findings, fields: Vec::new() }
+    Report::new(findings, Vec::new())
 }
 
 /// The line of a template, and where its board lies on it.

@@ -6,11 +6,11 @@ mod malformed;
 mod noise;
 mod whole;
 
-use platen_shape::surface::{Axis, Fit, Mask};
-use platen_shape::task::{
+use platen_model::{
     Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template, TemplateFinding,
     Verdict,
 };
+use platen_shape::surface::{Axis, Fit, Mask};
 use platen_shape::{Surface, TargetSurface, Vec3};
 
 use super::*;
@@ -76,6 +76,7 @@ fn task(shape: TargetShape, scanned_face: Facing, seat: Seat) -> Task {
             centre: Centre::At(1.5),
             limit: 0.003,
             seat,
+            source: None,
         }],
         stations: Vec::new(),
         sigma_correlated: 0.0,

@@ -11,11 +11,10 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use platen_plant::press::{Link, Measure, Press};
-use platen_press::{
-    Answer, Code, Figures, Journal, Measurement, Order, PressLink, Recalled, Record, Status, StrokeKey,
-    Verdict, channels, run_press,
-};
+use platen_model::Measure;
+use platen_model::{Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
+use platen_plant::press::{Link, Press};
+use platen_press::{Answer, Journal, Order, PressLink, Status, channels, run_press};
 use platen_sim_plate::Plan;
 use platen_sim_press::config::Timings;
 use platen_sim_press::steel::PlateConfig;
@@ -247,7 +246,7 @@ fn measurement(strokes: u32) -> Measurement {
         (Measure::Sense, -1.0),
     ]);
     let figures = Figures { values, stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, figures, scanned_at: None, warning: None }
+    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
 }
 
 /// What must hold of every run, whatever was done to it.

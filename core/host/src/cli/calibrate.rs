@@ -15,8 +15,8 @@ use crate::calibration::Calibration;
 use crate::plugin::{PluginError, Surfaces};
 use crate::rig::{self, Rig};
 use crate::stroke::Baseline;
-use crate::units::mm;
 use crate::{files, progress};
+use platen_model::units::mm;
 
 /// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
 /// supports, metres.

@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use platen_model::Verdict;
 use platen_plant::PlantFile;
-use platen_shape::task::Verdict;
 use tokio::sync::{mpsc, watch};
 
 use super::cell::{Cell, Taken};

@@ -14,8 +14,8 @@ use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
 use crate::report::{self, ReportError};
-use crate::units::mm;
 use pick::RunRef;
+use platen_model::units::mm;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \

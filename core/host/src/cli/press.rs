@@ -14,11 +14,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
+use platen_model::{Code, Language};
 use platen_plant::PlantFile;
 use platen_plant::press::{Press, Role};
-use platen_press::{
-    Client, Code, Language, LinkError, ModbusLink, alarms_csv, map_csv, map_markdown, map_page,
-};
+use platen_press::{Client, LinkError, ModbusLink, alarms_csv, map_csv, map_markdown, map_page};
 
 use super::{CliError, Common, output};
 

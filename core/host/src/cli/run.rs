@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use platen_model::Verdict;
 use platen_plant::PlantFile;
-use platen_shape::task::Verdict;
 use tokio::sync::{mpsc, watch};
 
 use super::{CliError, Common, output};

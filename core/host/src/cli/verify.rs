@@ -14,8 +14,8 @@ use super::setup::Setup;
 use super::{CliError, Common, measure, output};
 use crate::rig::Rig;
 use crate::stroke::{Baseline, Measured, Scanned};
-use crate::units::{metres, mm};
 use crate::{files, progress};
+use platen_model::units::{metres, mm};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \

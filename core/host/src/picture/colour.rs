@@ -2,7 +2,7 @@
 
 use plotters::style::RGBColor;
 
-use platen_shape::task::Verdict;
+use platen_model::Verdict;
 
 /// Text and frames.
 pub(super) const INK: RGBColor = RGBColor(26, 28, 31);

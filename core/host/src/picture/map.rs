@@ -1,14 +1,14 @@
 //! A field over the plate's own rectangle.
 
-use platen_shape::task::Verdict;
+use platen_model::Verdict;
 
 use super::colour::{self, INK, PALE};
 use super::page::{At, Page, Text, draw};
 use super::scale::{Scale, nice_ceiling};
 use super::shades::{self, Shades};
 use super::{Caption, PictureError, Yardstick};
-use crate::plugin::{Field, NodeState};
 use crate::record::PlateRecord;
+use platen_model::{Field, NodeState};
 
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: u32 = 1200;

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use platen_model::{Target, TargetShape};
 use platen_plant::PlateFile;
-use platen_plant::plate::{Target, TargetShape};
 
-use crate::units::{metres, mm};
+use platen_model::units::{metres, mm};
 
 /// Limit of a board where the plate file has none, millimetres, and its chord: the trade's 3 mm on 2 m.
 const USUAL: [f64; 2] = [3.0, 2000.0];

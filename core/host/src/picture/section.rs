@@ -203,7 +203,7 @@ impl Sheet<'_> {
 
 #[cfg(test)]
 mod tests {
-    use platen_shape::task::{Seat, Verdict};
+    use platen_model::{Seat, Verdict};
 
     use super::*;
     use crate::record::PointRecord;

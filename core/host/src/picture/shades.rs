@@ -8,7 +8,7 @@ use super::PictureError;
 use super::colour::{self, PALE, PAPER};
 use super::page::{At, Page};
 use super::scale::Scale;
-use crate::plugin::{Field, NodeState};
+use platen_model::{Field, NodeState};
 
 /// Shades from one anchor of the scale to the next.
 const PER_STEP: i32 = 4;

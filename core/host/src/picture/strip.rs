@@ -1,6 +1,6 @@
 //! The strokes of a plate so far: worst gap with its uncertainty against the limit.
 
-use platen_shape::task::Verdict;
+use platen_model::Verdict;
 
 use super::colour::{self, INK, PALE, PAPER};
 use super::page::{Page, Text, draw};

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use platen_abi::payload::{self, Header, Malformed};
+use platen_model::{Field, Findings, NodeState, Report, Task};
 use platen_plant::OptionValue;
 use platen_shape::surface::Surface;
-use platen_shape::task::{Findings, Task};
 
 use super::instance::InputFrame;
 use super::job::HostBuffer;
@@ -19,45 +19,6 @@ const MAX_FIELD: usize = 1 << 22;
 pub struct Comparison {
     instance: Instance,
     limit: Duration,
-}
-
-/// What a comparison found.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Report {
-    /// Name of the plugin.
-    pub comparison: String,
-    /// Figures, judgement, sentences.
-    pub findings: Findings,
-    /// Fields over the plate.
-    pub fields: Vec<Field>,
-}
-
-/// A field on an even grid over the whole plate, v outer, u inner.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Field {
-    /// Name, e.g. `displacement`.
-    pub name: String,
-    /// Unit, e.g. `m`.
-    pub unit: String,
-    /// Nodes along u and v.
-    pub nodes: [usize; 2],
-    /// Numbers a node.
-    pub components: usize,
-    /// Numbers, components innermost; what a node without data holds means nothing.
-    pub values: Vec<f64>,
-    /// What is known at each node.
-    pub state: Vec<NodeState>,
-}
-
-/// What is known at a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NodeState {
-    /// The plate was not seen here.
-    Unseen,
-    /// A value.
-    Seen,
-    /// A value below the level of detection: nothing changed.
-    Unchanged,
 }
 
 /// The surfaces of a plate that a comparison may look at.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::units::mm;
+use platen_model::units::mm;
 use platen_shape::{Check, EXPANDED, EdgeCheck, ShapeChecks};
 
 /// What tape, square and sight line would show.

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use platen_shape::evaluate::{self, GRID};
 use platen_shape::measure::Measurement;
 
-use crate::plugin::{Field, NodeState, Report};
-use crate::units::mm;
+use platen_model::units::mm;
+use platen_model::{Field, NodeState, Report};
 
 /// Places on an even grid over the plate; null where nothing is known.
 #[derive(Debug, Clone, Serialize, Deserialize)]

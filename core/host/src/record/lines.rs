@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use platen_model::{Seat, TemplateFinding, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::Surface;
 use platen_shape::evaluate;
 use platen_shape::measure::Measurement;
-use platen_shape::task::{Seat, TemplateFinding, Verdict};
 
-use crate::plugin::Report;
-use crate::units::{mm, mm_pair};
+use platen_model::Report;
+use platen_model::units::{mm, mm_pair};
 
 /// One reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -73,7 +73,7 @@ pub struct TemplateRecord {
 }
 
 pub(super) fn record(measurement: &Measurement, plate: &PlateFile, reports: &[&Report]) -> Vec<LineRecord> {
-    let line = |line: &platen_plant::plate::ReferenceLine| {
+    let line = |line: &platen_model::ReferenceLine| {
         let places =
             evaluate::reference_line(&measurement.surface, &measurement.location, line.from, line.to);
         let templates = reports.iter().flat_map(|report| &report.findings.templates);
@@ -99,7 +99,7 @@ pub(super) fn record(measurement: &Measurement, plate: &PlateFile, reports: &[&R
 
 fn template(
     finding: &TemplateFinding,
-    line: &platen_plant::plate::ReferenceLine,
+    line: &platen_model::ReferenceLine,
     plate: &PlateFile,
     surface: &Surface,
 ) -> TemplateRecord {
@@ -126,7 +126,7 @@ fn template(
 }
 
 /// The places on the plate of a board's gaps.
-fn places(finding: &TemplateFinding, line: &platen_plant::plate::ReferenceLine, chord: f64) -> Vec<[f64; 2]> {
+fn places(finding: &TemplateFinding, line: &platen_model::ReferenceLine, chord: f64) -> Vec<[f64; 2]> {
     let length = line.length();
     let last = finding.gap.len().saturating_sub(1).max(1) as f64;
     let at = |k: usize| (finding.start + chord * k as f64 / last) / length;

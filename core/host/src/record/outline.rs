@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use platen_shape::Blank;
 
-use crate::units::{metres, mm, mm_pair};
+use platen_model::units::{metres, mm, mm_pair};
 
 /// Where the four edges lie in (u, v), and how that is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

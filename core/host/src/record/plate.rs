@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use platen_model::{Facing, RadiusOf, Target, TargetShape};
 use platen_plant::PlateFile;
-use platen_plant::plate::{Facing, RadiusOf, Target, TargetShape};
 use platen_shape::{Surface, Vec3};
 
 use crate::picture::Yardstick;
-use crate::units::mm;
+use platen_model::units::mm;
 
 /// The plate as its file had it at this stroke.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

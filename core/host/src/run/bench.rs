@@ -7,9 +7,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use platen_history::History;
-use platen_plant::press::{Measure, Press};
+use platen_model::Measure;
+use platen_model::{Code, Measurement, StrokeData, StrokeKey};
+use platen_plant::press::Press;
 use platen_plant::{PlantFile, PlateFile};
-use platen_press::{Answer, Code, Measurement, StrokeData, StrokeKey};
+use platen_press::Answer;
 use platen_scan::Window;
 use platen_shape::{PlateSpec, Surface};
 use tokio::sync::mpsc::UnboundedSender;
@@ -19,11 +21,12 @@ use super::earlier::EarlierScans;
 use super::region::{self, Region};
 use super::{Watcher, figures};
 use crate::calibration::{self, Calibration};
-use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Report, Scanner, Surfaces};
+use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
 use crate::record::{Context, ResultRecord};
 use crate::rig::{self, Rig};
 use crate::stroke::{self, Baseline, Last, NotMeasured, Scanned, Tape};
 use crate::{files, past, report};
+use platen_model::Report;
 
 /// Longest scan of a driver that gives no estimate: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);

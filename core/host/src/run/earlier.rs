@@ -1,7 +1,6 @@
 //! What is on record of earlier scans of the plate in hand.
 
 use platen_history::{Archive, Error, Stroke};
-use platen_press::StrokeData;
 use platen_shape::{Blank, Surface};
 
 use crate::{files, past};
@@ -42,9 +41,8 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
         .inspect_err(|error| tracing::warn!("{error}; this stroke is compared with none"))
         .ok()
         .flatten()?;
+    let data = stroke.press_data();
     let document = stroke.document?;
-    // Written by this program as JSON; what cannot be read any more is as good as nothing said.
-    let data: StrokeData = serde_json::from_str(&stroke.data).unwrap_or_default();
     let surface = files::surface_beside(&document)
         .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
         .ok()?;

@@ -1,18 +1,18 @@
 //! From the comparisons' findings to the figures in the press's registers.
 
+use platen_model::Measure;
+use platen_model::{Code, Figures, Measurement, Timestamp, Verdict};
 use platen_plant::PlateFile;
-use platen_plant::press::Measure;
-use platen_press::{Figures, Measurement, Timestamp, Verdict};
-use platen_shape::task;
 
-use crate::plugin::{PluginError, Report};
+use crate::plugin::PluginError;
 use crate::stroke::Measured;
+use platen_model::Report;
 
 /// What goes to the press. Figures that no comparison gave stay out and show as invalid.
 pub(super) fn measurement(
     measured: &Measured,
     reports: &[Result<Report, PluginError>],
-    verdict: task::Verdict,
+    verdict: Verdict,
     plate: &PlateFile,
     times: [(Measure, std::time::Duration); 3],
     scanned_at: jiff::Timestamp,
@@ -33,7 +33,7 @@ pub(super) fn measurement(
     for (measure, time) in times {
         put(measure, time.as_secs_f64());
     }
-    let station = |station: &platen_plant::plate::Station| {
+    let station = |station: &platen_model::Station| {
         let name = format!("station.{}", station.name);
         found()
             .find(|figure| figure.name == name)
@@ -42,12 +42,8 @@ pub(super) fn measurement(
     };
     figures.stations = plate.stations.iter().map(station).collect();
     Measurement {
-        verdict: match verdict {
-            task::Verdict::Pass => Verdict::Pass,
-            task::Verdict::Fail => Verdict::Fail,
-            task::Verdict::CannotTell => Verdict::CannotTell,
-            task::Verdict::NotMeasured => Verdict::NotMeasured(platen_press::Code::EvaluationFailed),
-        },
+        verdict,
+        reason: (verdict == Verdict::NotMeasured).then_some(Code::EvaluationFailed),
         figures,
         scanned_at: timestamp(scanned_at),
         warning: None,

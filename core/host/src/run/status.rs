@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use platen_model::{Code, Language};
 use platen_plant::press::Press;
-use platen_press::{Answer, Code, Durations, Language, Status};
+use platen_press::{Answer, Durations, Status};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 

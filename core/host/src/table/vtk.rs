@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use super::PlateTable;
-use crate::units::mm;
+use platen_model::units::mm;
 
 /// VTK's number of a triangle.
 const TRIANGLE: u32 = 5;

@@ -4,10 +4,11 @@ mod place;
 mod target;
 mod template;
 
-pub use target::{Facing, RadiusOf, Target, TargetShape};
-pub use template::{Centre, PRESETS, Preset, Seat, Template};
+pub use template::{PRESETS, Preset};
 
 use std::path::Path;
+
+use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Template};
 
 use crate::document::{Document, Reported};
 use crate::{Error, Faults, Table};
@@ -37,77 +38,11 @@ pub struct PlateFile {
     pub stations: Vec<Station>,
 }
 
-/// The plate as ordered.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plate {
-    /// Its name.
-    pub id: String,
-    /// Extent along u, metres.
-    pub width: f64,
-    /// Extent along v, metres.
-    pub height: f64,
-    /// Thickness, metres.
-    pub thickness: f64,
-    /// Where it rests while it is scanned; recorded, and compared between strokes.
-    pub supports: Option<String>,
-    /// How far inside the mid-surface's edge the scanned face ends (bevelled edges), metres.
-    pub face_inset: f64,
-}
-
-/// A place to be reported.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Marker {
-    /// Name.
-    pub name: String,
-    /// Place, metres.
-    pub at: [f64; 2],
-}
-
-/// A straight line on the original rectangle.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReferenceLine {
-    /// Name.
-    pub name: String,
-    /// First point, metres.
-    pub from: [f64; 2],
-    /// Last point, metres.
-    pub to: [f64; 2],
-}
-
 /// A line, and its name even where the rest is faulty, so that a template on it is not called faulty too.
 #[derive(Debug, Clone)]
 struct NamedLine {
     name: Result<String, Reported>,
     line: Result<ReferenceLine, Reported>,
-}
-
-/// A place of the plate that rests on a support of the press.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Support {
-    /// Place, metres.
-    pub at: [f64; 2],
-}
-
-/// A place of which one figure goes to the press.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Station {
-    /// Name.
-    pub name: String,
-    /// Place, metres.
-    pub at: [f64; 2],
-    /// Which figure.
-    pub quantity: Quantity,
-}
-
-/// Figures of a station.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Measured minus target along the target's normal.
-    Deviation,
-    /// Gap of the nearest template.
-    Gap,
-    /// Target's curvature minus measured.
-    CurvatureDeficit,
 }
 
 impl PlateFile {
@@ -134,17 +69,15 @@ impl PlateFile {
 
     fn read(mut root: Table<'_>) -> Result<Self, Reported> {
         let mut rectangle = None;
-        let plate = root.table("plate").required().and_then(|table| Plate::read(table, &mut rectangle));
+        let plate = root.table("plate").required().and_then(|table| read_plate(table, &mut rectangle));
         let target = root.table("target").optional();
-        let target = target.and_then(|table| table.map(|table| Target::read(table, rectangle)).transpose());
-        let markers = read_all(&mut root, "marker", |table, names| Marker::read(table, names, rectangle));
-        let lines = read_all(&mut root, "reference_line", |table, names| {
-            ReferenceLine::read(table, names, rectangle)
-        });
+        let target = target.and_then(|table| table.map(|table| target::read(table, rectangle)).transpose());
+        let markers = read_all(&mut root, "marker", |table, names| read_marker(table, names, rectangle));
+        let lines = read_all(&mut root, "reference_line", |table, names| read_line(table, names, rectangle));
         let known = lines.as_deref().map_err(|reported| *reported);
-        let templates = read_all(&mut root, "template", |table, names| Template::read(table, names, known));
-        let supports = read_all(&mut root, "support", |table, _| Support::read(table, rectangle));
-        let stations = read_all(&mut root, "station", |table, names| Station::read(table, names, rectangle));
+        let templates = read_all(&mut root, "template", |table, names| template::read(table, names, known));
+        let supports = read_all(&mut root, "support", |table, _| read_support(table, rectangle));
+        let stations = read_all(&mut root, "station", |table, names| read_station(table, names, rectangle));
         root.finish();
         Ok(Self {
             plate: plate?,
@@ -173,104 +106,94 @@ fn read_all<'d, T>(
     Ok(all)
 }
 
-impl Plate {
-    /// Also sets `rectangle`, when both sides are sound, whatever else is not.
-    fn read(mut table: Table<'_>, rectangle: &mut Option<Rectangle>) -> Result<Self, Reported> {
-        let id = table.name("id").required();
-        let width = table.number("width_mm").in_range(SIDE_MM).required();
-        let height = table.number("height_mm").in_range(SIDE_MM).required();
-        let thickness = table.number("thickness_mm").in_range(THICKNESS_MM).located().required();
-        let supports = table.name("supports").optional();
-        let face_inset = table.number("face_inset_mm").at_least(0.0).located().optional();
-        let document = table.document();
-        table.finish();
+/// Also sets `rectangle`, when both sides are sound, whatever else is not.
+fn read_plate(mut table: Table<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
+    let id = table.name("id").required();
+    let width = table.number("width_mm").in_range(SIDE_MM).required();
+    let height = table.number("height_mm").in_range(SIDE_MM).required();
+    let thickness = table.number("thickness_mm").in_range(THICKNESS_MM).located().required();
+    let supports = table.name("supports").optional();
+    let face_inset = table.number("face_inset_mm").at_least(0.0).located().optional();
+    let document = table.document();
+    table.finish();
 
-        let (width, height) = (width?, height?);
-        *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
-        let thickness = thickness?;
-        let shorter = width.min(height);
-        if thickness.value > shorter / 4.0 {
+    let (width, height) = (width?, height?);
+    *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
+    let thickness = thickness?;
+    let shorter = width.min(height);
+    if thickness.value > shorter / 4.0 {
+        let message = format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
+        return Err(document.fault(&thickness.place, message));
+    }
+    let face_inset = match face_inset? {
+        Some(inset) if inset.value > thickness.value => {
             let message =
-                format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
-            return Err(document.fault(&thickness.place, message));
+                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
+            return Err(document.fault(&inset.place, message));
         }
-        let face_inset = match face_inset? {
-            Some(inset) if inset.value > thickness.value => {
-                let message = format!(
-                    "found {}, must not be above the thickness of {} mm",
-                    inset.value, thickness.value
-                );
-                return Err(document.fault(&inset.place, message));
-            }
-            inset => inset.map_or(0.0, |inset| inset.value),
-        };
-        Ok(Self {
-            id: id?,
-            width: metres(width),
-            height: metres(height),
-            thickness: metres(thickness.value),
-            supports: supports?,
-            face_inset: metres(face_inset),
-        })
-    }
+        inset => inset.map_or(0.0, |inset| inset.value),
+    };
+    Ok(Plate {
+        id: id?,
+        width: metres(width),
+        height: metres(height),
+        thickness: metres(thickness.value),
+        supports: supports?,
+        face_inset: metres(face_inset),
+    })
 }
 
-impl Marker {
-    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> Result<Self, Reported> {
-        let name = names.take(&mut table);
-        let at = place::point(&mut table, "at_mm", plate);
-        table.finish();
-        Ok(Self { name: name?, at: at? })
-    }
+fn read_marker(
+    mut table: Table<'_>,
+    names: &mut Names,
+    plate: Option<Rectangle>,
+) -> Result<Marker, Reported> {
+    let name = names.take(&mut table);
+    let at = place::point(&mut table, "at_mm", plate);
+    table.finish();
+    Ok(Marker { name: name?, at: at? })
 }
 
-impl Support {
-    fn read(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Self, Reported> {
-        let at = place::point(&mut table, "at_mm", plate);
-        table.finish();
-        Ok(Self { at: at? })
-    }
+fn read_support(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Support, Reported> {
+    let at = place::point(&mut table, "at_mm", plate);
+    table.finish();
+    Ok(Support { at: at? })
 }
 
-impl ReferenceLine {
-    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {
-        let name = names.take(&mut table);
-        let from = place::point(&mut table, "from_mm", plate);
-        let to = place::point(&mut table, "to_mm", plate);
-        let (document, place) = (table.document(), table.place().clone());
-        table.finish();
-        let line = name.clone().and_then(|name| {
-            let line = Self { name, from: from?, to: to? };
-            if line.from == line.to {
-                return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
-            }
-            Ok(line)
-        });
-        NamedLine { name, line }
-    }
-
-    /// Length on the original rectangle, metres.
-    pub fn length(&self) -> f64 {
-        (self.to[0] - self.from[0]).hypot(self.to[1] - self.from[1])
-    }
+fn read_line(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {
+    let name = names.take(&mut table);
+    let from = place::point(&mut table, "from_mm", plate);
+    let to = place::point(&mut table, "to_mm", plate);
+    let (document, place) = (table.document(), table.place().clone());
+    table.finish();
+    let line = name.clone().and_then(|name| {
+        let line = ReferenceLine { name, from: from?, to: to? };
+        if line.from == line.to {
+            return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
+        }
+        Ok(line)
+    });
+    NamedLine { name, line }
 }
 
-impl Station {
-    fn read(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> Result<Self, Reported> {
-        let name = names.take(&mut table);
-        let at = place::point(&mut table, "at_mm", plate);
-        let quantity = table.choice(
-            "quantity",
-            &[
-                ("deviation", Quantity::Deviation),
-                ("gap", Quantity::Gap),
-                ("curvature_deficit", Quantity::CurvatureDeficit),
-            ],
-        );
-        let quantity = quantity.required();
-        table.finish();
-        Ok(Self { name: name?, at: at?, quantity: quantity? })
-    }
+fn read_station(
+    mut table: Table<'_>,
+    names: &mut Names,
+    plate: Option<Rectangle>,
+) -> Result<Station, Reported> {
+    let name = names.take(&mut table);
+    let at = place::point(&mut table, "at_mm", plate);
+    let quantity = table.choice(
+        "quantity",
+        &[
+            ("deviation", Quantity::Deviation),
+            ("gap", Quantity::Gap),
+            ("curvature_deficit", Quantity::CurvatureDeficit),
+        ],
+    );
+    let quantity = quantity.required();
+    table.finish();
+    Ok(Station { name: name?, at: at?, quantity: quantity? })
 }
 
 /// Millimetres of the file to metres.

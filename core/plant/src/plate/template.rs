@@ -1,49 +1,12 @@
 //! Templates: boards laid on reference lines, with the rules of the trade as presets.
 
+use platen_model::{Centre, ReferenceLine, Seat, Template};
+
 use super::place::Names;
-use super::{NamedLine, ReferenceLine, metres, millimetres};
+use super::{NamedLine, metres, millimetres};
 use crate::document::Reported;
 use crate::field::Located;
 use crate::{Document, Table, nearest};
-
-/// A board whose edge is the target's section along a line.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Template {
-    /// Name; `T1`, `T2` by place in the file where none is given.
-    pub name: String,
-    /// Name of the reference line that it lies on.
-    pub line: String,
-    /// Length of the board, metres.
-    pub chord: f64,
-    /// Where its middle lies.
-    pub centre: Centre,
-    /// Largest gap that passes, metres.
-    pub limit: f64,
-    /// How it is held.
-    pub seat: Seat,
-    /// Where the rule comes from, to be printed beside its verdict.
-    pub source: Option<String>,
-}
-
-/// Where the middle of a board lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Centre {
-    /// Along the line from its first point, metres.
-    At(f64),
-    /// The place with the largest gap is searched along the line.
-    Worst,
-}
-
-/// How a board is held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seat {
-    /// It rests where it comes to rest; judged balanced when it rocks.
-    Gravity,
-    /// Equal gaps at both ends.
-    Balanced,
-    /// Both ends are set on the profile.
-    Held,
-}
 
 /// A rule of the trade: what a template takes from it unless the file says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,44 +45,42 @@ pub const PRESETS: &[Preset] = &[
     },
 ];
 
-impl Template {
-    pub(super) fn read(
-        mut table: Table<'_>,
-        names: &mut Names,
-        lines: Result<&[NamedLine], Reported>,
-    ) -> Result<Self, Reported> {
-        let name = name(&mut table, names);
-        let presets: Vec<(&str, Preset)> = PRESETS.iter().map(|preset| (preset.name, *preset)).collect();
-        let preset = table.choice("preset", &presets).located().optional();
-        let line =
-            table.name("line").located().required().and_then(|name| on_line(table.document(), &name, lines));
-        let (chord, limit) = board(&mut table, &preset);
-        let centre = centre(&mut table);
-        let seat = table
-            .choice("seat", &[("gravity", Seat::Gravity), ("balanced", Seat::Balanced), ("held", Seat::Held)])
-            .or(Seat::Gravity);
-        let source = table.name("source").optional();
-        let document = table.document();
-        table.finish();
+pub(super) fn read(
+    mut table: Table<'_>,
+    names: &mut Names,
+    lines: Result<&[NamedLine], Reported>,
+) -> Result<Template, Reported> {
+    let name = name(&mut table, names);
+    let presets: Vec<(&str, Preset)> = PRESETS.iter().map(|preset| (preset.name, *preset)).collect();
+    let preset = table.choice("preset", &presets).located().optional();
+    let line =
+        table.name("line").located().required().and_then(|name| on_line(table.document(), &name, lines));
+    let (chord, limit) = board(&mut table, &preset);
+    let centre = centre(&mut table);
+    let seat = table
+        .choice("seat", &[("gravity", Seat::Gravity), ("balanced", Seat::Balanced), ("held", Seat::Held)])
+        .or(Seat::Gravity);
+    let source = table.name("source").optional();
+    let document = table.document();
+    table.finish();
 
-        let (line, chord) = (line?, chord?);
-        fits(document, line, &chord)?;
-        let centre = match centre? {
-            Some(centre) => stays_on(document, line, chord.value, centre)?,
-            None => Centre::At(line.length() / 2.0),
-        };
-        let limit = limit?;
-        let preset = preset?.map(|preset| preset.value.source_for(chord.value, limit));
-        Ok(Self {
-            name: name?,
-            line: line.name.clone(),
-            chord: metres(chord.value),
-            centre,
-            limit: metres(limit),
-            seat: seat?,
-            source: source?.or(preset),
-        })
-    }
+    let (line, chord) = (line?, chord?);
+    fits(document, line, &chord)?;
+    let centre = match centre? {
+        Some(centre) => stays_on(document, line, chord.value, centre)?,
+        None => Centre::At(line.length() / 2.0),
+    };
+    let limit = limit?;
+    let preset = preset?.map(|preset| preset.value.source_for(chord.value, limit));
+    Ok(Template {
+        name: name?,
+        line: line.name.clone(),
+        chord: metres(chord.value),
+        centre,
+        limit: metres(limit),
+        seat: seat?,
+        source: source?.or(preset),
+    })
 }
 
 impl Preset {

@@ -266,7 +266,7 @@ pub struct Field {
     /// Equal reads in a row before a bit's change counts.
     pub debounce_reads: u8,
     /// The figure in an output field, when it is not the field's own.
-    pub from: Option<super::Measure>,
+    pub from: Option<platen_model::Measure>,
 }
 
 impl Field {

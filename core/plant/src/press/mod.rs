@@ -12,7 +12,7 @@ pub use allow::{Refused, WriteAllow};
 pub use field::{Dimension, Field, Kind, Place, Unit, WordOrder};
 pub use link::{Link, Parity, Quiet, Serial, Socket, Transport};
 pub use map::{AddressBase, Block, Counter, Profile, RegisterMap, Table};
-pub use names::{Input, Measure, Output};
+pub use names::{Input, Output};
 pub use pph1::{INVALID_I16, INVALID_U16, MAP_VERSION, STATIONS};
 
 use std::time::Duration;

@@ -2,6 +2,8 @@
 //!
 //! Code asks for [`Input::StrokeId`], never for register 3: where it stands is the plant file's matter.
 
+use platen_model::Measure;
+
 use crate::press::Dimension;
 
 /// One enum with a name and a meaning per variant, from one list.
@@ -155,31 +157,9 @@ names! {
     }
 }
 
-names! {
-    /// A figure of a measurement, as the host hands it over: metres, radians, seconds, shares of one.
-    Measure {
-        DeviationMax "deviation.max" Length "highest place above the best-fitting target, towards the scanner"
-        DeviationMin "deviation.min" Length "deepest place below the best-fitting target, negative"
-        DeviationRms "deviation.rms" Length "root mean square distance from the best-fitting target"
-        DeviationP95 "deviation.p95" Length "95 % of the plate lie nearer than this to the best-fitting target"
-        InTolerance "in_tolerance" Share "share of the area that gaps by no more than the tolerance under the target laid on the plate"
-        Tolerance "tolerance" Length "tolerance that was applied"
-        Coverage "coverage" Share "share of the target that was measured"
-        DeviationMaxU "deviation.max_u" Length "place of the highest place, u"
-        DeviationMaxV "deviation.max_v" Length "place of the highest place, v"
-        DeviationMinU "deviation.min_u" Length "place of the deepest place, u"
-        DeviationMinV "deviation.min_v" Length "place of the deepest place, v"
-        CurvatureDeviation "curvature.deviation" Share "deviation of the curvature from the target's"
-        GapMax "gap.max" Length "largest gap under a template"
-        GapUncertainty "gap.uncertainty" Length "uncertainty of the largest gap"
-        GapU "gap.u" Length "place of the largest gap, u"
-        GapV "gap.v" Length "place of the largest gap, v"
-        GapLine "gap.line" Count "number of the template with the largest gap"
-        Sense "sense" Count "-1 not bent enough, 0 within, +1 bent too far"
-        ScanTime "scan_time" Time "duration of the scan"
-        EvaluateTime "evaluate_time" Time "duration of the evaluation"
-        StrokeToResultTime "stroke_to_result_time" Time "from the trigger to the result"
-    }
+/// Returns the dimension of a figure: that of the field it stands in by default.
+pub(crate) fn dimension_of(measure: Measure) -> Option<Dimension> {
+    Output::ALL.iter().find(|output| output.measure() == Some(measure)).map(|output| output.dimension())
 }
 
 impl Output {

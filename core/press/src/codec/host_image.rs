@@ -68,7 +68,7 @@ impl HostImage {
             Output::StatusSimulated => self.simulated,
             Output::StatusStorageDegraded => self.storage_degraded,
             Output::StatusCalibrationInvalid => self.calibration_invalid,
-            Output::StatusNotMeasured => matches!(self.verdict(), Some(Verdict::NotMeasured(_))),
+            Output::StatusNotMeasured => self.verdict() == Some(Verdict::NotMeasured),
             Output::StatusCannotTell => self.verdict() == Some(Verdict::CannotTell),
             _ => return None,
         })
@@ -219,7 +219,8 @@ pub fn describe_outputs(map: &RegisterMap, block: &[u16]) -> Vec<(Output, String
 mod tests {
     use super::*;
     use crate::{Measurement, StrokeKey, Timestamp};
-    use platen_plant::press::{Field, Kind, Measure};
+    use platen_model::Measure;
+    use platen_plant::press::{Field, Kind};
 
     fn publication() -> Publication {
         let values = [
@@ -240,6 +241,7 @@ mod tests {
             recipe_id: Some(17),
             measurement: Measurement {
                 verdict: Verdict::Fail,
+                reason: None,
                 figures: Figures { values: values.into(), stations: vec![Some(0.001), None, Some(-0.002)] },
                 scanned_at: Some(Timestamp { unix_s: 1_700_000_000, ms: 250 }),
                 warning: None,
@@ -307,7 +309,7 @@ mod tests {
         };
         assert_eq!(bits(Verdict::Pass, true), 1 << 2 | 1 << 3);
         assert_eq!(bits(Verdict::Fail, true), 1 << 2 | 1 << 4);
-        assert_eq!(bits(Verdict::NotMeasured(Code::ScanTimeout), true), 1 << 2 | 1 << 12);
+        assert_eq!(bits(Verdict::NotMeasured, true), 1 << 2 | 1 << 12);
         assert_eq!(bits(Verdict::CannotTell, true), 1 << 2 | 1 << 13);
         assert_eq!(bits(Verdict::Pass, false), 0);
     }

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use platen_plant::press::{Measure, OnMissed};
+use platen_model::Measure;
+use platen_plant::press::OnMissed;
 
 use super::edges::EdgeCounter;
 use super::machine::{Handshake, Job};
 use super::{LinkState, Work};
-use crate::{Code, Figures, HostImage, Publication, Severity, Verdict};
+use crate::{Code, Figures, HostImage, Publication, Severity};
 
 impl Work {
     /// Whether a stroke is in hand: another one would be missed.
@@ -108,10 +109,7 @@ impl Handshake {
         let fault = if let LinkState::Fault(code) = self.link { Some(code) } else { None };
         let obstacle = self.obstacle().filter(|code| code.alarm().severity == Severity::Error);
         let missed = self.missed && self.config.policy.on_missed_stroke != OnMissed::Warn;
-        let unmeasured = result.and_then(|result| match result.measurement.verdict {
-            Verdict::NotMeasured(code) => Some(code),
-            Verdict::Pass | Verdict::Fail | Verdict::CannotTell => None,
-        });
+        let unmeasured = result.and_then(|result| result.measurement.reason);
         let urgent = fault.or(unmeasured.filter(|_| valid)).or(obstacle);
         urgent.or(unmeasured).or(missed.then_some(Code::MissedStroke))
     }

@@ -6,7 +6,7 @@ use platen_plant::press::OnStorageFull;
 
 use super::machine::{Effect, Handshake, Job};
 use super::{LinkState, Transition, Work};
-use crate::{Acked, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
+use crate::{Acknowledgement, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
 
 /// A journal that has not answered after this long counts as failed for this record.
 const JOURNAL_LIMIT: Duration = Duration::from_secs(10);
@@ -33,7 +33,7 @@ impl Handshake {
 
     pub(super) fn accept(&mut self, press: PressImage, now: Duration) {
         if let Some(key) = self.unacked.take() {
-            self.close(key, Acked::NextStroke);
+            self.close(key, Acknowledgement::NextStroke);
         }
         if self.last.is_some_and(|last| last.session != press.session_id) {
             self.attempts.clear();
@@ -117,10 +117,7 @@ impl Handshake {
         }
         let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
         let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
-        let failed = match &job.outcome {
-            Some(Measurement { verdict: Verdict::NotMeasured(code), .. }) if !job.acquired => Some(*code),
-            _ => None,
-        };
+        let failed = job.outcome.as_ref().filter(|_| !job.acquired).and_then(|outcome| outcome.reason);
         let overdue = now.saturating_sub(job.since) >= self.scan_limit();
         let unstored = job.journaled == Some(false) && self.storage_stops() && !scanning;
         failed
@@ -169,7 +166,7 @@ impl Handshake {
             self.effects.push(Effect::Cancel(key));
         }
         let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
-        let measured = !matches!(outcome.verdict, Verdict::NotMeasured(_));
+        let measured = outcome.verdict != Verdict::NotMeasured;
         self.finish(outcome, Work::Publish, now);
         if measured { Transition::T15 } else { Transition::T16 }
     }
@@ -177,7 +174,7 @@ impl Handshake {
     /// Makes the result final and journals it; it is written once that is done.
     pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
         let Some(job) = &mut self.job else { return };
-        if let Verdict::NotMeasured(code) = measurement.verdict {
+        if let Some(code) = measurement.reason {
             self.effects.push(Effect::Alarm(code));
         } else {
             job.add_times(&mut measurement.figures, now);
@@ -214,7 +211,7 @@ impl Handshake {
 
     pub(super) fn acked(&mut self, now: Duration) -> Transition {
         if let Some(key) = self.unacked {
-            self.close(key, Acked::Explicit);
+            self.close(key, Acknowledgement::Explicit);
         }
         self.ack_was_low = false;
         self.work = Work::Clear;

@@ -6,7 +6,7 @@ use platen_plant::press::{Input, OnInterrupted};
 
 use super::machine::{Effect, Handshake, Job};
 use super::{LinkState, Transition, Work};
-use crate::{Acked, Code, Measurement, Record, Stage, StrokeKey};
+use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 
 /// A heartbeat of another host that stands still this long is that of a dead one.
 const OWNER_WATCH: Duration = Duration::from_secs(2);
@@ -116,7 +116,7 @@ impl Handshake {
                 if stage < Stage::Finished {
                     self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
                 }
-                self.close(key, Acked::Never);
+                self.close(key, Acknowledgement::Never);
                 self.job = None;
                 if stage == Stage::Accepted && waits {
                     return self.accept_rescan(now, Transition::T7);
@@ -131,7 +131,8 @@ impl Handshake {
         let Some(key) = self.stroke() else { return self.become_idle(now) };
         let concluded = matches!(self.work, Work::Publish | Work::WaitAck) && self.journaled();
         if concluded && !self.press_is_at(key) {
-            let how = if self.work == Work::WaitAck { Acked::NextStroke } else { Acked::Never };
+            let how =
+                if self.work == Work::WaitAck { Acknowledgement::NextStroke } else { Acknowledgement::Never };
             self.close(key, how);
             return self.become_idle(now);
         }
@@ -158,7 +159,7 @@ impl Handshake {
     }
 
     /// Ends a stroke that the press does not wait for any more.
-    pub(super) fn close(&mut self, key: StrokeKey, how: Acked) {
+    pub(super) fn close(&mut self, key: StrokeKey, how: Acknowledgement) {
         self.effects.push(Effect::Journal(Record::Acked { key, how }));
         self.unacked = None;
     }

@@ -417,7 +417,7 @@ impl<L: Link> Runner<L> {
         self.clock.delivered = Instant::now();
         self.metrics.stroke_to_result.add(stroke_to_result);
         match result.measurement.verdict {
-            Verdict::NotMeasured(_) => self.metrics.not_measured += 1,
+            Verdict::NotMeasured => self.metrics.not_measured += 1,
             Verdict::Pass | Verdict::Fail | Verdict::CannotTell => self.metrics.measured += 1,
         }
         tracing::info!(

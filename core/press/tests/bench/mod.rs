@@ -17,11 +17,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use platen_plant::press::Measure;
-use platen_press::{
-    Acked, Answer, Figures, Journal, Measurement, Order, Publication, Recalled, Record, Stage, StrokeKey,
-    Verdict,
+use platen_model::Measure;
+use platen_model::{
+    Acknowledgement, Figures, Measurement, Publication, Recalled, Record, Stage, StrokeKey, Verdict,
 };
+use platen_press::{Answer, Journal, Order};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 pub use plc::{Habits, Plc};
@@ -74,7 +74,7 @@ impl Memory {
         publications.collect()
     }
 
-    pub fn acked(&self) -> Vec<(StrokeKey, Acked)> {
+    pub fn acked(&self) -> Vec<(StrokeKey, Acknowledgement)> {
         let records = self.records.lock().unwrap();
         let acked = records.iter().filter_map(|record| match record {
             Record::Acked { key, how } => Some((*key, *how)),
@@ -121,6 +121,7 @@ pub fn measurement(key: StrokeKey) -> Measurement {
     let figure = f64::from(key.stroke % 30_000) * 1e-5;
     Measurement {
         verdict: if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail },
+        reason: None,
         figures: Figures { values: [(Measure::DeviationMax, figure)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,
@@ -134,7 +135,7 @@ pub async fn host(
     scan: Duration,
     judge: Duration,
     scans: Arc<Mutex<Vec<StrokeKey>>>,
-    alarms: Arc<Mutex<Vec<platen_press::Code>>>,
+    alarms: Arc<Mutex<Vec<platen_model::Code>>>,
 ) {
     let ready = Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) };
     let _ = answers.send(ready);

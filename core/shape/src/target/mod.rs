@@ -12,8 +12,8 @@ use std::f64::consts::TAU;
 
 use crate::Vec3;
 use crate::surface::Curvature;
-use crate::task::{Facing, RadiusOf, Target, TargetShape};
 use cone::Cone;
+use platen_model::{Facing, RadiusOf, Target, TargetShape};
 
 pub use placement::Placement;
 

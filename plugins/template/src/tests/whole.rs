@@ -1,6 +1,6 @@
 //! The whole target laid on the plate, stations, and what does not depend on where the plate lies.
 
-use platen_shape::task::{Quantity, Station};
+use platen_model::{Quantity, Station};
 
 use super::*;
 
@@ -12,7 +12,7 @@ fn the_target_lies_on_a_plate_of_its_own_shape() {
         let report = run(&plate_of(shape, Facing::Outside), &task(shape, Facing::Outside, Seat::Gravity))
             .expect("sound");
         let field = &report.fields[0];
-        assert_eq!((field.n_u, field.n_v, field.components), (NODES, NODES, 1));
+        assert_eq!((field.nodes, field.components), ([NODES; 2], 1));
         assert!(field.values.iter().all(|d| *d < 1e-9 && *d > -3e-5), "{shape:?}");
         assert_eq!(figure(&report, "in_tolerance"), 1.0);
     }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::accuracy::Accuracy;
-use crate::units::mm;
+use platen_model::units::mm;
 
 /// One figure: name in documents, head in tables, value in the unit of the name, digits after the point.
 type Figure = (&'static str, &'static str, fn(&Accuracy) -> f64, usize);

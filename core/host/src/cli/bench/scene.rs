@@ -18,7 +18,7 @@ use crate::cli::CliError;
 use crate::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
 use crate::rig;
 use crate::stroke::NotMeasured;
-use crate::units::metres;
+use platen_model::units::metres;
 
 /// Casting the rays of a full dome takes minutes on a slow machine.
 const SCAN_LIMIT: Duration = Duration::from_secs(3600);

@@ -8,19 +8,18 @@ use std::time::Duration;
 
 use serde_json::{Map, Value as Json, json};
 
+use platen_model::{Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template};
 use platen_plant::Value;
-use platen_shape::task::{
-    Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template,
-};
 use platen_shape::{Placement, Surface, Vec3};
 
 use super::scene::{Scene, Setting, Shot};
 use super::{figures, stages};
 use crate::accuracy::{Truth, rms};
 use crate::cli::CliError;
-use crate::plugin::{Catalogue, Comparison, Field, Flattening, NodeState, Report, Surfaces};
+use crate::plugin::{Catalogue, Comparison, Flattening, Surfaces};
 use crate::rig;
-use crate::units::{metres, mm};
+use platen_model::units::{metres, mm};
+use platen_model::{Field, NodeState, Report};
 
 /// Extent and thickness of the plates, millimetres.
 const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
@@ -199,6 +198,7 @@ fn task() -> Task {
             centre: Centre::At(0.5 * width),
             limit: 0.003,
             seat: Seat::Balanced,
+            source: None,
         }],
         stations: Vec::new(),
         sigma_correlated: 0.0,

@@ -16,7 +16,7 @@ use crate::accuracy::Accuracy;
 use crate::cli::{CliError, output};
 use crate::plugin::{Catalogue, Flattening};
 use crate::progress;
-use crate::units::mm;
+use platen_model::units::mm;
 
 /// A quarter of the finest scanner's resolution: 10,240 columns a turn.
 pub(super) const QUARTER_DEG: f64 = 360.0 / 10_240.0;

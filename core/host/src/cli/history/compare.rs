@@ -12,10 +12,11 @@ use super::{RunRef, open};
 use crate::calibration::Calibration;
 use crate::cli::{CliError, Common, output};
 use crate::picture::Caption;
-use crate::plugin::{Catalogue, Comparison, Report, Surfaces};
+use crate::plugin::{Catalogue, Comparison, Surfaces};
 use crate::record::{PlateRecord, figure};
-use crate::units::mm;
 use crate::{files, past, progress, rig};
+use platen_model::Report;
+use platen_model::units::mm;
 
 /// The comparisons that need two surfaces.
 const COMPARISONS: [&str; 2] = ["displacement", "curvature"];

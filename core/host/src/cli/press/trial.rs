@@ -5,10 +5,11 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use platen_plant::press::{Measure, Mode, Press};
+use platen_model::Measure;
+use platen_model::{Code, Figures, Language, Measurement, StrokeKey, Verdict};
+use platen_plant::press::{Mode, Press};
 use platen_press::{
-    Answer, Code, Figures, HostSide, Language, LinkState, Measurement, MemoryJournal, Order, PressLink,
-    Status, StrokeKey, Verdict, channels, run_press,
+    Answer, HostSide, LinkState, MemoryJournal, Order, PressLink, Status, channels, run_press,
 };
 use serde_json::json;
 use tokio::sync::mpsc;
@@ -27,7 +28,7 @@ pub(super) fn stand_in(key: StrokeKey) -> Measurement {
         (Measure::Sense, -1.0),
     ];
     let figures = Figures { values: values.into(), stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, figures, scanned_at: None, warning: None }
+    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
 }
 
 /// What the stand-in of scanner and evaluation saw.

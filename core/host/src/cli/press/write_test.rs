@@ -7,11 +7,9 @@ use std::io::{BufRead, IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use platen_model::{Figures, Measurement, Publication, StrokeKey, Verdict};
 use platen_plant::press::{Mode, Output, Press};
-use platen_press::{
-    Client, Figures, HostImage, LinkError, Measurement, ModbusLink, PressImage, Publication, StrokeKey,
-    Verdict, describe_outputs,
-};
+use platen_press::{Client, HostImage, LinkError, ModbusLink, PressImage, describe_outputs};
 use serde_json::json;
 
 use super::super::run::runtime;
@@ -84,7 +82,8 @@ fn image(press: &Press, field: Output, step: usize) -> HostImage {
             stations: (0..place.count).map(|index| Some(number(index))).collect(),
         },
     };
-    let measurement = Measurement { verdict: Verdict::CannotTell, figures, scanned_at: None, warning: None };
+    let measurement =
+        Measurement { verdict: Verdict::CannotTell, reason: None, figures, scanned_at: None, warning: None };
     let key = StrokeKey { press: press.press_id, session: 0, stroke: 0, attempt: 0 };
     let result = Publication { key, run_id: 0, seq: 0, recipe_id: None, measurement };
     HostImage { result: Some(result), ..HostImage::default() }

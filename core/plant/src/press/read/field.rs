@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use platen_model::Measure;
+
 use crate::document::Reported;
 use crate::node::Kind as NodeKind;
+use crate::press::names::dimension_of;
 use crate::press::{
-    AddressBase, Block, Counter, Dimension, Field, Input, Kind, Measure, Output, Place, Unit, WordOrder,
+    AddressBase, Block, Counter, Dimension, Field, Input, Kind, Output, Place, Unit, WordOrder,
 };
 use crate::{Place as FilePlace, Table as Cursor};
 
@@ -277,10 +280,11 @@ fn output_keys(
     let measured = Output::from_name(name).is_some_and(|output| output.measure().is_some());
     let from = if measured {
         let sources: Vec<_> = Measure::ALL.iter().map(|measure| (measure.name(), *measure)).collect();
-        let from = table.choice("from", &sources).check(|measure| match measure.dimension() == dimension {
-            true => Ok(()),
-            false => Err(format!("{measure} is of another kind than this field")),
-        });
+        let from =
+            table.choice("from", &sources).check(|measure| match dimension_of(*measure) == Some(dimension) {
+                true => Ok(()),
+                false => Err(format!("{} is of another kind than this field", measure.name())),
+            });
         from.optional()
     } else {
         Ok(None)

@@ -1,4 +1,4 @@
-//! What the plate is to become.
+//! The target: the shape that the plate is bent toward.
 
 use serde::{Deserialize, Serialize};
 

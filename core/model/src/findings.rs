@@ -1,35 +1,10 @@
-//! What a comparison answers.
+//! The output of a comparison: figures, judgement and sentences cross the plugin boundary as JSON (`platen.findings/1`).
 
 use serde::{Deserialize, Serialize};
 
-/// Judgement. There is no good by default: what is not known is `CannotTell`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Within every limit, by more than the uncertainty.
-    Pass,
-    /// A limit lies within the uncertainty, or something was not seen.
-    CannotTell,
-    /// Outside a limit, by more than the uncertainty.
-    Fail,
-    /// There is no measurement.
-    NotMeasured,
-}
+use crate::{Field, Seat, Verdict};
 
-impl Verdict {
-    /// As it is told to people.
-    #[must_use]
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::CannotTell => "cannot tell",
-            Self::Fail => "fail",
-            Self::NotMeasured => "not measured",
-        }
-    }
-}
-
-/// The answer of one comparison.
+/// Figures, judgement and sentences of one comparison.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Findings {
     /// Judgement; `None` for a comparison that does not judge.
@@ -57,7 +32,7 @@ pub struct Figure {
     pub at: Option<[f64; 2]>,
 }
 
-/// How one board lies on the plate.
+/// Contact of one template with the plate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TemplateFinding {
     /// Name of the template.
@@ -65,18 +40,18 @@ pub struct TemplateFinding {
     /// Name of its line.
     pub line: String,
     /// Seat that was judged.
-    pub seat: super::Seat,
-    /// The board rocks on the plate.
+    pub seat: Seat,
+    /// The template rocks on the plate.
     pub rocks: bool,
-    /// Largest gap, metres; signed for a held board.
+    /// Largest gap, metres; signed for a held template.
     pub max_gap: f64,
     /// Its expanded uncertainty (95 %), metres.
     pub uncertainty: f64,
     /// Where it is.
     pub max_gap_at: [f64; 2],
-    /// Where the board touches.
+    /// Where the template touches.
     pub contacts: Vec<Contact>,
-    /// Place of the board's first end along the line, metres.
+    /// Place of the template's first end along the line, metres.
     pub start: f64,
     /// Gap at equal steps from the first end to the last, metres.
     pub gap: Vec<f64>,
@@ -90,11 +65,30 @@ pub struct TemplateFinding {
     pub says: String,
 }
 
-/// A place where a board touches.
+/// A place where a template touches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Place on the plate.
     pub at: [f64; 2],
     /// False when the plate was not seen there.
     pub seen: bool,
+}
+
+/// Output of one comparison.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Report {
+    /// Name of the plugin; empty until the host has received the report.
+    pub comparison: String,
+    /// Figures, judgement, sentences.
+    pub findings: Findings,
+    /// Fields over the plate.
+    pub fields: Vec<Field>,
+}
+
+impl Report {
+    /// Combines the parts as a plugin returns them; the host adds the plugin's name.
+    #[must_use]
+    pub fn new(findings: Findings, fields: Vec<Field>) -> Self {
+        Self { comparison: String::new(), findings, fields }
+    }
 }

@@ -1,0 +1,156 @@
+//! The journal's records: the steps of a stroke that survive a power cut.
+//!
+//! Each promise to the press is journalled before it is made: no stroke is echoed as accepted before
+//! [`Record::Accepted`] is on the disk, no result is published before [`Record::Finished`] is.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Publication, StrokeData, StrokeKey};
+
+/// A step of a stroke that must survive a power cut.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Record {
+    /// The stroke is going to be echoed as accepted, then scanned.
+    Accepted {
+        /// Its identity.
+        key: StrokeKey,
+        /// Key of its record.
+        run_id: u32,
+        /// What the press said about it.
+        data: Box<StrokeData>,
+    },
+    /// The scan is taken.
+    Scanned {
+        /// The stroke.
+        key: StrokeKey,
+    },
+    /// The result is going to be published.
+    Finished(Box<Publication>),
+    /// The press has the result, or never will.
+    Acked {
+        /// The stroke.
+        key: StrokeKey,
+        /// How it ended.
+        how: Acknowledgement,
+    },
+}
+
+impl Record {
+    /// The stroke it belongs to.
+    pub fn key(&self) -> StrokeKey {
+        match self {
+            Self::Accepted { key, .. } | Self::Scanned { key } | Self::Acked { key, .. } => *key,
+            Self::Finished(publication) => publication.key,
+        }
+    }
+
+    /// The step it records.
+    pub fn stage(&self) -> Stage {
+        match self {
+            Self::Accepted { .. } => Stage::Accepted,
+            Self::Scanned { .. } => Stage::Scanned,
+            Self::Finished(_) => Stage::Finished,
+            Self::Acked { .. } => Stage::Acked,
+        }
+    }
+}
+
+/// How far a stroke has come, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Accepted, not scanned.
+    Accepted,
+    /// Scanned, not judged.
+    Scanned,
+    /// Judged, the press may not have it.
+    Finished,
+    /// Done with.
+    Acked,
+}
+
+/// How the press took a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Acknowledgement {
+    /// It raised its acknowledge.
+    Explicit,
+    /// It went on to the next stroke while the result stood in the registers.
+    NextStroke,
+    /// It went on, or restarted, before the result was in the registers: the record alone has it.
+    Never,
+}
+
+/// The last stroke in the journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its identity.
+    pub key: StrokeKey,
+    /// Key of its record.
+    pub run_id: u32,
+    /// What the press said about it.
+    pub data: StrokeData,
+    /// How far it came.
+    pub stage: Stage,
+    /// Its result; `Some` from [`Stage::Finished`] on.
+    pub publication: Option<Publication>,
+}
+
+/// What the journal knows when the host starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recalled {
+    /// Random number of this installation, drawn once, never 0: tells a second host on the same press.
+    pub owner: u16,
+    /// `seq` of the last publication, 0 before the first.
+    pub result_seq: u16,
+    /// Run id of the last stroke, 0 before the first.
+    pub run_id: u32,
+    /// The last stroke accepted.
+    pub last: Option<Entry>,
+    /// Highest attempt per stroke number in the session of [`last`](Self::last): the strokes not to scan again.
+    pub attempts: BTreeMap<u16, u16>,
+}
+
+impl Recalled {
+    /// The journal of a new installation.
+    pub fn empty(owner: u16) -> Self {
+        Self { owner, result_seq: 0, run_id: 0, last: None, attempts: BTreeMap::new() }
+    }
+
+    /// Takes in the next record of a journal that is read from its beginning.
+    pub fn replay(&mut self, record: &Record) {
+        if let Record::Accepted { key, run_id, data } = record {
+            if self.last.as_ref().is_some_and(|last| last.key.session != key.session) {
+                self.attempts.clear();
+            }
+            self.attempts.insert(key.stroke, key.attempt);
+            self.run_id = *run_id;
+            let data = StrokeData::clone(data);
+            let (key, run_id) = (*key, *run_id);
+            self.last = Some(Entry { key, run_id, data, stage: Stage::Accepted, publication: None });
+        }
+        if let Record::Finished(publication) = record {
+            self.result_seq = publication.seq;
+        }
+        if let Some(last) = self.last.as_mut().filter(|last| last.key == record.key()) {
+            last.stage = record.stage();
+            if let Record::Finished(publication) = record {
+                last.publication = Some((**publication).clone());
+            }
+        }
+    }
+}
+
+impl Acknowledgement {
+    /// Returns the name in the record.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Explicit => "explicit",
+            Self::NextStroke => "next_stroke",
+            Self::Never => "never",
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! The vocabulary of the workspace: one type for each idea that more than one room uses.
+//!
+//! | module | types |
+//! |---|---|
+//! | `plate` | [`Plate`], [`Marker`], [`ReferenceLine`], [`Support`], [`Station`]: the plate as ordered and the places on it |
+//! | `target` | [`Target`] and its shapes: the shape that the plate is bent toward |
+//! | `template` | [`Template`], [`Centre`], [`Seat`]: a template laid on a reference line |
+//! | `stroke` | [`StrokeKey`], [`StrokeData`]: identity of a stroke, and the press's data about it |
+//! | `task` | [`Task`]: the input of a comparison |
+//! | `findings`, `field` | [`Findings`], [`Field`], [`Report`]: the output of a comparison |
+//! | `verdict`, `figures`, `publication` | [`Verdict`], [`Figures`], [`Publication`]: the result as the press receives it |
+//! | `journal` | [`Record`], [`Recalled`]: the steps of a stroke that survive a power cut |
+//! | `alarm` | [`Code`]: numbers, texts and remedies of the alarms |
+//!
+//! Lengths in metres, angles in radians, places as (u, v) on the original rectangle. [`units`] converts to the units of
+//! people. Plain data with serde: no I/O, no clock.
+
+mod alarm;
+mod field;
+mod figures;
+mod findings;
+mod journal;
+mod plate;
+mod publication;
+mod stroke;
+mod target;
+mod task;
+mod template;
+pub mod units;
+mod verdict;
+
+pub use alarm::{Alarm, Code, Language, Severity};
+pub use field::{Field, NodeState};
+pub use figures::{Figures, Measure};
+pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
+pub use journal::{Acknowledgement, Entry, Recalled, Record, Stage};
+pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support};
+pub use publication::{Measurement, Publication};
+pub use stroke::{StrokeData, StrokeKey, Timestamp};
+pub use target::{Facing, RadiusOf, Target, TargetShape};
+pub use task::Task;
+pub use template::{Centre, Seat, Template};
+pub use verdict::Verdict;
