@@ -4,8 +4,8 @@
 mod angles;
 #[path = "../src/chart.rs"]
 mod chart;
-#[path = "../src/reduced.rs"]
-mod reduced;
+#[path = "../src/reduced_system.rs"]
+mod reduced_system;
 
 use divan::Bencher;
 use platen_shape::flatten::closed_form::{ClosedForm, cylinder};

@@ -1,14 +1,14 @@
-//! The angles of a mesh, their targets and what a plane asks of them.
+//! Angles of a mesh: target angles, residuals and Jacobian of the planarity constraints.
 
 use std::f64::consts::{PI, TAU};
 
 use platen_shape::DiskMesh;
 use platen_shape::flatten::cotangents;
 
-/// Three numbers of a triangle, one per corner.
+/// Three numbers per triangle, one at each corner.
 pub(crate) type Corners = [f64; 3];
 
-/// The measured angles, at interior vertices scaled so that they sum up to 2 pi.
+/// Returns the measured angles, scaled at interior vertices so that they sum to 2 pi.
 pub(crate) fn targets(mesh: &DiskMesh, node_of: &[Option<u32>], n_inner: usize) -> Vec<Corners> {
     let mut targets: Vec<_> = cotangents(mesh).into_iter().map(|c| c.map(|c| 1.0_f64.atan2(c))).collect();
     let mut sums = vec![0.0; n_inner];
@@ -29,15 +29,15 @@ pub(crate) fn targets(mesh: &DiskMesh, node_of: &[Option<u32>], n_inner: usize) 
     targets
 }
 
-/// By how much the constraints fail: per triangle the sum less pi; per interior vertex the sum less 2 pi, and by how much
-/// the logarithm of its ring's length grows in one turn.
-pub(crate) struct Failing {
+/// Residuals of the constraints: per triangle the sum of angles less pi; per interior vertex the sum of angles less 2 pi,
+/// and the logarithm of the factor by which edge lengths grow in one turn around it.
+pub(crate) struct Residuals {
     pub(crate) triangles: Vec<f64>,
     pub(crate) vertices: Vec<[f64; 2]>,
 }
 
-impl Failing {
-    pub(crate) fn of(x: &[Corners], nodes: &[[Option<u32>; 3]], n_inner: usize) -> Self {
+impl Residuals {
+    pub(crate) fn new(x: &[Corners], nodes: &[[Option<u32>; 3]], n_inner: usize) -> Self {
         let mut vertices = vec![[-TAU, 0.0]; n_inner];
         for (x, nodes) in x.iter().zip(nodes) {
             let log_sin = x.map(|x| x.sin().ln());
@@ -52,12 +52,12 @@ impl Failing {
     }
 }
 
-/// The derivatives of a triangle's share in the vertex constraints: per corner, by its three angles, of the turn and of
-/// the growth.
+/// Jacobian block of a triangle in the vertex constraints: per corner, the derivatives of the turn and of the growth by the
+/// triangle's three angles.
 #[derive(Clone, Copy)]
-pub(crate) struct Slopes([[Corners; 2]; 3]);
+pub(crate) struct Jacobian([[Corners; 2]; 3]);
 
-impl Slopes {
+impl Jacobian {
     pub(crate) fn at(x: &Corners) -> Self {
         let cot = x.map(|x| 1.0 / x.tan());
         Self(std::array::from_fn(|k| {
@@ -69,12 +69,12 @@ impl Slopes {
         }))
     }
 
-    /// Rows of corner `k` times three numbers of the triangle.
+    /// Returns the product of the rows of corner `k` with three numbers of the triangle.
     pub(crate) fn times(&self, k: usize, x: &Corners) -> [f64; 2] {
         self.0[k].map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
     }
 
-    /// The rows' sum, weighted by the multipliers of the corners.
+    /// Returns the product of the transposed block with the multipliers of the corners.
     pub(crate) fn transposed_times(&self, multipliers: &[[f64; 2]; 3]) -> Corners {
         let mut sum = [0.0; 3];
         for (rows, m) in self.0.iter().zip(multipliers) {
@@ -83,7 +83,7 @@ impl Slopes {
         sum
     }
 
-    /// Rows of corner `k`.
+    /// Returns the rows of corner `k`.
     pub(crate) fn rows(&self, k: usize) -> &[Corners; 2] {
         &self.0[k]
     }

@@ -97,7 +97,7 @@ fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     assert!((0.5e-3..1.4e-3).contains(&mean) && max < 2.5e-3, "mean {mean:e}, max {max:e}");
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, no hang, no number that is none.
+/// Small meshes of every kind: noise up to the size of the cells. No panic, no hang, every coordinate finite.
 #[test]
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;

@@ -1,15 +1,15 @@
 //! Time of the elastic flattening by number of vertices: a 4 x 4 m plate, jittered, Delaunay.
 
+#[path = "../src/boundary_springs.rs"]
+mod boundary_springs;
 #[path = "../src/chart.rs"]
 mod chart;
-#[path = "../src/hold.rs"]
-mod hold;
+#[path = "../src/material_law_bound.rs"]
+mod material_law_bound;
 #[path = "../src/membrane.rs"]
 mod membrane;
-#[path = "../src/minimum.rs"]
-mod minimum;
-#[path = "../src/spread.rs"]
-mod spread;
+#[path = "../src/newton.rs"]
+mod newton;
 
 use divan::Bencher;
 use platen_shape::flatten::closed_form::{ClosedForm, cylinder, sphere_of_fibres};

@@ -1,28 +1,29 @@
-//! From the mesh to the chart: start, minimum, strain, uncertainty.
+//! Chart of a mesh: start, minimum of the energy, strain, uncertainty.
 
 use platen_sdk::Result;
 use platen_shape::flatten::{cotangents, first_turned, fixed_boundary};
 use platen_shape::{Chart, DiskMesh};
 
-use crate::hold::Hold;
+use crate::boundary_springs::BoundarySprings;
+use crate::material_law_bound::material_law_bound;
 use crate::membrane::{Membrane, Strained};
-use crate::minimum::{minimise, not_found, unsolved};
-use crate::spread::spread;
+use crate::newton::{minimise, not_found, unsolved};
 
-/// The chart of least membrane energy; `go_on` is asked between the steps.
-pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, go_on: impl Fn() -> Result<()>) -> Result<Chart> {
+/// Returns the chart of least membrane energy. `check` is called between the steps and stops the work with its error.
+pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, check: impl Fn() -> Result<()>) -> Result<Chart> {
     let mut uv = start(mesh)?;
-    go_on()?;
+    check()?;
     let membrane = Membrane::new(mesh, poisson);
-    let hold = Hold::new(mesh, scatter(&membrane.strains(&uv)));
-    minimise(mesh, &membrane, &hold, &mut uv, go_on)?;
+    let springs = BoundarySprings::new(mesh, scatter(&membrane.strains(&uv)));
+    minimise(mesh, &membrane, &springs, &mut uv, check)?;
     let strains = membrane.strains(&uv);
-    let sigma = spread(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
+    let sigma =
+        material_law_bound(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
     let strain = strain_of_vertices(mesh, &strains);
     Ok(Chart { uv, strain: Some(strain), sigma: Some(sigma) })
 }
 
-/// The harmonic map, or Tutte's where obtuse angles fold it.
+/// Returns the harmonic map, or Tutte's (uniform weights) where obtuse angles fold it.
 fn start(mesh: &DiskMesh) -> Result<Vec<[f64; 2]>> {
     let tutte = || vec![[1.0; 3]; mesh.triangles.len()];
     for weights in [&|| cotangents(mesh), &tutte as &dyn Fn() -> Vec<[f64; 3]>] {
@@ -34,7 +35,7 @@ fn start(mesh: &DiskMesh) -> Result<Vec<[f64; 2]>> {
     Err(not_found("the mesh folds over on the rectangle"))
 }
 
-/// Root mean square distance of the strain from its mean over the plate.
+/// Returns the root mean square deviation of the strain from its mean over the plate.
 fn scatter(strains: &[Strained]) -> f64 {
     let area: f64 = strains.iter().map(|s| s.area).sum();
     let mean = [0, 1, 2].map(|k| strains.iter().map(|s| s.area * s.strain[k]).sum::<f64>() / area);
@@ -45,7 +46,7 @@ fn scatter(strains: &[Strained]) -> f64 {
     (strains.iter().map(square).sum::<f64>() / area).sqrt()
 }
 
-/// Mean strain of the triangles at each vertex, by area: uu, vv, uv.
+/// Returns the area-weighted mean strain of the triangles at each vertex: uu, vv, uv.
 fn strain_of_vertices(mesh: &DiskMesh, strains: &[Strained]) -> Vec<[f64; 3]> {
     let mut sums = vec![(0.0, [0.0; 3]); mesh.vertices.len()];
     for (t, s) in mesh.triangles.iter().zip(strains) {

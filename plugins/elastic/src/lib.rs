@@ -1,62 +1,81 @@
-//! Flattening by least membrane energy onto the known outline, that of the blank or the rectangle as ordered: the default.
+//! Flattening `elastic`: least elastic energy of the membrane on the known outline. The default flattening.
 //!
-//! A plate that is pressed to a sphere or a torus must stretch and shrink in its own plane. This flattening looks for the
-//! places (u, v) at which the plate, drawn from its flat shape onto the measured mid-surface, has stored the least
-//! membrane energy (St. Venant and Kirchhoff, plane stress). It starts from the harmonic map and takes Newton's steps
-//! with a Hessian made positive triangle by triangle; no triangle is ever turned over.
+//! A plate that is pressed to a sphere or a torus stretches and shrinks in its own plane. This flattening finds the places
+//! (u, v) at which the plate, deformed from its flat shape onto the measured mid-surface, stores the least membrane
+//! energy. It replaces the flattenings of Masuda et al., "Point-based shape monitoring of plate bending for large-scale
+//! storage tanks" (section 4.3; plugins `abf` and `harmonic`), which are wrong by about a millimetre on double curvature.
 //!
-//! # The boundary
+//! # Method
 //!
-//! The material slides along the plate's edges. Across an edge, and in the corners along both of their edges, it is held
-//! by springs as stiff as the outline is known (`edge_sigma` and `corner_sigma` of the mesh). Where the plate must be
-//! strained the springs are as good as rigid; on a rolled plate they let a wrong inset of the outline go to both sides
-//! evenly instead of into the lengths between them. So the chart may leave the outline by about the uncertainty of
-//! the edge. A boundary without springs is not safe: up to 11 mm wrong.
+//! 1. *Start.* The fixed-boundary harmonic map; with uniform weights (Tutte) where obtuse angles fold it.
+//! 2. *Energy.* St. Venant-Kirchhoff material in plane stress, constant strain per triangle, plus springs at the boundary:
 //!
-//! # What it answers
+//!    ```text
+//!    W(x) = sum over triangles of A psi(E) + sum over springs of k (n . (x - x_known))^2 / 2
+//!    psi  = 1/2 S : E,   S = ((1 - nu) E + nu tr(E) I) / (1 - nu^2),   E = (F'F - I) / 2
+//!    ```
+//! 3. *Minimum.* Newton's method with line search (Armijo); the Hessian is projected triangle by triangle onto the positive
+//!    semidefinite matrices (Teran, Sifakis, Irving, Fedkiw, "Robust quasistatic finite elements and flesh simulation",
+//!    2005). No triangle is ever inverted.
 //!
-//! - (u, v) per vertex: exact on flat, rolled and conical plates; on a sphere of R 10 m, 5 x 2.5 m, 0.01 mm from the material
-//!   when that follows least energy and 0.24 mm (mean; 0.39 mm at most) when its fibres along one side keep their length.
-//! - Strain per vertex: Green's, area-weighted over the triangles around it.
-//! - Uncertainty per vertex: the distance between those two laws of the material. What the edges' own uncertainty leaves
-//!   between them is not in it; the host adds that for every flattening.
+//! # Boundary
 //!
-//! # What it needs
+//! The material slides freely along the plate's edges. Across an edge, and at the corners along both of their edges, springs
+//! hold it, as stiff as the outline is certain (`edge_sigma` and `corner_sigma` of the mesh). Where the plate must be
+//! strained the springs are practically rigid; on a rolled plate they share a wrong inset of the outline between two
+//! opposite edges instead of stretching the plate. The chart may therefore leave the outline by about the uncertainty of
+//! the edge. A free boundary is not safe: up to 11 mm wrong.
 //!
-//! Vertices that lie on the surface. Noise along the surface does no harm: a vertex that is measured elsewhere in the
-//! surface is another material point, and gets its (u, v). Noise across it makes every length longer by half the square of
-//! the slope: s mm at a spacing of h mm strain the mesh by about (s/h)^2, evenly spread 0.1 mm at 40 mm 6e-6, but 0.5 mm
-//! 1.6e-4, as much as a stroke may leave. Give it a smoothed surface, not the scanner's points.
+//! # Results
+//!
+//! - (u, v) per vertex: exact on flat, rolled and conical plates. On a sphere of R 10 m, 5 x 2.5 m: 0.01 mm from the material
+//!   when the material follows least energy; 0.24 mm in the mean and 0.39 mm at most when its fibres along one side keep
+//!   their length.
+//! - Membrane strain per vertex: Green's strain, area-weighted mean of the triangles around the vertex.
+//! - Uncertainty per vertex: the distance between these two material laws. The contribution of the edges' own uncertainty is
+//!   not part of it; the host adds that for every flattening.
+//!
+//! # Limits
+//!
+//! The vertices must lie on the surface. Noise along the surface is harmless: the vertex is another material point and gets
+//! that point's (u, v). Noise across the surface lengthens every side by half the square of the slope: s mm at a spacing of
+//! h mm strain the mesh by about (s/h)^2, that is 6e-6 for 0.1 mm at 40 mm, but 1.6e-4 for 0.5 mm, as much as a stroke may
+//! leave. The input must be a smoothed surface, not the scanner's points.
 //!
 //! # Example
 //!
 //! ```toml
 //! [flattening]
 //! plugin = "elastic"
+//! [flattening.options]
+//! poisson_ratio = 0.3
 //! ```
 //!
-//! | option | unit | default | |
-//! |---|---|---|---|
-//! | `poisson_ratio` | | 0.3 | 0 to 0.5; steel in the elastic range 0.3, flowing 0.5 |
+//! # Options
 //!
-//! # Refused
+//! | key | unit | default | range | meaning |
+//! |---|---|---|---|---|
+//! | `poisson_ratio` | 1 | 0.3 | 0 to 0.5 | Poisson's ratio nu; steel in the elastic range 0.3, flowing 0.5 |
 //!
-//! A triangle without area, a triangle with all corners on one edge of the plate, edges that differ from the sides of
-//! the rectangle by more than a tenth, a mesh so rough that no minimum is found.
+//! # Errors
+//!
+//! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose lengths
+//! differ from the sides of the rectangle by more than a tenth; a mesh so rough that no minimum is found.
 
+mod boundary_springs;
 mod chart;
-mod hold;
+mod material_law_bound;
 mod membrane;
-mod minimum;
-mod spread;
+mod newton;
 
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result, options};
+use platen_shape::flatten::check_fit;
 use platen_shape::{Chart, DiskMesh};
 
 options! {
-    /// Options of the elastic flattening.
+    /// Options of `elastic`.
     pub struct Options {
-        /// Share of a stretch by which the steel shrinks across it.
+        /// Poisson's ratio: share of a stretch by which the steel shrinks across it.
         poisson_ratio: f64 = 0.3, min 0.0, max 0.5;
     }
 }
@@ -77,8 +96,7 @@ impl Flattening for Elastic {
     }
 
     fn flatten(&mut self, job: &Job<'_>, mesh: &DiskMesh) -> Result<Chart> {
-        platen_shape::flatten::check_fit(mesh)
-            .map_err(|e| Error::new(ErrorKind::BadData, e.to_string()).hint(e.hint()))?;
+        check_fit(mesh).map_err(|e| Error::new(ErrorKind::BadData, e.to_string()).hint(e.hint()))?;
         chart::elastic(mesh, self.0.poisson_ratio, || job.check())
     }
 }

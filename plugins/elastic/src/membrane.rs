@@ -1,4 +1,4 @@
-//! The membrane energy of a map from the flat plate to a measured mesh, its gradient and a positive Hessian.
+//! St. Venant-Kirchhoff membrane energy of the map from the flat plate to the measured mesh: value, gradient, projected Hessian.
 //!
 //! The unknowns are the material places x = (u, v) of the mesh's vertices; the positions in space are given. In a
 //! triangle the deformation gradient F = [P1 - P0, P2 - P0] M^-1, M = [x1 - x0, x2 - x0], is constant, and
@@ -10,17 +10,18 @@
 //! W = sum over triangles of psi det(M) / 2
 //! ```
 //!
-//! W has the unit of an area; times Young's modulus and the thickness it is the energy of St. Venant and Kirchhoff.
+//! W has the unit of an area; multiplied by Young's modulus and the thickness it is the membrane energy.
 //! Moving the material places by dx = H x changes C by -(H'C + C H) and the area by tr H, so that
-//! dW = A (psi I - C S) : H, Eshelby's stress. The second derivative, in the frame where C is diagonal, falls into one
-//! 2 x 2 form of the stretches (H11, H22) and one of the shears (H12, H21); each is made positive semidefinite by
-//! dropping its negative eigenvalue. For small strain the forms are those of linear elasticity.
+//! dW = A (psi I - C S) : H, with Eshelby's stress in brackets. In the frame where C is diagonal the second derivative
+//! separates into a 2 x 2 quadratic form of the stretches (H11, H22) and one of the shears (H12, H21); each is projected
+//! onto the positive semidefinite forms by dropping its negative eigenvalue. For small strain the forms are those of linear
+//! elasticity.
 
 use platen_shape::DiskMesh;
 use platen_shape::flatten::signed_area;
 use platen_shape::sparse::Spd;
 
-/// The membrane of one mesh.
+/// Membrane of one mesh.
 pub(crate) struct Membrane<'a> {
     pub(crate) triangles: &'a [[u32; 3]],
     /// Metric of each triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
@@ -28,10 +29,10 @@ pub(crate) struct Membrane<'a> {
     poisson: f64,
 }
 
-/// A symmetric 2 x 2 tensor: 11, 22, 12.
+/// Symmetric 2 x 2 tensor: 11, 22, 12.
 pub(crate) type Sym = [f64; 3];
 
-/// A triangle on the plate and what was done to it.
+/// Strain of a triangle and its place on the flat plate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Strained {
     /// Area on the flat plate.
@@ -42,11 +43,11 @@ pub(crate) struct Strained {
     pub(crate) centre: [f64; 2],
 }
 
-/// The state of one triangle at given material places.
+/// State of one triangle at given material places.
 pub(crate) struct State {
     /// Area on the flat plate.
     pub(crate) area: f64,
-    /// Gradients of the three hat functions.
+    /// Gradients of the three linear shape functions (hat functions).
     pub(crate) hats: [[f64; 2]; 3],
     stretch: Sym,
     stress: Sym,
@@ -64,7 +65,7 @@ impl<'a> Membrane<'a> {
         Self { triangles: &mesh.triangles, metrics: mesh.triangles.iter().map(metric).collect(), poisson }
     }
 
-    /// The energy at the material places `x`; infinite when a triangle is turned over.
+    /// Returns the energy at the material places `x`; infinite when a triangle is inverted.
     pub(crate) fn energy(&self, x: &[[f64; 2]]) -> f64 {
         let mut sum = 0.0;
         for (t, metric) in self.triangles.iter().zip(&self.metrics) {
@@ -76,7 +77,7 @@ impl<'a> Membrane<'a> {
         sum
     }
 
-    /// Adds the energy's derivative by each material place to `gradient`.
+    /// Adds the derivative of the energy by each material place to `gradient`.
     pub(crate) fn add_gradient(&self, x: &[[f64; 2]], gradient: &mut [[f64; 2]]) {
         for (t, metric) in self.triangles.iter().zip(&self.metrics) {
             let Some(state) = self.state(t, metric, x) else { continue };
@@ -100,7 +101,7 @@ impl<'a> Membrane<'a> {
         }
     }
 
-    /// The strain of every triangle, in their order.
+    /// Returns the strain of every triangle, in the mesh's order.
     pub(crate) fn strains(&self, x: &[[f64; 2]]) -> Vec<Strained> {
         let of_triangle = |(t, metric): (&[u32; 3], &Sym)| {
             let [a, b, c] = t.map(|v| x[v as usize]);
@@ -138,7 +139,7 @@ impl State {
         green(self.stretch)
     }
 
-    /// psi I - C S; C and S commute, so it is symmetric.
+    /// Returns psi I - C S, symmetric because C and S commute.
     pub(crate) fn eshelby(&self) -> Sym {
         let ([c11, c22, c12], [s11, s22, s12]) = (self.stretch, self.stress);
         [
@@ -153,19 +154,19 @@ fn green(stretch: Sym) -> Sym {
     [0.5 * (stretch[0] - 1.0), 0.5 * (stretch[1] - 1.0), 0.5 * stretch[2]]
 }
 
-/// Plane stress of a strain, Young's modulus 1.
+/// Returns the plane stress of a strain, Young's modulus 1.
 pub(crate) fn stress([e11, e22, e12]: Sym, poisson: f64) -> Sym {
     let scale = 1.0 / (1.0 - poisson * poisson);
     [scale * (e11 + poisson * e22), scale * (e22 + poisson * e11), scale * (1.0 - poisson) * e12]
 }
 
-/// The second derivative of a triangle's energy per area as two quadratic forms in H, in the frame of C.
+/// Second derivative of a triangle's energy per area: two quadratic forms in H, in the principal frame of C.
 pub(crate) struct Forms {
-    /// Cosine and sine of the angle from u to the frame's first axis.
+    /// Cosine and sine of the angle from u to the first axis of the frame.
     turn: [f64; 2],
-    /// In (H11, H22).
+    /// Form in (H11, H22).
     stretches: Sym,
-    /// In (H12, H21).
+    /// Form in (H12, H21).
     shears: Sym,
 }
 
@@ -174,7 +175,7 @@ impl Forms {
         let [c11, c22, c12] = state.stretch;
         let (mean, half) = (0.5 * (c11 + c22), 0.5 * (c11 - c22));
         let radius = (half * half + c12 * c12).sqrt();
-        // Half the angle whose cosine is half / radius; any frame serves where C is a multiple of I.
+        // Half the angle whose cosine is half / radius. Where C is a multiple of I any frame is principal.
         let cos = if radius > 0.0 { (0.5 * (1.0 + half / radius)).max(0.0).sqrt() } else { 1.0 };
         let sin = (1.0 - cos * cos).max(0.0).sqrt().copysign(c12);
         let [c1, c2] = [mean + radius, mean - radius];
@@ -188,12 +189,12 @@ impl Forms {
         Self { turn: [cos, sin], stretches, shears }
     }
 
-    /// The nearest positive semidefinite forms.
+    /// Returns the nearest positive semidefinite forms.
     pub(crate) fn positive(self) -> Self {
         Self { stretches: positive_part(self.stretches), shears: positive_part(self.shears), ..self }
     }
 
-    /// The 2 x 2 block of two vertices with the given hat gradients.
+    /// Returns the 2 x 2 Hessian block of two vertices with the given hat gradients.
     pub(crate) fn block(&self, a: [f64; 2], b: [f64; 2], area: f64) -> [[f64; 2]; 2] {
         let [cos, sin] = self.turn;
         let turned = |g: [f64; 2]| [cos * g[0] + sin * g[1], cos * g[1] - sin * g[0]];
@@ -203,14 +204,14 @@ impl Forms {
         let k22 = area * (ee * a[0] * b[0] + dd * a[1] * b[1]);
         let k12 = area * (ad * a[0] * b[1] + be * a[1] * b[0]);
         let k21 = area * (ad * a[1] * b[0] + be * a[0] * b[1]);
-        // Back: R K R' with the columns of R the frame's axes.
+        // Rotation back: R K R' with the axes of the frame as columns of R.
         let (m11, m12) = (cos * k11 - sin * k21, cos * k12 - sin * k22);
         let (m21, m22) = (sin * k11 + cos * k21, sin * k12 + cos * k22);
         [[m11 * cos - m12 * sin, m11 * sin + m12 * cos], [m21 * cos - m22 * sin, m21 * sin + m22 * cos]]
     }
 }
 
-/// The nearest positive semidefinite form.
+/// Returns the nearest positive semidefinite form.
 pub(crate) fn positive_part([a, d, b]: Sym) -> Sym {
     let (mean, radius) = (0.5 * (a + d), (0.5 * (a - d)).hypot(b));
     let [high, low] = [mean + radius, mean - radius];

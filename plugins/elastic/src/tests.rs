@@ -1,4 +1,4 @@
-mod hold;
+mod boundary_springs;
 mod least_energy;
 mod membrane;
 
@@ -172,7 +172,7 @@ fn it_stops_when_told() {
     assert_eq!(told.unwrap_err(), stop());
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, no number that is none, no turned triangle.
+/// Small meshes of every kind: noise up to the size of the cells. No panic, every number finite, no inverted triangle.
 #[test]
 fn random_small_meshes_give_charts_or_are_refused() {
     let mut refused = 0;

@@ -1,15 +1,32 @@
-//! Flattening by harmonic map: the paper's second method (HM, section 4.3, equation 4), its fastest.
+//! Flattening `harmonic`: fixed-boundary harmonic map with cotangent weights.
 //!
-//! The boundary is laid where the mesh says, on the plate's outline by its share of each edge's arc length; the interior follows by minimising
-//! sum k_ij |p_i - p_j|^2 with k_ij = cot a_ij + cot b_ij, the cotangents of the angles opposite to the edge ij. One
-//! sparse Cholesky factorisation serves both coordinates.
+//! The second flattening method of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage
+//! tanks" (section 4.3, equation 4), and the faster of the two. It assigns each vertex of the mid-surface mesh its place
+//! (u, v) on the flat plate.
 //!
-//! # When to use it
+//! # Method
 //!
-//! Exact, up to the mesh, on plates that are bent without stretching: flat, cylinder, cone, bend bands. On double
-//! curvature it is wrong by a systematic 0.4 to 2 mm (sphere R 10 m, 5 x 2.5 m: 1 mm mean), since it spreads angles
-//! evenly instead of lengths; there use `elastic`. Both errors of the edge's place and of its length along the edge
-//! pass into the interior undamped. It tells neither strain nor uncertainty.
+//! The boundary vertices are fixed at the places that the mesh gives for them: on the outline of the plate, at their
+//! share of the edge's arc length. The interior vertices minimise the discrete Dirichlet energy
+//!
+//! ```text
+//! E = sum over edges ij of k_ij |p_i - p_j|^2,    k_ij = cot a_ij + cot b_ij
+//! ```
+//!
+//! where a_ij and b_ij are the angles opposite edge ij in its two triangles (Pinkall, Polthier, "Computing discrete
+//! minimal surfaces and their conjugates", 1993). The normal equations are symmetric positive definite; one sparse Cholesky
+//! factorisation serves both coordinates.
+//!
+//! # Accuracy and limits
+//!
+//! | plate | error |
+//! |---|---|
+//! | flat, cylinder, cone, bend bands (bent without stretching) | that of the mesh only, second order in its spacing |
+//! | sphere of R 10 m, 5 x 2.5 m | systematic, about 1 mm in the mean |
+//! | double curvature in general | systematic, 0.4 to 2 mm: the map preserves angles, the plate preserves lengths; use `elastic` |
+//!
+//! An error in the place of an edge, or in the arc length along it, enters the interior undamped. The chart contains
+//! neither strain nor uncertainty.
 //!
 //! # Example
 //!
@@ -18,16 +35,18 @@
 //! plugin = "harmonic"
 //! ```
 //!
-//! It has no options.
+//! # Options
 //!
-//! # Refused
+//! None.
 //!
-//! A triangle without area, a triangle with all corners on one edge of the plate, edges that differ from the sides of
-//! the rectangle by more than a tenth.
-
-mod map;
+//! # Errors
+//!
+//! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose lengths
+//! differ from the sides of the rectangle by more than a tenth.
 
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result};
+use platen_shape::flatten::{check_fit, cotangents, fixed_boundary};
+use platen_shape::sparse::SparseError;
 use platen_shape::{Chart, DiskMesh};
 
 struct Harmonic;
@@ -36,7 +55,7 @@ impl Flattening for Harmonic {
     const INFO: Info = Info::new(
         c"harmonic",
         c"Harmonic map",
-        c"The paper's harmonic map: exact on cylinders and cones, about 1 mm wrong on double curvature.",
+        c"Fixed-boundary harmonic map: exact on cylinders and cones, about 1 mm wrong on double curvature.",
         c"1.0.0",
     );
     type Options = ();
@@ -46,14 +65,18 @@ impl Flattening for Harmonic {
     }
 
     fn flatten(&mut self, job: &Job<'_>, mesh: &DiskMesh) -> Result<Chart> {
-        platen_shape::flatten::check_fit(mesh)
-            .map_err(|e| Error::new(ErrorKind::BadData, e.to_string()).hint(e.hint()))?;
+        check_fit(mesh).map_err(|e| Error::new(ErrorKind::BadData, e.to_string()).hint(e.hint()))?;
         job.check()?;
-        let uv = map::harmonic(mesh).map_err(|e| {
+        let uv = harmonic(mesh).map_err(|e| {
             Error::new(ErrorKind::BadData, e.to_string()).hint("scan again; if it stays, report this scan")
         })?;
         Ok(Chart { uv, ..Chart::default() })
     }
+}
+
+/// Returns (u, v) per vertex, metres.
+fn harmonic(mesh: &DiskMesh) -> std::result::Result<Vec<[f64; 2]>, SparseError> {
+    fixed_boundary(mesh, &cotangents(mesh))
 }
 
 platen_sdk::export!(flattening Harmonic);

@@ -1,4 +1,4 @@
-use crate::map::harmonic;
+use crate::harmonic;
 use platen_shape::Vec3;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, first_turned};
@@ -67,7 +67,7 @@ fn turn_and_shift() -> impl Fn(Vec3) -> Vec3 {
     move |p| Vec3::new(cos * p.z - sin * p.x + 4.0, p.y - 7.0, cos * p.x + sin * p.z + 1.0)
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, no number that is none.
+/// Small meshes of every kind: noise up to the size of the cells. No panic, every coordinate finite.
 #[test]
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;

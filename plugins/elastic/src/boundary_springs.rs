@@ -1,30 +1,32 @@
-//! How the known outline holds the material places of the boundary.
+//! Boundary springs: the prior of the outline on the material places of the boundary.
 //!
-//! An edge of the plate is seen at its place up to `edge_sigma`, a corner up to `corner_sigma`; the material may slide
-//! along an edge. Each is a spring along the outline's normal at the vertex, in a corner along the normals of both edges.
-//! Sliding by s along an edge of radius R leaves it by s^2 / 2R, nothing on a plate's edge. Read as statistics, the
-//! minimum of membrane energy plus springs is the likeliest chart when the membrane strain scatters by `strain` around
-//! zero and the edge's place by `edge_sigma`, the same all along the edge: the springs of one edge share
+//! The position of an edge is known with standard deviation `edge_sigma`, that of a corner with `corner_sigma`; the material
+//! may slide along an edge. Each is a spring along the outline's normal at the vertex, at a corner along the normals of both
+//! edges. Sliding by s along an edge of radius R leaves the edge by s^2 / 2R, which is negligible on a plate.
+//!
+//! The stiffness makes the minimum of membrane energy plus springs the maximum a posteriori chart when the membrane strain has
+//! the standard deviation `strain` around zero and the edge's position `edge_sigma`, fully correlated along the edge. The
+//! springs of one edge share, by arc length,
 //!
 //! ```text
 //! k = strain^2 W H / edge_sigma^2        (Young's modulus 1)
 //! ```
 //!
-//! by arc length. `strain` is the scatter of the harmonic map's strain about its mean over the plate; the mean is what a
-//! wrong place of the edges puts in. So on a sphere, where strain must be, the edges hold hard (strain 2e-3, 4 x 3 m,
-//! 0.1 mm: k = 5000 against about 1 of the plate), and on a rolled plate, whose own measures are known better than its
-//! edges' places, a misfit is shared between two opposite edges instead of being stretched into the plate.
+//! `strain` is the standard deviation of the harmonic map's strain about its mean over the plate; the mean is the effect of
+//! misplaced edges. On a sphere, where the plate must be strained, the edges are therefore practically fixed (strain 2e-3,
+//! 4 x 3 m, 0.1 mm: k = 5000 against about 1 of the plate). On a rolled plate, whose own dimensions are more certain than
+//! its edges' positions, a misfit is shared between two opposite edges instead of stretching the plate.
 
 use platen_shape::DiskMesh;
 use platen_shape::sparse::Spd;
 
-/// No edge is known better than this, metres: keeps the springs of perfect edges within the reach of f64.
+/// Least standard deviation of an edge, metres: keeps the springs of perfect edges within the range of f64.
 const MIN_SIGMA: f64 = 1e-6;
 
-/// No plate lies stiller than this: 1 K of heat.
+/// Least standard deviation of the strain: the thermal strain of 1 K.
 const MIN_STRAIN: f64 = 1e-5;
 
-/// A vertex drawn to its known place along one direction.
+/// Spring from a vertex to its known place, along one direction.
 struct Spring {
     vertex: u32,
     normal: [f64; 2],
@@ -33,18 +35,18 @@ struct Spring {
 }
 
 impl Spring {
-    /// How far the vertex is off along the direction.
+    /// Returns the distance of the vertex from its known place along the normal.
     fn stretch(&self, x: &[[f64; 2]]) -> f64 {
         let x = x[self.vertex as usize];
         self.normal[0] * (x[0] - self.place[0]) + self.normal[1] * (x[1] - self.place[1])
     }
 }
 
-/// All springs of a plate.
-pub(crate) struct Hold(Vec<Spring>);
+/// Springs of a plate.
+pub(crate) struct BoundarySprings(Vec<Spring>);
 
-impl Hold {
-    /// The springs of `mesh` for a membrane strain that scatters by `strain`.
+impl BoundarySprings {
+    /// Makes the springs of `mesh` for a membrane strain of standard deviation `strain`.
     pub(crate) fn new(mesh: &DiskMesh, strain: f64) -> Self {
         let scale = strain.max(MIN_STRAIN).powi(2) * mesh.width * mesh.height;
         let stiffness = |sigma: f64| scale / sigma.max(MIN_SIGMA).powi(2);
@@ -64,7 +66,7 @@ impl Hold {
             }
         }
         for (corner, [leaving, arriving]) in mesh.corner_sigma.iter().enumerate() {
-            // Along the edge that leaves, the corner lies on the line of the edge that arrives, and the reverse.
+            // The position along the leaving edge is held across the arriving edge, and the reverse.
             let before = (corner + 3) % 4;
             let (start, end) = (*mesh.edge(corner).start(), *mesh.edge(before).end());
             springs.push(spring(start, normal(mesh, before, end), stiffness(*leaving)));
@@ -93,7 +95,7 @@ impl Hold {
     }
 }
 
-/// Unit normal of the outline at position `at` of an edge: across the line of its neighbours there.
+/// Returns the unit normal of the outline at position `at` of an edge: perpendicular to the chord between its neighbours.
 fn normal(mesh: &DiskMesh, edge: usize, at: usize) -> [f64; 2] {
     let range = mesh.edge(edge);
     let place = |at: usize| mesh.places[at % mesh.places.len()];

@@ -1,32 +1,32 @@
-//! How far a material point may be from the place of least energy.
+//! Bound of the material law's effect on a material place: inextensible fibres against least energy.
 //!
-//! Steel that was pressed stroke by stroke need not lie where its membrane energy is least. The other extreme is that
-//! the fibres along one side of the plate kept their length and all strain went across them. The distance between the
-//! two hypotheses, for the fibres along u and for those along v, bounds what the law of the material does to a place.
+//! Steel that was pressed stroke by stroke need not lie where its membrane energy is least. The opposite extreme is that
+//! the fibres along one side of the plate kept their length and all strain went across them. The distance between the two
+//! hypotheses, the larger of fibres along u and fibres along v, is the uncertainty of a place.
 //!
-//! Strains are small, so the second hypothesis is one linear step from the first: find the shift d of the material
-//! places that minimises
+//! Strains are small, so the second hypothesis is one linear step from the first. The shift d of the material places
+//! minimises, by linear finite elements,
 //!
 //! ```text
 //! 1/2 integral of e(d) : D : e(d) + STIFF (E_ff - e_ff(d))^2,   e(d) = (grad d + grad d') / 2, no shift across edges,
 //! ```
 //!
-//! E the strain of least energy, f the direction of the fibres. The field is smooth: a grid of 16 x 16 cells gives it to a
-//! percent or two.
+//! with E the strain of least energy and f the direction of the fibres. The field is smooth: a grid of 16 x 16 cells
+//! resolves it to one or two percent.
 
 use platen_shape::flatten::plane_stress;
 use platen_shape::sparse::{Graph, SparseError, Spd};
 
 use crate::membrane::{Strained, Sym};
 
-/// Cells along each side of the plate at most; with fewer than 8 triangles a cell, fewer.
+/// Largest number of cells along each side; fewer where a cell would have fewer than 8 triangles.
 const CELLS: usize = 16;
-/// Stiffness of a fibre against that of the plate.
+/// Stiffness of the fibres relative to that of the plate.
 const STIFF: f64 = 1e3;
-/// Stiffness that holds the edges.
+/// Penalty stiffness against shifts across the edges.
 const HELD: f64 = 1e9;
 
-/// The grid of cells over the plate.
+/// Grid of cells over the plate.
 struct Grid {
     n: usize,
     cell: [f64; 2],
@@ -34,10 +34,13 @@ struct Grid {
     strains: Vec<Sym>,
 }
 
-/// Shift in u and in v of each place of `uv`, the larger of the two fibre hypotheses, metres.
+/// Returns the absolute shift in u and in v of each place of `uv`, the larger of the two fibre hypotheses, metres.
 ///
-/// `strains` has the state of every triangle, `uv` the places of least energy, `size` the extent of the plate.
-pub(crate) fn spread(
+/// `strains` contains the state of every triangle, `uv` the places of least energy, `size` the extent of the plate in metres.
+///
+/// # Errors
+/// [`SparseError`].
+pub(crate) fn material_law_bound(
     strains: &[Strained],
     uv: &[[f64; 2]],
     size: [f64; 2],
@@ -67,7 +70,7 @@ impl Grid {
         Self { n, cell, strains: sums.into_iter().map(mean).collect() }
     }
 
-    /// Nodes of each cell's two triangles, the diagonals alternating.
+    /// Returns the nodes of each cell's two triangles, with alternating diagonals.
     fn triangles(&self) -> impl Iterator<Item = (usize, [u32; 3])> {
         let n = self.n;
         (0..n * n).flat_map(move |k| {
@@ -82,7 +85,7 @@ impl Grid {
         [f64::from(node % row) * self.cell[0], f64::from(node / row) * self.cell[1]]
     }
 
-    /// Shift of every node when the fibres along `fibre` (0: u, 1: v) keep their length.
+    /// Solves for the shift of every node when the fibres along `fibre` (0: u, 1: v) keep their length.
     fn shifts(&self, fibre: usize, poisson: f64) -> Result<Vec<[f64; 2]>, SparseError> {
         let n_nodes = (self.n + 1) * (self.n + 1);
         let places: Vec<_> = (0..n_nodes as u32).map(|node| self.place(node)).collect();

@@ -1,55 +1,55 @@
-//! The minimum of membrane energy and springs, by Newton's method.
+//! Newton's method with line search for the minimum of membrane energy plus springs.
 //!
-//! The Hessian changes little on the way: strains are parts of a thousand. So its factor is kept as long as the steps
-//! shrink fast, and on most plates the first is the only one.
+//! The Hessian changes little on the way, because strains are parts per thousand. Its factor is therefore reused as long as
+//! the steps shrink fast; most plates need only one factorisation.
 
 use platen_sdk::{Error, ErrorKind, Result};
 use platen_shape::DiskMesh;
 use platen_shape::flatten::plane_picture;
 use platen_shape::sparse::{Graph, SparseError, Spd};
 
-use crate::hold::Hold;
+use crate::boundary_springs::BoundarySprings;
 use crate::membrane::Membrane;
 
-/// The last step is shorter than this, metres: a thousandth of what the best scan tells of a place.
+/// Convergence: no vertex moves farther in a full step, metres. A thousandth of the position uncertainty of the best scan.
 const TOLERANCE: f64 = 1e-7;
-/// Steps allowed; four or five are usual, a dozen on a mesh with folds in it.
+/// Largest number of steps; four or five are usual, a dozen on a folded mesh.
 const MAX_STEPS: usize = 60;
-/// The factor is renewed when a step is longer than this share of the one before.
+/// The Hessian is factored again when a step is longer than this share of the one before.
 const SLOW: f64 = 0.2;
-/// A step that lowers the energy by less than this share of what its slope promises is halved (Armijo's rule).
+/// Armijo's constant: a step that lowers the energy by less than this share of the linear prediction is halved.
 const SUFFICIENT: f64 = 1e-4;
-/// Shares of the energy below this are rounding.
+/// Relative rounding error of the energy.
 const ROUNDING: f64 = 1e-13;
 
-/// Moves the material places `x` to the nearest minimum; `go_on` is asked before each step.
+/// Moves the material places `x` to the nearest minimum. `check` is called before each step.
 ///
 /// # Errors
-/// When there is no minimum within reach, or `go_on` says so.
+/// When no minimum is found, or `check` fails.
 pub(crate) fn minimise(
     mesh: &DiskMesh,
     membrane: &Membrane<'_>,
-    hold: &Hold,
+    springs: &BoundarySprings,
     x: &mut [[f64; 2]],
-    go_on: impl Fn() -> Result<()>,
+    check: impl Fn() -> Result<()>,
 ) -> Result<()> {
     let nodes: Vec<_> = (0..x.len() as u32).map(Some).collect();
     let graph = Graph::of_elements(&mesh.triangles, &nodes, x.len());
     let mut spd = Spd::<2>::analyse(&graph, &plane_picture(mesh)).map_err(|e| unsolved(&e))?;
-    let energy = |x: &[[f64; 2]]| membrane.energy(x) + hold.energy(x);
+    let energy = |x: &[[f64; 2]]| membrane.energy(x) + springs.energy(x);
     let mut here = energy(x);
     let mut last_step = 0.0;
     for _ in 0..MAX_STEPS {
-        go_on()?;
+        check()?;
         if last_step == 0.0 {
             spd.clear();
             membrane.add_hessian(x, &mut spd);
-            hold.add_hessian(&mut spd);
+            springs.add_hessian(&mut spd);
             spd.factor().map_err(|e| unsolved(&e))?;
         }
         let mut gradient = vec![[0.0; 2]; x.len()];
         membrane.add_gradient(x, &mut gradient);
-        hold.add_gradient(x, &mut gradient);
+        springs.add_gradient(x, &mut gradient);
         let mut direction = [gradient.iter().map(|g| [-g[0], -g[1]]).collect::<Vec<_>>()];
         spd.solve(&mut direction).map_err(|e| unsolved(&e))?;
         let [direction] = direction;
@@ -71,7 +71,8 @@ pub(crate) fn minimise(
     Err(not_found(&format!("no minimum in {MAX_STEPS} steps")))
 }
 
-/// The largest of 1, 1/2, 1/4 ... that lowers the energy `here` enough without turning a triangle over, and the energy there.
+/// Backtracking line search: returns the largest of 1, 1/2, 1/4 ... that satisfies Armijo's rule without inverting a triangle,
+/// and the energy there. `here` is the energy at `x`.
 fn line_search(
     energy: impl Fn(&[[f64; 2]]) -> f64,
     here: f64,
@@ -96,5 +97,5 @@ pub(crate) fn unsolved(error: &SparseError) -> Error {
 
 pub(crate) fn not_found(what: &str) -> Error {
     Error::new(ErrorKind::BadData, format!("no least membrane energy: {what}"))
-        .hint("scan again; if it stays, report this scan and flatten it with `harmonic`")
+        .hint("scan again; if the error stays, report this scan and flatten it with `harmonic`")
 }
