@@ -1,16 +1,16 @@
-//! The named figures, in the words of the press's register map.
+//! Named figures, as in the press's register map.
 
 use platen_model::{Figure, Quantity, Task};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::deviation::Deviation;
-use crate::judge::Judged;
+use crate::evaluation::Evaluated;
 
-/// Nodes along each side for the mean curvature: the result's grid.
+/// Nodes along each side for the mean curvature, those of the result's grid.
 const GRID: usize = 21;
 
-/// Deviation of the whole plate: from the best-fitting target, whose two extremes say how far the shapes differ, and from
-/// the target laid on the plate, above which nothing stands.
+/// Returns the figures of the whole plate's deviation: from the best-fitting target, whose two extremes measure the difference
+/// of the shapes, and from the target in its seat.
 pub(crate) fn of_deviation(
     deviation: &Deviation,
     now: &Surface,
@@ -33,7 +33,7 @@ pub(crate) fn of_deviation(
         .copied()
         .fold(min, |deepest, i| if deviation.value[i] < deviation.value[deepest] { i } else { deepest });
 
-    // The best fit is held by all places: its own uncertainty is small beside that of one.
+    // The best fit depends on all places: its uncertainty is negligible beside that of one place.
     let placed = |name: &str, i: usize| Figure {
         uncertainty: Some(EXPANDED * now.sigma_point(deviation.uv[i][0], deviation.uv[i][1])),
         ..at(name, deviation.fitted[i], "m", deviation.uv[i])
@@ -60,15 +60,15 @@ pub(crate) fn of_deviation(
     figures
 }
 
-/// The board with the most gap per limit, and what each board says about the plate under it.
-pub(crate) fn of_templates(judged: &[Judged]) -> Vec<Figure> {
-    let share = |j: &Judged| j.finding.max_gap.abs() / j.finding.limit;
+/// Returns the figures of the template with the largest gap relative to its limit, and each template's radius, sagitta and play.
+pub(crate) fn of_templates(evaluated: &[Evaluated]) -> Vec<Figure> {
+    let share = |j: &Evaluated| j.finding.max_gap.abs() / j.finding.limit;
     let Some(worst) =
-        (0..judged.len()).reduce(|a, b| if share(&judged[b]) > share(&judged[a]) { b } else { a })
+        (0..evaluated.len()).reduce(|a, b| if share(&evaluated[b]) > share(&evaluated[a]) { b } else { a })
     else {
         return Vec::new();
     };
-    let finding = &judged[worst].finding;
+    let finding = &evaluated[worst].finding;
     let mut figures = vec![
         Figure {
             uncertainty: Some(finding.uncertainty),
@@ -80,7 +80,7 @@ pub(crate) fn of_templates(judged: &[Judged]) -> Vec<Figure> {
         plain("gap.line", (worst + 1) as f64, "1"),
         plain("sense", f64::from(finding.sense), "1"),
     ];
-    for j in judged {
+    for j in evaluated {
         let named = |what: &str| format!("template.{}.{what}", j.finding.name);
         figures.extend(j.radius.map(|radius| plain(&named("radius"), radius, "m")));
         figures.push(plain(&named("sagitta"), j.sagitta, "m"));
@@ -89,8 +89,8 @@ pub(crate) fn of_templates(judged: &[Judged]) -> Vec<Figure> {
     figures
 }
 
-/// Mean curvature of the plate in the direction of bending against the target's, as a share: -0.1 is a tenth not bent
-/// enough. None for a flat target.
+/// Returns the mean curvature of the plate in the direction of bending, relative to the target's, minus one: -0.1 is a tenth
+/// too little. `None` for a flat target.
 pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figure> {
     let (mut is, mut wanted) = (0.0, 0.0);
     for i in 0..GRID * GRID {
@@ -107,13 +107,13 @@ pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figu
     (!flat).then(|| plain("curvature.deviation", is / wanted - 1.0, "1"))
 }
 
-/// Figures of the stations; none for a station that was not seen or has no board.
+/// Returns the figures of the stations, except those that were not seen or have no template.
 pub(crate) fn of_stations(
     task: &Task,
     now: &Surface,
     target: &TargetSurface,
     deviation: &Deviation,
-    judged: &[Judged],
+    evaluated: &[Evaluated],
 ) -> Vec<Figure> {
     let mut figures = Vec::new();
     for station in &task.stations {
@@ -124,7 +124,7 @@ pub(crate) fn of_stations(
         };
         match station.quantity {
             Quantity::Gap => figures.extend(
-                nearest_gap(station.at, judged)
+                nearest_gap(station.at, evaluated)
                     .map(|(gap, uncertainty)| figure(gap, "m", uncertainty / EXPANDED)),
             ),
             _ if !now.mask().seen(u, v) => {}
@@ -146,8 +146,8 @@ pub(crate) fn of_stations(
     figures
 }
 
-/// Curvature of the plate and of the target in the target's direction of bending, positive the way the target bends;
-/// the mean of both directions where no direction is special.
+/// Returns the curvatures of plate and target in the target's direction of bending, positive the way the target bends; the
+/// mean curvature where the target has no such direction.
 fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] {
     let goal = target.curvature(u, v);
     let direction = target.bending(u, v);
@@ -157,20 +157,22 @@ fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] 
     })
 }
 
-/// Gap at the place under any board that is nearest to `station`, with its board's uncertainty.
-fn nearest_gap(station: [f64; 2], judged: &[Judged]) -> Option<(f64, f64)> {
+/// Returns the gap at the place under any template that is nearest to `station`, with its uncertainty.
+fn nearest_gap(station: [f64; 2], evaluated: &[Evaluated]) -> Option<(f64, f64)> {
     let distance = |at: &[f64; 2]| (at[0] - station[0]).hypot(at[1] - station[1]);
-    let places = judged.iter().flat_map(|j| {
+    let places = evaluated.iter().flat_map(|j| {
         j.places.iter().zip(&j.finding.gap).map(move |(at, gap)| (at, *gap, j.finding.uncertainty))
     });
     let nearest = places.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)))?;
     Some((nearest.1, nearest.2))
 }
 
+/// Returns a figure without place and uncertainty.
 pub(crate) fn plain(name: &str, value: f64, unit: &str) -> Figure {
     Figure { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
 }
 
+/// Returns a figure at a place, without uncertainty.
 pub(crate) fn at(name: &str, value: f64, unit: &str, place: [f64; 2]) -> Figure {
     Figure { at: Some(place), ..plain(name, value, unit) }
 }

@@ -1,25 +1,39 @@
-//! Comparison `template`: would the wooden template fit?
+//! Comparison `template`: the gap under a template, by one-sided contact, and the deviation from the whole target.
 //!
-//! A template is a board whose edge is the target's section along a reference line. It is laid on the fitted face
-//! as a rigid body, contact and not best fit. With x along the board from its middle and d(x) the plate above the board's
-//! edge in the section plane, the board lies on a + b x >= d(x), and the gap is a + b x - d(x).
+//! A template is a gauge whose edge is the target's section along a reference line, `chord_mm` long. Shops check a bent plate
+//! by laying it on the plate and measuring the gap. This comparison computes that contact on the fitted surface: a rigid
+//! body resting on the plate, not a best fit. The method is this project's own.
 //!
-//! | `seat` in the plate file | the board |
+//! # Method
+//!
+//! *Seat of a template.* With x along the template from its middle and d(x) the height of the plate over the template's edge
+//! in the section plane, the template rests on the lowest line a + b x >= d(x), and the gap is a + b x - d(x). The seats:
+//!
+//! | `seat` in the plate file | position of the template |
 //! |---|---|
-//! | `gravity` | lies as low as it can at its middle: on the edge of d's upper hull that spans the middle. Contacts closer than a quarter of the chord: it rocks and is judged balanced |
-//! | `balanced` | has equal gaps at both ends |
-//! | `held` | is set with both ends on the plate; the gap has a sign |
+//! | `gravity` | lowest at its middle: the edge of the upper convex hull of d that spans the middle. With contacts closer than a quarter of the chord the template rocks, and the balanced seat is judged |
+//! | `balanced` | equal gaps at both ends, one contact |
+//! | `held` | both ends set on the plate; the gap has a sign |
 //!
-//! A gap passes or fails its limit only outside its 95 % uncertainty: noise of the fit at the places that decide the gap,
-//! with how it goes together, the plant's correlated error and the scanner's own bias. A contact or the largest gap where the
-//! plate was not seen cannot be judged. With several boards, the figures `gap.*` are those of the one with the most gap
-//! per limit.
+//! *Verdict.* The gap passes or fails its limit only outside its 95 % uncertainty
 //!
-//! The target as a whole is laid on the plate too, rigid and from the scanner's side; the field `deviation` is measured minus
-//! target along the target's normal in that seat, so none is above zero; `deviation.gap` is the most that is open under
-//! it, `in_tolerance` the share of the plate where no more than the tolerance is. As one sign is missing there, the
-//! press's pair `deviation.max` and `.min`, with `.rms` and `.p95`, is that of the best fit instead, in which
-//! the places of the plate lie above and below the target.
+//! ```text
+//! U = 1.96 sqrt(s_fit^2 + s_corr^2 w'w / 2 + s_true^2)
+//! ```
+//!
+//! where s_fit is the fit's standard deviation of w'z, the heights z at the places that decide the gap with their weights w
+//! and covariances; s_corr the plant's correlated error of a position; s_true the scanner's error of a gap on a known artefact.
+//! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
+//! `gap.*` are those of the one with the largest gap relative to its limit.
+//!
+//! *Seat of the target.* The whole target is laid on the plate as a rigid surface, from the scanner's side. Its direction
+//! follows the least-squares rigid fit of all material points; its height and tilts solve the linear program "lowest over the
+//! middle of the plate, nowhere through the plate". The field `deviation` is measured minus target along the target's normal in
+//! that seat, so no value is above zero; `deviation.gap` is the largest opening under the target and `in_tolerance` the share of
+//! the plate within the tolerance. The pair `deviation.max`, `deviation.min` of the press, with `.rms` and `.p95`, refers to
+//! the best fit instead, which has deviations of both signs.
+//!
+//! # Example
 //!
 //! ```toml
 //! [[comparison]]
@@ -28,18 +42,38 @@
 //! tolerance_mm = 6.0
 //! ```
 //!
-//! | key | meaning |
-//! |---|---|
-//! | `tolerance_mm` | deviation that `in_tolerance` allows; the smallest limit of the templates unless given |
-//! | `search` | also slide the first template's board over the whole plate, along u and along v |
+//! # Options
 //!
-//! Figures beside the press's: `template.NAME.radius` and `.sagitta` of the plate under the board, `.rocking` its play from
-//! one tilt to the other, `gap.worst_along_u` and `gap.worst_along_v`, `station.NAME`.
+//! | key | unit | default | range | meaning |
+//! |---|---|---|---|---|
+//! | `tolerance_mm` | mm | smallest limit of the templates | 0 to 1000 | deviation that `in_tolerance` allows |
+//! | `search` | | `true` | | also slide the first template over the whole plate, along u and along v |
+//!
+//! The templates themselves, `[[template]]`, and `[target]` are part of the plate file.
+//!
+//! # Figures
+//!
+//! | figure | unit | meaning |
+//! |---|---|---|
+//! | `gap.max`, `gap.uncertainty`, `gap.u`, `gap.v`, `gap.line` | m, 1 | largest gap relative to its limit, its uncertainty, place and template number |
+//! | `sense` | 1 | -1 under-bent, 1 bent too far, 0 passed |
+//! | `template.NAME.radius`, `.sagitta`, `.rocking` | m, m, rad | radius and sagitta of the plate under the template; range of tilts while it touches |
+//! | `deviation.max`, `.min`, `.rms`, `.p95`, `.max_u`, ... | m | deviation from the best-fitting target |
+//! | `deviation.gap`, `deviation.rocks`, `tolerance`, `in_tolerance` | m, 1 | target in its seat |
+//! | `curvature.deviation` | 1 | mean curvature in the bending direction, relative to the target's, minus one |
+//! | `gap.worst_along_u`, `gap.worst_along_v` | m | result of `search` |
+//! | `station.NAME` | m, 1/m | figures of the plate file's stations |
+//!
+//! # Limits and errors
+//!
+//! Sideways curvature of an oblique line (a helix) is dropped, as a straight template drops it. Refused are: a target with an
+//! impossible radius; a template on an unknown line, longer than its line, or beyond an end of it; a line that leaves the plate;
+//! a plate that was seen on one side of its middle only.
 
 mod deviation;
+mod evaluation;
 mod figures;
-mod judge;
-mod programme;
+mod linear_program;
 mod seat;
 mod section;
 
@@ -49,29 +83,29 @@ use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Res
 use platen_shape::TargetSurface;
 
 use deviation::Deviation;
-use judge::{Judge, Judged};
+use evaluation::{Evaluated, Evaluator};
 use section::Line;
 
 platen_sdk::options! {
     /// Options of `template`.
     pub struct Options {
-        /// Deviation that counts as within tolerance; the smallest limit of the templates unless given.
+        /// Deviation that counts as within tolerance; default: the smallest limit of the templates.
         tolerance_mm: Option<f64>, unit "mm", min 0.0, max 1000.0;
-        /// Whether the first template's board is also slid over the whole plate.
+        /// Whether the first template is also slid over the whole plate.
         search: bool = true;
     }
 }
 
 struct TemplateGap(Options);
 
-/// Places on the very edge of the plate, metres.
+/// Rounding allowed for places on the edge of the plate, metres.
 const ON_EDGE: f64 = 1e-6;
 
 impl Comparison for TemplateGap {
     const INFO: Info = Info::new(
         c"template",
         c"Template",
-        c"Lays boards with the target's section, and the whole target, on the plate and judges the gaps.",
+        c"Lays templates with the target's section, and the whole target, on the plate and judges the gaps.",
         c"1.0.0",
     );
     type Options = Options;
@@ -85,7 +119,7 @@ impl Comparison for TemplateGap {
     }
 }
 
-/// `check` fails when the job was cancelled.
+/// Compares the plate with its target. `check` fails when the job was cancelled.
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let (task, now) = (&inputs.task, &inputs.now);
     let Some(target) = &task.target else {
@@ -93,54 +127,58 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     };
     let target = TargetSurface::new(target, task.width, task.height, task.thickness)
         .map_err(|e| Error::new(ErrorKind::Config, e.to_string()))?;
-    let judge = Judge {
+    let evaluator = Evaluator {
         now,
         target: &target,
         sigma_correlated: task.sigma_correlated,
         sigma_true: task.sigma_true.unwrap_or(0.0),
     };
-    let boards = task.templates.iter().map(|t| on_line(task, t)).collect::<Result<Vec<_>>>()?;
-    let mut judged = Vec::new();
-    for (template, (line, centre)) in task.templates.iter().zip(&boards) {
+    let lines = task.templates.iter().map(|t| on_line(task, t)).collect::<Result<Vec<_>>>()?;
+    let mut evaluated = Vec::new();
+    for (template, (line, centre)) in task.templates.iter().zip(&lines) {
         check()?;
         let centre = match centre {
             Centre::At(centre) => *centre,
-            Centre::Worst => judge.worst(line, template.chord, template.seat).0,
+            Centre::Worst => evaluator.worst(line, template.chord, template.seat).0,
         };
-        judged.push(judge.judge(template, line, centre));
+        evaluated.push(evaluator.evaluate(template, line, centre));
     }
     let deviation = Deviation::new(now, &target, check)?;
 
     let limits = task.templates.iter().map(|t| t.limit);
     let tolerance = options.tolerance_mm.map(|mm| mm / 1000.0).or_else(|| limits.reduce(f64::min));
     let mut found = figures::of_deviation(&deviation, now, &target, tolerance);
-    found.extend(figures::of_templates(&judged));
+    found.extend(figures::of_templates(&evaluated));
     found.extend(figures::of_curvature(now, &target));
-    found.extend(figures::of_stations(task, now, &target, &deviation, &judged));
-    let mut says = says(&judged);
+    found.extend(figures::of_stations(task, now, &target, &deviation, &evaluated));
+    let mut says = says(&evaluated);
     if let (true, Some(template)) = (options.search, task.templates.first()) {
-        let (anywhere, sentence) = search(&judge, task, template, check)?;
+        let (anywhere, sentence) = search(&evaluator, task, template, check)?;
         found.extend(anywhere);
         says.extend(sentence);
     }
-    let verdict = judged.iter().map(|j| j.finding.verdict).max().unwrap_or(Verdict::CannotTell);
-    let templates = judged.into_iter().map(|j| j.finding).collect();
+    let verdict = evaluated.iter().map(|j| j.finding.verdict).max().unwrap_or(Verdict::CannotTell);
+    let templates = evaluated.into_iter().map(|j| j.finding).collect();
     let findings = Findings { verdict: Some(verdict), says, figures: found, templates };
     Ok(Report::new(findings, vec![field(PlateGrid::new(now), deviation)]))
 }
 
+/// Returns the report of a plate that cannot be judged.
 fn unjudged(why: &str) -> Report {
     let findings =
         Findings { verdict: Some(Verdict::CannotTell), says: vec![why.into()], ..Findings::default() };
     Report::new(findings, Vec::new())
 }
 
-/// The line of a template, and where its board lies on it.
+/// Returns the line of a template and the position of the template on it.
+///
+/// # Errors
+/// [`ErrorKind::Config`] when the line is unknown or leaves the plate, or the template does not fit on it.
 fn on_line(task: &Task, template: &Template) -> Result<(Line, Centre)> {
     let refuse =
         |what: String| Err(Error::new(ErrorKind::Config, format!("template {}: {what}", template.name)));
     let Some(line) = task.reference_lines.iter().find(|line| line.name == template.line) else {
-        return refuse(format!("no reference line is called {:?}", template.line));
+        return refuse(format!("no reference line has the name {:?}", template.line));
     };
     let mm = |metres: f64| (metres * 1000.0).round();
     let inside = |[u, v]: [f64; 2]| {
@@ -155,31 +193,31 @@ fn on_line(task: &Task, template: &Template) -> Result<(Line, Centre)> {
             mm(v)
         ));
     }
-    let board = Line::new(&line.name, line.from, line.to);
-    let (chord, length) = (template.chord, board.length);
+    let on_plate = Line::new(&line.name, line.from, line.to);
+    let (chord, length) = (template.chord, on_plate.length);
     if chord.is_nan() || chord <= 0.0 || chord > length + ON_EDGE {
         let (chord, length) = (mm(chord), mm(length));
-        return refuse(format!("a board of {chord} mm does not fit its line {} of {length} mm", line.name));
+        return refuse(format!("its chord of {chord} mm does not fit its line {} of {length} mm", line.name));
     }
     if let Centre::At(at) = template.centre {
         let (first, last) = (0.5 * chord, length - 0.5 * chord);
         if !(first - ON_EDGE..=last + ON_EDGE).contains(&at) {
             let (at, first, last) = (mm(at), mm(first), mm(last));
             return refuse(format!(
-                "a board round {at} mm hangs over an end of {}; its middle must lie from {first} to {last} mm",
+                "a chord centred at {at} mm extends beyond an end of {}; its centre must lie from {first} to {last} mm",
                 line.name
             ));
         }
     }
-    Ok((board, template.centre))
+    Ok((on_plate, template.centre))
 }
 
-/// One sentence for each board, the worst first.
-fn says(judged: &[Judged]) -> Vec<String> {
-    if judged.is_empty() {
+/// Returns one sentence per template, the worst first.
+fn says(evaluated: &[Evaluated]) -> Vec<String> {
+    if evaluated.is_empty() {
         return vec!["cannot tell: the plate file names no template".into()];
     }
-    let mut order: Vec<&Judged> = judged.iter().collect();
+    let mut order: Vec<&Evaluated> = evaluated.iter().collect();
     order.sort_by(|a, b| {
         let (a, b) = (&a.finding, &b.finding);
         b.verdict.cmp(&a.verdict).then((b.max_gap.abs() / b.limit).total_cmp(&(a.max_gap.abs() / a.limit)))
@@ -187,9 +225,9 @@ fn says(judged: &[Judged]) -> Vec<String> {
     order.iter().map(|j| format!("{}: {}", j.finding.name, j.finding.says)).collect()
 }
 
-/// The template's board slid over the whole plate.
+/// Slides a template over the whole plate: the worst gap along u and along v, and a sentence when it exceeds the limit.
 fn search(
-    judge: &Judge<'_>,
+    evaluator: &Evaluator<'_>,
     task: &Task,
     template: &Template,
     check: &dyn Fn() -> Result<()>,
@@ -206,7 +244,7 @@ fn search(
         let mut worst: Option<(f64, [f64; 2])> = None;
         for line in lines.iter().filter(|line| line.length >= template.chord) {
             check()?;
-            let (centre, gap) = judge.worst(line, template.chord, template.seat);
+            let (centre, gap) = evaluator.worst(line, template.chord, template.seat);
             if worst.is_none_or(|(most, _)| gap > most) {
                 worst = Some((gap, line.at(centre)));
             }

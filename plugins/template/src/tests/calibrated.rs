@@ -26,7 +26,7 @@ fn gaps_lie_within_their_uncertainty_after_calibration() {
     let shape = goal(cylinder(8.0), Facing::Inside);
     let gaps: Vec<_> = (0..12).flat_map(|seed| artefact_gaps(&scan(8.0, seed), &shape, 2.0, 0.0)).collect();
     let sigma_true = covering(&gaps);
-    // At most twice the wave shows under a board, about two standard deviations.
+    // At most twice the wave shows under a template, about two standard deviations.
     assert!((0.6 * WAVE..1.1 * WAVE).contains(&sigma_true), "{sigma_true}");
 
     let mut task = task(cylinder(8.0), Facing::Inside, Seat::Balanced);

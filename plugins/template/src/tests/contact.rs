@@ -1,4 +1,4 @@
-//! Boards on circles, on either face, and against a rigid board that is lowered and rolled step by step.
+//! Templates on circles, on either face, and a rigid template lowered and rolled by exhaustive search.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn circles_give_the_difference_of_their_sagittas_on_either_face() {
             assert_eq!((found.sense, found.verdict), (sense, Verdict::Fail));
             assert!(found.says.starts_with(word), "{}", found.says);
 
-            // A board touches with its ends where the plate is more hollow than its edge.
+            // A template touches with its ends where the plate is more hollow than its edge.
             let ends_touch = (word == "bent too far") == (facing == Facing::Inside);
             assert_eq!((found.rocks, found.contacts.len()), (!ends_touch, if ends_touch { 2 } else { 1 }));
             assert_eq!(found.seat, if ends_touch { Seat::Gravity } else { Seat::Balanced });
@@ -33,7 +33,7 @@ fn circles_give_the_difference_of_their_sagittas_on_either_face() {
 }
 
 #[test]
-fn a_fitting_board_passes_on_every_target_shape() {
+fn a_fitting_template_passes_on_every_target_shape() {
     for facing in [Facing::Inside, Facing::Outside] {
         for shape in [
             TargetShape::Flat,
@@ -53,7 +53,7 @@ fn a_fitting_board_passes_on_every_target_shape() {
 }
 
 #[test]
-fn a_held_boards_gap_has_a_sign() {
+fn a_held_templates_gap_has_a_sign() {
     let held = |plate: f64| {
         let found = finding(
             &plate_of(cylinder(plate), Facing::Inside),
@@ -67,7 +67,7 @@ fn a_held_boards_gap_has_a_sign() {
 }
 
 #[test]
-fn a_straight_board_tells_hollow_from_crowned() {
+fn a_straight_template_distinguishes_hollow_from_crowned() {
     let says = |facing| {
         finding(&plate_of(cylinder(60.0), facing), &task(TargetShape::Flat, Facing::Inside, Seat::Gravity))
             .says
@@ -117,21 +117,21 @@ fn the_worst_place_is_where_the_bend_is_missing() {
     // Half of the missing slope on either side of the flat, 0.5 m away: 0.0375 * (0.5 - 0.15) = 13 mm.
     assert!((0.011..0.015).contains(&found.max_gap), "{found:?}");
     let middle = found.start + 0.5;
-    assert!((middle - 1.8).abs() < 0.06, "board round {middle}");
+    assert!((middle - 1.8).abs() < 0.06, "template round {middle}");
 }
 
-/// The lowest place of a rigid board on a plate, both closed curves in the section plane, by trying: for every tilt of the
-/// board it is lowered until it touches; the tilt that brings its middle lowest counts. Returns the largest gap
-/// along the board's own normal direction, and the first and the last place along the plate where it touches.
+/// The lowest place of a rigid template on a plate, both closed curves in the section plane, by exhaustive search: for every tilt of the
+/// template it is lowered until it touches; the tilt that brings its middle lowest counts. Returns the largest gap
+/// along the template's own normal direction, and the first and the last place along the plate where it touches.
 fn lowered(
-    board: impl Fn(f64) -> f64,
+    template: impl Fn(f64) -> f64,
     plate: impl Fn(f64) -> f64,
     chord: f64,
     tilts: [f64; 2],
 ) -> (f64, [f64; 2]) {
     let n = 1500;
     let edge: Vec<(f64, f64)> =
-        (0..=n).map(|k| chord * (f64::from(k) / f64::from(n) - 0.5)).map(|x| (x, board(x))).collect();
+        (0..=n).map(|k| chord * (f64::from(k) / f64::from(n) - 0.5)).map(|x| (x, template(x))).collect();
     let turned = |tilt: f64| {
         let (s, c) = f64::sin_cos(tilt);
         edge.iter().map(move |(x, z)| (c * x - s * z, s * x + c * z))
@@ -151,8 +151,8 @@ fn lowered(
 }
 
 #[test]
-fn a_rigid_board_lowered_by_trying_shows_the_same_gap() {
-    // A plate that is hollow with a wave, so that the board tilts: y = x^2 / 2R + size cos(f x + phase).
+fn a_rigid_template_lowered_by_trying_shows_the_same_gap() {
+    // A plate that is hollow with a wave, so that the template tilts: y = x^2 / 2R + size cos(f x + phase).
     for (round, [radius, size, f, phase]) in
         [[6.0, 1.5e-3, 4.0, 0.7], [5.0, 1e-3, 7.0, 2.0], [7.0, 2.5e-3, 3.0, 4.0], [9.0, 0.8e-3, 9.0, 5.5]]
             .into_iter()
@@ -188,8 +188,8 @@ fn a_rigid_board_lowered_by_trying_shows_the_same_gap() {
         assert!(!found.rocks, "round {round}: {found:?}");
 
         let face = goal - THICKNESS / 2.0;
-        let board = |x: f64| face - (face * face - x * x).sqrt();
-        let (tried, touched) = lowered(board, height, 2.0, [-0.02, 0.02]);
+        let template = |x: f64| face - (face * face - x * x).sqrt();
+        let (tried, touched) = lowered(template, height, 2.0, [-0.02, 0.02]);
         assert!((found.max_gap - tried).abs() < 5e-5, "round {round}: {} against {tried}", found.max_gap);
         let contacts = found.contacts.iter().map(|contact| contact.at[0] - 0.5 * WIDTH);
         for (contact, touched) in contacts.zip(touched) {

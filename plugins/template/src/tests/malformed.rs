@@ -13,7 +13,7 @@ fn refused(change: impl Fn(&mut Task)) -> String {
 fn malformed_tasks_are_refused_in_one_sentence() {
     assert!(
         refused(|t| t.templates[0].line = "R9".into())
-            .starts_with("template T1: no reference line is called \"R9\"")
+            .starts_with("template T1: no reference line has the name \"R9\"")
     );
     assert!(
         refused(|t| t.reference_lines[0].to = [3.2, 1.0]).starts_with(
@@ -22,11 +22,11 @@ fn malformed_tasks_are_refused_in_one_sentence() {
     );
     assert!(
         refused(|t| t.templates[0].chord = 3.5)
-            .starts_with("template T1: a board of 3500 mm does not fit its line R1 of 3000 mm")
+            .starts_with("template T1: its chord of 3500 mm does not fit its line R1 of 3000 mm")
     );
     assert!(
         refused(|t| t.templates[0].centre = Centre::At(0.4))
-            .starts_with("template T1: a board round 400 mm hangs over an end of R1")
+            .starts_with("template T1: a chord centred at 400 mm extends beyond an end of R1")
     );
     let negative =
         |t: &mut Task| t.target.as_mut().expect("there").shape = TargetShape::Sphere { radius: -8.0 };

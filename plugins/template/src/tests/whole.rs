@@ -76,7 +76,7 @@ fn stations_say_deviation_gap_and_missing_curvature() {
 }
 
 #[test]
-fn of_several_boards_the_one_with_the_most_gap_per_limit_is_the_figure() {
+fn of_several_templates_the_one_with_the_most_gap_per_limit_is_the_figure() {
     let mut task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
     let first = task.templates[0].clone();
     task.templates.push(Template { name: "T2".into(), chord: 1.5, limit: 0.0005, ..first });

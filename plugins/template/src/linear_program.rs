@@ -1,56 +1,57 @@
-//! The one-sided seat of a surface: a linear programme in three unknowns.
+//! Linear program in three unknowns by the dual simplex method: the one-sided seat of a rigid surface.
 //!
-//! Minimise q_1 over q in R^3 subject to r_i . q >= d_i for all i, by exchange: three constraints are held as
-//! equalities, the most violated one comes in, the one goes out that keeps the multipliers non-negative (the dual simplex
-//! method). The minimum rises in every round, so that it ends; it is exact, and takes tens of rounds for 10,000 constraints.
+//! Minimises q_1 over q in R^3 subject to r_i . q >= d_i for all i. Three constraints form the basis and hold as equalities;
+//! the most violated constraint enters, and the one leaves that keeps the multipliers non-negative (ratio test). The objective
+//! rises in every round, so the method ends. The solution is exact; 10,000 constraints take tens of rounds.
 
 use nalgebra::Matrix3;
 use platen_shape::Vec3;
 
-/// A vertex of the programme.
+/// Optimal vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Vertex {
     /// The unknowns.
     pub(crate) q: Vec3,
-    /// The constraints that hold it.
-    pub(crate) held_by: [usize; 3],
+    /// Active constraints.
+    pub(crate) active: [usize; 3],
 }
 
-/// Violations below this are rounding, metres.
+/// Violations below this count as rounding, metres.
 const ROUNDING: f64 = 1e-12;
 
-/// Far more rounds than ever needed; ties could turn in a circle.
+/// Largest number of rounds, far more than needed: with ties the method could cycle.
 const ROUNDS: usize = 1000;
 
-/// The minimum; `None` when the constraints do not bound it (all on one side of the middle) or are fewer than three.
+/// Returns the minimum; `None` when the program is unbounded (all constraints on one side of the middle) or has fewer than
+/// three constraints.
 ///
-/// `reach` is a length far beyond the constraints' own arms.
+/// `reach` is a length much larger than the lever arms of the constraints.
 pub(crate) fn minimum(rows: &[Vec3], d: &[f64], reach: f64) -> Option<Vertex> {
-    // Three legs far outside and far below carry the start; a bounded programme drops all of them.
+    // Start: three artificial constraints far outside and far below. A bounded program drops all of them.
     let deep = -reach;
-    let legs = [0.0, 2.0, 4.0].map(|k: f64| {
+    let artificial = [0.0, 2.0, 4.0].map(|k: f64| {
         let (sin, cos) = (k * std::f64::consts::PI / 3.0).sin_cos();
         Vec3::new(1.0, reach * cos, reach * sin)
     });
-    let row = |i: usize| if i < rows.len() { rows[i] } else { legs[i - rows.len()] };
+    let row = |i: usize| if i < rows.len() { rows[i] } else { artificial[i - rows.len()] };
     let height = |i: usize| if i < rows.len() { d[i] } else { deep };
     let mut basis = [rows.len(), rows.len() + 1, rows.len() + 2];
     for _ in 0..ROUNDS {
         let inverse = Matrix3::from_rows(&basis.map(|i| row(i).transpose())).try_inverse()?;
         let q = inverse * Vec3::from(basis.map(height));
-        let (incoming, lacking) = (0..rows.len())
+        let (entering, violation) = (0..rows.len())
             .map(|i| (i, d[i] - rows[i].dot(&q)))
             .fold((0, ROUNDING), |most, next| if next.1 > most.1 { next } else { most });
-        if lacking <= ROUNDING {
-            return basis.iter().all(|i| *i < rows.len()).then_some(Vertex { q, held_by: basis });
+        if violation <= ROUNDING {
+            return basis.iter().all(|i| *i < rows.len()).then_some(Vertex { q, active: basis });
         }
-        // Multipliers of the objective and of the incoming row in terms of the basis.
+        // Multipliers of the objective and of the entering row in terms of the basis.
         let multipliers = inverse.transpose() * Vec3::x();
-        let shares = inverse.transpose() * rows[incoming];
-        let outgoing = (0..3)
+        let shares = inverse.transpose() * rows[entering];
+        let leaving = (0..3)
             .filter(|&k| shares[k] > 1e-12)
             .min_by(|&a, &b| (multipliers[a] / shares[a]).total_cmp(&(multipliers[b] / shares[b])))?;
-        basis[outgoing] = incoming;
+        basis[leaving] = entering;
     }
     None
 }
@@ -71,7 +72,7 @@ mod tests {
         let (rows, d) = over_grid(41, |x, y| 0.01 * (x * x + y * y) + 0.003 * x);
         let vertex = minimum(&rows, &d, 1e3).expect("bounded");
         assert!((vertex.q - Vec3::new(0.02, 0.003, 0.0)).norm() < 1e-12, "{vertex:?}");
-        assert!(vertex.held_by.iter().all(|&i| rows[i].y.abs() == 1.0 && rows[i].z.abs() == 1.0));
+        assert!(vertex.active.iter().all(|&i| rows[i].y.abs() == 1.0 && rows[i].z.abs() == 1.0));
     }
 
     #[test]

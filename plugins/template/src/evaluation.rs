@@ -1,0 +1,234 @@
+//! Evaluation of one template: gap, uncertainty, verdict and sentence.
+
+use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
+use platen_shape::{EXPANDED, Surface, TargetSurface};
+
+use crate::seat::{Profile, Seating};
+use crate::section::{Chord, Line, Section};
+
+/// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
+const STRAIGHT: f64 = 0.1e-3;
+
+/// Places under a template: 1 cm apart for a chord of 2 m.
+const PLACES: usize = 201;
+
+/// Places under a template during the search for the worst position.
+const SEARCH_PLACES: usize = 41;
+
+/// Step of the search as a share of the chord.
+const SEARCH_STEP: f64 = 0.0125;
+
+/// Plate, target and the scanner's errors.
+#[derive(Debug)]
+pub(crate) struct Evaluator<'a> {
+    pub(crate) now: &'a Surface,
+    pub(crate) target: &'a TargetSurface,
+    /// Standard deviation of the correlated position error of a pair of scans, metres.
+    pub(crate) sigma_correlated: f64,
+    /// Standard deviation of a gap on a known artefact, metres.
+    pub(crate) sigma_true: f64,
+}
+
+/// Finding of a template, with the figures that the finding does not contain.
+#[derive(Debug)]
+pub(crate) struct Evaluated {
+    pub(crate) finding: TemplateFinding,
+    /// Range of tilts at which the template touches the plate, radians.
+    pub(crate) rocking: f64,
+    /// Radius of the plate under the template, positive when its centre lies on the scanner's side.
+    pub(crate) radius: Option<f64>,
+    /// Sagitta of the plate under the template.
+    pub(crate) sagitta: f64,
+    /// Places of the gap profile.
+    pub(crate) places: Vec<[f64; 2]>,
+}
+
+/// A template in its seat, with its gaps.
+struct Seated {
+    section: Section,
+    seating: Seating,
+    rocks: bool,
+    gaps: Vec<f64>,
+    largest: usize,
+}
+
+/// Position of the largest gap relative to the contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Opening {
+    BetweenContacts,
+    BeyondContacts,
+}
+
+impl Evaluator<'_> {
+    /// Evaluates a template whose middle lies at `centre` along its line, metres.
+    pub(crate) fn evaluate(&self, template: &Template, line: &Line, centre: f64) -> Evaluated {
+        let chord = Chord { centre, length: template.chord };
+        let seated = self.seat(line, chord, template.seat, PLACES);
+        let place = |k: usize| line.at(seated.section.along[k]);
+        let seen = |[u, v]: [f64; 2]| self.now.mask().seen(u, v);
+        let contacts: Vec<Contact> = seated
+            .section
+            .profile
+            .contacts(&seated.seating)
+            .into_iter()
+            .map(|k| Contact { at: place(k), seen: seen(place(k)) })
+            .collect();
+        let max_gap = seated.gaps[seated.largest];
+        let max_gap_at = place(seated.largest);
+        let uncertainty = self.uncertainty(line, &seated);
+
+        let hidden = contacts.iter().find(|c| !c.seen).map(|c| ("the board touches", c.at));
+        let hidden = hidden.or_else(|| (!seen(max_gap_at)).then_some(("the gap is largest", max_gap_at)));
+        let verdict = match max_gap.abs() {
+            _ if hidden.is_some() => Verdict::CannotTell,
+            gap if gap + uncertainty <= template.limit => Verdict::Pass,
+            gap if gap - uncertainty > template.limit => Verdict::Fail,
+            _ => Verdict::CannotTell,
+        };
+        let (bent, sense) = self.sense(&seated);
+        let open = format!("{:.1} mm open {}", max_gap.abs() * 1000.0, seated.where_open());
+        let from_edge = from_edge(line, max_gap_at);
+        let limit = template.limit * 1000.0;
+        let says = match (verdict, hidden) {
+            (_, Some((what, at))) => format!(
+                "cannot tell: {what} {} where the plate was not seen; clear that place and scan again",
+                self::from_edge(line, at)
+            ),
+            (Verdict::Pass, _) => format!("enough: {open}, limit {limit:.1} mm"),
+            (Verdict::Fail, _) => format!("{bent}: {open}, {from_edge}"),
+            _ => format!(
+                "cannot tell: {open}, known to {:.1} mm, limit {limit:.1} mm, {from_edge}",
+                (uncertainty * 1000.0).max(0.1)
+            ),
+        };
+        let finding = TemplateFinding {
+            name: template.name.clone(),
+            line: line.name.clone(),
+            seat: if seated.rocks { Seat::Balanced } else { template.seat },
+            rocks: seated.rocks,
+            max_gap,
+            uncertainty,
+            max_gap_at,
+            contacts,
+            start: seated.section.along[0],
+            limit: template.limit,
+            sense: if verdict == Verdict::Pass { 0 } else { sense },
+            verdict,
+            says,
+            gap: seated.gaps.clone(),
+        };
+        Evaluated {
+            finding,
+            rocking: seated.section.profile.rocking(),
+            radius: seated.section.radius(),
+            sagitta: seated.section.sagitta,
+            places: seated.section.along.iter().map(|s| line.at(*s)).collect(),
+        }
+    }
+
+    /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap.
+    pub(crate) fn worst(&self, line: &Line, chord: f64, seat: Seat) -> (f64, f64) {
+        let (first, last) = (0.5 * chord, (line.length - 0.5 * chord).max(0.5 * chord));
+        let n_steps = ((last - first) / (SEARCH_STEP * chord)).ceil() as usize;
+        let mut worst = (first, f64::NEG_INFINITY);
+        for k in 0..=n_steps {
+            let centre = first + (last - first) * k as f64 / n_steps.max(1) as f64;
+            let seated = self.seat(line, Chord { centre, length: chord }, seat, SEARCH_PLACES);
+            let gap = seated.gaps[seated.largest].abs();
+            if gap > worst.1 {
+                worst = (centre, gap);
+            }
+        }
+        worst
+    }
+
+    fn seat(&self, line: &Line, chord: Chord, seat: Seat, n_places: usize) -> Seated {
+        let section = Section::new(self.now, self.target, line, chord, n_places);
+        let profile = &section.profile;
+        let (seating, rocks) = seating(profile, seat, chord.length);
+        let gaps = profile.gaps(&seating);
+        let largest =
+            (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() + TIE { k } else { best });
+        Seated { seating, rocks, gaps, largest, section }
+    }
+
+    /// Returns the 95 % uncertainty of the largest gap: the fit's covariance at the places that decide the gap, the correlated
+    /// error of a single scan, taken as independent between those places, and the scanner's bias.
+    fn uncertainty(&self, line: &Line, seated: &Seated) -> f64 {
+        let terms: Vec<([f64; 2], f64)> = seated
+            .section
+            .profile
+            .functional(&seated.seating, seated.largest)
+            .into_iter()
+            .map(|(k, weight)| {
+                let [u, v] = line.at(seated.section.along[k]);
+                ([u, v], weight / seated.section.cosine(&self.now.normal(u, v)))
+            })
+            .collect();
+        let square: f64 = terms.iter().map(|(_, w)| w * w).sum();
+        let correlated = self.sigma_correlated * (0.5 * square).sqrt();
+        EXPANDED * self.now.sigma_of_heights(&terms).hypot(correlated).hypot(self.sigma_true)
+    }
+
+    /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests
+    /// on a plate that is more hollow than the template; one that overhangs the gap, on a plate that is less hollow.
+    fn sense(&self, seated: &Seated) -> (&'static str, i8) {
+        let hollow = seated.open() == Opening::BetweenContacts;
+        let sagitta = seated.section.target_sagitta;
+        if sagitta.abs() < STRAIGHT {
+            return (if hollow { "hollow" } else { "crowned" }, 1);
+        }
+        if hollow == (sagitta > 0.0) { ("bent too far", 1) } else { ("under-bent", -1) }
+    }
+}
+
+/// Gaps that differ by less than this are equal, metres: of equal gaps the first counts, independent of rounding.
+const TIE: f64 = 1e-9;
+
+/// Returns the seating to judge, and whether the template rocks in the gravity seat.
+fn seating(profile: &Profile, seat: Seat, chord: f64) -> (Seating, bool) {
+    match seat {
+        Seat::Balanced => (profile.balanced(), profile.gravity().span(profile) < 0.25 * chord),
+        Seat::Held => (profile.held(), false),
+        Seat::Gravity => {
+            let gravity = profile.gravity();
+            if gravity.span(profile) < 0.25 * chord { (profile.balanced(), true) } else { (gravity, false) }
+        }
+    }
+}
+
+impl Seated {
+    fn open(&self) -> Opening {
+        let contacts = self.section.profile.contacts(&self.seating);
+        let between = |k: usize| contacts.first() < Some(&k) && Some(&k) < contacts.last();
+        // Under a held template, whose ends touch, the plate may also stand above the edge.
+        match between(self.largest) && self.gaps[self.largest] > 0.0 {
+            true => Opening::BetweenContacts,
+            false => Opening::BeyondContacts,
+        }
+    }
+
+    fn where_open(&self) -> &'static str {
+        let gap = self.gaps[self.largest];
+        let x = &self.section.profile.x;
+        let half = 0.5 * (x[x.len() - 1] - x[0]);
+        let ends = [self.gaps[0], self.gaps[self.gaps.len() - 1]];
+        match self.open() {
+            _ if gap < 0.0 => "above the board's edge",
+            Opening::BetweenContacts if x[self.largest].abs() < 0.5 * half => "in the middle",
+            Opening::BetweenContacts => "between its contacts",
+            Opening::BeyondContacts if ends.iter().all(|end| *end > 0.5 * gap) => "at the ends",
+            Opening::BeyondContacts => "at one end",
+        }
+    }
+}
+
+/// Returns the place in words, along the direction in which the line mainly runs.
+fn from_edge(line: &Line, at: [f64; 2]) -> String {
+    let [along_u, along_v] = line.direction();
+    if along_u.abs() >= along_v.abs() {
+        format!("{:.1} m from the left edge", at[0])
+    } else {
+        format!("{:.1} m from the bottom edge", at[1])
+    }
+}
