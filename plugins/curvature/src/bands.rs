@@ -1,4 +1,4 @@
-//! The bend angle of a band.
+//! Bend bands: angle, size and uncertainty of a patch of changed curvature.
 
 use std::f64::consts::PI;
 
@@ -6,66 +6,67 @@ use platen_sdk::PlateGrid;
 use platen_shape::surface::Curvature;
 use platen_shape::{EXPANDED, Surface};
 
-/// A patch of the plate that bent in one sense.
+/// Patch of the plate that bent in one sense.
 #[derive(Debug, Clone)]
 pub(crate) struct Band {
-    /// Turn of the plate from one side of the band to the other, radians, positive towards the scanner.
+    /// Rotation of the plate from one side of the band to the other, radians, positive towards the scanner.
     pub(crate) angle: f64,
-    /// Sense of the patch, 1 or -1: not the angle's where the spline's swing beside a stronger band was taken for one.
+    /// Sense of the patch, 1 or -1. It differs from the angle's where the patch is the spline's overshoot beside a stronger band.
     sense: f64,
     /// 95 %, radians.
     pub(crate) uncertainty: f64,
-    /// Middle of the patch.
+    /// Weighted centre of the patch, (u, v), metres.
     pub(crate) centre: [f64; 2],
     /// Direction of the straight lines, from u towards v, 0 to pi.
     pub(crate) direction: f64,
-    /// Along the straight lines, metres.
+    /// Extent along the straight lines, metres.
     pub(crate) length: f64,
-    /// Across them.
+    /// Extent across them, metres.
     pub(crate) width: f64,
-    /// The nodes of the patch.
+    /// Nodes of the patch.
     pub(crate) nodes: Vec<usize>,
-    /// Unit direction across.
+    /// Unit direction across the band.
     across: [f64; 2],
-    /// From where to where it lies across and along, in the coordinates of these directions.
+    /// Range across and range along, in the coordinates of these directions, metres.
     span: [[f64; 2]; 2],
 }
 
-/// How far a spline swings beside a narrow bend, metres: two or three of its spans.
-const SWING: f64 = 0.2;
+/// Reach of the spline's overshoot beside a narrow bend, metres: two or three knot spans.
+const OVERSHOOT: f64 = 0.2;
 
 impl Band {
-    /// Bends the way its patch does, by more than chance. Of the many places that a map has, patches are the worst
-    /// ones: where nothing changed, their angles come to one and a half times the uncertainty of a place not picked.
-    pub(crate) fn beyond_doubt(&self) -> bool {
+    /// Returns whether the band bends in the sense of its patch by more than chance. Patches are selected as the most extreme
+    /// places of a map; where nothing changed, their angles reach one and a half times the uncertainty of an unselected place.
+    pub(crate) fn is_significant(&self) -> bool {
         self.sense * self.angle > 2.0 * self.uncertainty
     }
 
-    /// Lies where the spline still swings from this one.
-    pub(crate) fn swings_into(&self, other: &Self) -> bool {
+    /// Returns whether `other` lies within the overshoot of this band.
+    pub(crate) fn overshoots_into(&self, other: &Self) -> bool {
         let ([x, y], [u, v], [across, along]) = (self.across, other.centre, self.span);
-        let within = |s: f64, [from, to]: [f64; 2]| (from - SWING..=to + SWING).contains(&s);
+        let within = |s: f64, [from, to]: [f64; 2]| (from - OVERSHOOT..=to + OVERSHOOT).contains(&s);
         within(x * u + y * v, across) && within(x * v - y * u, along)
     }
 }
 
-/// Lines across a band on which its change is averaged.
+/// Number of lines across a band over which its change is averaged.
 const LINES: usize = 15;
 
-/// Step along them, metres: a spline's span is ten times as long.
+/// Step along them, metres, a tenth of a knot span.
 const STEP: f64 = 5e-3;
 
-/// The foot of a band: where its change has fallen to this share of its peak.
+/// Share of its peak to which the change has fallen at the foot of a band.
 const FOOT: f64 = 0.25;
 
-/// How far beyond its foot a band is summed, metres. A spline swings through beside a narrow bend, and only with that
-/// swing the turn is the plate's. A fixed length: ends that follow the sign of the change pick the noise that has this sign.
+/// Length of the integration beyond the foot, metres. The spline overshoots beside a narrow bend, and only the integral
+/// including the overshoot is the plate's rotation. The length is fixed, because limits at the change of sign would select
+/// noise of one sign.
 const BEYOND: f64 = 0.1;
 
-/// Half step of the slopes by which the uncertainty is told, metres.
+/// Half step of the difference quotients in the uncertainty, metres.
 const SLOPE_STEP: f64 = 5e-3;
 
-/// The band of a patch of nodes, between `[now, before]`.
+/// Measures the band of a patch of nodes between the surfaces `[now, before]`.
 pub(crate) fn measure(
     surfaces: [&Surface; 2],
     grid: PlateGrid,
@@ -77,7 +78,7 @@ pub(crate) fn measure(
     let section = Section::new(surfaces, grid, patch, total.strongest_direction());
     let sense = total.strongest().signum();
     let [from, to] = section.ends(sense);
-    let terms = section.turn(from, to);
+    let terms = section.rotation(from, to);
     let sigma = surfaces[0].sigma_of_heights(&terms).hypot(surfaces[1].sigma_of_heights(&terms));
     let weight = |i: usize| change[i].strongest().abs();
     let weights: f64 = patch.iter().map(|&i| weight(i)).sum();
@@ -97,14 +98,14 @@ pub(crate) fn measure(
     }
 }
 
-/// The section across a band, averaged along it.
+/// Section across a band, averaged along it.
 struct Section<'a> {
     surfaces: [&'a Surface; 2],
-    /// Direction in which the change bends.
+    /// Unit direction of the largest change.
     across: [f64; 2],
-    /// From where to where the patch reaches along the band.
+    /// Range of the patch along the band, metres.
     along: [f64; 2],
-    /// And across it.
+    /// Range across it, metres.
     reach: [f64; 2],
 }
 
@@ -117,7 +118,7 @@ impl<'a> Section<'a> {
         Self { surfaces, across, along: range([-y, x]), reach: range([x, y]) }
     }
 
-    /// Places on the plate at a distance across the band, spread along it.
+    /// Returns the places on the plate at distance `s` across the band, spread along it.
     fn places(&self, s: f64) -> impl Iterator<Item = [f64; 2]> {
         let ([x, y], [first, last], now) = (self.across, self.along, self.surfaces[0]);
         (0..LINES)
@@ -126,7 +127,7 @@ impl<'a> Section<'a> {
             .filter(|[u, v]| (0.0..=now.width()).contains(u) && (0.0..=now.height()).contains(v))
     }
 
-    /// Mean change of curvature across the band, in the mean over the band's length; 0 beyond the plate.
+    /// Returns the change of curvature across the band, averaged along it; 0 beyond the plate.
     fn change(&self, s: f64) -> f64 {
         let at = |surface: &Surface, [u, v]: [f64; 2]| surface.curvature(u, v).along(self.across);
         let [now, before] = self.surfaces;
@@ -136,7 +137,7 @@ impl<'a> Section<'a> {
         sum / f64::from(n.max(1))
     }
 
-    /// Where the band ends on both sides of its strongest change.
+    /// Returns the limits of integration on both sides of the largest change.
     fn ends(&self, sense: f64) -> [f64; 2] {
         let [first, last] = self.reach;
         let n = ((last - first) / STEP) as usize;
@@ -153,7 +154,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// The mean change summed from one end to the other (Simpson's rule).
+    /// Integrates the mean change between the limits (Simpson's rule).
     fn angle(&self, from: f64, to: f64) -> f64 {
         let n = 2 * ((to - from) / (2.0 * STEP)).ceil().max(1.0) as usize;
         let h = (to - from) / n as f64;
@@ -165,8 +166,8 @@ impl<'a> Section<'a> {
         (0..=n).map(|k| weight(k) * self.change(from + k as f64 * h)).sum::<f64>() * h / 3.0
     }
 
-    /// The mean turn between the two ends as heights: differences of slopes.
-    fn turn(&self, from: f64, to: f64) -> Vec<([f64; 2], f64)> {
+    /// Returns the mean rotation between the limits as a weighted sum of heights: a difference of slopes.
+    fn rotation(&self, from: f64, to: f64) -> Vec<([f64; 2], f64)> {
         let slope = |s: f64, sign: f64| {
             [1.0, -1.0].into_iter().flat_map(move |way| {
                 let places: Vec<[f64; 2]> = self.places(s + way * SLOPE_STEP).collect();

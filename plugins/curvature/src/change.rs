@@ -1,4 +1,4 @@
-//! What a stroke bent.
+//! Change of curvature between two scans: test against noise, and bend bands.
 
 use platen_model::Figure;
 use platen_model::{NodeState, Report};
@@ -12,8 +12,8 @@ use crate::{Nodes, Options, figure, place};
 /// Median of chi squared with three degrees of freedom.
 const MEDIAN: f64 = 2.366;
 
-/// 95 % quantile of three times F with 3 and 40 degrees of freedom: 7.81, that of chi squared, widened because the scale is told
-/// by the pair's own few tens of independent places.
+/// 95 % quantile of three times F with 3 and 40 degrees of freedom: wider than that of chi squared, 7.81, because the scale is
+/// estimated from the few tens of independent places of the pair.
 const DETECTED: f64 = 8.52;
 
 /// Adds the field, the bands and the sentences of the change between two scans, `[now, before]`.
@@ -29,12 +29,12 @@ pub(crate) fn add(
         now.curvature.iter().zip(&before.curvature).map(|(now, before)| *now - *before).collect();
     let sigma = |i: usize| [0, 1, 2].map(|k| now.sigma[i][k].hypot(before.sigma[i][k]));
     let known = |i: usize| now.known[i] && before.known[i];
-    let surprise: Vec<f64> = (0..PlateGrid::NODES).map(|i| surprise(&change[i], sigma(i))).collect();
-    let quiet = (0..PlateGrid::NODES).filter(|&i| known(i)).map(|i| surprise[i]);
-    let scale = quiet_scale(quiet.collect());
+    let chi_squared: Vec<f64> = (0..PlateGrid::NODES).map(|i| chi_squared(&change[i], sigma(i))).collect();
+    let quiet = (0..PlateGrid::NODES).filter(|&i| known(i)).map(|i| chi_squared[i]);
+    let scale = null_scale(quiet.collect());
     let label: Vec<i8> = (0..PlateGrid::NODES)
         .map(|i| {
-            let changed = known(i) && surprise[i] > DETECTED * scale;
+            let changed = known(i) && chi_squared[i] > DETECTED * scale;
             if changed { change[i].strongest().signum() as i8 } else { 0 }
         })
         .collect();
@@ -73,7 +73,7 @@ pub(crate) fn add(
     report.fields.push(grid.scalar("curvature_change", "1/m", values, state));
 }
 
-/// The bands among the patches, strongest first.
+/// Returns the significant bands among the patches, strongest first.
 fn bands(
     surfaces: [&Surface; 2],
     grid: PlateGrid,
@@ -82,35 +82,34 @@ fn bands(
 ) -> Vec<Band> {
     let mut all: Vec<Band> =
         patches.iter().map(|patch| bands::measure(surfaces, grid, patch, change)).collect();
-    all.retain(Band::beyond_doubt);
+    all.retain(Band::is_significant);
     all.sort_by(|a, b| b.angle.abs().total_cmp(&a.angle.abs()));
     let mut bands: Vec<Band> = Vec::new();
     for band in all {
-        if !bands.iter().any(|stronger| stronger.swings_into(&band)) {
+        if !bands.iter().any(|stronger| stronger.overshoots_into(&band)) {
             bands.push(band);
         }
     }
     bands
 }
 
-/// How much less the change scatters than stated, as a share of the variance, from the quieter half of the plate.
+/// Returns the scale of the empirical null distribution: the variance of the change relative to the stated one, from the
+/// median over the plate (Efron 2004).
 ///
-/// A spline's covariance counts what smoothing takes away from the plate's own shape, most of all from its curvature;
-/// between two scans of a shape that stayed, most of that is the same both times and cancels. How much depends on the
-/// smoothing that each scan was given, and is told by the pair itself (B. Efron, Large-scale simultaneous hypothesis testing:
-/// the choice of a null hypothesis, JASA 99, 2004). Never above 1: a plate less quiet than stated has changed over half
-/// of it, or wants calibrating.
-fn quiet_scale(mut surprise: Vec<f64>) -> f64 {
-    if surprise.is_empty() {
+/// A spline's covariance includes the smoothing bias, which is largest in curvature. Between two scans of an unchanged shape
+/// most of the bias is equal and cancels; the rest depends on the smoothing of each scan and is estimated from the pair. Never
+/// above 1: a plate with a larger median has changed over half of its area, or needs a calibration.
+fn null_scale(mut chi_squared: Vec<f64>) -> f64 {
+    if chi_squared.is_empty() {
         return 1.0;
     }
-    let middle = surprise.len() / 2;
-    let (_, median, _) = surprise.select_nth_unstable_by(middle, f64::total_cmp);
+    let middle = chi_squared.len() / 2;
+    let (_, median, _) = chi_squared.select_nth_unstable_by(middle, f64::total_cmp);
     (*median / MEDIAN).min(1.0)
 }
 
-/// How far a change lies beyond its noise: chi squared with three degrees of freedom when nothing changed.
-fn surprise(change: &Curvature, sigma: [f64; 3]) -> f64 {
+/// Returns the test statistic of a change: chi squared with three degrees of freedom when nothing changed.
+fn chi_squared(change: &Curvature, sigma: [f64; 3]) -> f64 {
     [change.u, change.v, change.uv].iter().zip(sigma).map(|(c, s)| (c / s).powi(2)).sum()
 }
 

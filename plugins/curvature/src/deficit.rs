@@ -1,4 +1,4 @@
-//! What is still to bend.
+//! Curvature missing to the target.
 
 use platen_model::Figure;
 use platen_model::{NodeState, Report};
@@ -17,7 +17,7 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
         })
         .collect();
     let sigma = (0..PlateGrid::NODES).map(|i| sigma(nodes, target, i)).collect::<Vec<f64>>();
-    let lod: Vec<f64> = (0..PlateGrid::NODES).map(|i| EXPANDED * evened(&sigma, i)).collect();
+    let lod: Vec<f64> = (0..PlateGrid::NODES).map(|i| EXPANDED * averaged(&sigma, i)).collect();
     let state: Vec<NodeState> = (0..PlateGrid::NODES)
         .map(|i| match (nodes.known[i], value[i].abs() < lod[i]) {
             (false, _) => NodeState::Unseen,
@@ -30,7 +30,7 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let enough = state.iter().filter(|s| **s == NodeState::Unchanged).count();
     let figures = &mut report.findings.figures;
     figures.push(figure("curvature.enough", enough as f64 / known.max(1) as f64, "1"));
-    // The most of each sense, beyond doubt.
+    // The extreme of each sense among the significant nodes.
     for (name, sign, word) in
         [("curvature.deficit_max", 1.0, "bend more"), ("curvature.deficit_min", -1.0, "bent too far")]
     {
@@ -46,8 +46,8 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     gaussian(report, nodes, target);
 }
 
-/// The Gaussian curvature that is missing, for targets that have any. Bending alone does not change it: the plate has
-/// to stretch for it.
+/// Adds the missing Gaussian curvature, for targets that have any. Bending alone does not change it (theorema egregium): the
+/// plate must stretch for it.
 fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let grid = nodes.grid;
     if !is_doubly_curved(nodes, target) {
@@ -56,7 +56,7 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let goal = grid.map(|u, v| target.curvature(u, v).gaussian);
     let value: Vec<f64> = goal.iter().zip(&nodes.curvature).map(|(goal, k)| goal - k.gaussian).collect();
     let known = |i: &usize| nodes.known[*i];
-    // Places on the edges stand for as much as others: a hundredth of the plate at most is counted twice.
+    // Nodes on the edges count as full cells: at most a hundredth of the plate is counted twice.
     let total =
         |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>() * grid.cell();
     let (missing, wanted) = (total(&value), total(&goal));
@@ -72,18 +72,18 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     report.fields.push(grid.scalar("gaussian_missing", "1/m2", value, state.collect()));
 }
 
-/// Whether bending alone cannot make the target.
+/// Returns whether the target has Gaussian curvature, which bending alone cannot make.
 pub(crate) fn is_doubly_curved(nodes: &Nodes, target: &TargetSurface) -> bool {
     // 1e-9 1/m^2: a sphere of 30 km.
     nodes.grid.map(|u, v| target.curvature(u, v).gaussian).iter().any(|goal| goal.abs() >= 1e-9)
 }
 
-/// Nodes to each side over which a sigma is evened out: about a span of the surface's spline.
+/// Nodes to each side over which a standard deviation is averaged: about one knot span.
 const REACH: usize = 2;
 
-/// Root mean square about a node. A spline's curvature is known worst at its knots and best between them, by one and the
-/// same error: places side by side shall not differ in whether they are bent enough.
-fn evened(sigma: &[f64], node: usize) -> f64 {
+/// Returns the root mean square around a node. The variance of a spline's curvature oscillates between the knots although
+/// neighbouring errors are the same error; averaging keeps neighbouring nodes in the same state.
+fn averaged(sigma: &[f64], node: usize) -> f64 {
     let range = |k: usize| k.saturating_sub(REACH)..(k + REACH + 1).min(PlateGrid::SIDE);
     let (rows, columns) = (range(node / PlateGrid::SIDE), range(node % PlateGrid::SIDE));
     let count = rows.len() * columns.len();
@@ -91,7 +91,7 @@ fn evened(sigma: &[f64], node: usize) -> f64 {
     (rows.flat_map(row).sum::<f64>() / count as f64).sqrt()
 }
 
-/// One sigma of the deficit at a node.
+/// Returns the standard deviation of the deficit at a node.
 fn sigma(nodes: &Nodes, target: &TargetSurface, i: usize) -> f64 {
     let ([u, v], [along_u, along_v, twist]) = (nodes.grid.at(i), nodes.sigma[i]);
     match target.bending(u, v) {

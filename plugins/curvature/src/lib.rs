@@ -1,19 +1,33 @@
-//! Comparison `curvature`: what the stroke bent, and where the plate still has to bend.
+//! Comparison `curvature`: change of curvature between two scans, and the curvature missing to the target.
 //!
-//! Curvature needs no alignment: however the plate moved as a whole between two strokes, its curvature at a material place
-//! is its own. So the change of curvature is the first map of what a stroke did, and the target's curvature minus
-//! the plate's is what is still to do.
+//! Curvature needs no alignment: the curvature at a material place does not depend on how the plate as a whole moved between
+//! two strokes. Its change is therefore the primary map of what a stroke did, and the target's curvature minus the plate's the
+//! map of what is still to bend. As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage
+//! tanks", the B-spline surfaces of two strokes (section 4.4) are compared at equal (u, v). The level of detection, the bend
+//! angles and the comparison with a target are this project's own.
 //!
-//! Level of detection, 95 %. One curvature: 1.96 sqrt(s^2 + s_corr^2), s from the spline's covariance. The change has
-//! three numbers (along u, along v, twist): a place is *unchanged* when the sum of (change / s)^2, s^2 from both splines and
-//! s_corr, lies below the 95 % quantile of what it is by chance, after s was scaled down to the scatter of the quieter half
-//! of the plate. s_corr is the correlated error of a position, taken as a wave of length L:
-//! s_position (2 pi / L)^2.
+//! # Method
 //!
-//! Changed places that hang together, and have one sense, are a band. Its bend angle is the change of curvature summed
-//! on lines across it, to beyond its foot, and averaged along it. A patch smaller than `min_patch`, one that bends by less than
-//! twice its uncertainty, and the spline's swing beside a stronger band count as unchanged: by chance 5 % of a plate that
-//! kept its shape lies above the level of detection.
+//! *Level of detection*, 95 %, of a single curvature:
+//!
+//! ```text
+//! LoD = 1.96 sqrt(s^2 + s_corr^2),    s_corr = s_position (2 pi / L)^2
+//! ```
+//!
+//! with s from the spline's covariance and s_corr the correlated error of a position, taken as a wave of length L
+//! (`wavelength`).
+//!
+//! *Test of a change.* The change at a place has three components: along u, along v, twist. The place is *unchanged* when the
+//! sum of (change / s)^2 over the components is below its 95 % quantile under no change, with s^2 from both splines and s_corr.
+//! Before the test s is scaled down to the scatter of the quieter half of the plate (empirical null distribution; Efron,
+//! "Large-scale simultaneous hypothesis testing: the choice of a null hypothesis", JASA 99, 2004).
+//!
+//! *Bend bands.* Connected changed places of one sense form a band. Its bend angle is the integral of the change of curvature
+//! across the band (Simpson's rule), to beyond its foot, averaged along the band. A patch smaller than `min_patch`, a patch that
+//! bends by less than twice its uncertainty, and the spline's overshoot beside a stronger band count as unchanged: by chance 5 %
+//! of an unchanged plate lies above the level of detection.
+//!
+//! # Example
 //!
 //! ```toml
 //! [[comparison]]
@@ -22,24 +36,43 @@
 //! against = "before"
 //! ```
 //!
-//! | key | meaning |
-//! |---|---|
-//! | `against` | `before`, the stroke before, or `baseline`, the blank |
-//! | `min_patch` | smallest patch of change, square metres |
-//! | `wavelength` | length over which the scanner's correlated error swings, metres |
-//! | `trusted` | places whose curvature is less certain than this count as not seen, 1/m |
+//! # Options
 //!
-//! Fields, mid-surface, positive when the centre lies on the scanner's side, 1/m: `kappa_u`, `kappa_v`, `kappa_uv` (twist),
-//! `kappa_max`, `kappa_min` (principal), `gaussian` (1/m2); with an earlier scan `curvature_change`, the
-//! change in the direction in which it is strongest; with a target `curvature_deficit`, positive where the plate has to
-//! bend more, neutral where it is enough; with a sphere or torus `gaussian_missing` (1/m2), for which the plate still has to
-//! stretch, and what it stretched already, the membrane strain of the mid-surface (`strain_u`, `strain_v`, `strain_uv`).
+//! | key | unit | default | range | meaning |
+//! |---|---|---|---|---|
+//! | `against` | | `before` | `before`, `baseline` | earlier scan: the stroke before, or the blank |
+//! | `min_patch` | m2 | 0.02 | 0 to 10 | smallest connected area that counts as changed |
+//! | `wavelength` | m | 1.0 | 0.05 to 100 | length of a period of the scanner's correlated error |
+//! | `trusted` | 1/m | 0.05 | 0.0001 to 10 | places whose curvature is less certain than this (95 %) count as not seen |
 //!
-//! Figures: `curvature.lod`, the shares `curvature.above_lod` and `curvature.changed_share`; `bend.N.angle` with its place,
-//! `bend.N.direction` of the straight lines, `bend.N.length` and `bend.N.width`; `curvature.deficit_max`,
-//! `curvature.deficit_min` and `curvature.enough`, the share that is done; `gaussian.missing` and `gaussian.wanted`, the
-//! Gaussian curvature integrated over what was seen (steradians), and `gaussian.missing_share`, 1 for any plate that only
-//! bent; `strain.max` and `strain.min`, the largest stretch and squeeze in any direction.
+//! # Fields
+//!
+//! Of the mid-surface, positive when the centre lies on the scanner's side.
+//!
+//! | field | unit | present | meaning |
+//! |---|---|---|---|
+//! | `kappa_u`, `kappa_v`, `kappa_uv` | 1/m | always | curvature along u, along v, twist |
+//! | `kappa_max`, `kappa_min`, `gaussian` | 1/m, 1/m2 | always | principal curvatures, Gaussian curvature |
+//! | `curvature_change` | 1/m | with an earlier scan | change in the direction in which it is largest |
+//! | `curvature_deficit` | 1/m | with a target | positive where the plate must bend more, neutral where it is enough |
+//! | `gaussian_missing` | 1/m2 | sphere, torus | Gaussian curvature for which the plate must still stretch |
+//! | `strain_u`, `strain_v`, `strain_uv` | 1 | sphere, torus | membrane strain of the mid-surface |
+//!
+//! # Figures
+//!
+//! | figure | unit | meaning |
+//! |---|---|---|
+//! | `curvature.lod` | 1/m | median level of detection |
+//! | `curvature.above_lod`, `curvature.changed_share` | 1 | share of the plate above it; share in bands |
+//! | `bend.N.angle`, `.direction`, `.length`, `.width` | rad, rad, m, m | band N: angle with its place, direction of the straight lines, size |
+//! | `curvature.deficit_max`, `curvature.deficit_min`, `curvature.enough` | 1/m, 1/m, 1 | extremes beyond doubt; share that is done |
+//! | `gaussian.missing`, `gaussian.wanted`, `gaussian.missing_share` | 1 | Gaussian curvature integrated over what was seen (steradians); the share is 1 for a plate that only bent |
+//! | `strain.max`, `strain.min` | 1 | largest stretch and largest shortening in any direction |
+//!
+//! # Limits and errors
+//!
+//! Curvature near the edge of the plate is uncertain; see `trusted`. Refused are an earlier scan of a plate of another size and
+//! a target with an impossible radius.
 
 mod bands;
 mod change;
@@ -55,13 +88,13 @@ use platen_shape::{EXPANDED, Surface, TargetSurface};
 platen_sdk::options! {
     /// Options of `curvature`.
     pub struct Options {
-        /// Which earlier scan to compare with.
+        /// Earlier scan to compare with.
         against: String = "before", choices ["before", "baseline"];
         /// Smallest connected area that counts as changed, square metres.
         min_patch: f64 = 0.02, unit "m2", min 0.0, max 10.0;
-        /// Length over which the scanner's correlated error swings.
+        /// Period of the scanner's correlated error.
         wavelength: f64 = 1.0, unit "m", min 0.05, max 100.0;
-        /// Least certain curvature that still counts as seen (95 %).
+        /// Largest uncertainty (95 %) of a curvature that still counts as seen.
         trusted: f64 = 0.05, unit "1/m", min 0.0001, max 10.0;
     }
 }
@@ -86,14 +119,14 @@ impl Comparison for Bending {
     }
 }
 
-/// Curvature at every node with what is known of it.
+/// Curvature at every node, with its uncertainty.
 #[derive(Debug)]
 struct Nodes {
     grid: PlateGrid,
     curvature: Vec<Curvature>,
-    /// One sigma along u, along v, of the twist.
+    /// Standard deviations: along u, along v, of the twist.
     sigma: Vec<[f64; 3]>,
-    /// Seen, and certain enough.
+    /// Whether the node was seen and is certain enough.
     known: Vec<bool>,
 }
 
@@ -124,10 +157,10 @@ impl Nodes {
     }
 }
 
-/// `check` fails when the job was cancelled.
+/// Compares the plate with its target and an earlier scan. `check` fails when the job was cancelled.
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let (task, now) = (&inputs.task, &inputs.now);
-    // A single scan has its share of what pairs of scans show.
+    // The correlated error is that of a pair of scans; a single scan has half its variance.
     let correlated = task.sigma_correlated / 2.0_f64.sqrt();
     let correlated = correlated * (std::f64::consts::TAU / options.wavelength).powi(2);
     let nodes = Nodes::new(now, correlated, options.trusted);
@@ -161,11 +194,12 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     Ok(report)
 }
 
+/// Returns a figure without place and uncertainty.
 fn figure(name: impl Into<String>, value: f64, unit: &str) -> Figure {
     Figure { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
 }
 
-/// `u 1500, v 900 mm`.
+/// Formats a place as `u 1500, v 900 mm`.
 fn place([u, v]: [f64; 2]) -> String {
     format!("u {:.0}, v {:.0} mm", u * 1000.0, v * 1000.0)
 }

@@ -1,4 +1,4 @@
-//! What the plate stretched.
+//! Membrane strain of the mid-surface.
 
 use platen_model::Figure;
 use platen_model::{NodeState, Report};
@@ -10,8 +10,8 @@ use crate::{Nodes, figure};
 /// Adds the membrane strain of the mid-surface: Green's strain of S(u, v) against the flat rectangle,
 /// (|S_u|^2 - 1) / 2, (|S_v|^2 - 1) / 2 and S_u . S_v / 2.
 ///
-/// It is that of the material map which the flattening chose: with `elastic` the one of least energy, with `harmonic` the
-/// map's own error as well.
+/// The strain is that of the flattening's material map: of least energy with `elastic`; with `harmonic` it includes the map's
+/// own error.
 pub(crate) fn add(report: &mut Report, nodes: &Nodes, now: &Surface) {
     let strain = nodes.grid.map(|u, v| {
         let d = now.derivatives(u, v);
