@@ -1,26 +1,26 @@
-//! The rigid motion of the plate as a whole.
+//! Alignment: rigid motion of the plate as a whole, by weighted least squares.
 
 use nalgebra::{Matrix6, Rotation3, Vector6};
 use platen_sdk::{PlateGrid, Result};
 use platen_shape::Vec3;
 
-use crate::grid::Nodes;
+use crate::nodes::Nodes;
 
 /// Nodes along each side.
 const NODES: usize = PlateGrid::SIDE;
 
-/// Standard deviation of a material point within the surface, metres: what scans of good plates show. The normal
-/// direction is known ten times better and decides the alignment; this keeps it from sliding.
+/// Standard deviation of a material point within the surface, metres, as observed on scans of good plates. The normal
+/// direction is ten times more certain and determines the alignment; this prevents sliding.
 const TANGENT_SIGMA: f64 = 0.3e-3;
 
-/// Errors that the fits do not know of (lattice, range bias) as a floor of the normal direction's sigma, metres.
+/// Least standard deviation along the normal, metres: errors outside the fits' covariances (lattice, range bias).
 const NORMAL_FLOOR: f64 = 0.05e-3;
 
-/// Tukey's constant: 95 % efficient on normal errors (Huber, Ronchetti, Robust Statistics, 2nd ed., 4.8).
+/// Tukey's biweight constant: 95 % efficiency for normal errors (Huber, Ronchetti, Robust Statistics, 2nd ed., 4.8).
 const TUKEY: f64 = 4.685;
 
-/// Local fits along each side that vote for the part that kept its shape.
-const VOTERS: usize = 6;
+/// Local fits along each side in the search for the unchanged part.
+const LOCAL_FITS: usize = 6;
 
 /// `p -> rotation * (p - pivot) + pivot + translation`, with the covariance of its six parameters.
 #[derive(Debug, Clone)]
@@ -31,12 +31,12 @@ pub(crate) struct Motion {
     covariance: Matrix6<f64>,
 }
 
-/// A motion and how it was found.
+/// Motion of the earlier plate, with the weights of its fit.
 #[derive(Debug)]
 pub(crate) struct Alignment<'a> {
     pub(crate) motion: Motion,
-    /// How much each place of the grid had its say in it, 0 to 1.
-    pub(crate) says: Vec<f64>,
+    /// Weight of each node in the fit, 0 to 1.
+    pub(crate) weights: Vec<f64>,
     pub(crate) name: &'a str,
 }
 
@@ -58,36 +58,36 @@ impl Motion {
         self.rotation.angle()
     }
 
-    /// How far the motion takes a point.
+    /// Returns the displacement of a point by the motion.
     pub(crate) fn translation_at(&self, p: Vec3) -> Vec3 {
         self.apply(&p) - p
     }
 
-    /// Standard deviation of the moved point along `normal`.
+    /// Returns the standard deviation of the moved point along `normal`.
     pub(crate) fn sigma(&self, p: &Vec3, normal: &Vec3) -> f64 {
         let row = jacobian_row(&(p - self.pivot), normal);
         (row.transpose() * self.covariance * row)[0].max(0.0).sqrt()
     }
 }
 
-/// Derivative of `direction . motion(p)` by the small rotation and the translation.
+/// Returns the derivative of `direction . motion(p)` by the small rotation and the translation.
 fn jacobian_row(arm: &Vec3, direction: &Vec3) -> Vector6<f64> {
     let turn = arm.cross(direction);
     Vector6::new(turn.x, turn.y, turn.z, direction.x, direction.y, direction.z)
 }
 
-/// The four corners fit best.
+/// Fits the four corners.
 pub(crate) fn corners(nodes: &Nodes) -> Motion {
     let last = NODES - 1;
-    these(nodes, &[0, last, NODES * last, NODES * last + last])
+    fit(nodes, &[0, last, NODES * last, NODES * last + last])
 }
 
-/// The places of a short list fit best.
+/// Fits all places of a short list.
 pub(crate) fn places(nodes: &Nodes) -> Motion {
-    these(nodes, &(0..nodes.now.len()).collect::<Vec<_>>())
+    fit(nodes, &(0..nodes.now.len()).collect::<Vec<_>>())
 }
 
-fn these(nodes: &Nodes, places: &[usize]) -> Motion {
+fn fit(nodes: &Nodes, places: &[usize]) -> Motion {
     let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
     for _ in 0..8 {
         step(nodes, &mut motion, places.iter().map(|i| (*i, 1.0)), 1.0);
@@ -95,17 +95,19 @@ fn these(nodes: &Nodes, places: &[usize]) -> Motion {
     motion
 }
 
-/// The largest part that kept its shape lies where it lay; with how much each place is of that part, 0 to 1.
+/// Fits the largest part that kept its shape. Returns the motion and the weight of each node, 0 to 1.
+///
+/// The local fit with the most inliers is refined by iteratively reweighted least squares with Tukey's biweight.
 pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result<(Motion, Vec<f64>)> {
-    let start = whole(nodes);
+    let start = all_seen(nodes);
     let mut best = (f64::NEG_INFINITY, start.clone());
-    for row in 0..VOTERS {
-        for column in 0..VOTERS {
+    for row in 0..LOCAL_FITS {
+        for column in 0..LOCAL_FITS {
             check()?;
             let motion = local(nodes, &start, row, column);
-            let votes = votes(nodes, &motion);
-            if votes > best.0 {
-                best = (votes, motion);
+            let inliers = inliers(nodes, &motion);
+            if inliers > best.0 {
+                best = (inliers, motion);
             }
         }
     }
@@ -114,12 +116,12 @@ pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result
         let weights = weights(nodes, &motion);
         step(nodes, &mut motion, weights.into_iter().enumerate(), SHARING);
     }
-    let says = weights(nodes, &motion);
-    Ok((motion, says))
+    let weights = weights(nodes, &motion);
+    Ok((motion, weights))
 }
 
-/// All seen places together.
-fn whole(nodes: &Nodes) -> Motion {
+/// Fits all places that were seen.
+fn all_seen(nodes: &Nodes) -> Motion {
     let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
     for _ in 0..6 {
         step(nodes, &mut motion, (0..PlateGrid::NODES).step_by(7).map(|i| (i, 1.0)), 1.0);
@@ -127,10 +129,10 @@ fn whole(nodes: &Nodes) -> Motion {
     motion
 }
 
-/// One cell of the voters' grid and a margin round it.
+/// Fits one cell of the grid of local fits, with a margin.
 fn local(nodes: &Nodes, start: &Motion, row: usize, column: usize) -> Motion {
     let range = |k: usize| {
-        let cell = (NODES - 1) as f64 / VOTERS as f64;
+        let cell = (NODES - 1) as f64 / LOCAL_FITS as f64;
         let (from, to) = ((k as f64 - 0.25) * cell, (k as f64 + 1.25) * cell);
         from.max(0.0) as usize..=to.min((NODES - 1) as f64) as usize
     };
@@ -148,12 +150,12 @@ fn scaled_residual(nodes: &Nodes, motion: &Motion, i: usize) -> f64 {
     off / nodes.sigma[i].hypot(NORMAL_FLOOR)
 }
 
-fn votes(nodes: &Nodes, motion: &Motion) -> f64 {
+fn inliers(nodes: &Nodes, motion: &Motion) -> f64 {
     let near = |i: &usize| nodes.seen[*i] && scaled_residual(nodes, motion, *i).abs() < TUKEY;
     (0..PlateGrid::NODES).step_by(3).filter(near).count() as f64
 }
 
-/// Tukey's weights.
+/// Returns Tukey's biweight of every node.
 fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
     let weight = |i: usize| {
         let r = scaled_residual(nodes, motion, i) / TUKEY;
@@ -162,11 +164,11 @@ fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
     (0..PlateGrid::NODES).map(weight).collect()
 }
 
-/// Nodes that share their error: a spline has fewer independent places than the fields have nodes. One in 25 is, as the
-/// nodes of the result's own grid.
+/// Nodes per independent place: a spline has fewer degrees of freedom than the fields have nodes. One in 25, as in the
+/// result's own grid.
 const SHARING: f64 = 25.0;
 
-/// One Gauss-Newton step of the weighted fit over the places given; `inflation` widens the covariance.
+/// Takes one Gauss-Newton step of the weighted fit over the given places; `inflation` scales the covariance.
 fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize, f64)>, inflation: f64) {
     let mut normal_matrix = Matrix6::zeros();
     let mut gradient = Vector6::zeros();
@@ -192,6 +194,7 @@ fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize,
     motion.covariance = cholesky.inverse() * inflation;
 }
 
+/// Returns the unit axis in which `n` is smallest.
 fn least_axis(n: &Vec3) -> Vec3 {
     let axis = n.iamin();
     Vec3::from_fn(|k, _| f64::from(k == axis))

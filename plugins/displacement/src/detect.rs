@@ -1,16 +1,16 @@
-//! What changed beyond doubt.
+//! Detection of change: displacement, level of detection, significant patches.
 
 use platen_model::NodeState;
 use platen_sdk::PlateGrid;
 use platen_shape::{EXPANDED, Vec3};
 
 use crate::align::Alignment;
-use crate::grid::Nodes;
+use crate::nodes::Nodes;
 
 /// Standard deviations that the largest of 441 independent places of an unchanged plate exceeds in 5 % of the pairs
-/// (two-sided, Bonferroni); a surface ties places nearer than a seventh of a metre. Five nodes in a hundred lie above their
-/// level of detection by chance, and they lie together; so a patch is a change when one of its nodes lies beyond this.
-const CERTAIN: f64 = 3.86;
+/// (two-sided, Bonferroni); places nearer than a seventh of a metre are correlated. Five nodes in a hundred lie above their
+/// level of detection by chance, and they are neighbours; a patch is therefore a change only when one of its nodes exceeds this.
+const SIGNIFICANT: f64 = 3.86;
 
 /// Displacement at every node.
 #[derive(Debug)]
@@ -19,21 +19,22 @@ pub(crate) struct Changes {
     pub(crate) vectors: Vec<Vec3>,
     /// Along the normal, towards the scanner, metres.
     pub(crate) normal: Vec<f64>,
-    /// One sigma of the displacement along the normal, metres.
+    /// Standard deviation of the displacement along the normal, metres.
     pub(crate) sigma: Vec<f64>,
     /// Level of detection, metres.
     pub(crate) lod: Vec<f64>,
-    /// Its median over what was seen.
+    /// Median of the level of detection over what was seen, metres.
     pub(crate) median_lod: f64,
-    /// Share of what was seen that lies above it, before patches are judged.
+    /// Share of what was seen that lies above it, before patches are dropped.
     pub(crate) above_lod: f64,
-    /// What is known.
+    /// State of every node.
     pub(crate) state: Vec<NodeState>,
 }
 
+/// Returns the displacement at every node, and where it is a significant change.
 pub(crate) fn changes(
     nodes: &Nodes,
-    Alignment { motion, says, .. }: &Alignment<'_>,
+    Alignment { motion, weights, .. }: &Alignment<'_>,
     sigma_correlated: f64,
     min_patch: f64,
 ) -> Changes {
@@ -42,8 +43,8 @@ pub(crate) fn changes(
     let normal: Vec<f64> = vectors.iter().zip(&nodes.normal).map(|(d, n)| d.dot(n)).collect();
     let sigma: Vec<f64> = (0..PlateGrid::NODES)
         .map(|i| {
-            // Where a place had its say the alignment follows its error, and does not add to it.
-            let align = motion.sigma(&nodes.before[i], &nodes.normal[i]) * (1.0 - says[i]).sqrt();
+            // Where a place determines the alignment, the alignment follows its error and does not add to it.
+            let align = motion.sigma(&nodes.before[i], &nodes.normal[i]) * (1.0 - weights[i]).sqrt();
             nodes.sigma[i].hypot(sigma_correlated).hypot(align)
         })
         .collect();
@@ -58,16 +59,16 @@ pub(crate) fn changes(
     let count = |wanted: NodeState| state.iter().filter(|state| **state == wanted).count();
     let (above, below) = (count(NodeState::Seen), count(NodeState::Unchanged));
     let above_lod = above as f64 / (above + below).max(1) as f64;
-    let certain = |patch: &[usize]| patch.iter().any(|&i| normal[i].abs() > CERTAIN * sigma[i]);
+    let significant = |patch: &[usize]| patch.iter().any(|&i| normal[i].abs() > SIGNIFICANT * sigma[i]);
     let least = (min_patch / nodes.grid.cell()) as usize;
-    drop_patches(&mut state, &normal, |patch| patch.len() < least || !certain(patch));
+    drop_patches(&mut state, &normal, |patch| patch.len() < least || !significant(patch));
     let mut of_seen: Vec<f64> = (0..PlateGrid::NODES).filter(|&i| nodes.seen[i]).map(|i| lod[i]).collect();
     of_seen.sort_by(f64::total_cmp);
     let median_lod = of_seen.get(of_seen.len() / 2).copied().unwrap_or(0.0);
     Changes { vectors, normal, sigma, lod, median_lod, above_lod, state }
 }
 
-/// Connected places of change in one sense become unchanged where `drop` says so.
+/// Marks the connected places of one sense for which `drop` is true as unchanged.
 fn drop_patches(state: &mut [NodeState], normal: &[f64], drop: impl Fn(&[usize]) -> bool) {
     let label: Vec<i8> = state
         .iter()

@@ -1,22 +1,35 @@
-//! Comparison `displacement`: how every place of the plate moved since the stroke before.
+//! Comparison `displacement`: movement of every material place between two scans, after alignment.
 //!
-//! After a stroke the plate has moved as a whole and has no part that is sure to be still, so a displacement means
-//! nothing without its alignment, which is therefore named in every sentence. The rigid motion that the alignment
-//! takes away is reported.
+//! As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", the B-spline surfaces
+//! of two strokes (section 4.4) are compared at equal (u, v). After a stroke the plate has moved as a whole and has no part that
+//! is certain to be still, so a displacement depends on its alignment. Every sentence names the alignment, and the rigid motion
+//! that it removes is reported. Alignment and level of detection are this project's own.
 //!
-//! | `alignment` | the plate before is moved so that |
+//! # Method
+//!
+//! *Alignment.* A rigid motion of the earlier plate, by weighted least squares (Gauss-Newton) over material points:
+//!
+//! | `alignment` | motion |
 //! |---|---|
-//! | `unchanged` | the largest part that kept its shape lies where it lay: many local fits vote, the best is refined by iterated reweighting (Tukey) |
-//! | `corners` | the four corners fit best |
-//! | `supports` | the places that rest on the press's supports, `[[support]]` of the plate file, fit best |
-//! | `none` | nothing: for a plate on fixed supports under a fixed scanner |
+//! | `unchanged` | robust: the largest part that kept its shape coincides. Of many local fits the one with the most inliers starts iteratively reweighted least squares with Tukey's biweight (Huber, Ronchetti, "Robust Statistics", 2nd ed., 4.8) |
+//! | `corners` | least squares of the four corners |
+//! | `supports` | least squares of the places on the press's supports, `[[support]]` of the plate file |
+//! | `none` | identity: for a plate on fixed supports under a fixed scanner |
 //!
-//! A place is *unchanged* when its displacement along the normal is below the level of detection,
-//! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2): s1 and s2 from the splines' covariances, without what smoothing
-//! takes from a shape, which is the same in both scans; s_corr from the plant's null pairs; s_align from the alignment, where
-//! a place had no say in it. By chance 5 % of a plate that kept its shape lies above it. So places above the LoD that hang
-//! together are a change only when they cover `min_patch` and one of them lies beyond 3.86 standard deviations (1.97 LoD), which
-//! happens on one unchanged plate in twenty (two-sided, Bonferroni over 441 independent places).
+//! *Level of detection*, 95 %. A place is *unchanged* when its displacement along the normal is below
+//!
+//! ```text
+//! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2)
+//! ```
+//!
+//! with s1 and s2 from the splines' covariances without their smoothing bias, which is equal in both scans; s_corr from the
+//! plant's null pairs; s_align from the covariance of the alignment, less where the place itself determines the alignment.
+//!
+//! *Patches.* By chance 5 % of an unchanged plate lies above the LoD. Connected places above it are a change only when they
+//! cover `min_patch` and one of them exceeds 3.86 standard deviations (1.97 LoD), which happens on one unchanged plate in twenty
+//! (two-sided, Bonferroni over 441 independent places).
+//!
+//! # Example
 //!
 //! ```toml
 //! [[comparison]]
@@ -26,22 +39,36 @@
 //! alignment = "unchanged"
 //! ```
 //!
-//! | key | meaning |
-//! |---|---|
-//! | `against` | `before`, the stroke before, or `baseline`, the blank |
-//! | `alignment` | see above |
-//! | `min_patch` | smallest patch of change, square metres; a bend band covers far more, chance patches of a null pair 0.03 to 0.04 |
+//! # Options
 //!
-//! Figures: `displacement.rms` along the normal and `displacement.sigma`, the root mean square of its stated deviation, whose
-//! difference on null pairs is what a calibration is about; `displacement.lod`, the median over the plate, and
-//! `displacement.above_lod`, the share above it before patches are judged; `displacement.changed_share`, `displacement.max` with its place; `displacement.plate_rotation` and
-//! `displacement.plate_translation` that the alignment took away.
+//! | key | unit | default | range | meaning |
+//! |---|---|---|---|---|
+//! | `against` | | `before` | `before`, `baseline` | earlier scan: the stroke before, or the blank |
+//! | `alignment` | | `unchanged` | `unchanged`, `corners`, `supports`, `none` | see above |
+//! | `min_patch` | m2 | 0.1 | 0 to 10 | smallest patch of change; a bend band covers far more, chance patches of a null pair 0.03 to 0.04 |
 //!
-//! Fields: `displacement` (3 components, scanner frame) and `displacement_normal` (towards the scanner), metres.
+//! # Fields and figures
+//!
+//! | field | unit | meaning |
+//! |---|---|---|
+//! | `displacement` | m | vector, scanner frame |
+//! | `displacement_normal` | m | component along the normal, towards the scanner |
+//!
+//! | figure | unit | meaning |
+//! |---|---|---|
+//! | `displacement.rms`, `displacement.sigma` | m | root mean square along the normal, and of its stated standard deviation; a calibration on null pairs estimates their difference |
+//! | `displacement.lod`, `displacement.above_lod` | m, 1 | median level of detection; share of the plate above it |
+//! | `displacement.changed_share`, `displacement.max` | 1, m | share in patches of change; largest displacement with its place |
+//! | `displacement.plate_rotation`, `displacement.plate_translation` | rad, m | rigid motion that the alignment removed |
+//!
+//! # Limits and errors
+//!
+//! Without an earlier scan the report contains no figures. Refused are an earlier scan of a plate of another size, and `supports`
+//! with fewer than three supports in sight.
 
 mod align;
 mod detect;
-mod grid;
+mod nodes;
 
 use platen_model::{Figure, Findings};
 use platen_model::{NodeState, Report};
@@ -49,14 +76,14 @@ use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Res
 use platen_shape::Surface;
 
 use align::{Alignment, Motion};
-use grid::Nodes;
+use nodes::Nodes;
 
 platen_sdk::options! {
     /// Options of `displacement`.
     pub struct Options {
-        /// Which earlier scan to compare with.
+        /// Earlier scan to compare with.
         against: String = "before", choices ["before", "baseline"];
-        /// How the plate's own movement is taken away.
+        /// How the plate's movement as a whole is removed.
         alignment: String = "unchanged", choices ["unchanged", "corners", "supports", "none"];
         /// Smallest connected area that counts as changed, square metres.
         min_patch: f64 = 0.1, unit "m2", min 0.0, max 10.0;
@@ -69,7 +96,7 @@ impl Comparison for Displacement {
     const INFO: Info = Info::new(
         c"displacement",
         c"Displacement",
-        c"How every place of the plate moved since the stroke before, its own movement as a whole taken away.",
+        c"How every place of the plate moved since the stroke before, after removal of the movement as a whole.",
         c"1.0.0",
     );
     type Options = Options;
@@ -83,26 +110,26 @@ impl Comparison for Displacement {
     }
 }
 
-/// `check` fails when the job was cancelled.
+/// Compares the plate with an earlier scan. `check` fails when the job was cancelled.
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let Some(earlier) = inputs.earlier(&options.against)? else {
         let says = vec![format!("no {} scan: displacement is not known", options.against)];
         return Ok(Report::new(Findings { says, ..Findings::default() }, Vec::new()));
     };
     let nodes = Nodes::new(&inputs.now, earlier);
-    let few = |motion| (motion, vec![0.0; PlateGrid::NODES]);
-    let (motion, says) = match options.alignment.as_str() {
-        "corners" => few(align::corners(&nodes)),
-        "supports" => few(on_supports(inputs, earlier)?),
-        "none" => few(Motion::none()),
+    let unweighted = |motion| (motion, vec![0.0; PlateGrid::NODES]);
+    let (motion, weights) = match options.alignment.as_str() {
+        "corners" => unweighted(align::corners(&nodes)),
+        "supports" => unweighted(on_supports(inputs, earlier)?),
+        "none" => unweighted(Motion::none()),
         _ => align::unchanged(check, &nodes)?,
     };
-    let alignment = Alignment { motion, says, name: &options.alignment };
+    let alignment = Alignment { motion, weights, name: &options.alignment };
     let changes = detect::changes(&nodes, &alignment, inputs.task.sigma_correlated, options.min_patch);
     Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &options.against))
 }
 
-/// The plate lies on its supports as it lay.
+/// Aligns the places on the supports.
 fn on_supports(inputs: &Inputs, earlier: &Surface) -> Result<Motion> {
     let supports: Vec<[f64; 2]> = inputs.task.supports.iter().map(|support| support.at).collect();
     let nodes = Nodes::at(&inputs.now, earlier, &supports);
@@ -125,7 +152,7 @@ fn report(
     against: &str,
 ) -> Report {
     let changed = changes.state.iter().filter(|s| **s == NodeState::Seen).count();
-    // What changed beyond doubt, else all that was seen.
+    // The significant changes; without any, all that was seen.
     let counts = |state: NodeState| state == NodeState::Seen || changed == 0 && state != NodeState::Unseen;
     let largest = (0..PlateGrid::NODES)
         .filter(|&i| counts(changes.state[i]))

@@ -1,4 +1,4 @@
-//! Both surfaces at the same material points.
+//! Both surfaces at equal (u, v).
 
 use platen_sdk::PlateGrid;
 use platen_shape::{Surface, Vec3};
@@ -12,22 +12,22 @@ pub(crate) struct Nodes {
     pub(crate) now: Vec<Vec3>,
     /// On the scanned face then.
     pub(crate) before: Vec<Vec3>,
-    /// Normal now, towards the scanner.
+    /// Unit normal now, towards the scanner.
     pub(crate) normal: Vec<Vec3>,
-    /// Standard deviation of the difference along the normal, from both fits.
+    /// Standard deviation of the difference along the normal, from both fits, metres.
     pub(crate) sigma: Vec<f64>,
-    /// Seen both times.
+    /// Whether both scans saw the place.
     pub(crate) seen: Vec<bool>,
 }
 
 impl Nodes {
-    /// Every place of the grid.
+    /// Evaluates both surfaces at every node of the grid.
     pub(crate) fn new(now: &Surface, before: &Surface) -> Self {
         let grid = PlateGrid::new(now);
         Self::at(now, before, &grid.map(|u, v| [u, v]))
     }
 
-    /// These places.
+    /// Evaluates both surfaces at `places`, (u, v) in metres.
     pub(crate) fn at(now: &Surface, before: &Surface, places: &[[f64; 2]]) -> Self {
         let places = || places.iter().copied();
         let seen = |[u, v]: [f64; 2]| now.mask().seen(u, v) && before.mask().seen(u, v);
@@ -41,7 +41,7 @@ impl Nodes {
         }
     }
 
-    /// The place in the middle of the list, before: that of the plate for the whole grid.
+    /// Returns the earlier position of the middle place of the list: for the whole grid, the middle of the plate.
     pub(crate) fn centre(&self) -> Vec3 {
         self.before[self.before.len() / 2]
     }

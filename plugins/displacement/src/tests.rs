@@ -196,13 +196,13 @@ fn null_pairs(seeds: std::ops::Range<u64>, amplitude: f64, sigma_correlated: f64
     let pairs = seeds.map(|seed| [scan(2 * seed), scan(2 * seed + 1)]);
     let changes = pairs.map(|[now, before]| {
         let nodes = Nodes::new(&now, &before);
-        let (motion, says) = align::unchanged(&|| Ok(()), &nodes).expect("not cancelled");
-        detect::changes(&nodes, &Alignment { motion, says, name: "unchanged" }, sigma_correlated, 0.0)
+        let (motion, weights) = align::unchanged(&|| Ok(()), &nodes).expect("not cancelled");
+        detect::changes(&nodes, &Alignment { motion, weights, name: "unchanged" }, sigma_correlated, 0.0)
     });
     changes.collect()
 }
 
-/// Each pair scatters by 0.05, so 20 tell little; `PLATEN_NULL_PAIRS=200` takes a minute and tells more.
+/// Number of null pairs. Each scatters by 0.05, so 20 decide little; `PLATEN_NULL_PAIRS=200` takes a minute.
 fn wanted() -> u64 {
     std::env::var("PLATEN_NULL_PAIRS").ok().and_then(|n| n.parse().ok()).unwrap_or(20)
 }
