@@ -61,7 +61,7 @@ impl Deviation {
         let vertex = linear_program::minimum(&rows, &heights, reach).ok_or_else(|| {
             Error::new(
                 ErrorKind::BadData,
-                "the target has no seat: the plate was seen on one side of its middle only",
+                "the target finds no seat: the plate was seen on one side of its middle only",
             )
             .hint("scan again with the whole plate in view")
         })?;
