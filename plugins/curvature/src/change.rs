@@ -1,7 +1,6 @@
 //! Change of curvature between two scans: test against noise, and bend bands.
 
-use platen_model::Figure;
-use platen_model::{NodeState, Report};
+use platen_model::{Figure, NodeState, Report};
 use platen_sdk::PlateGrid;
 use platen_shape::surface::Curvature;
 use platen_shape::{EXPANDED, Surface};

@@ -79,8 +79,7 @@ mod change;
 mod deficit;
 mod strain;
 
-use platen_model::{Field, NodeState, Report};
-use platen_model::{Figure, Findings};
+use platen_model::{Field, Figure, Findings, NodeState, Report};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::surface::Curvature;
 use platen_shape::{EXPANDED, Surface, TargetSurface};

@@ -1,7 +1,6 @@
 //! Membrane strain of the mid-surface.
 
-use platen_model::Figure;
-use platen_model::{NodeState, Report};
+use platen_model::{Figure, NodeState, Report};
 use platen_sdk::PlateGrid;
 use platen_shape::Surface;
 

@@ -70,8 +70,7 @@ mod align;
 mod detect;
 mod nodes;
 
-use platen_model::{Figure, Findings};
-use platen_model::{NodeState, Report};
+use platen_model::{Figure, Findings, NodeState, Report};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::Surface;
 

@@ -77,8 +77,7 @@ mod linear_program;
 mod seat;
 mod section;
 
-use platen_model::{Centre, Figure, Findings, Task, Template, Verdict};
-use platen_model::{Field, NodeState, Report};
+use platen_model::{Centre, Field, Figure, Findings, NodeState, Report, Task, Template, Verdict};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::TargetSurface;
 
