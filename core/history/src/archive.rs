@@ -1,42 +1,42 @@
-//! Questions to a history.
+//! Queries of a history.
 
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 use rusqlite::{Connection, Params, Row, named_params};
 
-use crate::{Error, Event, PlateRecord, Stroke, StrokeKey, Verdict, schema};
+use crate::{Error, PlateRecord, Stroke, StrokeKey, Verdict, schema};
 
-/// A history for reading.
+/// History opened for reading.
 #[derive(Debug)]
 pub struct Archive {
     connection: Connection,
     path: PathBuf,
 }
 
-/// Which strokes are asked for; an empty filter asks for all.
+/// Conditions of a query of strokes, combined by "and"; the default selects all.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
-    /// Of this physical plate.
+    /// Number of the physical plate.
     pub plate: Option<u32>,
-    /// Of this part number of the press.
+    /// Part number of the press.
     pub part_id: Option<u32>,
     /// Accepted at this time or later.
     pub since: Option<Timestamp>,
     /// Accepted before this time.
     pub until: Option<Timestamp>,
-    /// With this judgement.
+    /// Verdict.
     pub verdict: Option<Verdict>,
-    /// Only the newest so many.
+    /// Largest number of strokes; the newest are kept.
     pub newest: Option<u32>,
 }
 
-/// Columns of a stroke in the order that [`stroke`] reads them.
+/// Columns of a stroke, in the order in which [`stroke`] reads them.
 const STROKE: &str = "SELECT s.run_id, s.press, s.session, s.stroke, s.attempt, s.plate, s.recipe, s.baseline, s.dry_run, \
                       s.accepted, s.scanned, s.finished, s.acked, s.ack, s.seq, s.verdict, s.reason, s.figures, s.data, \
                       s.publication, s.document, s.scan, s.scan_sha256 FROM stroke s";
 
-/// A stroke that was measured: there is something to compare with.
+/// Condition of a stroke that was measured and can be compared with.
 const MEASURED: &str = "s.verdict IS NOT NULL AND s.verdict <> 'not_measured'";
 
 impl Archive {
@@ -60,12 +60,12 @@ impl Archive {
         &mut self.connection
     }
 
-    /// The database file.
+    /// Returns the path of the database.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The strokes that `filter` asks for, oldest first.
+    /// Returns the strokes selected by `filter`, oldest first.
     ///
     /// # Errors
     /// [`Error::Storage`], [`Error::Damaged`].
@@ -86,7 +86,7 @@ impl Archive {
         )
     }
 
-    /// One stroke.
+    /// Returns one stroke.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
@@ -95,7 +95,7 @@ impl Archive {
         found.ok_or_else(|| Error::NoSuchRun { path: self.path.clone(), run_id })
     }
 
-    /// The last stroke that a press had accepted.
+    /// Returns the last accepted stroke of a press.
     ///
     /// # Errors
     /// [`Error::Storage`], [`Error::Damaged`].
@@ -104,16 +104,8 @@ impl Archive {
         Ok(self.query(&sql, [press])?.pop())
     }
 
-    /// The strokes of a press that were accepted and are not done with, oldest first.
-    ///
-    /// # Errors
-    /// [`Error::Storage`], [`Error::Damaged`].
-    pub fn open_strokes(&self, press: u16) -> Result<Vec<Stroke>, Error> {
-        self.query(&format!("{STROKE} WHERE s.press = ?1 AND s.acked IS NULL ORDER BY s.run_id"), [press])
-    }
-
-    /// The stroke to compare a run with: the last one measured on the same physical plate, trials and other attempts of
-    /// the same stroke left out. A baseline counts: it is the state before the first stroke.
+    /// Returns the stroke to compare a run with: the last one measured on the same physical plate, without trials and other
+    /// attempts of the same stroke. A baseline counts: it is the state before the first stroke.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
@@ -126,7 +118,7 @@ impl Archive {
         Ok(self.query(&sql, (this.plate, run_id, this.key.session, this.key.stroke))?.pop())
     }
 
-    /// The scan of the blank that a run's (u, v) refer to: the last baseline measured on the same physical plate.
+    /// Returns the scan of the blank that a run's (u, v) refer to: the last baseline measured on the same physical plate.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
@@ -139,7 +131,7 @@ impl Archive {
         Ok(self.query(&sql, (this.plate, run_id))?.pop())
     }
 
-    /// All plates, oldest first.
+    /// Returns all plates, oldest first.
     ///
     /// # Errors
     /// [`Error::Storage`].
@@ -164,28 +156,7 @@ impl Archive {
         self.rows(sql, [], read).map_err(Error::storage(&self.path))
     }
 
-    /// The audit, of one run or of all, oldest first.
-    ///
-    /// # Errors
-    /// [`Error::Storage`].
-    pub fn events(&self, run_id: Option<u32>) -> Result<Vec<Event>, Error> {
-        let sql = "SELECT at, kind, run_id, text FROM event WHERE ?1 IS NULL OR run_id = ?1 ORDER BY event";
-        let read = |row: &Row<'_>| {
-            Ok(Event { at: time(row, 0)?, kind: row.get(1)?, run_id: row.get(2)?, text: row.get(3)? })
-        };
-        self.rows(sql, [run_id], read).map_err(Error::storage(&self.path))
-    }
-
-    /// The strokes whose raw scan is still kept and was taken before `limit`, oldest first.
-    ///
-    /// # Errors
-    /// [`Error::Storage`], [`Error::Damaged`].
-    pub fn scans_before(&self, limit: Timestamp) -> Result<Vec<Stroke>, Error> {
-        let sql = format!("{STROKE} WHERE s.scan IS NOT NULL AND s.accepted < ?1 ORDER BY s.run_id");
-        self.query(&sql, [text(limit)])
-    }
-
-    /// What the run id of a row must not be lost in: a damaged row is named.
+    /// Reads strokes. The first column is the run id, so that the error of a damaged row contains it.
     fn query(&self, sql: &str, values: impl Params) -> Result<Vec<Stroke>, Error> {
         let rows = self
             .rows(sql, values, |row| Ok((row.get(0)?, stroke(row))))
@@ -210,7 +181,7 @@ impl Archive {
     }
 }
 
-/// The identity in a row whose first columns are press, session, stroke, attempt.
+/// Reads the key from a row whose first columns are press, session, stroke, attempt.
 pub(crate) fn key(row: &Row<'_>) -> rusqlite::Result<StrokeKey> {
     key_from(row, 0)
 }
@@ -256,7 +227,7 @@ fn stroke(row: &Row<'_>) -> rusqlite::Result<Stroke> {
     })
 }
 
-/// A time as it stands in the tables.
+/// Formats a time as stored in the tables: UTC, RFC 3339, milliseconds.
 pub(crate) fn text(time: Timestamp) -> String {
     format!("{time:.3}")
 }

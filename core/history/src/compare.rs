@@ -1,10 +1,10 @@
-//! Two strokes side by side.
+//! Figures of two strokes side by side.
 
 use std::collections::BTreeSet;
 
 use crate::Stroke;
 
-/// One figure of two strokes; `None` where a stroke has none.
+/// One figure of two strokes; `None` where a stroke lacks it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Difference {
     /// Name of the figure.
@@ -15,7 +15,7 @@ pub struct Difference {
     pub second: Option<f64>,
 }
 
-/// Every figure that either stroke has, by name.
+/// Returns every figure of either stroke, by name.
 pub fn compare(first: &Stroke, second: &Stroke) -> Vec<Difference> {
     let names: BTreeSet<&String> = first.figures.keys().chain(second.figures.keys()).collect();
     let value = |stroke: &Stroke, name: &String| stroke.figures.get(name).copied();

@@ -1,18 +1,18 @@
-//! Why something could not be remembered or found.
+//! Errors of recording, querying and exporting.
 
 use std::path::{Path, PathBuf};
 
 use crate::StrokeKey;
 
-/// Why something could not be remembered or found.
+/// Errors of recording, querying and exporting.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Another process writes this history.
+    /// Another process has the history open for writing.
     #[error("{}: in use by {holder}; one history belongs to one host, stop that one first", path.display())]
     InUse {
         /// The database.
         path: PathBuf,
-        /// Program, process id and start of the other process, as it says itself.
+        /// Program, process id and start of the other process, from its lock file.
         holder: String,
     },
     /// The file or its folder cannot be opened.
@@ -20,7 +20,7 @@ pub enum Error {
     Unreachable {
         /// The database or its lock.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// SQLite failed: disk full, disk fault, no such table.
@@ -28,26 +28,26 @@ pub enum Error {
     Storage {
         /// The database.
         path: PathBuf,
-        /// What SQLite says.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// The file is no history, or one that a newer program wrote.
+    /// The file is not a history, or has the format of a newer program.
     #[error("{}: {why}", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is instead.
+        /// Description of the file.
         why: String,
     },
-    /// A step does not follow from what is on record: a fault of the caller, refused before it can do harm.
+    /// A step does not follow from those on record: a fault of the caller. Nothing was changed.
     #[error("{key}: {why}")]
     Contradiction {
         /// The stroke.
         key: StrokeKey,
-        /// What does not fit.
+        /// Description of the conflict.
         why: String,
     },
-    /// Nothing is on record under this number.
+    /// No record has this number.
     #[error("{}: no stroke has the run id {run_id}; `platen history list` shows them", path.display())]
     NoSuchRun {
         /// The database.
@@ -55,14 +55,14 @@ pub enum Error {
         /// The number asked for.
         run_id: u32,
     },
-    /// A row holds what this program never writes.
+    /// A row contains a value that this program never writes.
     #[error("{}: run {run_id}: {why}; the file was changed by other means", path.display())]
     Damaged {
         /// The database.
         path: PathBuf,
         /// The row.
         run_id: u32,
-        /// What is wrong with it.
+        /// Description of the fault.
         why: String,
     },
     /// An export could not be written.
@@ -74,14 +74,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// Turns SQLite's error into ours.
+    /// Returns a converter of SQLite's errors to [`Error::Storage`].
     pub(crate) fn storage(path: &Path) -> impl Fn(rusqlite::Error) -> Self + use<'_> {
         move |source| Self::Storage { path: path.to_owned(), source }
-    }
-
-    /// Whether the disk is full: results still go to the press, marked as not recorded.
-    pub fn is_disk_full(&self) -> bool {
-        let full = Some(rusqlite::ErrorCode::DiskFull);
-        matches!(self, Self::Storage { source, .. } if source.sqlite_error_code() == full)
     }
 }

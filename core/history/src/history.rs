@@ -1,4 +1,4 @@
-//! The one writer: each step of a stroke, on the disk before it is promised.
+//! Writer of a history: each step of a stroke is on the disk before the method returns.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,11 @@ use crate::archive::{self, Archive, text};
 use crate::lock::Lock;
 use crate::{Error, StrokeKey, Verdict, schema};
 
-/// A press counts strokes to 65535 and begins again: the same key within half a turn is the same stroke, later another.
+/// Half the range of the press's stroke counter, which wraps at 65535: the same key within as many runs is the same stroke,
+/// beyond it a new one.
 pub(crate) const RECENT_RUNS: u32 = 32_768;
 
-/// The writer of a history, for the strokes of one press. Its methods block until the disk has what they record.
+/// Writer of a history, for the strokes of one press. Its methods block until the record is on the disk.
 #[derive(Debug)]
 pub struct History {
     archive: Archive,
@@ -21,48 +22,48 @@ pub struct History {
     _lock: Lock,
 }
 
-/// What is known of a stroke when it is accepted.
+/// Record of a stroke at its acceptance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accepted {
-    /// Its identity; `press` is that of the [`History`].
+    /// Identity; `press` is that of the [`History`].
     pub key: StrokeKey,
-    /// Key of its record.
+    /// Number of the record.
     pub run_id: u32,
-    /// The press's number of the plate; 0 counts as none.
+    /// The press's part number; 0 counts as none.
     pub part_id: Option<u32>,
-    /// The press's name of the plate.
+    /// The press's part name.
     pub part_name: Option<String>,
-    /// Recipe that it is judged by.
+    /// Recipe number of the plate file.
     pub recipe: Option<u16>,
-    /// A scan of the blank.
+    /// Whether it is a scan of the blank.
     pub baseline: bool,
-    /// A trial.
+    /// Whether it is a trial.
     pub dry_run: bool,
-    /// Everything that the press said, JSON.
+    /// All data of the press, JSON.
     pub data: String,
 }
 
-/// What came of a stroke.
+/// Result of a stroke.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finished {
-    /// The stroke.
+    /// Identity of the stroke.
     pub key: StrokeKey,
-    /// Key of its record.
+    /// Number of the record.
     pub run_id: u32,
-    /// Count of published results that it goes out under.
+    /// Sequence number under which the result is published.
     pub seq: u16,
-    /// Judgement.
+    /// Verdict.
     pub verdict: Verdict,
-    /// Why there is no measurement.
+    /// Reason of a missing measurement.
     pub reason: Option<String>,
-    /// Named figures, in metres, radians, seconds and shares of one.
+    /// Named figures, in metres, radians, seconds and fractions.
     pub figures: BTreeMap<String, f64>,
-    /// The result as it goes to the press, JSON: published again word for word after a restart.
+    /// Published result, JSON; after a restart it is published again unchanged.
     pub publication: String,
 }
 
 impl History {
-    /// Opens the history of `press` for writing and makes it, with its folder, when it is new.
+    /// Opens the history of `press` for writing; creates it, with its folder, if it does not exist.
     ///
     /// # Errors
     /// [`Error::InUse`] naming the other process, [`Error::Unreachable`], [`Error::Foreign`], [`Error::Storage`].
@@ -78,16 +79,16 @@ impl History {
         Ok(Self { archive: Archive::new(connection, path), press, _lock: lock })
     }
 
-    /// The same history for reading.
+    /// Returns the history for reading.
     pub fn archive(&self) -> &Archive {
         &self.archive
     }
 
-    /// Records that a stroke is going to be echoed as accepted, then scanned. The same again changes nothing.
+    /// Records the acceptance of a stroke, before it is echoed to the press and scanned. The same again changes nothing.
     ///
     /// # Errors
-    /// [`Error::Contradiction`] when the run id is another stroke's, or the stroke is on record under another run id:
-    /// it must not be measured twice. [`Error::Storage`].
+    /// [`Error::Contradiction`] when the run id belongs to another stroke, or the stroke is on record under another run id:
+    /// a stroke is measured at most once. [`Error::Storage`].
     pub fn accept(&mut self, stroke: &Accepted, now: Timestamp) -> Result<(), Error> {
         self.own(stroke.key)?;
         let contradiction = |why: String| Err(Error::Contradiction { key: stroke.key, why });
@@ -119,7 +120,7 @@ impl History {
         transaction.commit().map_err(&storage)
     }
 
-    /// Records that the scan of a stroke is taken. The same again changes nothing.
+    /// Records that a stroke was scanned. The same again changes nothing.
     ///
     /// # Errors
     /// [`Error::Contradiction`] when the stroke was never accepted; [`Error::Storage`].
@@ -131,7 +132,7 @@ impl History {
     /// Records the result of a stroke, before it is published. The same again changes nothing.
     ///
     /// # Errors
-    /// [`Error::Contradiction`] when the stroke was never accepted, or has another result already; [`Error::Storage`].
+    /// [`Error::Contradiction`] when the stroke was never accepted, or has a different result; [`Error::Storage`].
     pub fn finish(&mut self, result: &Finished, now: Timestamp) -> Result<(), Error> {
         let Finished { key, run_id, .. } = *result;
         self.own(key)?;
@@ -163,7 +164,8 @@ impl History {
         transaction.commit().map_err(&storage)
     }
 
-    /// Records that the press has the result, or never will; `how` in the press's words. The same again changes nothing.
+    /// Records the end of a stroke: the press has acknowledged the result, or never will. `how` is the name of the
+    /// acknowledgement. The same again changes nothing.
     ///
     /// # Errors
     /// [`Error::Contradiction`] when the stroke was never accepted; [`Error::Storage`].
@@ -172,7 +174,7 @@ impl History {
         self.step(key, |transaction, run_id| transaction.execute(sql, (run_id, text(now), how)).map(drop))
     }
 
-    /// Records that the plate on the press is done with: strokes without a part number belong to the next one.
+    /// Records the end of the part: later strokes without a part number belong to a new plate.
     ///
     /// # Errors
     /// [`Error::Storage`].
@@ -182,7 +184,7 @@ impl History {
         ended.map(drop).map_err(self.storage())
     }
 
-    /// Notes where the result document of a run lies.
+    /// Records the path of a run's result document.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`].
@@ -191,35 +193,7 @@ impl History {
         self.change(run_id, "UPDATE stroke SET document = ?2 WHERE run_id = ?1", (run_id, document))
     }
 
-    /// Notes where the raw scan of a run lies, and its SHA-256 in hexadecimal.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRun`], [`Error::Storage`].
-    pub fn attach_scan(&mut self, run_id: u32, scan: &Path, sha256: &str) -> Result<(), Error> {
-        let scan = scan.to_string_lossy();
-        let sql = "UPDATE stroke SET scan = ?2, scan_sha256 = ?3 WHERE run_id = ?1";
-        self.change(run_id, sql, (run_id, scan, sha256))
-    }
-
-    /// Notes that the raw scan of a run is no longer there; its SHA-256 stays.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRun`], [`Error::Storage`].
-    pub fn forget_scan(&mut self, run_id: u32) -> Result<(), Error> {
-        self.change(run_id, "UPDATE stroke SET scan = NULL WHERE run_id = ?1", [run_id])
-    }
-
-    /// Adds a line to the audit.
-    ///
-    /// # Errors
-    /// [`Error::Storage`].
-    pub fn note(&mut self, kind: &str, run_id: Option<u32>, what: &str, now: Timestamp) -> Result<(), Error> {
-        let sql = "INSERT INTO event (at, kind, run_id, text) VALUES (?1, ?2, ?3, ?4)";
-        let added = self.archive.connection().execute(sql, (text(now), kind, run_id, what));
-        added.map(drop).map_err(self.storage())
-    }
-
-    /// One change to the newest run of a stroke.
+    /// Applies one change to the newest run of a stroke.
     fn step(
         &mut self,
         key: StrokeKey,
@@ -242,7 +216,7 @@ impl History {
         }
     }
 
-    /// The transaction rolls back when it is dropped without a commit.
+    /// Begins a transaction, which rolls back when dropped without a commit.
     fn begin(&mut self) -> Result<(PathBuf, Transaction<'_>), Error> {
         let path = self.archive.path().to_owned();
         let transaction = self.archive.connection_mut().transaction();
@@ -266,14 +240,15 @@ impl History {
     }
 }
 
-/// Run id of the newest record of a stroke.
+/// Returns the run id of the newest record of a stroke.
 fn newest(connection: &Connection, key: StrokeKey) -> rusqlite::Result<Option<u32>> {
     let sql =
         "SELECT max(run_id) FROM stroke WHERE press = ?1 AND session = ?2 AND stroke = ?3 AND attempt = ?4";
     connection.query_row(sql, (key.press, key.session, key.stroke, key.attempt), |row| row.get(0))
 }
 
-/// The physical plate that a stroke is made on: the one of its part number, else the one that has not ended.
+/// Returns the physical plate of a stroke, inserting it if it is new: the plate of the part number, else the one that has not
+/// ended.
 fn plate(connection: &Connection, stroke: &Accepted, now: Timestamp) -> rusqlite::Result<u32> {
     let part_id = stroke.part_id.filter(|part_id| *part_id != 0);
     let sql = "SELECT plate FROM plate WHERE press = ?1 AND part_id IS ?2 AND (?2 IS NOT NULL OR ended IS NULL) \
@@ -295,7 +270,7 @@ mod tests {
     use crate::StrokeKey;
 
     #[test]
-    fn a_full_disk_is_an_error_that_says_so_and_harms_nothing_recorded() {
+    fn a_full_disk_is_reported_and_harms_no_record() {
         let folder = tempfile::tempdir().unwrap();
         let now = jiff::Timestamp::UNIX_EPOCH;
         let mut history = History::open(&folder.path().join("history.sqlite"), 1, now).unwrap();
@@ -315,7 +290,6 @@ mod tests {
             history.archive.connection().pragma_query_value(None, "page_count", |row| row.get(0)).unwrap();
         history.archive.connection().pragma_update(None, "max_page_count", pages).unwrap();
         let error = history.accept(&stroke(2, "x".repeat(100_000)), now).unwrap_err();
-        assert!(error.is_disk_full(), "{error}");
         assert!(error.to_string().ends_with("database or disk is full"), "{error}");
         assert_eq!(history.recall().unwrap().run_id, 1);
 

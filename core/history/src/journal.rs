@@ -1,4 +1,4 @@
-//! The journal of the press side, kept in the history: records to rows and back.
+//! Journal of the press side: records to rows and back.
 
 use std::collections::BTreeMap;
 

@@ -1,14 +1,15 @@
-//! Strokes, plates and journal in SQLite.
+//! Record of strokes and plates, and the press side's journal, in one SQLite database per host.
 //!
-//! [`History`] is the one writer: it holds the lock of its database for as long as it lives, and every method that
-//! records a step of a stroke returns only when the step would survive a power cut (write-ahead log, full
-//! synchronisation). [`Archive`] reads, in any process and at any time: it is what `platen history` uses, also while the
-//! host runs.
+//! [`History`] is the only writer. It holds an exclusive lock file for its lifetime, and each method that records a step of
+//! a stroke returns only when the step would survive a power cut: SQLite's write-ahead log with `synchronous = FULL`.
+//! [`Archive`] reads, from any process and at any time, also while the host runs; `platen history` uses it.
 //!
-//! A stroke goes through four stages, [`Stage`]; the time of each is kept. What a press or an algorithm says about a
-//! stroke is kept as JSON that this crate does not interpret, beside the few columns that its own questions need.
+//! A stroke passes four stages, [`Stage`](platen_model::Stage); the time of each is recorded. [`History::record`] takes the
+//! steps in order and refuses one that does not follow from those on record; a repeated step changes nothing, so that the
+//! caller may repeat it after a crash. [`History::recall`] returns the state to continue from.
 //!
-//! This crate knows nothing of Modbus, plugins or geometry, and reads no clock: its caller says what time it is.
+//! Data of the press and results are stored as JSON, beside the few columns that queries need. [`StrokeTable`] exports strokes
+//! as CSV and Parquet. This crate does not depend on Modbus, plugins or geometry, and reads no clock: callers pass the time.
 
 mod archive;
 mod compare;
@@ -25,6 +26,6 @@ pub use compare::{Difference, compare};
 pub use error::Error;
 pub use export::StrokeTable;
 pub use history::{Accepted, Finished, History};
-pub use stroke::{Event, PlateRecord, Stroke};
+pub use stroke::{PlateRecord, Stroke};
 
 use platen_model::{StrokeKey, Verdict};

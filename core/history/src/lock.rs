@@ -1,4 +1,4 @@
-//! One writer per history: a lock file that says who holds it, freed by the system when the process ends, however.
+//! Lock file of a history: one writer at a time. It names the holder; the operating system releases it when the process ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
@@ -8,14 +8,17 @@ use jiff::Timestamp;
 
 use crate::Error;
 
-/// Held for as long as it lives.
+/// Exclusive lock, released when dropped.
 #[derive(Debug)]
 pub(crate) struct Lock {
     _file: File,
 }
 
 impl Lock {
-    /// Takes the lock of the database at `database`, or says who has it.
+    /// Takes the lock of the database at `database`.
+    ///
+    /// # Errors
+    /// [`Error::InUse`] naming the holder, [`Error::Unreachable`].
     pub(crate) fn take(database: &Path, now: Timestamp) -> Result<Self, Error> {
         let path = lock_path(database);
         let unreachable = |source| Error::Unreachable { path: path.clone(), source };
@@ -42,7 +45,7 @@ impl Lock {
     }
 }
 
-/// The lock stands beside the database, so that SQLite's own locks stay free for readers.
+/// Returns the path of the lock file: beside the database, so that SQLite's own locks stay free for readers.
 fn lock_path(database: &Path) -> PathBuf {
     let mut name = database.as_os_str().to_owned();
     name.push(".lock");

@@ -1,4 +1,4 @@
-//! Opening the database: made when new, refused when it is something else.
+//! Opening of the database: created when new, refused when it is anything else.
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,12 +9,12 @@ use crate::Error;
 
 /// Marks a SQLite file as a history of platen: "pltn".
 const APPLICATION_ID: i32 = 0x706c_746e;
-/// Of the tables in `schema.sql`.
+/// Version of the tables in `schema.sql`.
 const VERSION: i32 = 1;
-/// Longest wait for a reader's checkpoint; the writer itself never waits in write-ahead mode.
+/// Longest wait for a reader's checkpoint; in write-ahead mode the writer itself never waits.
 const BUSY: Duration = Duration::from_secs(5);
 
-/// Opens the database for writing and makes it when it is new. The caller holds the lock.
+/// Opens the database for writing and creates it when it is new. The caller holds the lock.
 pub(crate) fn open_writer(path: &Path) -> Result<Connection, Error> {
     let storage = Error::storage(path);
     let mut connection = Connection::open(path).map_err(&storage)?;
@@ -39,7 +39,8 @@ pub(crate) fn open_reader(path: &Path) -> Result<Connection, Error> {
     Ok(connection)
 }
 
-/// All tables and both marks in one transaction: a process that dies here leaves an empty file, which is made again.
+/// Creates all tables and both marks in one transaction: a process that dies here leaves an empty file, which the next one
+/// fills.
 fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
     transaction.execute_batch(include_str!("schema.sql"))?;
@@ -59,12 +60,12 @@ fn check(connection: &Connection, path: &Path) -> Result<(), Error> {
     };
     let foreign = |why: String| Err(Error::Foreign { path: path.to_owned(), why });
     if pragma("application_id")? != APPLICATION_ID {
-        return foreign("is a database, but no history of platen; name another file".to_owned());
+        return foreign("is a database, but not a history of platen; name another file".to_owned());
     }
     match pragma("user_version")? {
         VERSION => Ok(()),
         other => foreign(format!(
-            "has format {other}, this program knows {VERSION}; use the program that wrote it"
+            "has format {other}, this program reads format {VERSION}; use the program that wrote it"
         )),
     }
 }
@@ -72,7 +73,7 @@ fn check(connection: &Connection, path: &Path) -> Result<(), Error> {
 fn refuse(path: &Path, source: rusqlite::Error) -> Error {
     match source.sqlite_error_code() {
         Some(rusqlite::ErrorCode::NotADatabase) => {
-            Error::Foreign { path: path.to_owned(), why: "is no database; name another file".to_owned() }
+            Error::Foreign { path: path.to_owned(), why: "is not a database; name another file".to_owned() }
         }
         _ => Error::Storage { path: path.to_owned(), source },
     }

@@ -1,4 +1,4 @@
-//! What is on record about a stroke and a plate.
+//! Records of strokes and plates.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -7,58 +7,58 @@ use jiff::Timestamp;
 use platen_model::{Stage, StrokeData, StrokeKey, Verdict};
 use serde::Serialize;
 
-/// Everything on record about one stroke.
+/// Record of one stroke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stroke {
-    /// Key of the record, never used twice in one history.
+    /// Number of the record, unique in the history.
     pub run_id: u32,
-    /// Its identity.
+    /// Identity.
     pub key: StrokeKey,
     /// Number of the physical plate, [`PlateRecord::plate`].
     pub plate: u32,
-    /// Recipe that it was judged by.
+    /// Recipe number of the plate file.
     pub recipe: Option<u16>,
-    /// A scan of the blank.
+    /// Whether it is a scan of the blank.
     pub baseline: bool,
-    /// A trial.
+    /// Whether it is a trial.
     pub dry_run: bool,
-    /// When it was accepted.
+    /// Time of acceptance.
     pub accepted: Timestamp,
-    /// When it was scanned.
+    /// Time of the scan.
     pub scanned: Option<Timestamp>,
-    /// When it was judged.
+    /// Time of the result.
     pub finished: Option<Timestamp>,
-    /// When it was done with.
+    /// Time of the acknowledgement, or of giving up on it.
     pub acked: Option<Timestamp>,
-    /// How it was done with, in the press's words.
+    /// Name of the acknowledgement.
     pub ack: Option<String>,
-    /// Count of published results that its result went out under.
+    /// Sequence number under which the result was published.
     pub seq: Option<u16>,
-    /// Judgement.
+    /// Verdict.
     pub verdict: Option<Verdict>,
-    /// Why there is no measurement.
+    /// Reason of a missing measurement.
     pub reason: Option<String>,
-    /// Named figures of the result, in metres, radians, seconds and shares of one.
+    /// Named figures of the result, in metres, radians, seconds and fractions.
     pub figures: BTreeMap<String, f64>,
-    /// What the press said about the stroke, JSON.
+    /// All data of the press, JSON.
     pub data: String,
-    /// The result as it went to the press, JSON.
+    /// Published result, JSON.
     pub publication: Option<String>,
-    /// The result document.
+    /// Path of the result document.
     pub document: Option<PathBuf>,
-    /// The raw scan, while it is kept.
+    /// Path of the raw scan, where recorded.
     pub scan: Option<PathBuf>,
-    /// SHA-256 of the raw scan, kept for ever.
+    /// SHA-256 of the raw scan, where recorded.
     pub scan_sha256: Option<String>,
 }
 
 impl Stroke {
-    /// Returns the press's data about the stroke; empty where the record cannot be read any more.
+    /// Returns the data of the press; the default where the record cannot be parsed.
     pub fn press_data(&self) -> StrokeData {
         serde_json::from_str(&self.data).unwrap_or_default()
     }
 
-    /// How far it has come.
+    /// Returns the last stage that was reached.
     pub fn stage(&self) -> Stage {
         match (self.scanned, self.finished, self.acked) {
             (_, _, Some(_)) => Stage::Acked,
@@ -69,36 +69,23 @@ impl Stroke {
     }
 }
 
-/// A physical plate: the press's part where it sends a number, else what lay on it between two ends of part.
+/// Physical plate: the press's part where it sends a part number, else the strokes between two ends of part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlateRecord {
-    /// Its number in this history.
+    /// Number in this history.
     pub plate: u32,
-    /// The press that bends it.
+    /// Number of the press.
     pub press: u16,
-    /// The press's number of it.
+    /// The press's part number.
     pub part_id: Option<u32>,
-    /// The press's name of it.
+    /// The press's part name.
     pub part_name: Option<String>,
-    /// When its first stroke was accepted.
+    /// Acceptance of the first stroke.
     pub began: Timestamp,
-    /// When the press said that it was done with.
+    /// End of the part, as signalled by the press.
     pub ended: Option<Timestamp>,
-    /// How many strokes it has.
+    /// Number of strokes.
     pub strokes: u32,
-    /// Judgement of its last stroke that has one.
+    /// Verdict of the last stroke that has one.
     pub verdict: Option<Verdict>,
-}
-
-/// A line of the audit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Event {
-    /// When.
-    pub at: Timestamp,
-    /// What kind, in one word: `start`, `mode`, `refused_write`.
-    pub kind: String,
-    /// The stroke that it belongs to.
-    pub run_id: Option<u32>,
-    /// The rest, for people.
-    pub text: String,
 }

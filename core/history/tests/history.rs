@@ -1,4 +1,4 @@
-//! What is recorded is what is asked for, and what does not follow is refused.
+//! Recording, queries and export; refusal of steps that do not follow.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
@@ -12,21 +12,21 @@ use platen_model::{Stage, StrokeKey, Verdict};
 
 const PRESS: u16 = 3;
 
-/// A history in a folder of its own, and a clock that ticks a second per step.
-struct Bench {
+/// History in a temporary folder, with a clock that advances a second per step.
+struct Fixture {
     folder: tempfile::TempDir,
     history: Option<History>,
     now: Timestamp,
     run_id: u32,
 }
 
-impl Bench {
+impl Fixture {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let now = "2026-03-02T06:00:00Z".parse().unwrap();
-        let mut bench = Self { folder, history: None, now, run_id: 0 };
-        bench.reopen();
-        bench
+        let mut fixture = Self { folder, history: None, now, run_id: 0 };
+        fixture.reopen();
+        fixture
     }
 
     fn path(&self) -> PathBuf {
@@ -122,38 +122,37 @@ fn finished(key: StrokeKey, run_id: u32, verdict: Verdict) -> Finished {
 
 #[test]
 fn a_new_history_has_an_owner_that_stays() {
-    let mut bench = Bench::new();
-    let new = bench.history().recall().unwrap();
+    let mut fixture = Fixture::new();
+    let new = fixture.history().recall().unwrap();
     assert_ne!(new.owner, 0);
     assert_eq!((new.result_seq, new.run_id, new.last.is_none(), new.attempts.len()), (0, 0, true, 0));
-    bench.reopen();
-    assert_eq!(bench.history().recall().unwrap(), new);
+    fixture.reopen();
+    assert_eq!(fixture.history().recall().unwrap(), new);
 }
 
 #[test]
 fn every_stage_is_on_record_with_its_time_and_survives_reopening() {
-    let mut bench = Bench::new();
-    let run_id = bench.accept(9, 41, Some(700));
-    let stages = |bench: &mut Bench| {
-        bench.reopen();
-        let recalled = bench.history().recall().unwrap();
+    let mut fixture = Fixture::new();
+    let run_id = fixture.accept(9, 41, Some(700));
+    let stages = |fixture: &mut Fixture| {
+        fixture.reopen();
+        let recalled = fixture.history().recall().unwrap();
         (recalled.last.unwrap().stage, recalled.result_seq)
     };
-    assert_eq!(stages(&mut bench), (Stage::Accepted, 0));
+    assert_eq!(stages(&mut fixture), (Stage::Accepted, 0));
     let key = key(9, 41, 0);
-    let now = bench.tick();
-    bench.history().scanned(key, now).unwrap();
-    assert_eq!(stages(&mut bench), (Stage::Scanned, 0));
-    let now = bench.tick();
-    bench.history().finish(&finished(key, run_id, Verdict::Fail), now).unwrap();
-    assert_eq!(stages(&mut bench), (Stage::Finished, 1));
-    let now = bench.tick();
-    bench.history().acked(key, "explicit", now).unwrap();
-    assert_eq!(stages(&mut bench), (Stage::Acked, 1));
+    let now = fixture.tick();
+    fixture.history().scanned(key, now).unwrap();
+    assert_eq!(stages(&mut fixture), (Stage::Scanned, 0));
+    let now = fixture.tick();
+    fixture.history().finish(&finished(key, run_id, Verdict::Fail), now).unwrap();
+    assert_eq!(stages(&mut fixture), (Stage::Finished, 1));
+    let now = fixture.tick();
+    fixture.history().acked(key, "explicit", now).unwrap();
+    assert_eq!(stages(&mut fixture), (Stage::Acked, 1));
 
-    bench.history().attach_document(run_id, "results/1/result.json".as_ref()).unwrap();
-    bench.history().attach_scan(run_id, "results/1/scan.e57".as_ref(), "ab12").unwrap();
-    let stroke = bench.archive().stroke(run_id).unwrap();
+    fixture.history().attach_document(run_id, "results/1/result.json".as_ref()).unwrap();
+    let stroke = fixture.archive().stroke(run_id).unwrap();
     let times = [Some(stroke.accepted), stroke.scanned, stroke.finished, stroke.acked];
     let times = times.map(|time| time.unwrap().to_string());
     let expected = ["06:00:01", "06:00:02", "06:00:03", "06:00:04"].map(|t| format!("2026-03-02T{t}Z"));
@@ -166,38 +165,36 @@ fn every_stage_is_on_record_with_its_time_and_survives_reopening() {
         (r#"{"die_id":4}"#, Some(r#"{"seq":1}"#))
     );
     assert_eq!(stroke.document.as_deref(), Some("results/1/result.json".as_ref()));
-    assert_eq!((stroke.scan_sha256.as_deref(), stroke.reason), (Some("ab12"), None));
-
-    bench.history().forget_scan(run_id).unwrap();
-    let stroke = bench.archive().stroke(run_id).unwrap();
-    assert_eq!((stroke.scan, stroke.scan_sha256.as_deref()), (None, Some("ab12")));
+    assert_eq!(stroke.reason, None);
+    let missing = fixture.history().attach_document(77, "result.json".as_ref());
+    assert!(matches!(missing, Err(Error::NoSuchRun { run_id: 77, .. })));
 }
 
 #[test]
 fn the_same_step_again_changes_nothing() {
-    let mut bench = Bench::new();
-    let run_id = bench.measure(1, 1, None, Verdict::Pass);
+    let mut fixture = Fixture::new();
+    let run_id = fixture.measure(1, 1, None, Verdict::Pass);
     let key = key(1, 1, 0);
-    let now = bench.tick();
-    bench.history().acked(key, "explicit", now).unwrap();
-    let once = bench.archive().stroke(run_id).unwrap();
+    let now = fixture.tick();
+    fixture.history().acked(key, "explicit", now).unwrap();
+    let once = fixture.archive().stroke(run_id).unwrap();
     for _ in 0..2 {
-        let now = bench.tick();
-        bench.history().accept(&accepted(key, run_id), now).unwrap();
-        bench.history().scanned(key, now).unwrap();
-        bench.history().finish(&finished(key, run_id, Verdict::Pass), now).unwrap();
-        bench.history().acked(key, "never", now).unwrap();
+        let now = fixture.tick();
+        fixture.history().accept(&accepted(key, run_id), now).unwrap();
+        fixture.history().scanned(key, now).unwrap();
+        fixture.history().finish(&finished(key, run_id, Verdict::Pass), now).unwrap();
+        fixture.history().acked(key, "never", now).unwrap();
     }
-    assert_eq!(bench.archive().strokes(&Filter::default()).unwrap(), [once]);
+    assert_eq!(fixture.archive().strokes(&Filter::default()).unwrap(), [once]);
 }
 
 #[test]
 fn what_does_not_follow_is_refused_and_leaves_no_trace() {
-    let mut bench = Bench::new();
-    let run_id = bench.measure(1, 7, None, Verdict::Pass);
-    let before = bench.archive().strokes(&Filter::default()).unwrap();
-    let now = bench.now;
-    let history = bench.history();
+    let mut fixture = Fixture::new();
+    let run_id = fixture.measure(1, 7, None, Verdict::Pass);
+    let before = fixture.archive().strokes(&Filter::default()).unwrap();
+    let now = fixture.now;
+    let history = fixture.history();
     let check = |result: Result<(), Error>, expected: &str| {
         assert_eq!(result.unwrap_err().to_string(), expected);
     };
@@ -224,54 +221,54 @@ fn what_does_not_follow_is_refused_and_leaves_no_trace() {
         history.accept(&accepted(StrokeKey { press: 4, ..key(1, 9, 0) }, 9), now),
         "press 4 session 1 stroke 9: this history was opened for press 3",
     );
-    assert_eq!(bench.archive().strokes(&Filter::default()).unwrap(), before);
+    assert_eq!(fixture.archive().strokes(&Filter::default()).unwrap(), before);
 }
 
 #[test]
 fn a_stroke_number_may_come_back_after_a_turn_of_the_counter() {
-    let mut bench = Bench::new();
-    bench.measure(1, 7, None, Verdict::Pass);
-    bench.run_id = 65_535;
-    let again = bench.measure(1, 7, None, Verdict::Fail);
+    let mut fixture = Fixture::new();
+    fixture.measure(1, 7, None, Verdict::Pass);
+    fixture.run_id = 65_535;
+    let again = fixture.measure(1, 7, None, Verdict::Fail);
     assert_eq!(again, 65_536);
-    let recalled = bench.history().recall().unwrap();
-    let last = bench.archive().last(PRESS).unwrap().unwrap();
+    let recalled = fixture.history().recall().unwrap();
+    let last = fixture.archive().last(PRESS).unwrap().unwrap();
     assert_eq!((recalled.run_id, last.verdict), (65_536, Some(Verdict::Fail)));
-    let now = bench.tick();
-    bench.history().acked(key(1, 7, 0), "explicit", now).unwrap();
-    assert_eq!(bench.archive().stroke(1).unwrap().stage(), Stage::Finished);
-    assert_eq!(bench.archive().stroke(again).unwrap().stage(), Stage::Acked);
+    let now = fixture.tick();
+    fixture.history().acked(key(1, 7, 0), "explicit", now).unwrap();
+    assert_eq!(fixture.archive().stroke(1).unwrap().stage(), Stage::Finished);
+    assert_eq!(fixture.archive().stroke(again).unwrap().stage(), Stage::Acked);
 }
 
 #[test]
 fn attempts_of_the_running_session_are_recalled_for_half_a_turn() {
-    let mut bench = Bench::new();
-    bench.measure(1, 5, None, Verdict::Pass);
-    bench.measure(2, 6, None, Verdict::Pass);
-    bench.run_id = 40_000;
-    bench.measure(2, 7, None, Verdict::Pass);
-    bench.accept_as(2, 7, 1, None, |_| {});
-    bench.accept(2, 8, None);
-    let recalled = bench.history().recall().unwrap();
+    let mut fixture = Fixture::new();
+    fixture.measure(1, 5, None, Verdict::Pass);
+    fixture.measure(2, 6, None, Verdict::Pass);
+    fixture.run_id = 40_000;
+    fixture.measure(2, 7, None, Verdict::Pass);
+    fixture.accept_as(2, 7, 1, None, |_| {});
+    fixture.accept(2, 8, None);
+    let recalled = fixture.history().recall().unwrap();
     assert_eq!(recalled.attempts, BTreeMap::from([(7, 1), (8, 0)]));
     assert_eq!(recalled.last.unwrap().key, key(2, 8, 0));
 }
 
 #[test]
 fn a_plate_is_its_part_number_else_what_lies_between_two_ends_of_part() {
-    let mut bench = Bench::new();
+    let mut fixture = Fixture::new();
     let numbered =
-        [bench.accept(1, 1, Some(700)), bench.accept(1, 2, Some(701)), bench.accept(1, 3, Some(700))];
-    let nameless = [bench.accept(1, 4, None), bench.accept(1, 5, Some(0))];
-    let now = bench.tick();
-    bench.history().part_end(now).unwrap();
-    let next = bench.accept(1, 6, None);
-    let back = bench.accept(1, 7, Some(701));
-    let plate = |run_id| bench.archive().stroke(run_id).unwrap().plate;
+        [fixture.accept(1, 1, Some(700)), fixture.accept(1, 2, Some(701)), fixture.accept(1, 3, Some(700))];
+    let nameless = [fixture.accept(1, 4, None), fixture.accept(1, 5, Some(0))];
+    let now = fixture.tick();
+    fixture.history().part_end(now).unwrap();
+    let next = fixture.accept(1, 6, None);
+    let back = fixture.accept(1, 7, Some(701));
+    let plate = |run_id| fixture.archive().stroke(run_id).unwrap().plate;
     assert_eq!(numbered.map(plate), [1, 2, 1]);
     assert_eq!(nameless.map(plate), [3, 3]);
     assert_eq!((plate(next), plate(back)), (4, 2));
-    let plates = bench.archive().plates().unwrap();
+    let plates = fixture.archive().plates().unwrap();
     let ended: Vec<bool> = plates.iter().map(|plate| plate.ended.is_some()).collect();
     assert_eq!(ended, [true, false, true, false]);
     let strokes: Vec<u32> = plates.iter().map(|plate| plate.strokes).collect();
@@ -280,43 +277,43 @@ fn a_plate_is_its_part_number_else_what_lies_between_two_ends_of_part() {
 
 #[test]
 fn the_stroke_before_is_the_last_measured_one_of_the_same_plate() {
-    let mut bench = Bench::new();
-    let blank = bench.accept_as(1, 1, 0, Some(700), |stroke| stroke.baseline = true);
-    bench.conclude(key(1, 1, 0), blank, Verdict::CannotTell);
-    let first = bench.measure(1, 2, Some(700), Verdict::Fail);
-    let failed = bench.measure(1, 3, Some(700), Verdict::NotMeasured);
-    let other = bench.measure(1, 4, Some(701), Verdict::Pass);
-    let trial = bench.accept_as(1, 5, 0, Some(700), |stroke| stroke.dry_run = true);
-    bench.conclude(key(1, 5, 0), trial, Verdict::Pass);
-    let unfinished = bench.accept(1, 6, Some(700));
-    let second = bench.measure(1, 7, Some(700), Verdict::Fail);
-    let rescan = bench.accept_as(1, 7, 1, Some(700), |_| {});
-    bench.conclude(key(1, 7, 1), rescan, Verdict::Pass);
-    let third = bench.accept(1, 8, Some(700));
+    let mut fixture = Fixture::new();
+    let blank = fixture.accept_as(1, 1, 0, Some(700), |stroke| stroke.baseline = true);
+    fixture.conclude(key(1, 1, 0), blank, Verdict::CannotTell);
+    let first = fixture.measure(1, 2, Some(700), Verdict::Fail);
+    let failed = fixture.measure(1, 3, Some(700), Verdict::NotMeasured);
+    let other = fixture.measure(1, 4, Some(701), Verdict::Pass);
+    let trial = fixture.accept_as(1, 5, 0, Some(700), |stroke| stroke.dry_run = true);
+    fixture.conclude(key(1, 5, 0), trial, Verdict::Pass);
+    let unfinished = fixture.accept(1, 6, Some(700));
+    let second = fixture.measure(1, 7, Some(700), Verdict::Fail);
+    let rescan = fixture.accept_as(1, 7, 1, Some(700), |_| {});
+    fixture.conclude(key(1, 7, 1), rescan, Verdict::Pass);
+    let third = fixture.accept(1, 8, Some(700));
 
-    assert_eq!(bench.before(blank), None);
-    assert_eq!(bench.before(first), Some(blank));
-    assert_eq!(bench.before(failed), Some(first));
-    assert_eq!(bench.before(other), None);
-    assert_eq!(bench.before(unfinished), Some(first));
-    assert_eq!(bench.before(second), Some(first));
-    assert_eq!(bench.before(rescan), Some(first));
-    assert_eq!(bench.before(third), Some(rescan));
-    let baseline = |run_id| bench.archive().baseline(run_id).unwrap().map(|stroke| stroke.run_id);
+    assert_eq!(fixture.before(blank), None);
+    assert_eq!(fixture.before(first), Some(blank));
+    assert_eq!(fixture.before(failed), Some(first));
+    assert_eq!(fixture.before(other), None);
+    assert_eq!(fixture.before(unfinished), Some(first));
+    assert_eq!(fixture.before(second), Some(first));
+    assert_eq!(fixture.before(rescan), Some(first));
+    assert_eq!(fixture.before(third), Some(rescan));
+    let baseline = |run_id| fixture.archive().baseline(run_id).unwrap().map(|stroke| stroke.run_id);
     assert_eq!((baseline(third), baseline(blank), baseline(other)), (Some(blank), None, None));
-    let plate = &bench.archive().plates().unwrap()[0];
+    let plate = &fixture.archive().plates().unwrap()[0];
     assert_eq!((plate.strokes, plate.verdict), (8, Some(Verdict::Pass)));
 }
 
 #[test]
 fn strokes_are_found_by_plate_part_time_and_verdict() {
-    let mut bench = Bench::new();
+    let mut fixture = Fixture::new();
     for stroke in 1..=4 {
         let verdict = if stroke < 4 { Verdict::Fail } else { Verdict::Pass };
-        bench.measure(1, stroke, Some(700 + u32::from(stroke % 2)), verdict);
+        fixture.measure(1, stroke, Some(700 + u32::from(stroke % 2)), verdict);
     }
     let runs = |filter: Filter| -> Vec<u32> {
-        bench.archive().strokes(&filter).unwrap().iter().map(|stroke| stroke.run_id).collect()
+        fixture.archive().strokes(&filter).unwrap().iter().map(|stroke| stroke.run_id).collect()
     };
     let at = |text: &str| Some(text.parse().unwrap());
     assert_eq!(runs(Filter::default()), [1, 2, 3, 4]);
@@ -326,41 +323,21 @@ fn strokes_are_found_by_plate_part_time_and_verdict() {
     assert_eq!(runs(Filter { newest: Some(2), ..Filter::default() }), [3, 4]);
     assert_eq!(runs(Filter { since: at("2026-03-02T06:00:04Z"), ..Filter::default() }), [2, 3, 4]);
     assert_eq!(runs(Filter { until: at("2026-03-02T06:00:04Z"), ..Filter::default() }), [1]);
-    let open: Vec<u32> = bench.archive().open_strokes(PRESS).unwrap().iter().map(|s| s.run_id).collect();
-    assert_eq!(open, [1, 2, 3, 4]);
-    let missing = bench.archive().stroke(9).unwrap_err().to_string();
+    let missing = fixture.archive().stroke(9).unwrap_err().to_string();
     assert!(missing.ends_with("no stroke has the run id 9; `platen history list` shows them"), "{missing}");
 }
 
 #[test]
-fn raw_scans_are_found_by_age_until_they_are_forgotten() {
-    let mut bench = Bench::new();
-    let old = bench.measure(1, 1, None, Verdict::Pass);
-    let limit = bench.tick();
-    let new = bench.measure(1, 2, None, Verdict::Pass);
-    for run_id in [old, new] {
-        bench.history().attach_scan(run_id, format!("{run_id}.e57").as_ref(), "00").unwrap();
-    }
-    let expired = |bench: &Bench| -> Vec<u32> {
-        bench.archive().scans_before(limit).unwrap().iter().map(|stroke| stroke.run_id).collect()
-    };
-    assert_eq!(expired(&bench), [old]);
-    bench.history().forget_scan(old).unwrap();
-    assert_eq!(expired(&bench), [0_u32; 0]);
-    assert!(matches!(bench.history().forget_scan(77), Err(Error::NoSuchRun { run_id: 77, .. })));
-}
-
-#[test]
 fn two_strokes_compare_figure_by_figure_and_all_export_as_one_table() {
-    let mut bench = Bench::new();
-    let first = bench.measure(1, 1, Some(700), Verdict::Fail);
-    let second = bench.accept(1, 2, Some(700));
+    let mut fixture = Fixture::new();
+    let first = fixture.measure(1, 1, Some(700), Verdict::Fail);
+    let second = fixture.accept(1, 2, Some(700));
     let mut result = finished(key(1, 2, 0), second, Verdict::NotMeasured);
     result.figures = BTreeMap::from([("gap.max".to_owned(), 0.002), ("deviation.max".to_owned(), 0.01)]);
     result.reason = Some("two loops, \"chain\"".to_owned());
-    let now = bench.tick();
-    bench.history().finish(&result, now).unwrap();
-    let strokes = bench.archive().strokes(&Filter::default()).unwrap();
+    let now = fixture.tick();
+    fixture.history().finish(&result, now).unwrap();
+    let strokes = fixture.archive().strokes(&Filter::default()).unwrap();
     let difference = |name: &str, first, second| Difference { name: name.to_owned(), first, second };
     assert_eq!(
         compare(&strokes[0], &strokes[1]),
@@ -391,6 +368,33 @@ fn two_strokes_compare_figure_by_figure_and_all_export_as_one_table() {
     );
 }
 
+#[test]
+fn cells_are_quoted_only_where_rfc_4180_requires_it() {
+    for (reason, cell) in [
+        ("plain; tab\t 'x' #1", "plain; tab\t 'x' #1"),
+        (" spaces ", " spaces "),
+        ("a,b", "\"a,b\""),
+        ("\"a\"", "\"\"\"a\"\"\""),
+        ("two\nlines", "\"two\nlines\""),
+        ("carriage\rreturn", "\"carriage\rreturn\""),
+        ("-1", "-1"),
+        ("0.7 m\u{b2}", "0.7 m\u{b2}"),
+    ] {
+        let mut fixture = Fixture::new();
+        let run_id = fixture.accept_as(1, 1, 0, None, |stroke| stroke.data = "{}".to_owned());
+        let mut result = finished(key(1, 1, 0), run_id, Verdict::NotMeasured);
+        (result.figures, result.reason) = (BTreeMap::new(), Some(reason.to_owned()));
+        let now = fixture.tick();
+        fixture.history().finish(&result, now).unwrap();
+        let mut csv = Vec::new();
+        StrokeTable::new(&fixture.archive().strokes(&Filter::default()).unwrap())
+            .write_csv(&mut csv)
+            .unwrap();
+        let csv = String::from_utf8(csv).unwrap();
+        assert!(csv.ends_with(&format!(",,not_measured,{cell}\r\n")), "{csv:?}");
+    }
+}
+
 /// The rows of a Parquet file as its own reader shows them.
 fn rows(file: Vec<u8>) -> Vec<String> {
     use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -409,43 +413,29 @@ fn rows(file: Vec<u8>) -> Vec<String> {
 }
 
 #[test]
-fn what_the_press_said_is_exported_in_its_own_types() {
-    let mut bench = Bench::new();
-    let told = r#"{"die_id":4,"force":1.5e6,"part_name":"a,b","plc_time":{"unix_s":1},"temperature":null}"#;
-    bench.accept_as(1, 1, 0, None, |stroke| stroke.data = told.to_owned());
-    bench.accept_as(1, 2, 0, None, |stroke| stroke.data = r#"{"die_id":null}"#.to_owned());
-    let strokes = bench.archive().strokes(&Filter::default()).unwrap();
+fn values_of_the_press_are_exported_in_their_own_types() {
+    let mut fixture = Fixture::new();
+    let data = r#"{"die_id":4,"force":1.5e6,"part_name":"a,b","plc_time":{"unix_s":1},"temperature":null}"#;
+    fixture.accept_as(1, 1, 0, None, |stroke| stroke.data = data.to_owned());
+    fixture.accept_as(1, 2, 0, None, |stroke| stroke.data = r#"{"die_id":null}"#.to_owned());
+    let strokes = fixture.archive().strokes(&Filter::default()).unwrap();
     let mut csv = Vec::new();
     StrokeTable::new(&strokes).write_csv(&mut csv).unwrap();
     let csv = String::from_utf8(csv).unwrap();
     let lines: Vec<&str> = csv.lines().collect();
     assert!(lines[0].ends_with(",verdict,reason,press.die_id,press.force,press.part_name"), "{csv}");
     assert!(lines[1].ends_with("Z,,,,,,4,1500000,\"a,b\""), "{csv}");
-    assert!(lines[2].ends_with("Z,,,,,,,,"), "nothing said is nothing written: {csv}");
+    assert!(lines[2].ends_with("Z,,,,,,,,"), "a missing value is an empty cell: {csv}");
     let mut parquet = Vec::new();
     StrokeTable::new(&strokes).write_parquet(&mut parquet).unwrap();
     assert!(rows(parquet)[1].ends_with("press.die_id: null, press.force: null, press.part_name: null"));
 }
 
 #[test]
-fn the_audit_keeps_its_order() {
-    let mut bench = Bench::new();
-    let run_id = bench.accept(1, 1, None);
-    let now = bench.tick();
-    bench.history().note("start", None, "platen 0.1.0", now).unwrap();
-    bench.history().note("refused_write", Some(run_id), "register 99", now).unwrap();
-    let kinds = |run_id| -> Vec<String> {
-        bench.archive().events(run_id).unwrap().into_iter().map(|event| event.kind).collect()
-    };
-    assert_eq!(kinds(None), ["start", "refused_write"]);
-    assert_eq!(kinds(Some(run_id)), ["refused_write"]);
-}
-
-#[test]
-fn a_second_writer_is_told_who_the_first_is_and_readers_are_not_in_the_way() {
-    let mut bench = Bench::new();
-    let path = bench.path();
-    let refused = History::open(&path, PRESS, bench.now).unwrap_err().to_string();
+fn a_second_writer_is_refused_by_name_and_readers_are_not_blocked() {
+    let mut fixture = Fixture::new();
+    let path = fixture.path();
+    let refused = History::open(&path, PRESS, fixture.now).unwrap_err().to_string();
     let program = std::env::current_exe().unwrap();
     let program = program.file_name().unwrap().to_string_lossy().into_owned();
     let process = std::process::id();
@@ -458,14 +448,14 @@ fn a_second_writer_is_told_who_the_first_is_and_readers_are_not_in_the_way() {
         )
     );
     let reader = Archive::open(&path).unwrap();
-    bench.measure(1, 1, None, Verdict::Pass);
+    fixture.measure(1, 1, None, Verdict::Pass);
     assert_eq!(reader.strokes(&Filter::default()).unwrap().len(), 1);
-    bench.reopen();
+    fixture.reopen();
     assert_eq!(reader.strokes(&Filter::default()).unwrap().len(), 1);
 }
 
 #[test]
-fn files_that_are_no_history_are_left_alone() {
+fn files_that_are_not_a_history_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let now = Timestamp::UNIX_EPOCH;
     let check = |name: &str, expected: &str| {
@@ -476,17 +466,17 @@ fn files_that_are_no_history_are_left_alone() {
         assert_eq!(std::fs::read(&path).ok(), before);
     };
     std::fs::write(folder.path().join("plate.toml"), "[plate]\nid = 'A17'\n".repeat(50)).unwrap();
-    check("plate.toml", "is no database; name another file");
+    check("plate.toml", "is not a database; name another file");
     let database = |name: &str, sql: &str| {
         rusqlite::Connection::open(folder.path().join(name)).unwrap().execute_batch(sql).unwrap();
     };
     database("other.sqlite", "CREATE TABLE t (x)");
-    check("other.sqlite", "is a database, but no history of platen; name another file");
+    check("other.sqlite", "is a database, but not a history of platen; name another file");
     database(
         "newer.sqlite",
         "CREATE TABLE t (x); PRAGMA application_id = 0x706c746e; PRAGMA user_version = 2",
     );
-    check("newer.sqlite", "has format 2, this program knows 1; use the program that wrote it");
+    check("newer.sqlite", "has format 2, this program reads format 1; use the program that wrote it");
     let absent = folder.path().join("absent.sqlite");
     let error = Archive::open(&absent).unwrap_err().to_string();
     assert_eq!(error, format!("{}: No such file or directory (os error 2)", absent.display()));
@@ -495,10 +485,10 @@ fn files_that_are_no_history_are_left_alone() {
 
 #[test]
 fn a_row_changed_by_hand_is_named() {
-    let mut bench = Bench::new();
-    bench.measure(1, 1, None, Verdict::Pass);
-    let other = rusqlite::Connection::open(bench.path()).unwrap();
+    let mut fixture = Fixture::new();
+    fixture.measure(1, 1, None, Verdict::Pass);
+    let other = rusqlite::Connection::open(fixture.path()).unwrap();
     other.execute("UPDATE stroke SET verdict = 'good'", []).unwrap();
-    let error = bench.archive().stroke(1).unwrap_err().to_string();
+    let error = fixture.archive().stroke(1).unwrap_err().to_string();
     assert!(error.contains("run 1: ") && error.contains("unknown verdict \"good\""), "{error}");
 }

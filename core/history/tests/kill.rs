@@ -1,7 +1,7 @@
-//! `kill -9` at every point of a stroke: none is scanned twice, none is lost without a word, no result changes.
+//! `kill -9` at every point of a stroke: no stroke is scanned twice, lost unreported, or published with two results.
 //!
-//! The test plays the press and lives on; the host is this same test binary started again as a child, talks over its
-//! pipes, and is killed: at each named point while it stands still there, then at moments that nobody chose.
+//! The test acts as the press. The host is the same test binary as a child process, connected by pipes, and is killed: at each
+//! named point while it is paused there, then at random moments.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
@@ -19,7 +19,7 @@ const SESSION: u16 = 5;
 const CHILD: &str = "PLATEN_HISTORY_CHILD";
 const STOP: &str = "PLATEN_HISTORY_STOP";
 
-/// Where the child stands still when [`STOP`] names it: round every promise of stroke 2.
+/// Points at which the child pauses when [`STOP`] names them: around every step of stroke 2.
 const POINTS: [&str; 10] = [
     "before accept",
     "after accept",
@@ -33,7 +33,7 @@ const POINTS: [&str; 10] = [
     "after acked",
 ];
 
-/// What the press saw.
+/// Observations of the press.
 #[derive(Default)]
 struct Witness {
     scans: BTreeMap<u16, u32>,
@@ -65,11 +65,11 @@ impl Host {
     }
 
     fn order(&mut self, order: &str) {
-        // A child that died no longer reads; the end of its reports says so.
+        // A child that died no longer reads; the end of its reports shows it.
         let _ = writeln!(self.orders, "{order}");
     }
 
-    /// The next report. A child that ends without being killed has failed: its own words are on the standard error.
+    /// Returns the next report. A child that ends without being killed has failed; its standard error shows why.
     fn report(&mut self) -> String {
         loop {
             let mut line = String::new();
@@ -106,17 +106,17 @@ impl Witness {
         }
     }
 
-    /// No stroke scanned twice, none silent, every sequence number used once and in order.
+    /// Asserts that no stroke was scanned twice or unreported, and every sequence number was used once and in order.
     fn judge(&self, strokes: u16, database: &Path) {
         assert!(self.scans.values().all(|&scans| scans == 1), "scans: {:?}", self.scans);
         assert_eq!(self.results.keys().copied().collect::<Vec<_>>(), (1..=strokes).collect::<Vec<_>>());
         let seqs: Vec<u16> = self.results.values().map(|(seq, _)| *seq).collect();
         assert_eq!(seqs, (1..=strokes).collect::<Vec<_>>());
         let history = History::open(database, PRESS, Timestamp::UNIX_EPOCH).unwrap();
-        assert_eq!(history.archive().open_strokes(PRESS).unwrap(), []);
         let rows = history.archive().strokes(&platen_history::Filter::default()).unwrap();
         assert_eq!(rows.len(), usize::from(strokes));
         for row in &rows {
+            assert_eq!(row.stage(), Stage::Acked);
             let (seq, result) = &self.results[&row.key.stroke];
             assert_eq!((row.seq, row.publication.as_deref()), (Some(*seq), Some(result.as_str())));
             let measured = row.verdict != Some(Verdict::NotMeasured);
@@ -130,7 +130,7 @@ impl Witness {
     }
 }
 
-/// Runs `strokes` strokes; `fatal` says after each report whether the host dies now.
+/// Runs `strokes` strokes; `fatal` returns after each report whether to kill the host.
 fn press(database: &Path, strokes: u16, stop: &str, mut fatal: impl FnMut(&str) -> bool) -> (Witness, u32) {
     let mut witness = Witness::default();
     let mut deaths = 0;
@@ -182,7 +182,7 @@ fn killed_at_every_point_of_a_stroke() {
 }
 
 #[test]
-fn killed_at_moments_that_nobody_chose() {
+fn killed_at_random_moments() {
     let seed = 20_260_302;
     println!("seed {seed}");
     let mut state: u64 = seed;
@@ -296,7 +296,7 @@ fn report(what: &str) {
     out.flush().unwrap();
 }
 
-/// Tells the press and waits to be killed.
+/// Reports the pause and waits to be killed.
 fn stand_still() -> ! {
     report("standing");
     loop {
