@@ -9,7 +9,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use platen_shape::surface::{Axis, Fit};
+use platen_shape::surface::{SplineFit, UniformKnots};
 
 /// Extent of the plate, metres.
 const SIZE: [f64; 2] = [4.0, 3.0];
@@ -46,7 +46,10 @@ fn write(folder: &Path, name: &str, n_points: usize, spans: usize, noise: f64) -
     let (mut best_ms, mut fitted) = (f64::INFINITY, None);
     for _ in 0..REPEAT {
         let start = Instant::now();
-        let mut fit = Fit::<3>::new(Axis::new(0.0, SIZE[0], spans), Axis::new(0.0, SIZE[1], spans));
+        let mut fit = SplineFit::<3>::new(
+            UniformKnots::new(0.0, SIZE[0], spans),
+            UniformKnots::new(0.0, SIZE[1], spans),
+        );
         for ([u, v], point) in uv.iter().zip(&points) {
             fit.add(*u, *v, *point, weight);
         }
@@ -65,7 +68,7 @@ fn write(folder: &Path, name: &str, n_points: usize, spans: usize, noise: f64) -
         "points_m": points,
         "places_m": places().collect::<Vec<_>>(),
         "true_m": places().map(plate).collect::<Vec<_>>(),
-        "fitted_m": places().map(|[u, v]| fitted.net.point(u, v)).collect::<Vec<_>>(),
+        "fitted_m": places().map(|[u, v]| fitted.spline.point(u, v)).collect::<Vec<_>>(),
         "ms": best_ms,
     });
     let file = std::fs::File::create(folder.join(format!("{name}.json")))?;

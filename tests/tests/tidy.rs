@@ -7,8 +7,12 @@ use std::process::Command;
 /// Workspace crates that each kind of crate may use in its library or program (not in its tests).
 fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
     Some(match (folder, name) {
-        (_, "platen-abi" | "platen-scan" | "platen-plant" | "platen-history" | "platen-sim-plate") => &[],
-        (_, "platen-shape") => &["platen-scan"],
+        (
+            _,
+            "platen-abi" | "platen-numerics" | "platen-scan" | "platen-plant" | "platen-history"
+            | "platen-sim-plate",
+        ) => &[],
+        (_, "platen-shape") => &["platen-numerics", "platen-scan"],
         (_, "platen-sdk") => &["platen-abi", "platen-scan", "platen-shape"],
         (_, "platen-press") => &["platen-plant"],
         (_, "platen") => {
@@ -16,7 +20,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         }
         (_, "simulated") => &["platen-sdk", "platen-scan", "platen-sim-plate", "platen-sim-scanner"],
         ("drivers", _) => &["platen-sdk", "platen-scan"],
-        ("plugins", _) => &["platen-sdk", "platen-shape"],
+        ("plugins", _) => &["platen-numerics", "platen-sdk", "platen-shape"],
         (_, "platen-sim-scanner" | "platen-sim-press") => &["platen-sim-plate"],
         (_, "platen-sim") => &["platen-sim-plate", "platen-sim-scanner", "platen-sim-press"],
         ("tests", _) => return None,

@@ -19,7 +19,7 @@ use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
 use platen_shape::mesh::Face;
 use platen_shape::outline::outline;
-use platen_shape::surface::{Axis, Fit};
+use platen_shape::surface::{SplineFit, UniformKnots};
 use platen_shape::{
     Chart, DiskMesh, Flatten, FlattenError, Measurement, Outline, Patch, PlateSpec, Vec3, measure,
 };
@@ -144,8 +144,8 @@ fn fit(bencher: Bencher<'_, '_>, (n_points, n_spans): (usize, usize)) {
         })
         .collect();
     bencher.bench_local(|| {
-        let axis = Axis::new(0.0, 4.0, n_spans);
-        let mut fit = Fit::<3>::new(axis, axis);
+        let axis = UniformKnots::new(0.0, 4.0, n_spans);
+        let mut fit = SplineFit::<3>::new(axis, axis);
         for &[u, v, z] in &points {
             fit.add(u, v, [u, v, z], 1e6);
         }

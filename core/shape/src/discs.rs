@@ -195,14 +195,14 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::Sample;
-    use crate::flatten::closed_form::Random;
-    use crate::surface::{Axis, Fit, Mask};
+    use crate::surface::{Mask, SplineFit, UniformKnots};
+    use platen_numerics::random::Random;
 
     /// A level plate of 1 m x 1 m, 6 m in front of the scanner and 3 m below it.
     const CORNER: [f64; 3] = [5.5, -0.5, -3.0];
 
     fn surface() -> Surface {
-        let mut fit = Fit::new(Axis::new(0.0, 1.0, 8), Axis::new(0.0, 1.0, 8));
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, 1.0, 8), UniformKnots::new(0.0, 1.0, 8));
         for i in 0..2500 {
             let (u, v) = ((f64::from(i % 50) + 0.5) / 50.0, (f64::from(i / 50) + 0.5) / 50.0);
             fit.add(u, v, [CORNER[0] + u, CORNER[1] + v, CORNER[2] - 0.02], 1e6);
@@ -214,7 +214,7 @@ mod tests {
 
     /// Its scan, 1 mrad between beams and 1 mm of noise, with spots of a radius painted round (u, v).
     fn scan(spots: &[([f64; 2], f64)]) -> Patch {
-        let mut noise = Random(5);
+        let mut noise = Random::new(5);
         let mut samples = Vec::new();
         for column in 0..400 {
             for row in 0..300 {

@@ -57,7 +57,7 @@ impl Forming {
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::surface::{Axis, Fit, Mask};
+    use crate::surface::{Mask, SplineFit, UniformKnots};
     use platen_model::{Facing, RadiusOf, Target, TargetShape};
 
     const W: f64 = 3.0;
@@ -66,7 +66,7 @@ mod tests {
 
     /// A mid-surface without noise, bent along u to the curvature k.
     fn bent(k: f64, mut mask: Mask) -> Surface {
-        let mut fit = Fit::new(Axis::new(0.0, W, 15), Axis::new(0.0, H, 10));
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, W, 15), UniformKnots::new(0.0, H, 10));
         for i in 0..120 * 80 {
             let (u, v) = (W * (f64::from(i % 120) + 0.5) / 120.0, H * (f64::from(i / 120) + 0.5) / 80.0);
             let point = match k {
@@ -79,7 +79,7 @@ mod tests {
             }
         }
         // Points without noise tell nothing of how much to smooth.
-        let penalty = crate::surface::Penalty { u: 1e-6, v: 1e-6 };
+        let penalty = platen_numerics::reml::Penalty { u: 1e-6, v: 1e-6 };
         Surface::new(fit.solve_with(penalty).unwrap(), T, mask)
     }
 

@@ -77,7 +77,7 @@ pub enum MeasureError {
     #[error(transparent)]
     Flatten(#[from] FlattenError),
     /// No surface.
-    #[error(transparent)]
+    #[error("surface: {0}; scan again with the plate in full view")]
     Surface(#[from] Undetermined),
 }
 

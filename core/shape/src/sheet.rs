@@ -7,10 +7,10 @@
 
 use nalgebra::Vector2;
 
-use crate::kernels::wide;
 use crate::plane::Plane;
-use crate::surface::{Axis, Fit, Fitted, Net, Undetermined};
+use crate::surface::{FittedSpline, SplineFit, TensorSpline, Undetermined, UniformKnots};
 use crate::{Patch, Sample, Vec3};
+use platen_numerics::simd::dispatch_simd;
 
 /// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
 /// all samples.
@@ -38,7 +38,7 @@ const REACH: f64 = 0.5;
 pub struct Sheet {
     plane: Plane,
     /// Height over the plane, metres.
-    height: Net<1>,
+    height: TensorSpline<1>,
     /// Observed over stated standard deviation of the samples.
     pub(crate) noise_scale: f64,
 }
@@ -71,11 +71,11 @@ impl Sheet {
             return Err(Undetermined { n_points: patch.samples.len() });
         }
         let axis = |k: usize| {
-            let n_spans = Axis::of_length(high[k] - low[k], SPAN).n_spans();
-            Axis::new(low[k], high[k], n_spans)
+            let n_spans = UniformKnots::of_length(high[k] - low[k], SPAN).n_spans();
+            UniformKnots::new(low[k], high[k], n_spans)
         };
         let (fitted, noise_scale) = heights.smooth([axis(0), axis(1)])?;
-        Ok(Self { plane, height: fitted.net, noise_scale })
+        Ok(Self { plane, height: fitted.spline, noise_scale })
     }
 
     /// The sheet of a plate by its corners.
@@ -118,13 +118,13 @@ impl Sheet {
 
 impl Heights {
     /// The spline through the heights, and how much larger than stated their noise is.
-    fn smooth(&self, axes: [Axis; 2]) -> Result<(Fitted<1>, f64), Undetermined> {
+    fn smooth(&self, axes: [UniformKnots; 2]) -> Result<(FittedSpline<1>, f64), Undetermined> {
         let all = self.weighted(axes, |i| self.per_sigmas[i].powi(2));
-        let penalty = all.choose_penalty([1.0]).penalty;
+        let penalty = all.select_penalty([1.0]).penalty;
         let first = all.solve_with(penalty)?;
         let residuals: Vec<f64> = (0..self.places.len())
             .map(|i| {
-                (self.heights[i] - first.net.point(self.places[i][0], self.places[i][1])[0])
+                (self.heights[i] - first.spline.point(self.places[i][0], self.places[i][1])[0])
                     * self.per_sigmas[i]
             })
             .collect();
@@ -135,9 +135,9 @@ impl Heights {
     }
 
     /// The heights as points of a fit, each with its weight.
-    fn weighted(&self, axes: [Axis; 2], weight: impl Fn(usize) -> f64) -> Fit<1> {
-        let mut fit = Fit::new(axes[0], axes[1]);
-        wide(
+    fn weighted(&self, axes: [UniformKnots; 2], weight: impl Fn(usize) -> f64) -> SplineFit<1> {
+        let mut fit = SplineFit::new(axes[0], axes[1]);
+        dispatch_simd(
             #[inline(always)]
             || {
                 for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {

@@ -1,39 +1,31 @@
 //! The fitted surface S(u, v) of the plate's mid-surface, and what can be read off it at one place.
 //!
 //! S is a bicubic spline over the original rectangle, fitted by penalised least squares to all samples, moved by
-//! half the thickness against the scanner ([`Fit`]). The samples' noise acts along the normal, so every standard
+//! half the thickness against the scanner ([`SplineFit`]). The samples' noise acts along the normal, so every standard
 //! deviation here is that of the normal direction; how well a material point is located within the surface is the
 //! flattening's affair.
 
-mod axis;
-mod band;
-mod fit;
 mod mask;
-mod moments;
-mod net;
 mod parts;
-mod smoothing;
 
-pub use axis::Axis;
-pub use fit::{Fit, Fitted, Undetermined};
 pub use mask::Mask;
-pub(crate) use net::approximate;
-pub use net::{Jet, Net};
 pub use parts::{SurfaceError, SurfaceParts};
-pub(crate) use smoothing::Penalty;
+pub use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
+pub use platen_numerics::tensor_spline::TensorSpline;
+pub use platen_numerics::uniform_knots::UniformKnots;
 
 use crate::Vec3;
-use axis::Stencil;
-use band::BandFactor;
+use platen_numerics::block_banded_cholesky::BlockBandedFactor;
+use platen_numerics::uniform_knots::LocalBasis;
 
 /// The mid-surface S(u, v), (u, v) in `[0, W] x [0, H]`, metres, scanner frame.
 ///
 /// Beyond the rectangle the outermost spans go on: a few millimetres outside are as good as the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    net: Net<3>,
+    spline: TensorSpline<3>,
     thickness: f64,
-    precision: BandFactor,
+    precision: BlockBandedFactor,
     covariance: Vec<[f64; 49]>,
     noise_share: f32,
     mask: Mask,
@@ -76,22 +68,22 @@ pub struct Curvature {
 impl Surface {
     /// The surface of a fit over the original rectangle, which starts in (0, 0).
     #[must_use]
-    pub fn new(fitted: Fitted<3>, thickness: f64, mask: Mask) -> Self {
+    pub fn new(fitted: FittedSpline<3>, thickness: f64, mask: Mask) -> Self {
         let covariance = fitted.precision.local_inverse();
         let noise_share = fitted.noise_share as f32;
-        Self { net: fitted.net, thickness, precision: fitted.precision, covariance, noise_share, mask }
+        Self { spline: fitted.spline, thickness, precision: fitted.precision, covariance, noise_share, mask }
     }
 
     /// Extent along u, metres.
     #[must_use]
     pub fn width(&self) -> f64 {
-        self.net.u.end()
+        self.spline.u.end()
     }
 
     /// Extent along v, metres.
     #[must_use]
     pub fn height(&self) -> f64 {
-        self.net.v.end()
+        self.spline.v.end()
     }
 
     /// Thickness of the plate, metres.
@@ -100,10 +92,10 @@ impl Surface {
         self.thickness
     }
 
-    /// The spline: axes and control net.
+    /// Returns the spline: knots and control net.
     #[must_use]
-    pub fn net(&self) -> &Net<3> {
-        &self.net
+    pub fn spline(&self) -> &TensorSpline<3> {
+        &self.spline
     }
 
     /// What was seen.
@@ -115,13 +107,13 @@ impl Surface {
     /// Position on the mid-surface.
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> Vec3 {
-        self.net.point(u, v).into()
+        self.spline.point(u, v).into()
     }
 
     /// Position and derivatives to second order.
     #[must_use]
     pub fn derivatives(&self, u: f64, v: f64) -> Derivatives {
-        let jet = self.net.jet(u, v);
+        let jet = self.spline.jet(u, v);
         Derivatives {
             p: jet.p.into(),
             u: jet.u.into(),
@@ -135,14 +127,14 @@ impl Surface {
     /// Unit normal, towards the scanner.
     #[must_use]
     pub fn normal(&self, u: f64, v: f64) -> Vec3 {
-        let [_, along_u, along_v] = self.net.frame(u, v).map(Vec3::from);
+        let [_, along_u, along_v] = self.spline.frame(u, v).map(Vec3::from);
         along_u.cross(&along_v).normalize()
     }
 
     /// Position on the scanned face: half the thickness above the mid-surface.
     #[must_use]
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
-        let [p, along_u, along_v] = self.net.frame(u, v).map(Vec3::from);
+        let [p, along_u, along_v] = self.spline.frame(u, v).map(Vec3::from);
         p + along_u.cross(&along_v).normalize() * (0.5 * self.thickness)
     }
 
@@ -155,7 +147,7 @@ impl Surface {
     /// Standard deviation of the position along the normal, metres.
     #[must_use]
     pub fn sigma_point(&self, u: f64, v: f64) -> f64 {
-        let (su, sv) = (self.net.u.stencil(u), self.net.v.stencil(v));
+        let (su, sv) = (self.spline.u.local_basis(u), self.spline.v.local_basis(v));
         self.variance(&su, &sv, |i, k| su.value[i] * sv.value[k]).sqrt()
     }
 
@@ -173,8 +165,8 @@ impl Surface {
     /// tangential parts only, which meet nothing but other tangential parts.
     #[must_use]
     pub fn sigma_curvature(&self, u: f64, v: f64) -> [f64; 3] {
-        let (su, sv) = (self.net.u.stencil(u), self.net.v.stencil(v));
-        let [_, along_u, along_v] = self.net.frame(u, v).map(Vec3::from);
+        let (su, sv) = (self.spline.u.local_basis(u), self.spline.v.local_basis(v));
+        let [_, along_u, along_v] = self.spline.frame(u, v).map(Vec3::from);
         let (e, g) = (along_u.norm_squared(), along_v.norm_squared());
         [
             self.variance(&su, &sv, |i, k| su.d2[i] * sv.value[k]).sqrt() / e,
@@ -189,12 +181,12 @@ impl Surface {
     /// factor (0.2 ms for 50 x 40 spans), however many terms.
     #[must_use]
     pub fn sigma_of_heights(&self, terms: &[([f64; 2], f64)]) -> f64 {
-        let mut functional = vec![0.0; self.net.control.len()];
+        let mut functional = vec![0.0; self.spline.control.len()];
         for ([u, v], weight) in terms {
-            let ((i, bu), (k, bv)) = (self.net.u.values(*u), self.net.v.values(*v));
+            let ((i, bu), (k, bv)) = (self.spline.u.values(*u), self.spline.v.values(*v));
             for (row, fv) in bv.iter().enumerate() {
                 for (column, fu) in bu.iter().enumerate() {
-                    functional[(k + row) * self.net.u.n_coefficients() + i + column] += weight * fv * fu;
+                    functional[(k + row) * self.spline.u.n_coefficients() + i + column] += weight * fv * fu;
                 }
             }
         }
@@ -202,12 +194,12 @@ impl Surface {
     }
 
     /// Variance of the sum of the 16 coefficients of a span, weighted by `weight(i, k)`.
-    fn variance(&self, su: &Stencil, sv: &Stencil, weight: impl Fn(usize, usize) -> f64) -> f64 {
+    fn variance(&self, su: &LocalBasis, sv: &LocalBasis, weight: impl Fn(usize, usize) -> f64) -> f64 {
         let weights: [[f64; 4]; 4] = std::array::from_fn(|k| std::array::from_fn(|i| weight(i, k)));
         let mut sum = 0.0;
         for a in 0..16 {
             let (i, k) = (a % 4, a / 4);
-            let row = &self.covariance[(sv.first + k) * self.net.u.n_coefficients() + su.first + i];
+            let row = &self.covariance[(sv.first + k) * self.spline.u.n_coefficients() + su.first + i];
             let slot = |b: usize| (b / 4 + 3 - k) * 7 + b % 4 + 3 - i;
             let inner: f64 = (0..16).map(|b| weights[b / 4][b % 4] * row[slot(b)]).sum();
             sum += weights[k][i] * inner;

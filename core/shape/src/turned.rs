@@ -114,8 +114,8 @@ fn unexplained(now: &Surface, before: &Surface, names: &Matrix2<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::flatten::closed_form::Random;
-    use crate::surface::{Axis, Fit, Mask};
+    use crate::surface::{Mask, SplineFit, UniformKnots};
+    use platen_numerics::random::Random;
 
     const SIDE: f64 = 2.0;
 
@@ -133,8 +133,8 @@ mod tests {
             let next = angle + h * curvature((i as f64 + 0.5) * h);
             profile.push((x + h * next.cos(), z + h * next.sin(), next));
         }
-        let mut noise = Random(seed);
-        let mut fit = Fit::new(Axis::new(0.0, SIDE, 32), Axis::new(0.0, height, 24));
+        let mut noise = Random::new(seed);
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, SIDE, 32), UniformKnots::new(0.0, height, 24));
         let side = names.determinant();
         for i in 0..20_000 {
             let at = [(f64::from(i % 160) + 0.5) / 160.0, (f64::from(i / 160) + 0.5) / 125.0];

@@ -86,7 +86,7 @@ fn nothing_panics_and_all_numbers_are_finite() {
                 measure(&patch, &outline, &scene.spec(), &scene.spec().rectangle(), &mut Harmonic, &mut clock)
         {
             assert!(m.corners.iter().all(|p| p.iter().all(|c| c.is_finite())), "seed {seed}");
-            assert!(m.surface.net().control.iter().flatten().all(|c| c.is_finite()), "seed {seed}");
+            assert!(m.surface.spline().control.iter().flatten().all(|c| c.is_finite()), "seed {seed}");
             assert!(m.chart.uv.iter().flatten().all(|c| c.is_finite()), "seed {seed}");
             measurements += 1;
         }

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
+use platen_numerics::sparse::{Graph, SparseError};
 use platen_sdk::{Error, ErrorKind, Result};
 use platen_shape::DiskMesh;
 use platen_shape::flatten::{fixed_boundary, interior, plane_picture};
-use platen_shape::sparse::{Graph, SparseError};
 
 use crate::angles::{Corners, Residuals, targets};
 use crate::reduced_system::{Multipliers, ReducedSystem};

@@ -10,7 +10,7 @@
 //! J L^-1 J' dm = c - J L^-1 r is partitioned into triangles (1, diagonal) and vertices (2); its Schur complement in 2 is the
 //! sum over the triangles of Q P Q', with Q the Jacobian rows of the triangle's corners and P = L^-1 - L^-1 1 1' L^-1 / (1' L^-1 1).
 
-use platen_shape::sparse::{Graph, SparseError, Spd};
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 use crate::angles::{Corners, Jacobian, Residuals};
 

@@ -2,6 +2,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::chart::{abf, plane_angles};
 use nalgebra::{DMatrix, DVector};
+use platen_numerics::random::Random;
 use platen_shape::DiskMesh;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, interior};
@@ -102,7 +103,7 @@ fn on_a_sphere_it_is_wrong_by_a_millimetre() {
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;
     for seed in 0..3000 {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let cells = [1 + (random.unit() * 9.0) as u32, 1 + (random.unit() * 9.0) as u32];
         let size = [0.5 + 5.0 * random.unit(), 0.5 + 5.0 * random.unit()];
         let radius = 2.0 + 20.0 * random.unit();

@@ -2,7 +2,7 @@
 
 use platen_model::{Facing, RadiusOf, Target, TargetShape, Task};
 use platen_shape::Vec3;
-use platen_shape::surface::{Axis, Fit, Mask};
+use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn plate(sigma: f64, seed: u64, k: impl Fn(f64) -> f64) -> Surface {
         let middle = angle + 0.5 * h * k((i as f64 + 0.25) * h);
         profile.push((x + h * middle.cos(), z + h * middle.sin(), angle + h * k((i as f64 + 0.5) * h)));
     }
-    let mut fit = Fit::new(Axis::new(0.0, WIDTH, 48), Axis::new(0.0, HEIGHT, 32));
+    let mut fit = SplineFit::new(UniformKnots::new(0.0, WIDTH, 48), UniformKnots::new(0.0, HEIGHT, 32));
     for i in 0..24_000 {
         let (u, v) =
             ((f64::from(i % 200) + 0.5) * WIDTH / 200.0, (f64::from(i / 200) + 0.5) * HEIGHT / 120.0);

@@ -3,7 +3,7 @@
 use nalgebra::Rotation3;
 use platen_model::{Support, Task};
 use platen_shape::Vec3;
-use platen_shape::surface::{Axis, Fit, Mask};
+use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 
 use super::*;
 
@@ -52,7 +52,7 @@ fn shape(extra: f64) -> impl Fn(f64) -> (Vec3, Vec3) {
 fn plate(sigma: f64, seed: u64, extra: f64, wave: impl Fn(f64, f64) -> f64) -> Surface {
     let mut noise = Noise(spread(seed));
     let shape = shape(extra);
-    let mut fit = Fit::new(Axis::new(0.0, WIDTH, 48), Axis::new(0.0, HEIGHT, 32));
+    let mut fit = SplineFit::new(UniformKnots::new(0.0, WIDTH, 48), UniformKnots::new(0.0, HEIGHT, 32));
     for i in 0..24_000 {
         let (u, v) =
             ((f64::from(i % 200) + 0.5) * WIDTH / 200.0, (f64::from(i / 200) + 0.5) * HEIGHT / 120.0);

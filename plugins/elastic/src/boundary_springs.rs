@@ -17,8 +17,8 @@
 //! 4 x 3 m, 0.1 mm: k = 5000 against about 1 of the plate). On a rolled plate, whose own dimensions are more certain than
 //! its edges' positions, a misfit is shared between two opposite edges instead of stretching the plate.
 
+use platen_numerics::sparse::Spd;
 use platen_shape::DiskMesh;
-use platen_shape::sparse::Spd;
 
 /// Least standard deviation of an edge, metres: keeps the springs of perfect edges within the range of f64.
 const MIN_SIGMA: f64 = 1e-6;

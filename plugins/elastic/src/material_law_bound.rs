@@ -14,8 +14,8 @@
 //! with E the strain of least energy and f the direction of the fibres. The field is smooth: a grid of 16 x 16 cells
 //! resolves it to one or two percent.
 
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 use platen_shape::flatten::plane_stress;
-use platen_shape::sparse::{Graph, SparseError, Spd};
 
 use crate::membrane::{Strained, Sym};
 

@@ -17,9 +17,9 @@
 //! onto the positive semidefinite forms by dropping its negative eigenvalue. For small strain the forms are those of linear
 //! elasticity.
 
+use platen_numerics::sparse::Spd;
 use platen_shape::DiskMesh;
 use platen_shape::flatten::signed_area;
-use platen_shape::sparse::Spd;
 
 /// Membrane of one mesh.
 pub(crate) struct Membrane<'a> {

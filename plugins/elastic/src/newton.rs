@@ -3,10 +3,10 @@
 //! The Hessian changes little on the way, because strains are parts per thousand. Its factor is therefore reused as long as
 //! the steps shrink fast; most plates need only one factorisation.
 
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 use platen_sdk::{Error, ErrorKind, Result};
 use platen_shape::DiskMesh;
 use platen_shape::flatten::plane_picture;
-use platen_shape::sparse::{Graph, SparseError, Spd};
 
 use crate::boundary_springs::BoundarySprings;
 use crate::membrane::Membrane;

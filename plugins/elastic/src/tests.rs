@@ -4,6 +4,7 @@ mod membrane;
 
 use crate::chart::elastic;
 use least_energy::sphere_of_least_energy;
+use platen_numerics::random::Random;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, cotangents, first_turned, fixed_boundary};
 use platen_shape::{Chart, Vec3};
@@ -177,7 +178,7 @@ fn it_stops_when_told() {
 fn random_small_meshes_give_charts_or_are_refused() {
     let mut refused = 0;
     for seed in 0..2000 {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let cells = [1 + (random.unit() * 9.0) as u32, 1 + (random.unit() * 9.0) as u32];
         let size = [0.5 + 5.0 * random.unit(), 0.5 + 5.0 * random.unit()];
         let radius = 2.0 + 20.0 * random.unit();

@@ -44,9 +44,9 @@
 //! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose lengths
 //! differ from the sides of the rectangle by more than a tenth.
 
+use platen_numerics::sparse::SparseError;
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result};
 use platen_shape::flatten::{check_fit, cotangents, fixed_boundary};
-use platen_shape::sparse::SparseError;
 use platen_shape::{Chart, DiskMesh};
 
 struct Harmonic;

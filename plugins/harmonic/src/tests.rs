@@ -1,4 +1,5 @@
 use crate::harmonic;
+use platen_numerics::random::Random;
 use platen_shape::Vec3;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, first_turned};
@@ -72,7 +73,7 @@ fn turn_and_shift() -> impl Fn(Vec3) -> Vec3 {
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;
     for seed in 0..4000 {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let cells = [1 + (random.unit() * 9.0) as u32, 1 + (random.unit() * 9.0) as u32];
         let size = [0.5 + 5.0 * random.unit(), 0.5 + 5.0 * random.unit()];
         let radius = 2.0 + 20.0 * random.unit();

@@ -10,7 +10,7 @@ use platen_model::{
     Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template, TemplateFinding,
     Verdict,
 };
-use platen_shape::surface::{Axis, Fit, Mask};
+use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 use platen_shape::{Surface, TargetSurface, Vec3};
 
 use super::*;
@@ -31,7 +31,7 @@ fn surface(n_points: usize, sigma: f64, seed: u64, plate: impl Fn(f64, f64) -> (
         let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
         radius * (std::f64::consts::TAU * random.f64()).cos()
     };
-    let mut fit = Fit::new(Axis::new(0.0, WIDTH, 30), Axis::new(0.0, HEIGHT, 20));
+    let mut fit = SplineFit::new(UniformKnots::new(0.0, WIDTH, 30), UniformKnots::new(0.0, HEIGHT, 20));
     let columns = (n_points as f64 * WIDTH / HEIGHT).sqrt() as usize;
     let rows = n_points / columns;
     for k in 0..columns * rows {

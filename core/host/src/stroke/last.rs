@@ -23,7 +23,7 @@ impl Last<'_> {
 
 #[cfg(test)]
 mod tests {
-    use platen_shape::surface::{Axis, Fit, Mask};
+    use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 
     use super::*;
 
@@ -31,7 +31,7 @@ mod tests {
     fn u_goes_on_from_the_last_scan_and_turns_with_the_press() {
         // Radians: of a spline's normal equations, which stiffen as points without noise ask for more smoothing.
         const ROUNDING: f64 = 1e-7;
-        let mut fit = Fit::new(Axis::new(0.0, 2.0, 4), Axis::new(0.0, 1.0, 4));
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, 2.0, 4), UniformKnots::new(0.0, 1.0, 4));
         for i in 0..400 {
             let (u, v) = (0.1 * (f64::from(i % 20) + 0.5), 0.05 * (f64::from(i / 20) + 0.5));
             fit.add(u, v, [5.0 + u, v, -3.0], 1e6);

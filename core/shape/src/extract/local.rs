@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 
 use super::window::Window;
 use crate::Vec3;
-use crate::kernels::wide;
+use platen_numerics::simd::dispatch_simd;
 
 /// Cells on a side of the square that shares one fit.
 pub(super) const TILE: usize = 4;
@@ -170,7 +170,7 @@ impl LocalFace {
         if points.n < LEAST_CELLS {
             return None;
         }
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || Self::through(&mut points),
         )

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::disjoint::Disjoint;
+use platen_numerics::union_find::UnionFind;
 
 /// Label of a cell that is part of none.
 pub(super) const NONE: u32 = u32::MAX;
@@ -11,7 +11,7 @@ pub(super) const NONE: u32 = u32::MAX;
 /// number of parts. Margins are not set, so columns do not run into each other.
 pub(super) fn parts(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut runs: Vec<Range<usize>> = Vec::new();
-    let mut sets = Disjoint::default();
+    let mut sets = UnionFind::default();
     let mut before = 0..0;
     for (column, cells) in mask.chunks_exact(n_rows.max(1)).enumerate() {
         let first = runs.len();
@@ -21,7 +21,7 @@ pub(super) fn parts(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
         while i < before.end && j < runs.len() {
             let (left_end, right_end) = (runs[i].end + n_rows, runs[j].end);
             if runs[i].start + n_rows < right_end && runs[j].start < left_end {
-                sets.join(i as u32, j as u32);
+                sets.union(i as u32, j as u32);
             }
             if left_end <= right_end {
                 i += 1;
@@ -36,7 +36,7 @@ pub(super) fn parts(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut n = 0;
     for (run, cells) in runs.into_iter().enumerate() {
         // The root is the first run of its part.
-        let root = sets.root(run as u32) as usize;
+        let root = sets.find(run as u32) as usize;
         if root == run {
             number[run] = n;
             n += 1;

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::continuity::Link;
-use crate::disjoint::Disjoint;
+use platen_numerics::union_find::UnionFind;
 
 /// Cells `rows` of one column, each continuous with the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl Extent {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Regions {
     runs: Vec<Run>,
-    sets: Disjoint,
+    sets: UnionFind,
     extent: Vec<Extent>,
 }
 
@@ -79,7 +79,7 @@ impl Regions {
 
     /// The component of a run, as the number of its root.
     pub(super) fn root(&mut self, number: u32) -> u32 {
-        self.sets.root(number)
+        self.sets.find(number)
     }
 
     pub(super) fn extent(&self, root: u32) -> Extent {
@@ -96,7 +96,7 @@ impl Regions {
     }
 
     fn join(&mut self, a: u32, b: u32) {
-        if let Some((root, joined)) = self.sets.join(a, b) {
+        if let Some((root, joined)) = self.sets.union(a, b) {
             let joined = self.extent[joined as usize];
             self.extent[root as usize].merge(joined);
         }

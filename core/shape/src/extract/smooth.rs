@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::continuity::Continuity;
 use super::window::Window;
-use crate::kernels::wide;
+use platen_numerics::simd::dispatch_simd;
 
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];
@@ -27,7 +27,7 @@ pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity
     let mut copies = [window.inverse.clone(), window.inverse.clone()];
     // A half step of a column needs the one before of its two neighbours, so the half steps follow each other through
     // the columns, one column apart: what a column needs is still in the cache.
-    wide(
+    dispatch_simd(
         #[inline(always)]
         || {
             for front in 0..spans.len() + 2 * PAIRS {

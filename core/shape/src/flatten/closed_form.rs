@@ -2,6 +2,7 @@
 
 use crate::mesh::{DiskMesh, DiskParts, MeshError};
 use crate::{Blank, Vec3};
+use platen_numerics::random::Random;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 /// A plate's mesh that knows where each of its vertices lies on the plate.
@@ -58,7 +59,7 @@ impl ClosedForm {
     /// Adds noise of standard deviation `sigma` along z to the interior vertices, after `seed`.
     #[must_use]
     pub fn with_noise(mut self, sigma: f64, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let first = self.parts.boundary.len();
         self.parts.vertices[first..].iter_mut().for_each(|p| p.z += sigma * random.normal());
         self
@@ -114,31 +115,9 @@ pub fn sphere_of_fibres(radius: f64, size: [f64; 2]) -> impl Fn([f64; 2]) -> [f6
     }
 }
 
-/// A generator of pseudo-random numbers: splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
-/// generators", 2014).
-#[derive(Debug, Clone)]
-pub struct Random(pub u64);
-
-impl Random {
-    /// Next number, evenly spread over [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Next number, normally spread with standard deviation 1 (Box and Muller).
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.unit()).cos()
-    }
-}
-
 /// The boundary loop from (0,0), then the interior row by row.
 fn material_points(size: [f64; 2], [nu, nv]: [u32; 2], jitter: f64, seed: u64) -> Vec<[f64; 2]> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let at = |i: f64, j: f64| [size[0] * i / f64::from(nu), size[1] * j / f64::from(nv)];
     let on = |i: u32, j: u32| at(f64::from(i), f64::from(j));
     let mut uv = Vec::new();

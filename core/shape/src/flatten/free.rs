@@ -15,7 +15,7 @@
 use super::domain::{first_turned, plane_picture, signed_area};
 use super::laplace::{cotangents, fixed_boundary};
 use crate::mesh::DiskMesh;
-use crate::sparse::{Graph, SparseError, Spd};
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 /// Poisson's ratio of steel.
 const POISSON: f64 = 0.3;

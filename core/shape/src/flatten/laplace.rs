@@ -2,7 +2,7 @@
 
 use super::domain::{interior, plane_picture};
 use crate::mesh::DiskMesh;
-use crate::sparse::{Graph, SparseError, Spd};
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 /// Cotangents of the three angles of every triangle of the mesh, at its corners in their order.
 pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {

@@ -3,12 +3,12 @@
 use nalgebra::{Matrix3, Rotation3};
 
 use super::{Measurement, measure};
-use crate::flatten::closed_form::Random;
 use crate::flatten::{cotangents, fixed_boundary};
 use crate::surface::Derivatives;
 use crate::{
     Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, Outline, Patch, PlateSpec, Sample, Sheet, Vec3,
 };
+use platen_numerics::random::Random;
 
 /// The paper's harmonic map.
 pub(super) struct Harmonic;
@@ -96,7 +96,7 @@ impl Scene {
 
     /// Samples over the scanned face, one per cell of a grid, anywhere in it.
     pub(super) fn patch(&self) -> Patch {
-        let (placed, mut random) = (self.placed(), Random(self.seed));
+        let (placed, mut random) = (self.placed(), Random::new(self.seed));
         let size = self.size.map(|length| length - 2.0 * self.inset);
         let n = size.map(|length| (length / self.pitch) as usize);
         let mut samples = Vec::with_capacity(n[0] * n[1]);
@@ -116,7 +116,7 @@ impl Scene {
 
     /// The face's edges, a point every 10 mm, hidden parts bridged by a straight line.
     pub(super) fn outline(&self) -> Outline {
-        let (placed, mut random) = (self.placed(), Random(self.seed + 1000));
+        let (placed, mut random) = (self.placed(), Random::new(self.seed + 1000));
         let ([w, h], i) = (self.size, self.inset);
         let at = [[i, i], [w - i, i], [w - i, h - i], [i, h - i]];
         let mut jitter = |s: f64| s * Vec3::new(random.normal(), random.normal(), random.normal());

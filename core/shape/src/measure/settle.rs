@@ -7,8 +7,9 @@
 use super::Quality;
 use crate::mesh::{Face, Facets};
 use crate::sheet::{biweight, per_sigma_across};
-use crate::surface::{Axis, Fit, Fitted, Mask, Net, Penalty, Surface, Undetermined};
+use crate::surface::{FittedSpline, Mask, SplineFit, Surface, TensorSpline, Undetermined, UniformKnots};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
+use platen_numerics::reml::Penalty;
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without one gets spans of twice the length.
 const SPAN: f64 = 0.06;
@@ -38,10 +39,10 @@ pub(super) fn settle(
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
     // Of even numbers of spans the fit may join two each.
     let [u, v] = [spec.width, spec.height].map(|length| {
-        let n_spans = Axis::of_length(length, SPAN).n_spans();
-        Axis::new(0.0, length, n_spans.next_multiple_of(2))
+        let n_spans = UniformKnots::of_length(length, SPAN).n_spans();
+        UniformKnots::new(0.0, length, n_spans.next_multiple_of(2))
     });
-    let mut fit = Fit::<3>::new(u, v);
+    let mut fit = SplineFit::<3>::new(u, v);
     let mut seen = Seen::new(spec);
     let per_scale = 1.0 / face.noise_scale;
     let mut variance = 0.0;
@@ -73,26 +74,26 @@ pub(super) fn settle(
 }
 
 /// The chart over (a, b), by least squares on the vertices, with a penalty that acts below three spans only.
-fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<Net<2>, Undetermined> {
+fn carry(face: &Face, places: &[[f64; 2]], chart: &Chart) -> Result<TensorSpline<2>, Undetermined> {
     let (a, b) = (face.mid.u, face.mid.v);
-    let mut fit = Fit::<2>::new(a, b);
+    let mut fit = SplineFit::<2>::new(a, b);
     for ([x, y], uv) in places.iter().zip(&chart.uv) {
         fit.add(*x, *y, *uv, 1.0);
     }
     let density = places.len() as f64 / (a.end() * b.end());
     let weight = |step: f64| density * (3.0 * step / std::f64::consts::TAU).powi(6);
-    Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.net)
+    Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.spline)
 }
 
 /// Mean normal of the plate: at right angles to both diagonals.
-fn direction(mid: &Net<3>) -> Vec3 {
+fn direction(mid: &TensorSpline<3>) -> Vec3 {
     let corner = |a: f64, b: f64| Vec3::from(mid.point(a, b));
     let (w, h) = (mid.u.end(), mid.v.end());
     (corner(w, h) - corner(0.0, 0.0)).cross(&(corner(0.0, h) - corner(w, 0.0))).normalize()
 }
 
-fn moved(mut fitted: Fitted<3>, by: Vec3) -> Fitted<3> {
-    fitted.net.control.iter_mut().for_each(|c| *c = (Vec3::from(*c) + by).into());
+fn moved(mut fitted: FittedSpline<3>, by: Vec3) -> FittedSpline<3> {
+    fitted.spline.control.iter_mut().for_each(|c| *c = (Vec3::from(*c) + by).into());
     fitted
 }
 

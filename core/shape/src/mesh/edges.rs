@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::surface::{Axis, Net, approximate};
 use crate::{EdgeCurve, Outline, Vec3};
+use platen_numerics::tensor_spline::{TensorSpline, approximate_curve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 /// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
 /// surface. Detail across the surface (narrow bends) is added later, from the samples inside.
@@ -17,7 +18,7 @@ const CORNER: f64 = 1e6;
 
 /// A smooth curve over [0, 1].
 struct Edge {
-    axis: Axis,
+    axis: UniformKnots,
     control: DMatrix<f64>,
 }
 
@@ -26,7 +27,7 @@ impl Edge {
     fn fit(curve: &EdgeCurve) -> Self {
         let n = curve.points.len();
         let length: f64 = curve.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let axis = Axis::new(0.0, 1.0, ((length / SPAN).ceil() as usize).clamp(3, 64));
+        let axis = UniformKnots::new(0.0, 1.0, ((length / SPAN).ceil() as usize).clamp(3, 64));
         let n_coefficients = axis.n_coefficients();
         let mut normal = DMatrix::zeros(n_coefficients, n_coefficients);
         let mut rhs = DMatrix::zeros(n_coefficients, 3);
@@ -72,20 +73,26 @@ impl Edge {
 /// The Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum reproduces every
 /// surface of second order, however it is bent or turned. With an inset the outline lies that far inside of the
 /// rectangle, and the patch goes on beyond it.
-pub(crate) fn coons(outline: &Outline, width: f64, height: f64, inset: f64, axes: [Axis; 2]) -> Net<3> {
+pub(crate) fn coons(
+    outline: &Outline,
+    width: f64,
+    height: f64,
+    inset: f64,
+    axes: [UniformKnots; 2],
+) -> TensorSpline<3> {
     let corner = |k: usize| outline.corners[k].point;
     let share = |d: usize, at: f64| (at - inset) / ([width, height][d] - 2.0 * inset);
     // Control values along u of the edges v = 0 and v = H, along v of those at u = W and u = 0.
     let control = |k: usize| {
         let edge = Edge::fit(&outline.edges[k]);
         let share = |at: f64| if k < 2 { share(k % 2, at) } else { 1.0 - share(k % 2, at) };
-        approximate(axes[k % 2], |at| edge.point(share(at)))
+        approximate_curve(axes[k % 2], |at| edge.point(share(at)))
     };
     let [bottom, right, top, left] = [0, 1, 2, 3].map(control);
     // Blending is linear: so are the control values, in the abscissas of the B-splines.
-    let mut net = Net::zeros(axes[0], axes[1]);
+    let mut patch = TensorSpline::zeros(axes[0], axes[1]);
     let n_u = axes[0].n_coefficients();
-    for (c, slot) in net.control.iter_mut().enumerate() {
+    for (c, slot) in patch.control.iter_mut().enumerate() {
         let (i, k) = (c % n_u, c / n_u);
         let (x, y) = (share(0, axes[0].abscissa(i)), share(1, axes[1].abscissa(k)));
         let along_v = bottom[i] * (1.0 - y) + top[i] * y;
@@ -94,5 +101,5 @@ pub(crate) fn coons(outline: &Outline, width: f64, height: f64, inset: f64, axes
             (corner(0) * (1.0 - x) + corner(1) * x) * (1.0 - y) + (corner(3) * (1.0 - x) + corner(2) * x) * y;
         *slot = (along_v + along_u - twice).into();
     }
-    net
+    patch
 }

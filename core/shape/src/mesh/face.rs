@@ -7,7 +7,7 @@
 use super::edges::coons;
 use super::facets::Facets;
 use crate::sheet::{SPAN, thinned};
-use crate::surface::{Axis, Net};
+use crate::surface::{TensorSpline, UniformKnots};
 use crate::{Outline, Patch, PlateSpec, Vec3};
 
 /// Facets along a span of the first picture: 50 mm; it has no finer detail than its edges.
@@ -17,9 +17,9 @@ const FACETS: usize = 2;
 #[derive(Debug, Clone)]
 pub struct Face {
     /// The scanned face, metres, scanner frame.
-    pub face: Net<3>,
+    pub face: TensorSpline<3>,
     /// The mid-surface at the same (a, b): half the thickness below the face along its normal.
-    pub mid: Net<3>,
+    pub mid: TensorSpline<3>,
     /// Feet (a, b) of some of the samples, in lattice order.
     pub(crate) places: Vec<[f64; 2]>,
     /// Observed over stated standard deviation of the samples.
@@ -30,16 +30,16 @@ impl Face {
     /// The face that `outline` encloses.
     #[must_use]
     pub fn of(patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Self {
-        let axes = [spec.width, spec.height].map(|length| Axis::of_length(length, SPAN));
+        let axes = [spec.width, spec.height].map(|length| UniformKnots::of_length(length, SPAN));
         let base = coons(outline, spec.width, spec.height, spec.face_inset, axes);
         let mut places = Vec::new();
         Facets::of(&base, FACETS).walk(thinned(patch), |_, foot| places.push(foot.value));
-        let face = Net::approximate(axes[0], axes[1], |a, b| {
+        let face = TensorSpline::approximate(axes[0], axes[1], |a, b| {
             let [p, along_a, along_b] = base.frame(a, b).map(Vec3::from);
             let met = outline.sheet.along(p, along_b.cross(&along_a).normalize());
             met.map_or(p, |(point, _)| point).into()
         });
-        let mid = Net::approximate(axes[0], axes[1], |a, b| {
+        let mid = TensorSpline::approximate(axes[0], axes[1], |a, b| {
             let [p, along_a, along_b] = face.frame(a, b).map(Vec3::from);
             (p - along_a.cross(&along_b).normalize() * (0.5 * spec.thickness)).into()
         });

@@ -14,8 +14,9 @@
 //! height is wrong by 0.5 um and the normal by 2e-4 rad where two facets meet, 12 mm from either's middle.
 
 use crate::Vec3;
-use crate::kernels::wide;
-use crate::surface::{Axis, Jet, Net};
+use platen_numerics::simd::dispatch_simd;
+use platen_numerics::tensor_spline::{Jet, TensorSpline};
+use platen_numerics::uniform_knots::UniformKnots;
 
 /// A facet serves points up to this share of its size from its middle; beyond, the next one does.
 const REACH: f64 = 0.6;
@@ -113,7 +114,7 @@ impl Facet {
 
 /// A surface as facets, v outer, u inner.
 pub(crate) struct Facets {
-    axes: [Axis; 2],
+    axes: [UniformKnots; 2],
     n: [usize; 2],
     /// Size of a facet in (a, b), and one over it.
     size: [f64; 2],
@@ -123,7 +124,7 @@ pub(crate) struct Facets {
 
 impl Facets {
     /// The facets of `surface`, `per_span` along each span each way, which carry its own coordinates (a, b).
-    pub(crate) fn of(surface: &Net<3>, per_span: usize) -> Self {
+    pub(crate) fn of(surface: &TensorSpline<3>, per_span: usize) -> Self {
         let own = |at: [f64; 2]| {
             let zero = [0.0; 2];
             Jet { p: at, u: [1.0, 0.0], v: [0.0, 1.0], uu: zero, uv: zero, vv: zero }
@@ -132,7 +133,11 @@ impl Facets {
     }
 
     /// The facets of `surface`, which carry a pair given with its derivatives by (a, b).
-    pub(crate) fn carrying(surface: &Net<3>, per_span: usize, carried: impl Fn([f64; 2]) -> Jet<2>) -> Self {
+    pub(crate) fn carrying(
+        surface: &TensorSpline<3>,
+        per_span: usize,
+        carried: impl Fn([f64; 2]) -> Jet<2>,
+    ) -> Self {
         let axes = [surface.u, surface.v];
         let n = axes.map(|axis| per_span * axis.n_spans());
         let size = axes.map(|axis| axis.step() / per_span as f64);
@@ -142,7 +147,7 @@ impl Facets {
             Facet::of(at, &surface.jet(at[0], at[1]), &carried(at))
         };
         let mut facets = Vec::with_capacity(n[0] * n[1]);
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || facets.extend((0..n[0] * n[1]).map(facet)),
         );
@@ -159,7 +164,7 @@ impl Facets {
     ) {
         let mut column = None;
         let (mut first, mut last) = (0, 0);
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for sample in samples {
@@ -236,13 +241,13 @@ mod tests {
 
     #[test]
     fn feet_on_a_cylinder_are_the_closed_form() {
-        let axes = [Axis::new(0.0, 4.0, 40), Axis::new(0.0, 2.0, 20)];
+        let axes = [UniformKnots::new(0.0, 4.0, 40), UniformKnots::new(0.0, 2.0, 20)];
         let r = 5.0;
         let point = |u: f64, v: f64| [r * (u / r).sin(), v, r * (1.0 - (u / r).cos())];
         // Coordinates that are not those of the arc: a = u + 0.02 u^2.
         let arc = |a: f64| ((1.0 + 0.08 * a).sqrt() - 1.0) / 0.04;
-        let net = Net::approximate(axes[0], axes[1], |a, b| point(arc(a), b));
-        let facets = Facets::of(&net, 4);
+        let cylinder = TensorSpline::approximate(axes[0], axes[1], |a, b| point(arc(a), b));
+        let facets = Facets::of(&cylinder, 4);
         let truth = |k: u32| {
             let (a, v, h) =
                 (4.0 * f64::from(k) / 199.0, 2.0 * f64::from(k % 7) / 6.0, 0.005 * f64::from(k % 5));

@@ -1,6 +1,6 @@
 //! Whether triangles form a disk: a question of indices alone.
 
-use crate::disjoint::Disjoint;
+use platen_numerics::union_find::UnionFind;
 
 use super::error::{MeshError, malformed, not_a_disk};
 
@@ -12,7 +12,7 @@ pub(super) fn check_topology(
     n_vertices: usize,
 ) -> Result<(), MeshError> {
     let fans = Fans::of(triangles, n_vertices)?;
-    let (mut parts, mut n_parts) = (Disjoint::of(triangles.len()), triangles.len());
+    let (mut parts, mut n_parts) = (UnionFind::of(triangles.len()), triangles.len());
     let mut n_open = 0;
     for vertex in 0..n_vertices as u32 {
         let fan = fans.at(vertex);
@@ -27,7 +27,7 @@ pub(super) fn check_topology(
                 )));
             }
             match fan.iter().find(|other| other.last == side.next) {
-                Some(other) => n_parts -= usize::from(parts.join(side.triangle, other.triangle).is_some()),
+                Some(other) => n_parts -= usize::from(parts.union(side.triangle, other.triangle).is_some()),
                 None => n_open += 1,
             }
         }

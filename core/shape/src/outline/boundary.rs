@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn the_loop_runs_around_dropouts_and_along_the_rim() {
-        let mut seed = crate::flatten::closed_form::Random(7);
+        let mut seed = platen_numerics::random::Random::new(7);
         let cells = (0..40).flat_map(|c| (0..30).map(move |r| (c, r)));
         let patch =
             patch(cells.filter(|&(c, r)| seed.unit() > 0.1 || c == 0 || r == 0 || c == 39 || r == 29));

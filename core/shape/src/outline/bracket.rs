@@ -11,6 +11,7 @@
 use super::settled::Settled;
 use super::strip::Strip;
 use crate::patch::Beyond;
+use platen_numerics::normal_distribution::{CERTAIN, cdf, log_cdf};
 
 /// Softness of a bracket in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
@@ -204,9 +205,8 @@ pub(super) fn footprint_at(lines: &[Line], edge: impl Fn(f64) -> f64, all: f64) 
         lines.iter().filter(|l| l.tells_footprint()).map(|l| (l, edge(l.along))).collect();
     let likelihood = |line: &Line, edge: f64, footprint: f64| {
         let seen = footprint * line.per_radian;
-        let is_mixed = |off: f64| {
-            (1.0 - HIDDEN_PART) * normal_cdf((seen - (off - edge).abs()) / (SOFTNESS * line.per_angle))
-        };
+        let is_mixed =
+            |off: f64| (1.0 - HIDDEN_PART) * cdf((seen - (off - edge).abs()) / (SOFTNESS * line.per_angle));
         let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
         line.mixed
             .map_or(sound, |(low, high)| sound * (is_mixed(low) + STRAY_PART) * (is_mixed(high) + STRAY_PART))
@@ -261,7 +261,7 @@ struct Bound {
 impl Bound {
     /// Likelihood of an edge by its distances inside of the two places, in units of softness.
     fn value(sure: f64, likely: f64) -> f64 {
-        HIDDEN_PART * normal_cdf(sure) + (1.0 - HIDDEN_PART) * normal_cdf(likely)
+        HIDDEN_PART * cdf(sure) + (1.0 - HIDDEN_PART) * cdf(likely)
     }
 
     /// The same, with the slope of its logarithm and the negative second derivative of a lower bound of that (expectation
@@ -270,11 +270,11 @@ impl Bound {
         if sure.min(likely) > CERTAIN {
             return (1.0, 0.0, 0.0);
         }
-        let (a, b) = (normal(sure), normal(likely));
-        let (a_part, b_part) = (HIDDEN_PART * a.0, (1.0 - HIDDEN_PART) * b.0);
+        let (a, b) = (log_cdf(sure), log_cdf(likely));
+        let (a_part, b_part) = (HIDDEN_PART * a.cdf, (1.0 - HIDDEN_PART) * b.cdf);
         let sum = (a_part + b_part).max(f64::MIN_POSITIVE);
         let (a_part, b_part) = (a_part / sum, b_part / sum);
-        (sum, a_part * a.1 + b_part * b.1, a_part * a.2 + b_part * b.2)
+        (sum, a_part * a.slope + b_part * b.slope, a_part * a.bend + b_part * b.bend)
     }
 }
 
@@ -375,68 +375,14 @@ impl Bracket {
     }
 }
 
-/// Beyond so many standard deviations the distribution function is 0 or 1, to a hundred-millionth.
-const CERTAIN: f64 = 5.6;
-
 /// Length of (a, b), of metres as of micrometres: faster than `hypot`, which heeds what f64 cannot square.
 fn norm(a: f64, b: f64) -> f64 {
     (a * a + b * b).sqrt()
 }
 
-/// The normal distribution function, its logarithm's slope and negative second derivative.
-fn normal(z: f64) -> (f64, f64, f64) {
-    // Below, the density by the series of Mills' ratio; its error there is below 1 in 500.
-    const TAIL: f64 = -4.0;
-    if z > CERTAIN {
-        return (1.0, 0.0, 0.0);
-    }
-    let bell = (-0.5 * z * z).exp();
-    let density = bell / (2.0 * std::f64::consts::PI).sqrt();
-    let (cdf, slope) = if z < TAIL {
-        let slope = -z / (1.0 - 1.0 / (z * z) + 3.0 / z.powi(4));
-        (density / slope, slope)
-    } else {
-        let cdf = if z < 0.0 { upper_tail(-z, bell) } else { 1.0 - upper_tail(z, bell) };
-        (cdf, density / cdf)
-    };
-    (cdf, slope, slope * (slope + z))
-}
-
-/// The normal distribution function.
-fn normal_cdf(z: f64) -> f64 {
-    if z.abs() > CERTAIN {
-        return f64::from(z > 0.0);
-    }
-    let tail = upper_tail(z.abs(), (-0.5 * z * z).exp());
-    if z < 0.0 { tail } else { 1.0 - tail }
-}
-
-/// One minus the normal distribution function at `z` of 0 or more, where `bell` is exp(-z^2 / 2): Abramowitz and
-/// Stegun 7.1.26, to 1.5e-7.
-fn upper_tail(z: f64, bell: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 / std::f64::consts::SQRT_2 * z);
-    let series = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
-    0.5 * series.iter().rev().fold(0.0, |sum, c| sum * t + c) * t * bell
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_logarithm_and_its_derivatives_agree() {
-        // ln of the distribution function at -5, 0 and 1.5, from tables.
-        for (z, log) in [(-5.0, -15.064_998), (0.0, -std::f64::consts::LN_2), (1.5, -0.069_143)] {
-            assert!((normal(z).0.ln() - log).abs() < 3e-3, "{z}: {}", normal(z).0.ln());
-        }
-        for z in [-6.0, -3.0, -0.7, 0.4, 2.0] {
-            let h = 1e-3;
-            let (below, above) = (normal(z - h), normal(z + h));
-            assert!(((above.0 / below.0).ln() / (2.0 * h) - normal(z).1).abs() < 0.02);
-            assert!((-(above.1 - below.1) / (2.0 * h) - normal(z).2).abs() < 0.05);
-            assert!((normal(z).0 - normal_cdf(z)).abs() < 2e-7);
-        }
-    }
 
     #[test]
     fn a_bracket_pulls_from_outside_and_rests_within() {

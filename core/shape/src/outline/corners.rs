@@ -3,8 +3,8 @@
 
 use nalgebra::Vector2;
 
-use super::OutlineError;
-use super::random::Random;
+use super::{OutlineError, SEED};
+use platen_numerics::random::Random;
 
 type Vec2 = Vector2<f64>;
 
@@ -50,7 +50,7 @@ pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 
     let around = Loop::new(points);
     let mut candidates = Vec::new();
     for at in around.sharpest_turns(reach) {
-        let mut random = Random::new(at as u64);
+        let mut random = Random::new(SEED ^ at as u64);
         let support = SUPPORT_STEPS * step;
         let apart = (PAIR_SUPPORTS * support).min(PAIR_PART * reach);
         let before = line(&around.before(at, reach), support, apart, &mut random);

@@ -10,11 +10,11 @@ use super::bracket::{self, Beam, Bracket, Line};
 use super::posterior::Posterior;
 use super::seen::Seen;
 use super::settled::Settled;
-use super::spline::{Normal, Roughness, Spline};
 use super::strip::Strip;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use crate::surface::Axis;
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 /// Span of the curve, metres.
 const SPAN: f64 = 0.25;
@@ -105,8 +105,8 @@ impl Edge {
         let Sampling { step, noise, .. } = sampling;
         let EdgeData { strip, lines, dithered, from, to } = data;
         let (start, end) = strip.span();
-        let axis = Axis::new(start, end, ((end - start) / SPAN).ceil() as usize);
-        let prior = Normal::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
+        let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
+        let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
         let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(Beam::of(footprint), noise));
         let mut used: Vec<Bracket> = brackets(footprint).collect();
@@ -164,7 +164,11 @@ impl Edge {
 /// The most likely curve, by Newton's method from the middles of the brackets: first a step for each of ever less widened ones,
 /// which pull from afar. It never goes on from the curve of another footprint: with 2 mm of noise that one may lie at a
 /// lesser maximum of the likelihood, 1 mm off, and the footprint that it tells would keep it there.
-fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Spline, Cholesky<f64, Dyn>)> {
+fn most_likely(
+    prior: &CurveFit,
+    brackets: &[Bracket],
+    step: f64,
+) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
     for bracket in brackets {
         let (to, weight) = bracket.middle(step);
@@ -187,11 +191,11 @@ fn most_likely(prior: &Normal, brackets: &[Bracket], step: f64) -> Option<(Splin
 
 /// One Newton step of a curve.
 fn pulled(
-    prior: &Normal,
+    prior: &CurveFit,
     brackets: &[Bracket],
-    curve: &Spline,
+    curve: &SplineCurve,
     least_soft: f64,
-) -> Option<(Spline, Cholesky<f64, Dyn>)> {
+) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
     for bracket in brackets {
         let (to, weight) = bracket.pull(curve.at(bracket.along), least_soft);

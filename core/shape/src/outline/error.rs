@@ -32,7 +32,7 @@ pub enum OutlineError {
         seen_percent: f64,
     },
     /// The face has too few samples to be smoothed.
-    #[error(transparent)]
+    #[error("outline: {0}; scan again with the plate in full view")]
     Face(#[from] Undetermined),
     /// The hint does not tell the corners apart.
     #[error(

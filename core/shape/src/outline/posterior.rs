@@ -3,8 +3,9 @@
 use nalgebra::{Cholesky, DMatrix, Dyn, SMatrix, SVector};
 
 use super::bracket::{Beam, FOOTPRINT_SPREAD, Line, SOFTNESS};
-use super::spline::{Normal, Spline};
-use super::{Sampling, chain};
+use super::{SEED, Sampling};
+use platen_numerics::adaptive_metropolis::mean_and_covariance;
+use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
 /// Places of the edge that are free where its posterior is not normal: ends and thirds. Between them a stiff curve leaves
 /// two tenths of a millimetre open.
@@ -28,14 +29,14 @@ const TOGETHER: usize = 64;
 /// The expected curve of an edge and its covariance.
 #[derive(Debug, Clone)]
 pub(super) struct Posterior {
-    pub(super) curve: Spline,
+    pub(super) curve: SplineCurve,
     covariance: DMatrix<f64>,
 }
 
 impl Posterior {
     /// About the most likely curve, as a normal distribution (Laplace's method): of an edge that crosses many lines
     /// of the lattice.
-    pub(super) fn laplace(curve: Spline, precision: &Cholesky<f64, Dyn>) -> Self {
+    pub(super) fn laplace(curve: SplineCurve, precision: &Cholesky<f64, Dyn>) -> Self {
         Self { curve, covariance: precision.inverse() }
     }
 
@@ -47,8 +48,8 @@ impl Posterior {
     /// `curve` is a likely one, its ends the places of the edge's corners along it, `footprint` that of all edges,
     /// radians. `None` when the prior leaves the curve open.
     pub(super) fn sampled(
-        curve: &Spline,
-        prior: &Normal,
+        curve: &SplineCurve,
+        prior: &CurveFit,
         lines: &[Line],
         [from, to]: [f64; 2],
         footprint: f64,
@@ -68,7 +69,8 @@ impl Posterior {
         let of_places = SMatrix::<f64, PLACES, PLACES>::from_fn(|i, j| places[i].dot(&across.column(j)));
         let through = &across * of_places.try_inverse()?;
         let between = factor.inverse() - &through * across.transpose();
-        let parts: [Spline; PLACES] = std::array::from_fn(|k| curve.with(through.column(k).into_owned()));
+        let parts: [SplineCurve; PLACES] =
+            std::array::from_fn(|k| curve.with(through.column(k).into_owned()));
         let at_lines: Vec<(&Line, f64, SVector<f64, PLACES>)> = lines
             .iter()
             .map(|l| (l, curve.at(l.along), SVector::from_fn(|k, _| parts[k].at(l.along))))
@@ -89,7 +91,7 @@ impl Posterior {
                 - 0.5 * (free[PLACES].powi(2) + free[PLACES + 1].powi(2))
         };
         let first = SVector::from_fn(|k, _| if k < PLACES { FIRST_STEP * step } else { FIRST_PART });
-        let (mean, covariance) = chain::moments(first, logarithm);
+        let (mean, covariance) = mean_and_covariance(first, SEED ^ FREE as u64, logarithm);
         let (mean, covariance) =
             (mean.fixed_rows::<PLACES>(0), covariance.fixed_view::<PLACES, PLACES>(0, 0));
         let covariance = between + &through * covariance * through.transpose();

@@ -9,10 +9,10 @@ use nalgebra::Vector2;
 
 use super::seen::Seen;
 use super::settled::Settled;
-use super::spline::{Normal, Roughness, Spline};
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use crate::surface::Axis;
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 /// Spacing of the base curve's points, metres.
 const SPACING: f64 = 0.005;
@@ -84,7 +84,7 @@ impl Strip {
         let up = along.cross(&inward);
         let length = (to - from).norm();
         let (start, end) = (-OVERHANG * length, (1.0 + OVERHANG) * length);
-        let axis = |span: f64| Axis::new(start, end, ((end - start) / span).ceil() as usize);
+        let axis = |span: f64| UniformKnots::new(start, end, ((end - start) / span).ceil() as usize);
         let local = |p: Vec3| Vec3::new((p - from).dot(&along), (p - from).dot(&inward), (p - from).dot(&up));
         let data: Vec<(Vec3, Vec3)> = crossings
             .iter()
@@ -101,15 +101,19 @@ impl Strip {
         if weights.iter().sum::<f64>() <= LEAST_WEIGHT {
             return Err(too_few());
         }
-        let mut height = Normal::with_prior(
+        let mut height = CurveFit::with_prior(
             axis(SPAN_NORMAL),
             Roughness::CurvatureChange,
             CURVATURE_CHANGE.0,
             CURVATURE_CHANGE.1,
         );
         let tilt = |k: fn(&Vec3) -> f64| {
-            let mut fit =
-                Normal::with_prior(axis(SPAN_NORMAL), Roughness::Curvature, NORMAL_CHANGE.0, NORMAL_CHANGE.1);
+            let mut fit = CurveFit::with_prior(
+                axis(SPAN_NORMAL),
+                Roughness::Curvature,
+                NORMAL_CHANGE.0,
+                NORMAL_CHANGE.1,
+            );
             for ((p, n), w) in data.iter().zip(&weights) {
                 // A local fit knows its tilt to about its noise over its width of ten steps.
                 fit.add(p.x, k(n), w * (10.0 * step / noise).powi(2));
@@ -188,12 +192,13 @@ impl Strip {
 }
 
 /// The edge seen along the mean normal, and the weight (0 to 1) with which each crossing belongs to it.
-fn robust_across(axis: Axis, data: &[(Vec3, Vec3)], step: f64) -> Option<(Spline, Vec<f64>)> {
+fn robust_across(axis: UniformKnots, data: &[(Vec3, Vec3)], step: f64) -> Option<(SplineCurve, Vec<f64>)> {
     let mut weights = vec![1.0; data.len()];
     let mut spread = 20.0 * step;
     let mut curve = None;
     for _ in 0..ROUNDS {
-        let mut fit = Normal::with_prior(axis, Roughness::Curvature, CURVATURE_ACROSS.0, CURVATURE_ACROSS.1);
+        let mut fit =
+            CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE_ACROSS.0, CURVATURE_ACROSS.1);
         for ((p, _), w) in data.iter().zip(&weights) {
             fit.add(p.x, p.y, w / (step * step));
         }

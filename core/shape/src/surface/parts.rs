@@ -1,10 +1,10 @@
 //! A surface as plain numbers, to be stored or sent across a library boundary.
 
 use super::Surface;
-use super::axis::Axis;
-use super::band::BandFactor;
 use super::mask::Mask;
-use super::net::Net;
+use platen_numerics::block_banded_cholesky::BlockBandedFactor;
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
 
 /// Everything a [`Surface`] is made of. Control values lie v outer, u inner.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -46,8 +46,8 @@ impl Surface {
     /// [`SurfaceError`] when lengths do not fit, knots are not uniform or a number is not finite.
     pub fn from_parts(parts: SurfaceParts) -> Result<Self, SurfaceError> {
         let fault = |what| SurfaceError { what };
-        let u = Axis::from_knots(&parts.knots_u).ok_or(fault("knots of u are not uniform"))?;
-        let v = Axis::from_knots(&parts.knots_v).ok_or(fault("knots of v are not uniform"))?;
+        let u = UniformKnots::from_knots(&parts.knots_u).ok_or(fault("knots of u are not uniform"))?;
+        let v = UniformKnots::from_knots(&parts.knots_v).ok_or(fault("knots of v are not uniform"))?;
         let (n_u, n_v) = (u.n_coefficients(), v.n_coefficients());
         if parts.control.len() != n_u * n_v || parts.covariance.len() != n_u * n_v {
             return Err(fault("the control net does not fit its knots"));
@@ -59,22 +59,22 @@ impl Surface {
         if !(parts.noise_share > 0.0 && parts.noise_share <= 1.0) {
             return Err(fault("the share of noise is not above 0 to 1"));
         }
-        let precision = BandFactor::from_blocks(n_u, n_v, parts.precision_factor)
+        let precision = BlockBandedFactor::from_blocks(n_u, n_v, parts.precision_factor)
             .ok_or(fault("the factor does not fit the control net"))?;
         let mask = Mask::from_cells(u.end(), v.end(), parts.mask_cells, parts.seen)
             .ok_or(fault("the mask does not fit its cells"))?;
-        let net = Net { u, v, control: parts.control };
+        let spline = TensorSpline { u, v, control: parts.control };
         let SurfaceParts { thickness, covariance, noise_share, .. } = parts;
-        Ok(Self { net, thickness, precision, covariance, noise_share, mask })
+        Ok(Self { spline, thickness, precision, covariance, noise_share, mask })
     }
 
     /// The parts of this surface.
     #[must_use]
     pub fn to_parts(&self) -> SurfaceParts {
         SurfaceParts {
-            knots_u: self.net.u.knots(),
-            knots_v: self.net.v.knots(),
-            control: self.net.control.clone(),
+            knots_u: self.spline.u.knots(),
+            knots_v: self.spline.v.knots(),
+            control: self.spline.control.clone(),
             thickness: self.thickness,
             precision_factor: self.precision.blocks().to_vec(),
             covariance: self.covariance.clone(),

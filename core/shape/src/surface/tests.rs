@@ -2,15 +2,15 @@ use super::*;
 
 /// A surface without noise over 3 x 2 m, with points `f(u, v)` of the mid-surface.
 fn exact(spans: [usize; 2], f: impl Fn(f64, f64) -> Vec3) -> Surface {
-    let (u, v) = (Axis::new(0.0, 3.0, spans[0]), Axis::new(0.0, 2.0, spans[1]));
-    let mut fit = Fit::new(u, v);
+    let (u, v) = (UniformKnots::new(0.0, 3.0, spans[0]), UniformKnots::new(0.0, 2.0, spans[1]));
+    let mut fit = SplineFit::new(u, v);
     let (n_u, n_v) = (8 * spans[0], 8 * spans[1]);
     for k in 0..n_u * n_v {
         let at = |j: usize, n: usize, length: f64| length * (j as f64 + 0.5) / n as f64;
         let (x, y) = (at(k % n_u, n_u, 3.0), at(k / n_u, n_v, 2.0));
         fit.add(x, y, f(x, y).into(), 1e8);
     }
-    let penalty = smoothing::Penalty { u: 1e-6, v: 1e-6 };
+    let penalty = platen_numerics::reml::Penalty { u: 1e-6, v: 1e-6 };
     Surface::new(fit.solve_with(penalty).expect("determined"), 0.04, Mask::unseen(3.0, 2.0, 0.1))
 }
 

@@ -1,4 +1,12 @@
-//! How dense algebra and long loops run.
+//! Vector instructions: dispatch to the widest ones, and isolation from kernels that leave their registers dirty.
+
+/// Runs `work` compiled for the widest vector registers of this processor.
+///
+/// Everything that is to be vectorised must be inlined into `work`. Results are the same to the last bit as without.
+#[inline(always)]
+pub fn dispatch_simd<T>(work: impl FnOnce() -> T) -> T {
+    pulp::Arch::new().dispatch(work)
+}
 
 /// Runs work on faer's dense kernels on a thread of its own, and waits for it.
 ///
@@ -6,16 +14,9 @@
 /// then on every SSE instruction of that thread between the AVX ones of the C library's `sin`, `exp` and `log` costs a transition: outline
 /// and extraction were measured 5 to 10 times slower after the first plate. The registers go with the thread; starting one
 /// costs 0.05 ms.
-pub(crate) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+pub fn on_own_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| match scope.spawn(work).join() {
         Ok(done) => done,
         Err(panic) => std::panic::resume_unwind(panic),
     })
-}
-
-/// Runs a loop compiled for the widest vector registers of this processor. What is to be so compiled must be inlined into
-/// `work`; results are the same to the last bit as without.
-#[inline(always)]
-pub(crate) fn wide<T>(work: impl FnOnce() -> T) -> T {
-    pulp::Arch::new().dispatch(work)
 }

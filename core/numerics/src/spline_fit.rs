@@ -1,27 +1,27 @@
-//! Penalised weighted least squares of a tensor spline on scattered points.
+//! Penalised weighted least squares of a bicubic spline on scattered points: sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2.
 
-use super::axis::Axis;
-use super::band::BandFactor;
-use super::moments::Moments;
-use super::net::Net;
-use super::smoothing::{Chosen, Penalty};
+use crate::block_banded_cholesky::BlockBandedFactor;
+use crate::normal_equations::CellMoments;
+use crate::reml::{Penalty, SelectedPenalty};
+use crate::tensor_spline::TensorSpline;
+use crate::uniform_knots::UniformKnots;
 
-/// Spans of a net, at least, when it is made coarser.
+/// Spans of a spline, at least, when it is made coarser.
 const LEAST_SPANS: usize = 8;
 
-/// Points being gathered for a fit of `D` components over two axes.
+/// Sums over the points of a fit of `D` components over two axes.
 #[derive(Debug, Clone)]
-pub struct Fit<const D: usize> {
-    moments: Moments<D>,
+pub struct SplineFit<const D: usize> {
+    moments: CellMoments<D>,
 }
 
-/// A fitted spline with what is known of its coefficients.
+/// A fitted spline with the precision of its coefficients.
 #[derive(Debug, Clone)]
-pub struct Fitted<const D: usize> {
+pub struct FittedSpline<const D: usize> {
     /// The spline.
-    pub net: Net<D>,
+    pub spline: TensorSpline<D>,
     /// Cholesky factor of the coefficients' precision, the same for every component.
-    pub(crate) precision: BandFactor,
+    pub precision: BlockBandedFactor,
     /// Share of the covariance that is scatter of the points, the mean over the axes' rectangle: what is left of it when two fits
     /// to the same shape are compared. The rest is what the penalty takes from a shape, the same in both. 1 under a given penalty.
     pub noise_share: f64,
@@ -33,19 +33,19 @@ pub struct Fitted<const D: usize> {
     pub n_points: usize,
 }
 
-/// The points do not determine the spline.
+/// Error: the points do not determine the spline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("surface: {n_points} points do not determine the surface; scan again with the plate in full view")]
+#[error("{n_points} points do not determine the surface")]
 pub struct Undetermined {
     /// Points that were given.
     pub n_points: usize,
 }
 
-impl<const D: usize> Fit<D> {
+impl<const D: usize> SplineFit<D> {
     /// Starts a fit over two axes.
     #[must_use]
-    pub fn new(u: Axis, v: Axis) -> Self {
-        Self { moments: Moments::empty(u, v) }
+    pub fn new(u: UniformKnots, v: UniformKnots) -> Self {
+        Self { moments: CellMoments::empty(u, v) }
     }
 
     /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points a little outside count for the
@@ -55,46 +55,50 @@ impl<const D: usize> Fit<D> {
         self.moments.add(u, v, y, w);
     }
 
-    /// Solves with the penalty that the data make most likely, judged by the component along `direction`. Along an axis where that
-    /// smooths over many spans, and their number is even, the net gets spans of twice the length: the same surface, at a
-    /// fraction of the cost, which grows with the fourth power of their number.
+    /// Solves with the penalty selected by REML from the component along `direction`. Along an axis where that smooths over many
+    /// spans, and their number is even, the spline gets spans of twice the length: the same surface, at a fraction of the
+    /// cost, which grows with the fourth power of their number.
     ///
     /// # Errors
     /// [`Undetermined`] when there are too few points, or all in one place.
-    pub fn solve(&self, direction: [f64; D]) -> Result<Fitted<D>, Undetermined> {
-        let Chosen { penalty, noise_share, coarse } = self.choose_penalty(direction);
+    pub fn solve(&self, direction: [f64; D]) -> Result<FittedSpline<D>, Undetermined> {
+        let SelectedPenalty { penalty, noise_share, coarse } = self.select_penalty(direction);
         let fitted = match self.coarser(coarse) {
             Some(fit) => fit.solve_with(penalty)?,
             None => self.solve_with(penalty)?,
         };
-        Ok(Fitted { noise_share, ..fitted })
+        Ok(FittedSpline { noise_share, ..fitted })
     }
 
-    /// The same points over spans of twice the length along those of (u, v) that are `wanted` and have twice as many as a net
+    /// Moves the points to spans of twice the length along those of (u, v) that are `wanted` and have twice as many as a spline
     /// needs; `None` when there is no such axis.
     fn coarser(&self, wanted: [bool; 2]) -> Option<Self> {
-        let can = |axis: &Axis| axis.n_spans().is_multiple_of(2) && axis.n_spans() >= 2 * LEAST_SPANS;
+        let can = |axis: &UniformKnots| axis.n_spans().is_multiple_of(2) && axis.n_spans() >= 2 * LEAST_SPANS;
         let coarser = [wanted[0] && can(&self.moments.u), wanted[1] && can(&self.moments.v)];
         coarser.contains(&true).then(|| Self { moments: self.moments.joined(coarser) })
     }
 
-    /// The penalty that the data make most likely.
-    pub(crate) fn choose_penalty(&self, direction: [f64; D]) -> Chosen {
-        self.moments.grid_values(direction).choose_penalty()
+    /// Selects the penalty by REML from the component along `direction`.
+    #[must_use]
+    pub fn select_penalty(&self, direction: [f64; D]) -> SelectedPenalty {
+        self.moments.grid_values(direction).select_penalty()
     }
 
     /// Solves with the given penalty.
-    pub(crate) fn solve_with(&self, penalty: Penalty) -> Result<Fitted<D>, Undetermined> {
-        let Moments { u, v, n_points, .. } = self.moments;
+    ///
+    /// # Errors
+    /// [`Undetermined`].
+    pub fn solve_with(&self, penalty: Penalty) -> Result<FittedSpline<D>, Undetermined> {
+        let CellMoments { u, v, n_points, .. } = self.moments;
         let (mut matrix, mut control) = self.moments.normal_equations();
         matrix.add_kronecker(&u.roughness(), &v.gram(), penalty.u);
         matrix.add_kronecker(&u.gram(), &v.roughness(), penalty.v);
         let precision = matrix.factor().map_err(|_| Undetermined { n_points })?;
         precision.solve(&mut control);
-        let net = Net { u, v, control };
-        let residual_square = self.moments.residual_square(&net);
-        Ok(Fitted {
-            net,
+        let spline = TensorSpline { u, v, control };
+        let residual_square = self.moments.residual_square(&spline);
+        Ok(FittedSpline {
+            spline,
             precision,
             noise_share: 1.0,
             residual_square,
@@ -107,12 +111,13 @@ impl<const D: usize> Fit<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flatten::closed_form::Random;
+    use crate::random::Random;
 
     /// Scattered points of f with noise sigma, fitted on n x m spans.
-    fn fit(n_points: usize, spans: [usize; 2], sigma: f64, f: impl Fn(f64, f64) -> f64) -> Fitted<1> {
-        let mut noise = Random(7);
-        let mut fit = Fit::new(Axis::new(0.0, 3.0, spans[0]), Axis::new(0.0, 2.0, spans[1]));
+    fn fit(n_points: usize, spans: [usize; 2], sigma: f64, f: impl Fn(f64, f64) -> f64) -> FittedSpline<1> {
+        let mut noise = Random::new(7);
+        let mut fit =
+            SplineFit::new(UniformKnots::new(0.0, 3.0, spans[0]), UniformKnots::new(0.0, 2.0, spans[1]));
         for _ in 0..n_points {
             let (u, v) = (3.0 * noise.unit(), 2.0 * noise.unit());
             fit.add(u, v, [f(u, v) + sigma * noise.normal()], sigma.max(1e-6).powi(-2));
@@ -120,11 +125,11 @@ mod tests {
         fit.solve([1.0]).expect("determined")
     }
 
-    fn rms(net: &Net<1>, f: impl Fn(f64, f64) -> f64) -> f64 {
+    fn rms(spline: &TensorSpline<1>, f: impl Fn(f64, f64) -> f64) -> f64 {
         let n = 41;
         let sum: f64 = (0..n * n)
             .map(|k| (3.0 * (k % n) as f64 / (n - 1) as f64, 2.0 * (k / n) as f64 / (n - 1) as f64))
-            .map(|(u, v)| (net.point(u, v)[0] - f(u, v)).powi(2))
+            .map(|(u, v)| (spline.point(u, v)[0] - f(u, v)).powi(2))
             .sum();
         (sum / (n * n) as f64).sqrt()
     }
@@ -134,7 +139,7 @@ mod tests {
         let f = |u: f64, v: f64| 0.1 * u * u - 0.05 * u * v + 0.02 * v * v + 0.3;
         let fitted = fit(20_000, [40, 28], 5e-4, f);
         // Nine free coefficients of 20,000 points: 0.5 mm / sqrt(20,000 / 9) = 0.011 mm.
-        let error = rms(&fitted.net, f);
+        let error = rms(&fitted.spline, f);
         assert!(error < 2.5e-5, "rms error {error}");
         let per_point = fitted.residual_square / fitted.n_points as f64;
         assert!((per_point - 1.0).abs() < 0.05, "{per_point}");
@@ -151,8 +156,8 @@ mod tests {
             inside + 0.15 * 0.5 * 0.3 * (u - 1.65).max(0.0)
         };
         let fitted = fit(120_000, [48, 32], 5e-4, |u, _| bend(u));
-        assert!(rms(&fitted.net, |u, _| bend(u)) < 3e-5);
-        let peak = fitted.net.jet(1.5, 1.0).uu[0];
+        assert!(rms(&fitted.spline, |u, _| bend(u)) < 3e-5);
+        let peak = fitted.spline.jet(1.5, 1.0).uu[0];
         assert!((peak - 0.15).abs() < 0.01, "peak curvature {peak}");
     }
 
@@ -169,8 +174,8 @@ mod tests {
                 + 0.15 * 0.5 * 0.3 * behind
         };
         let fitted = fit(120_000, [48, 32], 5e-4, bend);
-        assert!(rms(&fitted.net, bend) < 4e-5, "{}", rms(&fitted.net, bend));
-        let jet = fitted.net.jet(1.5, 1.0);
+        assert!(rms(&fitted.spline, bend) < 4e-5, "{}", rms(&fitted.spline, bend));
+        let jet = fitted.spline.jet(1.5, 1.0);
         let peak = cos * cos * jet.uu[0] + 2.0 * cos * sin * jet.uv[0] + sin * sin * jet.vv[0];
         assert!((peak - 0.15).abs() < 0.03, "peak curvature {peak}");
     }
@@ -181,17 +186,17 @@ mod tests {
         let f = |u: f64, v: f64| 0.05 * (2.0 * u).sin() + 0.1 * v * v;
         let (mut square, mut stated) = (0.0, 0.0);
         for seed in 0..40 {
-            let mut noise = Random(1000 + seed);
-            let mut fit = Fit::new(Axis::new(0.0, 3.0, 20), Axis::new(0.0, 2.0, 14));
+            let mut noise = Random::new(1000 + seed);
+            let mut fit = SplineFit::new(UniformKnots::new(0.0, 3.0, 20), UniformKnots::new(0.0, 2.0, 14));
             for _ in 0..3000 {
                 let (u, v) = (3.0 * noise.unit(), 2.0 * noise.unit());
                 fit.add(u, v, [f(u, v) + 1e-3 * noise.normal()], 1e6);
             }
             let fitted = fit.solve([1.0]).expect("determined");
-            square += (fitted.net.point(1.3, 0.8)[0] - f(1.3, 0.8)).powi(2) / 40.0;
-            let ((i, bu), (k, bv)) = (fitted.net.u.values(1.3), fitted.net.v.values(0.8));
-            let mut functional = vec![0.0; fitted.net.control.len()];
-            let n_u = fitted.net.u.n_coefficients();
+            square += (fitted.spline.point(1.3, 0.8)[0] - f(1.3, 0.8)).powi(2) / 40.0;
+            let ((i, bu), (k, bv)) = (fitted.spline.u.values(1.3), fitted.spline.v.values(0.8));
+            let mut functional = vec![0.0; fitted.spline.control.len()];
+            let n_u = fitted.spline.u.n_coefficients();
             (0..16).for_each(|s| functional[(k + s / 4) * n_u + i + s % 4] = bv[s / 4] * bu[s % 4]);
             stated += fitted.precision.variance(&functional) / 40.0;
         }
@@ -201,9 +206,9 @@ mod tests {
 
     #[test]
     fn coarser_spans_hold_the_same_points() {
-        let mut noise = Random(11);
-        let axis = |n_spans: usize| Axis::new(-1.0, 2.0, n_spans);
-        let (mut fine, mut coarse) = (Fit::new(axis(24), axis(16)), Fit::new(axis(12), axis(8)));
+        let mut noise = Random::new(11);
+        let axis = |n_spans: usize| UniformKnots::new(-1.0, 2.0, n_spans);
+        let (mut fine, mut coarse) = (SplineFit::new(axis(24), axis(16)), SplineFit::new(axis(12), axis(8)));
         for _ in 0..4000 {
             let (u, v, w) = (3.0 * noise.unit() - 1.0, 3.0 * noise.unit() - 1.0, noise.unit());
             let y = [(3.0 * u).sin() + noise.normal(), v * u];
@@ -211,13 +216,18 @@ mod tests {
             coarse.add(u, v, y, w);
         }
         let penalty = Penalty { u: 1e-4, v: 1e-3 };
-        let solved = |fit: &Fit<2>| fit.solve_with(penalty).expect("determined");
+        let solved = |fit: &SplineFit<2>| fit.solve_with(penalty).expect("determined");
         let (joined, direct) = (solved(&fine.coarser([true; 2]).expect("even")), solved(&coarse));
-        let apart =
-            joined.net.control.iter().flatten().zip(direct.net.control.iter().flatten()).map(|(a, b)| a - b);
+        let apart = joined
+            .spline
+            .control
+            .iter()
+            .flatten()
+            .zip(direct.spline.control.iter().flatten())
+            .map(|(a, b)| a - b);
         assert!(apart.map(f64::abs).fold(0.0, f64::max) < 1e-10);
         assert!((joined.residual_square / direct.residual_square - 1.0).abs() < 1e-10);
-        assert_eq!((joined.n_points, joined.net.u.n_spans(), joined.net.v.n_spans()), (4000, 12, 8));
+        assert_eq!((joined.n_points, joined.spline.u.n_spans(), joined.spline.v.n_spans()), (4000, 12, 8));
         // Fewer than eight spans, or an odd number, stay.
         assert!(fine.coarser([false, false]).is_none() && coarse.coarser([false, true]).is_none());
     }
@@ -226,16 +236,16 @@ mod tests {
     fn spans_grow_where_nothing_narrow_is_and_only_there() {
         let bend = |u: f64| 0.5 * 0.3 * (u - 1.5).max(0.0).powi(2);
         let fine = fit(120_000, [48, 32], 5e-4, |u, _| bend(u));
-        assert_eq!((fine.net.u.n_spans(), fine.net.v.n_spans()), (48, 16));
+        assert_eq!((fine.spline.u.n_spans(), fine.spline.v.n_spans()), (48, 16));
         let smooth = |u: f64, v: f64| 0.04 * u * u + 0.03 * u * v;
         let coarse = fit(120_000, [48, 32], 5e-4, smooth);
-        assert_eq!((coarse.net.u.n_spans(), coarse.net.v.n_spans()), (24, 16));
-        assert!(rms(&coarse.net, smooth) < 1e-5);
+        assert_eq!((coarse.spline.u.n_spans(), coarse.spline.v.n_spans()), (24, 16));
+        assert!(rms(&coarse.spline, smooth) < 1e-5);
     }
 
     #[test]
     fn too_few_points_are_refused() {
-        let mut fit = Fit::new(Axis::new(0.0, 1.0, 4), Axis::new(0.0, 1.0, 4));
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, 1.0, 4), UniformKnots::new(0.0, 1.0, 4));
         fit.add(0.5, 0.5, [1.0], 1.0);
         assert_eq!(fit.solve([1.0]).err(), Some(Undetermined { n_points: 1 }));
     }

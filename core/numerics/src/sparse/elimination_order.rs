@@ -1,7 +1,8 @@
-//! Elimination order by nested dissection: the nodes are cut in two halves at the median of their longer extent, the
-//! nodes of one half that touch the other are eliminated last, and each half is ordered in the same way.
+//! Elimination order by geometric nested dissection (George, SIAM J. Numer. Anal. 10 (1973)).
 //!
-//! On plane meshes the separators are short, so the factor is sparser and quicker to find than by minimum degree.
+//! The nodes are cut in two halves at the median of their longer extent, the nodes of one half that touch the other are
+//! eliminated last, and each half is ordered in the same way. On plane meshes the separators are short, so the factor is
+//! sparser and quicker to find than by minimum degree.
 
 use super::Graph;
 
@@ -9,7 +10,7 @@ use super::Graph;
 /// an eighth more fill.
 const LEAF: usize = 20;
 
-/// The nodes of `graph` in elimination order. `points` has one point per node.
+/// Returns the nodes of `graph` in elimination order. `points` has one point per node.
 pub(super) fn nested_dissection(graph: &Graph, points: &[[f64; 2]]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..graph.n_nodes() as u32).collect();
     let mut dissection = Dissection { graph, points, half: vec![0; order.len()], halves: 0 };

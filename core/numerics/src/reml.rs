@@ -1,4 +1,4 @@
-//! How much to smooth: the two penalty weights of a fit, chosen from the data by restricted maximum likelihood.
+//! Restricted maximum likelihood (REML) of the two penalty weights of a spline fit.
 //!
 //! A fit minimises sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2. Third derivatives leave every shape of
 //! constant curvature alone; one weight per direction lets a narrow bend stay narrow across and be smoothed along
@@ -12,25 +12,26 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::axis::Axis;
+use crate::uniform_knots::UniformKnots;
 
 /// Weights of the penalty of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Penalty {
+pub struct Penalty {
     /// Of the squared third derivative by u, integrated over the rectangle.
-    pub(crate) u: f64,
+    pub u: f64,
     /// Of the squared third derivative by v.
-    pub(crate) v: f64,
+    pub v: f64,
 }
 
-/// The penalty that the data make most likely.
+/// Penalty of the largest restricted likelihood.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Chosen {
-    pub(crate) penalty: Penalty,
-    /// Share of the covariance that is scatter: see [`Fitted::noise_share`](super::Fitted::noise_share).
-    pub(crate) noise_share: f64,
+pub struct SelectedPenalty {
+    /// The weights.
+    pub penalty: Penalty,
+    /// Share of the covariance that is scatter: see [`FittedSpline::noise_share`](crate::spline_fit::FittedSpline::noise_share).
+    pub noise_share: f64,
     /// Along u and along v: the penalty leaves nothing that spans of twice the length could not follow.
-    pub(crate) coarse: [bool; 2],
+    pub coarse: [bool; 2],
 }
 
 /// The two Gauss places of a span, from its middle: a function of degree 1 fitted to evenly spread noise has
@@ -40,8 +41,8 @@ pub(crate) const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_
 /// Values at the Gauss places of all spans, `None` where nothing was seen.
 #[derive(Debug, Clone)]
 pub(crate) struct GridValues {
-    pub(crate) u: Axis,
-    pub(crate) v: Axis,
+    pub(crate) u: UniformKnots,
+    pub(crate) v: UniformKnots,
     /// v outer, u inner.
     pub(crate) values: Vec<Option<f64>>,
     /// Mean variance of a value as the points' weights state it.
@@ -67,11 +68,11 @@ const LEAST_NOISE: f64 = 0.01;
 const LAST_STEP: f64 = 0.2;
 
 impl GridValues {
-    /// The most likely penalty.
-    pub(crate) fn choose_penalty(&self) -> Chosen {
-        let (along_u, along_v) = (Spectrum::new(&self.u), Spectrum::new(&self.v));
+    /// Selects the penalty of the largest restricted likelihood.
+    pub(crate) fn select_penalty(&self) -> SelectedPenalty {
+        let (along_u, along_v) = (AxisSpectrum::new(&self.u), AxisSpectrum::new(&self.v));
         let (mut filled, gaps) = self.filled();
-        let mut criterion = Criterion::new(&along_u, &along_v, &filled);
+        let mut criterion = RestrictedLikelihood::new(&along_u, &along_v, &filled);
         let mut best = STIFF;
         if !gaps.is_empty() {
             // A crude fill has kinks that would pass for shape: first a stiff spline goes through, then the chosen one.
@@ -86,7 +87,7 @@ impl GridValues {
             u: scale_u / (noise * 0.5 * self.v.step()),
             v: scale_v / (noise * 0.5 * self.u.step()),
         };
-        Chosen {
+        SelectedPenalty {
             penalty,
             noise_share: criterion.noise_share(best),
             coarse: best.map(|exponent| exponent >= COARSE),
@@ -119,15 +120,15 @@ impl GridValues {
 }
 
 /// The basis of an axis that makes data and penalty diagonal.
-struct Spectrum {
+struct AxisSpectrum {
     /// From grid values to coordinates.
     transform: DMatrix<f64>,
     /// The penalty's eigenvalues relative to the data's, the null space exactly 0.
     roughness: DVector<f64>,
 }
 
-impl Spectrum {
-    fn new(axis: &Axis) -> Self {
+impl AxisSpectrum {
+    fn new(axis: &UniformKnots) -> Self {
         let n = axis.n_coefficients();
         let mut basis = DMatrix::zeros(2 * axis.n_spans(), n);
         for j in 0..2 * axis.n_spans() {
@@ -156,9 +157,9 @@ impl Spectrum {
 }
 
 /// The restricted likelihood of one grid of values.
-struct Criterion<'a> {
-    u: &'a Spectrum,
-    v: &'a Spectrum,
+struct RestrictedLikelihood<'a> {
+    u: &'a AxisSpectrum,
+    v: &'a AxisSpectrum,
     /// Coordinates of the values, u down, v across.
     coordinates: DMatrix<f64>,
     /// Their squares.
@@ -168,8 +169,8 @@ struct Criterion<'a> {
     n_values: usize,
 }
 
-impl<'a> Criterion<'a> {
-    fn new(u: &'a Spectrum, v: &'a Spectrum, values: &DMatrix<f64>) -> Self {
+impl<'a> RestrictedLikelihood<'a> {
+    fn new(u: &'a AxisSpectrum, v: &'a AxisSpectrum, values: &DMatrix<f64>) -> Self {
         let coordinates = &u.transform * values * v.transform.transpose();
         let squares = coordinates.map(|z| z * z);
         let outside = (values.norm_squared() - squares.sum()).max(0.0);
@@ -187,7 +188,7 @@ impl<'a> Criterion<'a> {
 
     /// The penalty's factors at exponents `x`.
     fn scales(&self, x: [f64; 2]) -> [f64; 2] {
-        let largest = |s: &Spectrum| s.roughness.max().max(f64::MIN_POSITIVE);
+        let largest = |s: &AxisSpectrum| s.roughness.max().max(f64::MIN_POSITIVE);
         [10f64.powf(x[0]) / largest(self.u), 10f64.powf(x[1]) / largest(self.v)]
     }
 

@@ -28,7 +28,7 @@ fn the_order_names_every_node_once_and_saves_fill() {
     let (triangles, points) = grid(60);
     let n = points.len();
     let graph = Graph::of_elements(&triangles, &all_free(n), n);
-    let mut order = order::nested_dissection(&graph, &points);
+    let mut order = elimination_order::nested_dissection(&graph, &points);
     let dissected = Spd::<1>::analyse(&graph, &points).unwrap().factor_len();
     // Along a line nothing can be dissected: the order is that of the rows, the factor a full band.
     let row_by_row: Vec<_> = (0..n).map(|k| [k as f64, 0.0]).collect();

@@ -1,9 +1,9 @@
-//! The symmetric matrix of a tensor spline fit, its Cholesky factor and the part of its inverse that is needed.
+//! Block-banded Cholesky factorisation of the normal matrix of a tensor spline, and the band of its inverse.
 //!
 //! Coefficients are ordered row after row of the control net along its longer axis. A B-spline meets those of the
 //! three rows before it, so the matrix has half-bandwidth 3 in blocks of one row, and so has its factor. The
-//! covariance of anything read off one place of the surface needs the inverse only inside the same band: block
-//! recursion of Takahashi, Fagan and Chen (1973), in blocks as in Golub and Plemmons (1980).
+//! covariance of a spline's value at one place needs the inverse only inside the same band: the recursion of
+//! Takahashi, Fagan and Chen (1973), in blocks as in Golub and Plemmons (1980).
 //!
 //! All dense kernels run on one thread: the bits do not depend on the machine's load.
 
@@ -13,14 +13,14 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use crate::kernels::apart;
+use crate::simd::on_own_thread;
 
 /// Rows of the net that one B-spline reaches back to.
 const REACH: usize = 3;
 
 /// How the coefficients of a net are laid out in blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Layout {
+struct Layout {
     n_u: usize,
     n_v: usize,
 }
@@ -87,31 +87,33 @@ impl Layout {
 
 /// A symmetric matrix over the coefficients of a net: blocks (row, row - 0..=3), column-major, lower triangle.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct BandMatrix {
+pub struct BlockBandedMatrix {
     layout: Layout,
     blocks: Vec<f64>,
 }
 
-/// The lower Cholesky factor of a [`BandMatrix`], in the same layout.
+/// The lower Cholesky factor of a [`BlockBandedMatrix`], in the same layout.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct BandFactor {
+pub struct BlockBandedFactor {
     layout: Layout,
     blocks: Vec<f64>,
 }
 
-/// The matrix is not positive definite: some coefficients are determined neither by points nor by the penalty.
+/// Error: the matrix is not positive definite; some coefficients are determined neither by points nor by the penalty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct NotPositive;
+pub struct NotPositiveDefinite;
 
-impl BandMatrix {
-    pub(crate) fn zeros(n_u: usize, n_v: usize) -> Self {
+impl BlockBandedMatrix {
+    /// Builds the zero matrix over `n_u` x `n_v` coefficients.
+    #[must_use]
+    pub fn zeros(n_u: usize, n_v: usize) -> Self {
         let layout = Layout { n_u, n_v };
         Self { layout, blocks: vec![0.0; layout.len()] }
     }
 
     /// Adds `value` for the product of coefficient pair `i` along u with pair `k` along v, both ascending: to the
     /// entries (i0,k0)-(i1,k1) and (i1,k0)-(i0,k1), once where they coincide.
-    pub(crate) fn add_pair(&mut self, i: [usize; 2], k: [usize; 2], value: f64) {
+    pub fn add_pair(&mut self, i: [usize; 2], k: [usize; 2], value: f64) {
         self.add((i[0], k[0]), (i[1], k[1]), value);
         if i[0] != i[1] && k[0] != k[1] {
             self.add((i[1], k[0]), (i[0], k[1]), value);
@@ -119,7 +121,7 @@ impl BandMatrix {
     }
 
     /// Adds `weight` times the Kronecker product of two banded matrices given by their upper diagonals.
-    pub(crate) fn add_kronecker(&mut self, along_u: &[[f64; 4]], along_v: &[[f64; 4]], weight: f64) {
+    pub fn add_kronecker(&mut self, along_u: &[[f64; 4]], along_v: &[[f64; 4]], weight: f64) {
         let (layout, m) = (self.layout, self.layout.block());
         let (outer, inner) = if layout.v_is_outer() { (along_v, along_u) } else { (along_u, along_v) };
         for row in 0..layout.n_rows() {
@@ -171,12 +173,15 @@ impl BandMatrix {
         (0..x.len()).map(|c| product[layout.index(c)]).collect()
     }
 
-    /// Cholesky factorisation, left-looking over block rows.
-    pub(crate) fn factor(self) -> Result<BandFactor, NotPositive> {
-        apart(|| self.factor_here())
+    /// Factorises the matrix (Cholesky, left-looking over block rows).
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`].
+    pub fn factor(self) -> Result<BlockBandedFactor, NotPositiveDefinite> {
+        on_own_thread(|| self.factor_here())
     }
 
-    fn factor_here(mut self) -> Result<BandFactor, NotPositive> {
+    fn factor_here(mut self) -> Result<BlockBandedFactor, NotPositiveDefinite> {
         let (layout, m) = (self.layout, self.layout.block());
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(m, Par::Seq, Default::default()));
         for row in 0..layout.n_rows() {
@@ -208,7 +213,7 @@ impl BandMatrix {
                         stack,
                         Default::default(),
                     )
-                    .map_err(|_| NotPositive)?;
+                    .map_err(|_| NotPositiveDefinite)?;
                     (0..m).for_each(|c| target.as_mut().col_mut(c).subrows_mut(0, c).fill(0.0));
                 } else {
                     let diagonal = view(&before[layout.range(column, 0)], m);
@@ -217,27 +222,29 @@ impl BandMatrix {
             }
         }
         if self.blocks.iter().any(|x| !x.is_finite()) {
-            return Err(NotPositive);
+            return Err(NotPositiveDefinite);
         }
-        Ok(BandFactor { layout, blocks: self.blocks })
+        Ok(BlockBandedFactor { layout, blocks: self.blocks })
     }
 }
 
-impl BandFactor {
-    /// A factor from its blocks; `None` when their number does not fit the net.
-    pub(crate) fn from_blocks(n_u: usize, n_v: usize, blocks: Vec<f64>) -> Option<Self> {
+impl BlockBandedFactor {
+    /// Builds a factor from its blocks; `None` when their number does not fit the coefficients.
+    #[must_use]
+    pub fn from_blocks(n_u: usize, n_v: usize, blocks: Vec<f64>) -> Option<Self> {
         let layout = Layout { n_u, n_v };
         (blocks.len() == layout.len()).then_some(Self { layout, blocks })
     }
 
-    /// The blocks, to be stored or sent.
-    pub(crate) fn blocks(&self) -> &[f64] {
+    /// Returns the blocks, to be stored or sent.
+    #[must_use]
+    pub fn blocks(&self) -> &[f64] {
         &self.blocks
     }
 
     /// Solves A X = B in place; rows of `x` in the net's order, one column per component.
-    pub(crate) fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
-        apart(|| self.solve_here(x));
+    pub fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
+        on_own_thread(|| self.solve_here(x));
     }
 
     fn solve_here<const D: usize>(&self, x: &mut [[f64; D]]) {
@@ -259,10 +266,11 @@ impl BandFactor {
         }
     }
 
-    /// Variance `f' A^-1 f` of a linear functional with coefficients `f` in the net's order.
-    pub(crate) fn variance(&self, f: &[f64]) -> f64 {
+    /// Returns the variance `f' A^-1 f` of a linear functional with coefficients `f` in the net's order.
+    #[must_use]
+    pub fn variance(&self, f: &[f64]) -> f64 {
         let columns: Vec<[f64; 1]> = f.iter().map(|x| [*x]).collect();
-        apart(|| self.forward(&columns).as_ref().squared_norm_l2())
+        on_own_thread(|| self.forward(&columns).as_ref().squared_norm_l2())
     }
 
     /// L^-1 B in block order.
@@ -285,10 +293,11 @@ impl BandFactor {
         work
     }
 
-    /// The inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
+    /// Returns the inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
     /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
-    pub(crate) fn local_inverse(&self) -> Vec<[f64; 49]> {
-        apart(|| self.local_inverse_here())
+    #[must_use]
+    pub fn local_inverse(&self) -> Vec<[f64; 49]> {
+        on_own_thread(|| self.local_inverse_here())
     }
 
     fn local_inverse_here(&self) -> Vec<[f64; 49]> {
@@ -376,13 +385,13 @@ fn view_mut(block: &mut [f64], m: usize) -> MatMut<'_, f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::axis::Axis;
+    use crate::uniform_knots::UniformKnots;
     use nalgebra::DMatrix;
 
     /// Gram matrix plus penalty over a small net, as a band and as a dense matrix.
-    fn example(spans_u: usize, spans_v: usize) -> (BandMatrix, DMatrix<f64>) {
-        let (u, v) = (Axis::new(0.0, 1.0, spans_u), Axis::new(0.0, 1.3, spans_v));
-        let mut band = BandMatrix::zeros(u.n_coefficients(), v.n_coefficients());
+    fn example(spans_u: usize, spans_v: usize) -> (BlockBandedMatrix, DMatrix<f64>) {
+        let (u, v) = (UniformKnots::new(0.0, 1.0, spans_u), UniformKnots::new(0.0, 1.3, spans_v));
+        let mut band = BlockBandedMatrix::zeros(u.n_coefficients(), v.n_coefficients());
         band.add_kronecker(&u.gram(), &v.gram(), 1.0);
         band.add_kronecker(&u.roughness(), &v.gram(), 1e-7);
         let full = |diagonals: &[[f64; 4]]| {
@@ -437,8 +446,8 @@ mod tests {
     /// The recursion over many rows under a stiff penalty: a skew rounding error would grow fivefold per row.
     #[test]
     fn the_inverse_is_as_good_in_the_last_row_as_in_the_first() {
-        let (u, v) = (Axis::new(0.0, 3.0, 50), Axis::new(0.0, 2.0, 33));
-        let mut band = BandMatrix::zeros(u.n_coefficients(), v.n_coefficients());
+        let (u, v) = (UniformKnots::new(0.0, 3.0, 50), UniformKnots::new(0.0, 2.0, 33));
+        let mut band = BlockBandedMatrix::zeros(u.n_coefficients(), v.n_coefficients());
         band.add_kronecker(&u.gram(), &v.gram(), 1.0);
         band.add_kronecker(&u.roughness(), &v.gram(), 1e-3);
         band.add_kronecker(&u.gram(), &v.roughness(), 1e-3);
@@ -455,6 +464,6 @@ mod tests {
 
     #[test]
     fn an_undetermined_net_is_refused() {
-        assert_eq!(BandMatrix::zeros(5, 6).factor().err(), Some(NotPositive));
+        assert_eq!(BlockBandedMatrix::zeros(5, 6).factor().err(), Some(NotPositiveDefinite));
     }
 }

@@ -1,5 +1,4 @@
-//! Symmetric positive definite systems on meshes: assembled from blocks, ordered by nested dissection, solved by
-//! sparse Cholesky.
+//! Sparse Cholesky factorisation of symmetric positive definite systems on meshes, ordered by nested dissection.
 //!
 //! A system has `D` unknowns per node of a [`Graph`]; nodes that share an edge of the graph may couple. [`Spd::analyse`]
 //! orders the nodes and analyses the factor once; after that [`Spd::clear`], [`Spd::add`], [`Spd::factor`] and
@@ -9,7 +8,7 @@
 //! slower there), and always on one thread, so that the bits of a result never depend on the machine's load or cores.
 //! The matrix is stored as its upper triangle in elimination order, so faer neither orders nor permutes anything.
 
-mod order;
+mod elimination_order;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
@@ -19,12 +18,12 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
-use crate::kernels::apart;
+use crate::simd::on_own_thread;
 
-/// Why a system could not be solved.
+/// Reason why a system could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SparseError {
-    /// The matrix has no Cholesky factor: nothing holds some unknowns, or an element is indefinite.
+    /// The matrix has no Cholesky factor: some unknowns are not constrained, or an element is indefinite.
     #[error("the system of {unknowns} unknowns is not positive definite")]
     NotPositiveDefinite {
         /// Number of unknowns.
@@ -35,7 +34,7 @@ pub enum SparseError {
     TooLarge {
         /// Number of unknowns.
         unknowns: usize,
-        /// What faer reported.
+        /// Message of faer.
         reason: String,
     },
 }
@@ -49,7 +48,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// The graph whose nodes are joined when they share an element (triangle) of `elements`.
+    /// Joins the nodes that share an element (triangle) of `elements`.
     ///
     /// `node_of[v]` is the node of vertex `v`, or `None` where the vertex is no unknown; nodes are `0..n_nodes`.
     pub fn of_elements<const K: usize>(
@@ -99,12 +98,12 @@ impl Graph {
         graph
     }
 
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn n_nodes(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Neighbours of a node, in growing order.
+    /// Returns the neighbours of a node, in growing order.
     pub fn neighbours(&self, node: u32) -> &[u32] {
         &self.neighbours[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
     }
@@ -123,14 +122,14 @@ pub struct Spd<const D: usize> {
 }
 
 impl<const D: usize> Spd<D> {
-    /// Orders the nodes of `graph` by bisecting `points` (any plane picture of the nodes; only the cost depends on
-    /// it) and analyses the factor. All values are zero after it.
+    /// Orders the nodes of `graph` by bisecting `points` (any projection of the nodes to a plane; only the cost depends
+    /// on it) and analyses the factor symbolically. All values are zero after it.
     ///
     /// # Errors
     /// [`SparseError::TooLarge`].
     pub fn analyse(graph: &Graph, points: &[[f64; 2]]) -> Result<Self, SparseError> {
         let n_nodes = graph.n_nodes();
-        let order = order::nested_dissection(graph, points);
+        let order = elimination_order::nested_dissection(graph, points);
         let mut place = vec![0u32; n_nodes];
         for (at, &node) in order.iter().enumerate() {
             place[node as usize] = at as u32;
@@ -152,12 +151,12 @@ impl<const D: usize> Spd<D> {
         Ok(Self { place, upper, matrix, values, symbolic, factor })
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn n_unknowns(&self) -> usize {
         self.place.len() * D
     }
 
-    /// Number of stored entries of the factor.
+    /// Returns the number of stored entries of the factor.
     pub fn factor_len(&self) -> usize {
         self.factor.len()
     }
@@ -197,7 +196,7 @@ impl<const D: usize> Spd<D> {
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|e| too_large(unknowns, e))?;
         let (factor, matrix) = (&mut self.factor, SparseColMatRef::new(self.matrix.as_ref(), &self.values));
-        let factored = apart(|| {
+        let factored = on_own_thread(|| {
             let stack = MemStack::new(&mut memory);
             let shift = Default::default();
             let plan = Default::default();
@@ -222,7 +221,7 @@ impl<const D: usize> Spd<D> {
             }
         }
         let right = MatMut::from_column_major_slice_mut(&mut x, unknowns, columns.len());
-        apart(|| {
+        on_own_thread(|| {
             let stack = MemStack::new(&mut memory);
             LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(Conj::No, right, Par::Seq, stack);
         });

@@ -1,22 +1,21 @@
-//! A tensor-product spline: a control net over two axes, with as many components as needed.
+//! Bicubic tensor-product splines: evaluation, derivatives, and least-squares approximation of a given function.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SVector};
 
-use super::axis::{Axis, BASIS};
-use crate::Vec3;
+use crate::uniform_knots::{BASIS, UniformKnots};
 
-/// A bicubic spline map from (u, v) to `D` components.
+/// A bicubic tensor-product spline from (u, v) to `D` components.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Net<const D: usize> {
-    /// Axis of u.
-    pub u: Axis,
-    /// Axis of v.
-    pub v: Axis,
+pub struct TensorSpline<const D: usize> {
+    /// Knots of u.
+    pub u: UniformKnots,
+    /// Knots of v.
+    pub v: UniformKnots,
     /// Control values, v outer, u inner: index `k * u.n_coefficients() + i`.
     pub control: Vec<[f64; D]>,
 }
 
-/// Value and derivatives of a net: the order of the names is the order of differentiation.
+/// Value and derivatives of a spline at one place: the order of the names is the order of differentiation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jet<const D: usize> {
     /// Value.
@@ -33,31 +32,31 @@ pub struct Jet<const D: usize> {
     pub vv: [f64; D],
 }
 
-impl<const D: usize> Net<D> {
-    /// A net of zeros.
+impl<const D: usize> TensorSpline<D> {
+    /// Builds the spline that is 0 everywhere.
     #[must_use]
-    pub fn zeros(u: Axis, v: Axis) -> Self {
+    pub fn zeros(u: UniformKnots, v: UniformKnots) -> Self {
         Self { u, v, control: vec![[0.0; D]; u.n_coefficients() * v.n_coefficients()] }
     }
 
-    /// The spline nearest to `f` by least squares on a regular grid of two samples per span (and the ends).
+    /// Approximates `f` by least squares on a regular grid of two samples per span (and the ends).
     #[must_use]
-    pub fn approximate(u: Axis, v: Axis, mut f: impl FnMut(f64, f64) -> [f64; D]) -> Self {
+    pub fn approximate(u: UniformKnots, v: UniformKnots, mut f: impl FnMut(f64, f64) -> [f64; D]) -> Self {
         let (us, pu) = grid_projection(&u);
         let (vs, pv) = grid_projection(&v);
         let samples: Vec<Vec<[f64; D]>> = vs.iter().map(|&y| us.iter().map(|&x| f(x, y)).collect()).collect();
-        let mut net = Self::zeros(u, v);
+        let mut spline = Self::zeros(u, v);
         for d in 0..D {
             let values = DMatrix::from_fn(us.len(), vs.len(), |i, k| samples[k][i][d]);
             let control = &pu * values * pv.transpose();
-            for (slot, value) in net.control.iter_mut().zip(control.iter()) {
+            for (slot, value) in spline.control.iter_mut().zip(control.iter()) {
                 slot[d] = *value;
             }
         }
-        net
+        spline
     }
 
-    /// The value at (u, v).
+    /// Returns the value at (u, v).
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> [f64; D] {
         let ((i, bu), (k, bv)) = (self.u.values(u), self.v.values(v));
@@ -72,10 +71,10 @@ impl<const D: usize> Net<D> {
         p
     }
 
-    /// Value and first derivatives at (u, v): p, p_u, p_v.
+    /// Returns value and first derivatives at (u, v): p, p_u, p_v.
     #[must_use]
     pub fn frame(&self, u: f64, v: f64) -> [[f64; D]; 3] {
-        let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
+        let (su, sv) = (self.u.local_basis(u), self.v.local_basis(v));
         let mut out = [[0.0; D]; 3];
         for row in 0..4 {
             let (mut along, mut slope) = ([0.0; D], [0.0; D]);
@@ -94,11 +93,11 @@ impl<const D: usize> Net<D> {
         out
     }
 
-    /// Value and derivatives to second order at (u, v).
+    /// Returns value and derivatives to second order at (u, v).
     #[must_use]
     #[inline(always)]
     pub fn jet(&self, u: f64, v: f64) -> Jet<D> {
-        let (su, sv) = (self.u.stencil(u), self.v.stencil(v));
+        let (su, sv) = (self.u.local_basis(u), self.v.local_basis(v));
         let mut jet = Jet { p: [0.0; D], u: [0.0; D], v: [0.0; D], uu: [0.0; D], uv: [0.0; D], vv: [0.0; D] };
         for row in 0..4 {
             let (mut along, mut slope, mut bend) = ([0.0; D], [0.0; D], [0.0; D]);
@@ -128,12 +127,12 @@ impl<const D: usize> Net<D> {
         &self.control[start..start + 4]
     }
 
-    /// The polynomial of the span (i, k) in its middle-centred coordinates s (along u) and t (along v): `[q][p]` is the
-    /// coefficient of s^p t^q.
-    pub(super) fn polynomial(&self, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
+    /// Returns the polynomial of the span (i, k) in its middle-centred coordinates s (along u) and t (along v): `[q][p]` is
+    /// the coefficient of s^p t^q.
+    pub(crate) fn polynomial(&self, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
         let mut bicubic = [[[0.0; D]; 4]; 4];
         for (b, along_v) in BASIS.iter().enumerate() {
-            // Row k + b of the net as a polynomial in s.
+            // Row k + b of the spline as a polynomial in s.
             let mut row = [[0.0; D]; 4];
             for (control, along_u) in self.row(i, k + b).iter().zip(&BASIS) {
                 for (slot, f) in row.iter_mut().zip(along_u) {
@@ -150,28 +149,31 @@ impl<const D: usize> Net<D> {
     }
 }
 
-/// Coefficients of the spline curve nearest to `f`, as [`Net::approximate`] finds those of a surface.
-pub(crate) fn approximate(axis: Axis, f: impl FnMut(f64) -> Vec3) -> Vec<Vec3> {
-    let (at, projection) = grid_projection(&axis);
-    let samples: Vec<Vec3> = at.into_iter().map(f).collect();
+/// Returns the coefficients of the spline curve nearest to `f`, as [`TensorSpline::approximate`] for a surface.
+pub fn approximate_curve<const D: usize>(
+    knots: UniformKnots,
+    f: impl FnMut(f64) -> SVector<f64, D>,
+) -> Vec<SVector<f64, D>> {
+    let (at, projection) = grid_projection(&knots);
+    let samples: Vec<SVector<f64, D>> = at.into_iter().map(f).collect();
     let coefficient = |row: usize| projection.row(row).iter().zip(&samples).map(|(w, p)| p * *w).sum();
-    (0..axis.n_coefficients()).map(coefficient).collect()
+    (0..knots.n_coefficients()).map(coefficient).collect()
 }
 
-/// Sample places of an axis, two per span and the end, and the matrix from samples to least-squares coefficients.
-fn grid_projection(axis: &Axis) -> (Vec<f64>, DMatrix<f64>) {
-    let n = 2 * axis.n_spans().max(3);
+/// Returns the sample places of one direction, two per span and the end, and the matrix from samples to least-squares coefficients.
+fn grid_projection(knots: &UniformKnots) -> (Vec<f64>, DMatrix<f64>) {
+    let n = 2 * knots.n_spans().max(3);
     let at: Vec<f64> =
-        (0..=n).map(|j| axis.start() + (axis.end() - axis.start()) * j as f64 / n as f64).collect();
-    let mut basis = DMatrix::zeros(n + 1, axis.n_coefficients());
+        (0..=n).map(|j| knots.start() + (knots.end() - knots.start()) * j as f64 / n as f64).collect();
+    let mut basis = DMatrix::zeros(n + 1, knots.n_coefficients());
     for (j, x) in at.iter().enumerate() {
-        let (first, values) = axis.values(*x);
+        let (first, values) = knots.values(*x);
         for (i, value) in values.iter().enumerate() {
             basis[(j, first + i)] = *value;
         }
     }
     let projection = (basis.transpose() * &basis).cholesky().map(|c| c.solve(&basis.transpose()));
-    (at, projection.unwrap_or_else(|| DMatrix::zeros(axis.n_coefficients(), n + 1)))
+    (at, projection.unwrap_or_else(|| DMatrix::zeros(knots.n_coefficients(), n + 1)))
 }
 
 #[cfg(test)]
@@ -184,12 +186,13 @@ mod tests {
 
     #[test]
     fn bicubics_are_reproduced_with_their_derivatives() {
-        let net = Net::approximate(Axis::new(0.0, 2.0, 6), Axis::new(-1.0, 1.0, 5), cubic);
+        let spline =
+            TensorSpline::approximate(UniformKnots::new(0.0, 2.0, 6), UniformKnots::new(-1.0, 1.0, 5), cubic);
         for (u, v) in [(0.0, -1.0), (0.7, 0.3), (2.0, 1.0), (1.99, -0.2)] {
-            let jet = net.jet(u, v);
-            let frame = net.frame(u, v);
+            let jet = spline.jet(u, v);
+            let frame = spline.frame(u, v);
             let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-10;
-            assert!(close(jet.p, cubic(u, v)) && close(net.point(u, v), jet.p) && close(frame[0], jet.p));
+            assert!(close(jet.p, cubic(u, v)) && close(spline.point(u, v), jet.p) && close(frame[0], jet.p));
             assert!(close(jet.u, [3.0 * u * u * v, v * v * v + 2.0 * u]) && close(frame[1], jet.u));
             assert!(close(jet.v, [u * u * u - 2.0 * v, 3.0 * u * v * v]) && close(frame[2], jet.v));
             assert!(close(jet.uu, [6.0 * u * v, 2.0]) && close(jet.uv, [3.0 * u * u, 3.0 * v * v]));
@@ -201,10 +204,11 @@ mod tests {
     fn a_smooth_function_is_met_with_the_fourth_order() {
         let error = |n: usize| {
             let f = |u: f64, v: f64| [(3.0 * u).sin() * (2.0 * v).cos()];
-            let net = Net::approximate(Axis::new(0.0, 1.0, n), Axis::new(0.0, 1.0, n), f);
+            let spline =
+                TensorSpline::approximate(UniformKnots::new(0.0, 1.0, n), UniformKnots::new(0.0, 1.0, n), f);
             (0..400)
                 .map(|k| (f64::from(k % 20) / 19.0, f64::from(k / 20) / 19.0))
-                .map(|(u, v)| (net.point(u, v)[0] - f(u, v)[0]).abs())
+                .map(|(u, v)| (spline.point(u, v)[0] - f(u, v)[0]).abs())
                 .fold(0.0, f64::max)
         };
         let order = (error(8) / error(16)).log2();

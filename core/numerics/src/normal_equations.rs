@@ -1,15 +1,16 @@
-//! Normal equations of a tensor spline fit, gathered as moments per cell of the knot grid.
+//! Normal equations of a penalised tensor spline fit, accumulated as moments per cell of the knot grid.
 //!
 //! The 16 B-splines of a cell are polynomials of degree 3 x 3, so every product of two is one of degree 6 x 6: 49
 //! weighted moments per cell hold what 136 products per point would. Points are only touched to add their
 //! moments; the cells are turned into the normal matrix once, whatever the number of points.
 
-use super::axis::{Axis, BASIS, multiply, pairs};
-use super::band::BandMatrix;
-use super::net::Net;
-use super::smoothing::{GAUSS, GridValues};
-use crate::kernels::wide;
 use nalgebra::{Matrix4, Vector4};
+
+use crate::block_banded_cholesky::BlockBandedMatrix;
+use crate::reml::{GAUSS, GridValues};
+use crate::simd::dispatch_simd;
+use crate::tensor_spline::TensorSpline;
+use crate::uniform_knots::{BASIS, UniformKnots, multiply, pairs};
 
 /// Weighted sums over the points of one cell.
 #[derive(Debug, Clone, Copy)]
@@ -44,9 +45,9 @@ impl<const D: usize> Cell<D> {
 
 /// Sums over all points of a fit of `D` components.
 #[derive(Debug, Clone)]
-pub(crate) struct Moments<const D: usize> {
-    pub(crate) u: Axis,
-    pub(crate) v: Axis,
+pub(crate) struct CellMoments<const D: usize> {
+    pub(crate) u: UniformKnots,
+    pub(crate) v: UniformKnots,
     cells: Vec<Cell<D>>,
     /// Sum of w y^2 over points and components.
     pub(crate) square: f64,
@@ -56,9 +57,9 @@ pub(crate) struct Moments<const D: usize> {
     pub(crate) n_points: usize,
 }
 
-impl<const D: usize> Moments<D> {
+impl<const D: usize> CellMoments<D> {
     /// No points yet.
-    pub(crate) fn empty(u: Axis, v: Axis) -> Self {
+    pub(crate) fn empty(u: UniformKnots, v: UniformKnots) -> Self {
         let empty = Cell { gram: [[0.0; 8]; 7], rhs: [[[0.0; 4]; D]; 4], n_points: 0 };
         Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, weight: 0.0, n_points: 0 }
     }
@@ -95,7 +96,7 @@ impl<const D: usize> Moments<D> {
 
     /// The same sums, to the last bits, over cells of twice the length along those of (u, v) that are named `coarser`.
     pub(crate) fn joined(&self, coarser: [bool; 2]) -> Self {
-        let axis = |axis: Axis, coarser: bool| if coarser { (axis.coarser(), 2) } else { (axis, 1) };
+        let axis = |axis: UniformKnots, coarser: bool| if coarser { (axis.coarser(), 2) } else { (axis, 1) };
         let ((u, of_u), (v, of_v)) = (axis(self.u, coarser[0]), axis(self.v, coarser[1]));
         let shift = |coarser: bool, cell: usize| if coarser { &HALVES[cell % 2] } else { &WHOLE };
         let mut cells = Self::empty(u, v).cells;
@@ -117,15 +118,15 @@ impl<const D: usize> Moments<D> {
     }
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
-    pub(crate) fn normal_equations(&self) -> (BandMatrix, Vec<[f64; D]>) {
-        wide(
+    pub(crate) fn normal_equations(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
+        dispatch_simd(
             #[inline(always)]
             || self.normal_equations_here(),
         )
     }
 
     #[inline(always)]
-    fn normal_equations_here(&self) -> (BandMatrix, Vec<[f64; D]>) {
+    fn normal_equations_here(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
         let (n_u, n_v) = (self.u.n_coefficients(), self.v.n_coefficients());
         // Per coefficient the sums with those up to three further along v and along u.
         let mut sums = vec![[[0.0; 4]; 4]; n_u * n_v];
@@ -141,7 +142,7 @@ impl<const D: usize> Moments<D> {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
             self.add_right_hand_side(cell, i, k, &mut rhs);
             for ((a, b), pv) in &products {
-                // Moments of this pair of v-splines, left as a polynomial in u.
+                // CellMoments of this pair of v-splines, left as a polynomial in u.
                 let mut row = [0.0; 8];
                 for (f, moments) in pv.iter().zip(&cell.gram) {
                     row.iter_mut().zip(moments).for_each(|(slot, moment)| *slot += f * moment);
@@ -155,7 +156,7 @@ impl<const D: usize> Moments<D> {
                 }
             }
         }
-        let mut matrix = BandMatrix::zeros(n_u, n_v);
+        let mut matrix = BlockBandedMatrix::zeros(n_u, n_v);
         for (c, sums) in sums.iter().enumerate() {
             let (i, k) = (c % n_u, c / n_u);
             for (dk, along_u) in sums.iter().enumerate().take(n_v - k) {
@@ -167,12 +168,12 @@ impl<const D: usize> Moments<D> {
         (matrix, rhs)
     }
 
-    /// Weighted sum of squared distances of the points from `net`, over all components.
-    pub(crate) fn residual_square(&self, net: &Net<D>) -> f64 {
+    /// Weighted sum of squared distances of the points from `spline`, over all components.
+    pub(crate) fn residual_square(&self, spline: &TensorSpline<D>) -> f64 {
         let mut sum = self.square;
         for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points > 0) {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
-            let polynomial = net.polynomial(i, k);
+            let polynomial = spline.polynomial(i, k);
             for d in 0..D {
                 for (a, q) in (0..4).flat_map(|q| (0..4).map(move |p| (p, q))) {
                     // The polynomial's own image under the cell's moments, less twice the right-hand side.

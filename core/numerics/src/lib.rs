@@ -1,0 +1,30 @@
+//! Numerics of platen: linear solvers, splines, smoothing and sampling that know of no plate and no scan.
+//!
+//! In order of use, each room only using those above it:
+//!
+//! | room | method |
+//! |---|---|
+//! | [`simd`] | run-time dispatch to the widest vector registers |
+//! | [`union_find`], [`random`], [`normal_distribution`] | disjoint sets, SplitMix64, the error function |
+//! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
+//! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
+//! | [`uniform_knots`], [`penalised_curve`], [`tensor_spline`] | uniform cubic B-splines: basis, smoothing curve, surface |
+//! | [`block_banded_cholesky`] | Cholesky factor of a tensor spline's normal matrix, and the band of its inverse |
+//! | [`reml`], `normal_equations`, [`spline_fit`] | penalised least squares on scattered points, smoothing by restricted maximum likelihood |
+//!
+//! Every routine runs on one thread and its results are the same to the last bit in each run, whatever the load of the
+//! machine. Lengths have no unit here. No clock, no files, no randomness but from a given seed.
+
+pub mod adaptive_metropolis;
+pub mod block_banded_cholesky;
+pub mod normal_distribution;
+mod normal_equations;
+pub mod penalised_curve;
+pub mod random;
+pub mod reml;
+pub mod simd;
+pub mod sparse;
+pub mod spline_fit;
+pub mod tensor_spline;
+pub mod uniform_knots;
+pub mod union_find;

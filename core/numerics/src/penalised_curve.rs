@@ -1,0 +1,128 @@
+//! Smoothing curves: cubic splines of one variable by penalised least squares (P-splines: Eilers and Marx, Stat. Sci. 11
+//! (1996)), seen as a Gaussian prior on the coefficients.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::uniform_knots::UniformKnots;
+
+/// A cubic spline of one variable.
+#[derive(Debug, Clone)]
+pub struct SplineCurve {
+    knots: UniformKnots,
+    coefficients: DVector<f64>,
+}
+
+impl SplineCurve {
+    /// Builds the spline of `knots.n_coefficients()` coefficients.
+    #[must_use]
+    pub fn new(knots: UniformKnots, coefficients: DVector<f64>) -> Self {
+        Self { knots, coefficients }
+    }
+
+    /// Returns a spline over the same knots.
+    #[must_use]
+    pub fn with(&self, coefficients: DVector<f64>) -> Self {
+        Self { knots: self.knots, coefficients }
+    }
+
+    /// Returns the spline with its coefficients moved.
+    #[must_use]
+    pub fn moved(&self, by: &DVector<f64>) -> Self {
+        self.with(&self.coefficients + by)
+    }
+
+    /// Returns the value at `x` as a linear functional of the coefficients.
+    #[must_use]
+    pub fn functional(&self, x: f64) -> DVector<f64> {
+        let (first, values) = self.knots.values(x);
+        let mut functional = DVector::zeros(self.knots.n_coefficients());
+        for i in 0..4 {
+            functional[first + i] = values[i];
+        }
+        functional
+    }
+
+    /// Returns the value at `x`.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, x: f64) -> f64 {
+        let (first, values) = self.knots.values(x);
+        (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
+    }
+
+    /// Returns an upper bound of the distance from a spline over the same knots: the largest between their coefficients.
+    #[must_use]
+    pub fn distance(&self, other: &Self) -> f64 {
+        (&self.coefficients - &other.coefficients).amax()
+    }
+}
+
+/// Normal equations of a smoothing curve: sums over data, and a Gaussian prior of its roughness.
+#[derive(Debug, Clone)]
+pub struct CurveFit {
+    knots: UniformKnots,
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+/// Derivative that the prior penalises, as a difference of neighbouring coefficients.
+#[derive(Debug, Clone, Copy)]
+pub enum Roughness {
+    /// Second derivative.
+    Curvature,
+    /// Third derivative.
+    CurvatureChange,
+}
+
+impl CurveFit {
+    /// Starts without data: the derivative varies as white noise over `length` with the standard deviation `spread`.
+    #[must_use]
+    pub fn with_prior(knots: UniformKnots, roughness: Roughness, spread: f64, length: f64) -> Self {
+        let n = knots.n_coefficients();
+        let mut matrix = DMatrix::zeros(n, n);
+        let (stencil, order): (&[f64], i32) = match roughness {
+            Roughness::Curvature => (&[1.0, -2.0, 1.0], 2),
+            Roughness::CurvatureChange => (&[-1.0, 3.0, -3.0, 1.0], 3),
+        };
+        let scale = knots.step() / (length * spread * spread) * knots.step().powi(-2 * order);
+        for start in 0..=n - stencil.len() {
+            for (i, a) in stencil.iter().enumerate() {
+                for (j, b) in stencil.iter().enumerate() {
+                    matrix[(start + i, start + j)] += scale * a * b;
+                }
+            }
+        }
+        Self { knots, matrix, right: DVector::zeros(n) }
+    }
+
+    /// Adds a value `y` at `x` with the weight `w` (one over its variance).
+    pub fn add(&mut self, x: f64, y: f64, w: f64) {
+        let (first, values) = self.knots.values(x);
+        for i in 0..4 {
+            // The factorisation reads the lower triangle.
+            for j in 0..=i {
+                self.matrix[(first + i, first + j)] += w * values[i] * values[j];
+            }
+            self.right[first + i] += w * values[i] * y;
+        }
+    }
+
+    /// Returns the negative log density of a curve under the prior, up to a constant, before any data were added.
+    #[must_use]
+    pub fn roughness(&self, spline: &SplineCurve) -> f64 {
+        0.5 * spline.coefficients.dot(&(&self.matrix * &spline.coefficients))
+    }
+
+    /// Adds the observation 0 of a functional with the weight `w` (one over its variance).
+    pub fn hold(&mut self, functional: &DVector<f64>, w: f64) {
+        self.matrix += functional * functional.transpose() * w;
+    }
+
+    /// Solves for the most likely curve; also returns the Cholesky factor of its precision. `None` when it is undetermined.
+    #[must_use]
+    pub fn solve(self) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
+        let factor = Cholesky::new(self.matrix)?;
+        let coefficients = factor.solve(&self.right);
+        Some((SplineCurve::new(self.knots, coefficients), factor))
+    }
+}
