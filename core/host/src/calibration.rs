@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_plant::plant::CalibrationUse;
-use platen_plant::{Document, Error as PlantError, Reported, Table};
+use platen_plant::{Document, Error as PlantError, Reported, TomlTable};
 
 use platen_model::units::{metres, mm};
 
@@ -64,7 +64,7 @@ impl Calibration {
         Ok(document.finish(read)?)
     }
 
-    fn read(mut root: Table<'_>) -> Result<Self, Reported> {
+    fn read(mut root: TomlTable<'_>) -> Result<Self, Reported> {
         let table = root.table("calibration").required();
         root.finish();
         let mut table = table?;

@@ -9,7 +9,7 @@ use toml::de::DeTable;
 use crate::node::{Entry, Node};
 use crate::source::{Place, Source};
 use crate::syntax::Syntax;
-use crate::{Error, Fault, Faults, Table};
+use crate::{Error, Fault, Faults, TomlTable};
 
 /// Proof that a fault has been recorded: only [`Document`] makes it, so a reader that returns it cannot refuse a file
 /// without a word.
@@ -22,11 +22,11 @@ pub struct Reported(());
 /// only when everything has been read.
 ///
 /// ```
-/// use platen_plant::{Document, Faults, Reported, Table};
+/// use platen_plant::{Document, Faults, Reported, TomlTable};
 ///
 /// struct Oven { name: String, heat_kw: f64 }
 ///
-/// fn oven(mut table: Table<'_>) -> Result<Oven, Reported> {
+/// fn oven(mut table: TomlTable<'_>) -> Result<Oven, Reported> {
 ///     let name = table.string("name").required();
 ///     let heat_kw = table.number("heat_kw").in_range(1.0..=500.0).or(90.0);
 ///     table.finish();
@@ -88,8 +88,8 @@ impl Document {
     }
 
     /// The cursor over the whole file.
-    pub fn root(&self) -> Table<'_> {
-        Table::new(self, Place { key: self.path.clone(), offset: self.root.span.start }, self.entries())
+    pub fn root(&self) -> TomlTable<'_> {
+        TomlTable::new(self, Place { key: self.path.clone(), offset: self.root.span.start }, self.entries())
     }
 
     /// Records a fault at `place`.

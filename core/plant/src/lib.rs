@@ -1,6 +1,6 @@
 //! Plant and plate TOML to checked types, every fault at once with file, line and column.
 //!
-//! [`Document`] parses a file and keeps every key and value with its place; [`Table`] and [`Field`] read it, key by key,
+//! [`Document`] parses a file and keeps every key and value with its place; [`TomlTable`] and [`TomlKey`] read it, key by key,
 //! and collect the faults; [`check_options`] does the same for the options of a plugin, from the plugin's own
 //! declarations. What leaves this crate is checked and in metres, radians and seconds.
 //!
@@ -9,7 +9,7 @@
 mod document;
 mod error;
 mod fault;
-mod field;
+mod key;
 mod nearest;
 mod node;
 mod option;
@@ -25,12 +25,12 @@ mod unit;
 pub use document::{Document, Reported};
 pub use error::Error;
 pub use fault::{Fault, Faults};
-pub use field::{Field, Located};
+pub use key::{Located, TomlKey};
 pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options, deprecated_options};
 pub use plant::{PlantFile, PluginUse, ScanWindow};
 pub use plate::PlateFile;
 pub use schema::{PLANT_SCHEMA, PLATE_SCHEMA, options_schema, plant_schema};
 pub use source::Place;
-pub use table::Table;
-pub use unit::Unit;
+pub use table::TomlTable;
+pub use unit::{Dimension, Unit};

@@ -10,11 +10,11 @@ use toml::de::{DeTable, DeValue};
 pub(crate) struct Node {
     /// Bytes of the value in the text; of its header or key for a table that a header or a dotted key opened.
     pub(crate) span: Range<usize>,
-    pub(crate) kind: Kind,
+    pub(crate) kind: NodeKind,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Kind {
+pub(crate) enum NodeKind {
     Bool(bool),
     Integer(i64),
     Float(f64),
@@ -40,25 +40,24 @@ pub(crate) struct Entry {
 impl Node {
     /// Takes over a parsed table, its keys in the order of the text.
     pub(crate) fn from_table(table: &Spanned<DeTable<'_>>) -> Self {
-        Self { span: table.span(), kind: Kind::Table(entries(table.get_ref())) }
+        Self { span: table.span(), kind: NodeKind::Table(entries(table.get_ref())) }
     }
 
     /// Takes over a parsed value.
     pub(crate) fn from_value(value: &Spanned<DeValue<'_>>) -> Self {
         let kind = match value.get_ref() {
-            DeValue::Boolean(value) => Kind::Bool(*value),
-            DeValue::Integer(value) => {
-                i64::from_str_radix(value.as_str(), value.radix()).map_or(Kind::TooLarge, Kind::Integer)
-            }
+            DeValue::Boolean(value) => NodeKind::Bool(*value),
+            DeValue::Integer(value) => i64::from_str_radix(value.as_str(), value.radix())
+                .map_or(NodeKind::TooLarge, NodeKind::Integer),
             DeValue::Float(value) => match value.as_str().parse::<f64>() {
-                Ok(number) if number.is_infinite() && !value.as_str().contains("inf") => Kind::TooLarge,
-                Ok(number) => Kind::Float(number),
-                Err(_) => Kind::TooLarge,
+                Ok(number) if number.is_infinite() && !value.as_str().contains("inf") => NodeKind::TooLarge,
+                Ok(number) => NodeKind::Float(number),
+                Err(_) => NodeKind::TooLarge,
             },
-            DeValue::String(value) => Kind::String(value.to_string()),
-            DeValue::Datetime(_) => Kind::Datetime,
-            DeValue::Array(array) => Kind::Array(array.iter().map(Self::from_value).collect()),
-            DeValue::Table(table) => Kind::Table(entries(table)),
+            DeValue::String(value) => NodeKind::String(value.to_string()),
+            DeValue::Datetime(_) => NodeKind::Datetime,
+            DeValue::Array(array) => NodeKind::Array(array.iter().map(Self::from_value).collect()),
+            DeValue::Table(table) => NodeKind::Table(entries(table)),
         };
         Self { span: value.span(), kind }
     }
@@ -66,31 +65,31 @@ impl Node {
     /// What the value is, in the words of a message: `the text "north"`, `4000`, `a table`.
     pub(crate) fn describe(&self) -> String {
         match &self.kind {
-            Kind::Bool(value) => value.to_string(),
-            Kind::Integer(value) => value.to_string(),
-            Kind::Float(value) => format!("{value:?}"),
-            Kind::String(value) => format!("the text {value:?}"),
-            Kind::Datetime => "a date or time".to_owned(),
-            Kind::Array(values) if values.is_empty() => "an empty list".to_owned(),
-            Kind::Array(values) if values.iter().all(|v| matches!(v.kind, Kind::Table(_))) => {
+            NodeKind::Bool(value) => value.to_string(),
+            NodeKind::Integer(value) => value.to_string(),
+            NodeKind::Float(value) => format!("{value:?}"),
+            NodeKind::String(value) => format!("the text {value:?}"),
+            NodeKind::Datetime => "a date or time".to_owned(),
+            NodeKind::Array(values) if values.is_empty() => "an empty list".to_owned(),
+            NodeKind::Array(values) if values.iter().all(|v| matches!(v.kind, NodeKind::Table(_))) => {
                 "a list of tables".to_owned()
             }
-            Kind::Array(values) => format!("a list of {}", values.len()),
-            Kind::Table(_) => "a table".to_owned(),
-            Kind::TooLarge => "a number beyond 64 bits".to_owned(),
-            Kind::Broken => "broken text".to_owned(),
+            NodeKind::Array(values) => format!("a list of {}", values.len()),
+            NodeKind::Table(_) => "a table".to_owned(),
+            NodeKind::TooLarge => "a number beyond 64 bits".to_owned(),
+            NodeKind::Broken => "broken text".to_owned(),
         }
     }
 
     /// Marks every value below this one for which `is_broken` holds, whole, with all that it holds.
     pub(crate) fn break_values(&mut self, is_broken: &impl Fn(&Self) -> bool) {
         let visit = |value: &mut Self| match is_broken(value) {
-            true => value.kind = Kind::Broken,
+            true => value.kind = NodeKind::Broken,
             false => value.break_values(is_broken),
         };
         match &mut self.kind {
-            Kind::Table(entries) => entries.iter_mut().for_each(|entry| visit(&mut entry.value)),
-            Kind::Array(values) => values.iter_mut().for_each(visit),
+            NodeKind::Table(entries) => entries.iter_mut().for_each(|entry| visit(&mut entry.value)),
+            NodeKind::Array(values) => values.iter_mut().for_each(visit),
             _ => {}
         }
     }
@@ -98,7 +97,7 @@ impl Node {
     /// The entries of a table.
     pub(crate) fn as_table(&self) -> Option<&[Entry]> {
         match &self.kind {
-            Kind::Table(entries) => Some(entries),
+            NodeKind::Table(entries) => Some(entries),
             _ => None,
         }
     }

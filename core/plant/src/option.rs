@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::document::{Document, Reported};
-use crate::field::Field;
+use crate::key::TomlKey;
 use crate::nearest;
-use crate::node::{Entry, Kind, Node};
+use crate::node::{Entry, Node, NodeKind};
 use crate::source::{Place, Source};
-use crate::table::{Table, number};
-use crate::unit::Unit;
+use crate::table::{TomlTable, number};
+use crate::unit::{Dimension, Unit};
 use crate::{Fault, Faults};
 
 /// Type of an option.
@@ -119,7 +119,7 @@ impl RawOptions {
 
     fn document(&self) -> Document {
         let span = self.place.offset..self.place.offset;
-        let root = Node { span, kind: Kind::Table(self.entries.clone()) };
+        let root = Node { span, kind: NodeKind::Table(self.entries.clone()) };
         Document::part(self.source.clone(), self.place.key.clone(), root)
     }
 
@@ -211,7 +211,7 @@ impl OptionDecl {
         must(!self.doc.trim().is_empty(), "a sentence of documentation is missing");
         must(self.unit.as_deref().is_none_or(|unit| Unit::find(unit).is_some()), "the unit is unknown");
         must(
-            self.kind != OptionType::Duration || self.declared_unit().measures() == "time",
+            self.kind != OptionType::Duration || self.declared_unit().dimension() == Dimension::Time,
             "the unit must be one of time",
         );
         must(self.min.zip(self.max).is_none_or(|(min, max)| min <= max), "min is above max");
@@ -240,7 +240,7 @@ impl OptionDecl {
         document.finish(value)
     }
 
-    fn read<'d>(&self, table: &mut Table<'d>, folder: &Path) -> Field<'d, Value> {
+    fn read<'d>(&self, table: &mut TomlTable<'d>, folder: &Path) -> TomlKey<'d, Value> {
         let name = &self.name;
         match self.kind {
             OptionType::Bool => table.bool(name).map(Value::Bool),
@@ -270,12 +270,11 @@ impl OptionDecl {
 
     fn int(&self, node: &Node) -> Result<i64, String> {
         let value = match &node.kind {
-            Kind::Integer(value) => *value,
-            Kind::String(text) if self.unit.is_some() => {
-                whole(self.declared_unit().read(text)?).ok_or_else(|| {
+            NodeKind::Integer(value) => *value,
+            NodeKind::String(text) if self.unit.is_some() => whole(self.declared_unit().read(text)?)
+                .ok_or_else(|| {
                     format!("found {text:?}, expected a whole number of {}", self.declared_unit().symbol())
-                })?
-            }
+                })?,
             _ => return Err(format!("found {}, expected a whole number", node.describe())),
         };
         self.in_range(value as f64, node).map(|()| value)
@@ -285,7 +284,7 @@ impl OptionDecl {
         let measured = self.unit.is_some() || self.kind == OptionType::Duration;
         let value = match (&node.kind, number(node)) {
             (_, Some(value)) => value,
-            (Kind::String(text), _) if measured => self.declared_unit().read(text)?,
+            (NodeKind::String(text), _) if measured => self.declared_unit().read(text)?,
             _ => return Err(format!("found {}, expected a number", node.describe())),
         };
         self.in_range(value, node).map(|()| value)
@@ -293,7 +292,7 @@ impl OptionDecl {
 
     fn floats(&self, node: &Node) -> Result<Vec<f64>, String> {
         match &node.kind {
-            Kind::Array(values) => values.iter().map(|value| self.float(value)).collect(),
+            NodeKind::Array(values) => values.iter().map(|value| self.float(value)).collect(),
             _ => Err(format!("found {}, expected a list of numbers", node.describe())),
         }
     }
@@ -363,15 +362,15 @@ fn whole(value: f64) -> Option<i64> {
 /// A secret text, or where to find it: never quoted in a message.
 fn secret(node: &Node, folder: &Path) -> Result<String, String> {
     let entries = match &node.kind {
-        Kind::String(text) => return Ok(text.clone()),
-        Kind::Table(entries) => entries.as_slice(),
+        NodeKind::String(text) => return Ok(text.clone()),
+        NodeKind::Table(entries) => entries.as_slice(),
         _ => &[],
     };
     match entries {
-        [Entry { key, value: Node { kind: Kind::String(name), .. }, .. }] if key == "env" => {
+        [Entry { key, value: Node { kind: NodeKind::String(name), .. }, .. }] if key == "env" => {
             std::env::var(name).map_err(|_| format!("the environment variable {name} is not set"))
         }
-        [Entry { key, value: Node { kind: Kind::String(name), .. }, .. }] if key == "file" => {
+        [Entry { key, value: Node { kind: NodeKind::String(name), .. }, .. }] if key == "file" => {
             let path = folder.join(name);
             let text =
                 std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::Fault;
-use crate::node::{Entry, Kind, Node};
+use crate::node::{Entry, Node, NodeKind};
 use crate::source::{Place, Source};
 
 /// What the parser complained of.
@@ -92,8 +92,8 @@ fn in_plain_words(message: &str, span: &Range<usize>) -> String {
 /// Bytes of the value after the equals sign of the key that holds `offset`.
 fn value_at(source: &Source, table: &Node, offset: usize) -> Option<Range<usize>> {
     let children: Vec<&Node> = match &table.kind {
-        Kind::Table(entries) => entries.iter().map(|entry| &entry.value).collect(),
-        Kind::Array(values) => values.iter().collect(),
+        NodeKind::Table(entries) => entries.iter().map(|entry| &entry.value).collect(),
+        NodeKind::Array(values) => values.iter().collect(),
         _ => return None,
     };
     children.into_iter().find_map(|child| {
@@ -105,8 +105,10 @@ fn value_at(source: &Source, table: &Node, offset: usize) -> Option<Range<usize>
 /// Whether a table, or every table of an array, was opened by a header and not by braces.
 fn under_header(source: &Source, node: &Node) -> bool {
     match &node.kind {
-        Kind::Table(_) => source.text.as_bytes().get(node.span.start) == Some(&b'['),
-        Kind::Array(values) => !values.is_empty() && values.iter().all(|value| under_header(source, value)),
+        NodeKind::Table(_) => source.text.as_bytes().get(node.span.start) == Some(&b'['),
+        NodeKind::Array(values) => {
+            !values.is_empty() && values.iter().all(|value| under_header(source, value))
+        }
         _ => false,
     }
 }
@@ -155,7 +157,7 @@ fn owner<'a>(source: &Source, root: &'a Node, offset: usize) -> (String, &'a [En
     let mut stack = vec![(String::new(), root)];
     while let Some((path, node)) = stack.pop() {
         match &node.kind {
-            Kind::Table(entries) => {
+            NodeKind::Table(entries) => {
                 let braces = source.text.as_bytes().get(node.span.start) == Some(&b'{');
                 let holds = (braces && node.span.contains(&offset))
                     || (under_header(source, node) && node.span.end <= offset);
@@ -168,7 +170,7 @@ fn owner<'a>(source: &Source, root: &'a Node, offset: usize) -> (String, &'a [En
                 };
                 stack.extend(entries.iter().map(below));
             }
-            Kind::Array(values) => {
+            NodeKind::Array(values) => {
                 let numbered = |(i, value)| (format!("{path}[{}]", i + 1), value);
                 stack.extend(values.iter().enumerate().map(numbered));
             }

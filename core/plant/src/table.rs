@@ -2,25 +2,25 @@
 
 use crate::RawOptions;
 use crate::document::{Document, Reported};
-use crate::field::{Field, Located};
+use crate::key::{Located, TomlKey};
 use crate::nearest;
-use crate::node::{Entry, Kind, Node};
+use crate::node::{Entry, Node, NodeKind};
 use crate::source::Place;
 
 /// A cursor over one table of a [`Document`].
 ///
-/// Each getter notes its key as known; [`Table::finish`] reports the others. Read every key, then finish, then take the
+/// Each getter notes its key as known; [`TomlTable::finish`] reports the others. Read every key, then finish, then take the
 /// values out: see [`Document`].
 #[derive(Debug)]
 #[must_use = "finish() reports the unknown keys"]
-pub struct Table<'d> {
+pub struct TomlTable<'d> {
     document: &'d Document,
     place: Place,
     entries: &'d [Entry],
     asked: Vec<String>,
 }
 
-impl<'d> Table<'d> {
+impl<'d> TomlTable<'d> {
     pub(crate) fn new(document: &'d Document, place: Place, entries: &'d [Entry]) -> Self {
         Self { document, place, entries, asked: Vec::new() }
     }
@@ -46,33 +46,33 @@ impl<'d> Table<'d> {
     }
 
     /// true or false.
-    pub fn bool(&mut self, key: &str) -> Field<'d, bool> {
+    pub fn bool(&mut self, key: &str) -> TomlKey<'d, bool> {
         self.value(key, "true or false", |node| match node.kind {
-            Kind::Bool(value) => Some(value),
+            NodeKind::Bool(value) => Some(value),
             _ => None,
         })
     }
 
     /// A whole number.
-    pub fn integer(&mut self, key: &str) -> Field<'d, i64> {
+    pub fn integer(&mut self, key: &str) -> TomlKey<'d, i64> {
         self.value(key, "a whole number", |node| match node.kind {
-            Kind::Integer(value) => Some(value),
+            NodeKind::Integer(value) => Some(value),
             _ => None,
         })
     }
 
     /// A finite number, with or without decimals.
-    pub fn number(&mut self, key: &str) -> Field<'d, f64> {
+    pub fn number(&mut self, key: &str) -> TomlKey<'d, f64> {
         self.value(key, "a number", number)
     }
 
     /// A text.
-    pub fn string(&mut self, key: &str) -> Field<'d, String> {
+    pub fn string(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string)
     }
 
     /// A text that is not empty.
-    pub fn name(&mut self, key: &str) -> Field<'d, String> {
+    pub fn name(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string).check(|name| match name.trim().is_empty() {
             true => Err("is empty, must have at least one character".to_owned()),
             false => Ok(()),
@@ -80,7 +80,7 @@ impl<'d> Table<'d> {
     }
 
     /// One of a few words.
-    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Field<'d, T> {
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> TomlKey<'d, T> {
         let words = || choices.iter().map(|(word, _)| *word);
         self.value(key, "a text", string).try_map(|found| {
             choices.iter().find(|(word, _)| *word == found).map(|(_, value)| *value).ok_or_else(|| {
@@ -91,31 +91,31 @@ impl<'d> Table<'d> {
     }
 
     /// A list of finite numbers.
-    pub fn numbers(&mut self, key: &str) -> Field<'d, Vec<f64>> {
+    pub fn numbers(&mut self, key: &str) -> TomlKey<'d, Vec<f64>> {
         self.value(key, "a list of numbers", |node| match &node.kind {
-            Kind::Array(values) => values.iter().map(number).collect(),
+            NodeKind::Array(values) => values.iter().map(number).collect(),
             _ => None,
         })
     }
 
     /// A list of exactly `N` finite numbers: a point, a direction.
-    pub fn vector<const N: usize>(&mut self, key: &str) -> Field<'d, [f64; N]> {
+    pub fn vector<const N: usize>(&mut self, key: &str) -> TomlKey<'d, [f64; N]> {
         self.value(key, &format!("a list of {N} numbers"), vector)
     }
 
     /// `R` lists of exactly `N` finite numbers: the rows of a matrix.
-    pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> Field<'d, [[f64; N]; R]> {
+    pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> TomlKey<'d, [[f64; N]; R]> {
         self.value(key, &format!("{R} lists of {N} numbers"), |node| match &node.kind {
-            Kind::Array(rows) => rows.iter().map(vector).collect::<Option<Vec<_>>>()?.try_into().ok(),
+            NodeKind::Array(rows) => rows.iter().map(vector).collect::<Option<Vec<_>>>()?.try_into().ok(),
             _ => None,
         })
     }
 
     /// A list of texts, each with its place.
-    pub fn strings(&mut self, key: &str) -> Field<'d, Vec<Located<String>>> {
+    pub fn strings(&mut self, key: &str) -> TomlKey<'d, Vec<Located<String>>> {
         let place = self.place_of(key);
         self.value(key, "a list of texts", |node| match &node.kind {
-            Kind::Array(values) => values
+            NodeKind::Array(values) => values
                 .iter()
                 .map(|value| {
                     let place = Place { key: place.clone(), offset: value.span.start };
@@ -127,7 +127,7 @@ impl<'d> Table<'d> {
     }
 
     /// A table below this one, missing or not.
-    pub fn table(&mut self, key: &str) -> Field<'d, Table<'d>> {
+    pub fn table(&mut self, key: &str) -> TomlKey<'d, TomlTable<'d>> {
         let (document, path) = (self.document, self.place_of(key));
         self.value(key, "a table", |node| {
             let place = Place { key: path.clone(), offset: node.span.start };
@@ -139,7 +139,7 @@ impl<'d> Table<'d> {
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no table.
-    pub fn section(&mut self, key: &str) -> Result<Table<'d>, Reported> {
+    pub fn section(&mut self, key: &str) -> Result<TomlTable<'d>, Reported> {
         let empty = Self::new(self.document, self.missing_place(key), &[]);
         Ok(self.table(key).optional()?.unwrap_or(empty))
     }
@@ -148,10 +148,10 @@ impl<'d> Table<'d> {
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no array of tables.
-    pub fn tables(&mut self, key: &str) -> Result<Vec<Table<'d>>, Reported> {
+    pub fn tables(&mut self, key: &str) -> Result<Vec<TomlTable<'d>>, Reported> {
         let (document, path) = (self.document, self.place_of(key));
         let field = self.value(key, &format!("tables, each under [[{path}]]"), |node| match &node.kind {
-            Kind::Array(values) => values
+            NodeKind::Array(values) => values
                 .iter()
                 .enumerate()
                 .map(|(i, value)| {
@@ -174,17 +174,17 @@ impl<'d> Table<'d> {
     }
 
     /// The raw value, for keys that accept several types.
-    pub(crate) fn node(&mut self, key: &str) -> Field<'d, &'d Node> {
+    pub(crate) fn node(&mut self, key: &str) -> TomlKey<'d, &'d Node> {
         self.asked.push(key.to_owned());
         let Some(entry) = self.entries.iter().find(|entry| entry.key == key) else {
-            return Field::new(self.document, self.missing_place(key), Ok(None));
+            return TomlKey::new(self.document, self.missing_place(key), Ok(None));
         };
         let place = Place { key: self.place_of(key), offset: entry.value.span.start };
         let state = match entry.value.kind {
-            Kind::Broken => Err(self.document.broken()),
+            NodeKind::Broken => Err(self.document.broken()),
             _ => Ok(Some(&entry.value)),
         };
-        Field::new(self.document, place, state)
+        TomlKey::new(self.document, place, state)
     }
 
     /// Reports every key that was never asked for, with the nearest one that could have been meant.
@@ -195,7 +195,7 @@ impl<'d> Table<'d> {
         });
     }
 
-    /// As [`Table::finish`], with the message made from the nearest key, if any, and all that were asked for.
+    /// As [`TomlTable::finish`], with the message made from the nearest key, if any, and all that were asked for.
     pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
         for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
             let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };
@@ -210,7 +210,7 @@ impl<'d> Table<'d> {
         key: &str,
         expected: &str,
         read: impl FnOnce(&'d Node) -> Option<T>,
-    ) -> Field<'d, T> {
+    ) -> TomlKey<'d, T> {
         self.node(key).try_map(|node| {
             read(node).ok_or_else(|| format!("found {}, expected {expected}", node.describe()))
         })
@@ -232,22 +232,22 @@ impl<'d> Table<'d> {
 pub(crate) fn number(node: &Node) -> Option<f64> {
     match node.kind {
         // Whole numbers above 2^53 lose their last digits; no quantity of a plant has so many.
-        Kind::Integer(value) => Some(value as f64),
-        Kind::Float(value) => value.is_finite().then_some(value),
+        NodeKind::Integer(value) => Some(value as f64),
+        NodeKind::Float(value) => value.is_finite().then_some(value),
         _ => None,
     }
 }
 
 fn vector<const N: usize>(node: &Node) -> Option<[f64; N]> {
     match &node.kind {
-        Kind::Array(values) => values.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
+        NodeKind::Array(values) => values.iter().map(number).collect::<Option<Vec<f64>>>()?.try_into().ok(),
         _ => None,
     }
 }
 
 fn string(node: &Node) -> Option<String> {
     match &node.kind {
-        Kind::String(value) => Some(value.clone()),
+        NodeKind::String(value) => Some(value.clone()),
         _ => None,
     }
 }

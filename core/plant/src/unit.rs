@@ -1,78 +1,162 @@
-//! Units of values in a plant file: what they measure and how they convert.
+//! Units of measure: of TOML values, of plugin options and of scaled registers.
 
 use std::f64::consts::PI;
 
-/// A unit of the table below.
+/// Quantity that a unit measures, or content of a register field that has no unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// One bit.
+    Switch,
+    /// Characters.
+    Text,
+    /// A counter, a code, an identity.
+    Count,
+    /// A share of one.
+    Ratio,
+    /// Base unit: metre.
+    Length,
+    /// Base unit: radian.
+    Angle,
+    /// Base unit: second.
+    Time,
+    /// Base unit: hertz.
+    Frequency,
+    /// Base unit: 1/m.
+    Curvature,
+    /// Base unit: m/s.
+    Speed,
+    /// Base unit: newton.
+    Force,
+    /// Base unit: pascal.
+    Pressure,
+    /// Base unit: byte.
+    Data,
+    /// Base unit: degree Celsius.
+    Temperature,
+}
+
+impl Dimension {
+    /// Returns the name for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Switch => "switch",
+            Self::Text => "text",
+            Self::Count => "count",
+            Self::Ratio => "ratio",
+            Self::Length => "length",
+            Self::Angle => "angle",
+            Self::Time => "time",
+            Self::Frequency => "frequency",
+            Self::Curvature => "curvature",
+            Self::Speed => "speed",
+            Self::Force => "force",
+            Self::Pressure => "pressure",
+            Self::Data => "amount of data",
+            Self::Temperature => "temperature",
+        }
+    }
+}
+
+/// Unit of measure: one of a fixed list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     symbol: &'static str,
-    measures: &'static str,
+    dimension: Dimension,
     /// One unit is `numerator / denominator` base units; two numbers, so that decimal factors stay exact.
     numerator: f64,
     denominator: f64,
 }
 
-const fn unit(symbol: &'static str, measures: &'static str, numerator: f64, denominator: f64) -> Unit {
-    Unit { symbol, measures, numerator, denominator }
+const fn unit(symbol: &'static str, dimension: Dimension, numerator: f64, denominator: f64) -> Unit {
+    Unit { symbol, dimension, numerator, denominator }
 }
 
-/// Every unit that a value or an option may name. Temperatures are only accepted as they are: no other scale is in use.
+/// Every unit. Temperatures have one scale only.
 const UNITS: &[Unit] = &[
-    unit("m", "length", 1.0, 1.0),
-    unit("km", "length", 1000.0, 1.0),
-    unit("cm", "length", 1.0, 100.0),
-    unit("mm", "length", 1.0, 1000.0),
-    unit("um", "length", 1.0, 1e6),
-    unit("in", "length", 254.0, 10_000.0),
-    unit("ft", "length", 3048.0, 10_000.0),
-    unit("rad", "angle", 1.0, 1.0),
-    unit("mrad", "angle", 1.0, 1000.0),
-    unit("deg", "angle", PI, 180.0),
-    unit("s", "time", 1.0, 1.0),
-    unit("ms", "time", 1.0, 1000.0),
-    unit("us", "time", 1.0, 1e6),
-    unit("min", "time", 60.0, 1.0),
-    unit("h", "time", 3600.0, 1.0),
-    unit("d", "time", 86_400.0, 1.0),
-    unit("Hz", "frequency", 1.0, 1.0),
-    unit("kHz", "frequency", 1000.0, 1.0),
-    unit("MHz", "frequency", 1e6, 1.0),
-    unit("1/m", "curvature", 1.0, 1.0),
-    unit("1/km", "curvature", 1.0, 1000.0),
-    unit("1/mm", "curvature", 1000.0, 1.0),
-    unit("m/s", "speed", 1.0, 1.0),
-    unit("mm/s", "speed", 1.0, 1000.0),
-    unit("N", "force", 1.0, 1.0),
-    unit("kN", "force", 1000.0, 1.0),
-    unit("MN", "force", 1e6, 1.0),
-    unit("Pa", "pressure", 1.0, 1.0),
-    unit("MPa", "pressure", 1e6, 1.0),
-    unit("GPa", "pressure", 1e9, 1.0),
-    unit("B", "amount of data", 1.0, 1.0),
-    unit("kB", "amount of data", 1e3, 1.0),
-    unit("MB", "amount of data", 1e6, 1.0),
-    unit("GB", "amount of data", 1e9, 1.0),
-    unit("KiB", "amount of data", 1024.0, 1.0),
-    unit("MiB", "amount of data", 1_048_576.0, 1.0),
-    unit("GiB", "amount of data", 1_073_741_824.0, 1.0),
-    unit("degC", "temperature", 1.0, 1.0),
-    unit("1", "ratio", 1.0, 1.0),
-    unit("%", "ratio", 1.0, 100.0),
+    unit("m", Dimension::Length, 1.0, 1.0),
+    unit("km", Dimension::Length, 1000.0, 1.0),
+    unit("cm", Dimension::Length, 1.0, 100.0),
+    Unit::MILLIMETRE,
+    unit("um", Dimension::Length, 1.0, 1e6),
+    unit("in", Dimension::Length, 254.0, 10_000.0),
+    unit("ft", Dimension::Length, 3048.0, 10_000.0),
+    unit("rad", Dimension::Angle, 1.0, 1.0),
+    unit("mrad", Dimension::Angle, 1.0, 1000.0),
+    Unit::DEGREE,
+    Unit::SECOND,
+    Unit::MILLISECOND,
+    unit("us", Dimension::Time, 1.0, 1e6),
+    Unit::MINUTE,
+    unit("h", Dimension::Time, 3600.0, 1.0),
+    Unit::DAY,
+    unit("Hz", Dimension::Frequency, 1.0, 1.0),
+    unit("kHz", Dimension::Frequency, 1000.0, 1.0),
+    unit("MHz", Dimension::Frequency, 1e6, 1.0),
+    unit("1/m", Dimension::Curvature, 1.0, 1.0),
+    unit("1/km", Dimension::Curvature, 1.0, 1000.0),
+    unit("1/mm", Dimension::Curvature, 1000.0, 1.0),
+    unit("m/s", Dimension::Speed, 1.0, 1.0),
+    unit("mm/s", Dimension::Speed, 1.0, 1000.0),
+    unit("N", Dimension::Force, 1.0, 1.0),
+    Unit::KILONEWTON,
+    unit("MN", Dimension::Force, 1e6, 1.0),
+    unit("Pa", Dimension::Pressure, 1.0, 1.0),
+    unit("MPa", Dimension::Pressure, 1e6, 1.0),
+    unit("GPa", Dimension::Pressure, 1e9, 1.0),
+    unit("B", Dimension::Data, 1.0, 1.0),
+    unit("kB", Dimension::Data, 1e3, 1.0),
+    unit("MB", Dimension::Data, 1e6, 1.0),
+    unit("GB", Dimension::Data, 1e9, 1.0),
+    unit("KiB", Dimension::Data, 1024.0, 1.0),
+    unit("MiB", Dimension::Data, 1_048_576.0, 1.0),
+    unit("GiB", Dimension::Data, 1_073_741_824.0, 1.0),
+    Unit::CELSIUS,
+    Unit::ONE,
+    Unit::PERCENT,
 ];
 
 impl Unit {
-    /// Seconds.
-    pub const SECOND: Self = unit("s", "time", 1.0, 1.0);
-    /// Minutes.
-    pub const MINUTE: Self = unit("min", "time", 60.0, 1.0);
-    /// Days.
-    pub const DAY: Self = unit("d", "time", 86_400.0, 1.0);
-    /// The unit of what measures nothing.
-    pub const ONE: Self = unit("1", "ratio", 1.0, 1.0);
+    /// Millimetre.
+    pub const MILLIMETRE: Self = unit("mm", Dimension::Length, 1.0, 1000.0);
+    /// Degree of angle.
+    pub const DEGREE: Self = unit("deg", Dimension::Angle, PI, 180.0);
+    /// Second.
+    pub const SECOND: Self = unit("s", Dimension::Time, 1.0, 1.0);
+    /// Millisecond.
+    pub const MILLISECOND: Self = unit("ms", Dimension::Time, 1.0, 1000.0);
+    /// Minute.
+    pub const MINUTE: Self = unit("min", Dimension::Time, 60.0, 1.0);
+    /// Day.
+    pub const DAY: Self = unit("d", Dimension::Time, 86_400.0, 1.0);
+    /// Kilonewton.
+    pub const KILONEWTON: Self = unit("kN", Dimension::Force, 1000.0, 1.0);
+    /// Degree Celsius.
+    pub const CELSIUS: Self = unit("degC", Dimension::Temperature, 1.0, 1.0);
+    /// Pure number.
+    pub const ONE: Self = unit("1", Dimension::Ratio, 1.0, 1.0);
+    /// Hundredth.
+    pub const PERCENT: Self = unit("%", Dimension::Ratio, 1.0, 100.0);
 
-    /// What it measures: "length", "time".
-    pub fn measures(&self) -> &'static str {
-        self.measures
+    /// Returns the quantity measured.
+    pub fn dimension(&self) -> Dimension {
+        self.dimension
+    }
+
+    /// Returns the number of base units in one of this unit.
+    pub fn factor(&self) -> f64 {
+        self.numerator / self.denominator
+    }
+
+    /// Returns whether a register field of `dimension` may have this unit. A pure number stands for the base unit, except
+    /// where registers commonly hold another one.
+    pub fn fits(&self, dimension: Dimension) -> bool {
+        let explicit = matches!(dimension, Dimension::Length | Dimension::Angle | Dimension::Force);
+        self.dimension == dimension || (*self == Self::ONE && !explicit)
+    }
+
+    /// Returns the units that a register field of `dimension` may have, with their symbols.
+    pub(crate) fn fitting(dimension: Dimension) -> Vec<(&'static str, Self)> {
+        UNITS.iter().filter(|unit| unit.fits(dimension)).map(|unit| (unit.symbol, *unit)).collect()
     }
 
     /// The unit with this symbol; `µ` and `°` are accepted for `u` and `deg`.
@@ -106,25 +190,26 @@ impl Unit {
         let given = Self::find(symbol).ok_or_else(|| {
             format!("found {text:?} with the unknown unit \"{symbol}\", allowed {}", self.family())
         })?;
-        if given.measures != self.measures {
+        if given.dimension != self.dimension {
             return Err(format!(
                 "found {text:?}, which is {}, expected {} in {}",
-                given.measures,
-                self.measures,
+                given.dimension.name(),
+                self.dimension.name(),
                 self.family()
             ));
         }
         Ok(given.to(number, *self))
     }
 
-    /// Converts a value of this unit to `other`, which measures the same.
+    /// Converts a value of this unit to `other` of the same dimension.
     pub(crate) fn to(self, value: f64, other: Self) -> f64 {
         value * (self.numerator * other.denominator) / (self.denominator * other.numerator)
     }
 
     /// All symbols that convert to this unit.
     fn family(&self) -> String {
-        let family: Vec<_> = UNITS.iter().filter(|u| u.measures == self.measures).map(|u| u.symbol).collect();
+        let family: Vec<_> =
+            UNITS.iter().filter(|u| u.dimension == self.dimension).map(|u| u.symbol).collect();
         family.join(", ")
     }
 }

@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
-use platen_plant::PlantFile;
 use platen_plant::press::{
-    AddressBase, Input, Kind, Mode, Output, Place, Press, Profile, RegisterMap, Role, Transport, Unit,
-    WordOrder,
+    AddressBase, Input, Mode, Output, Press, Profile, RegisterMap, RegisterPlace, RegisterType, Role,
+    Transport, WordOrder,
 };
+use platen_plant::{PlantFile, Unit};
 
 const LINK: &str =
     "[press]\nname = \"Press 3\"\npress_id = 3\n[press.link]\nhost = \"192.0.2.10\"\nunit = 1\n";
@@ -68,20 +68,26 @@ max_writes_per_s = 5
     assert_eq!((map.address_base, map.read.start, map.write.start), (AddressBase::FiveDigits, 200, 300));
     assert_eq!(press.timeouts.heartbeat_in.as_millis(), 5000);
     let trigger = map.input(Input::Trigger).unwrap();
-    assert_eq!((trigger.place, trigger.active_low, trigger.debounce_reads), (Place::Bit(34, 0), true, 3));
-    assert_eq!(map.input(Input::StrokeId).unwrap().place, Place::Register(35));
+    assert_eq!(
+        (trigger.place, trigger.active_low, trigger.debounce_reads),
+        (RegisterPlace::Bit(34, 0), true, 3)
+    );
+    assert_eq!(map.input(Input::StrokeId).unwrap().place, RegisterPlace::Register(35));
     assert_eq!((map.counter.wrap, map.counter.first), (9999, 0));
     assert_eq!(map.input(Input::StrokeIdTail), None);
     let thickness = map.input(Input::Thickness).unwrap();
-    assert_eq!((thickness.kind, thickness.scale, thickness.unit), (Kind::F32, 1.0, Unit::Inch));
+    assert_eq!(
+        (thickness.kind, thickness.scale, thickness.unit),
+        (RegisterType::F32, 1.0, Unit::find("in").unwrap())
+    );
     assert_eq!((thickness.order, thickness.min, thickness.max), (WordOrder::Cdab, Some(0.1), Some(5.0)));
-    assert_eq!(map.input(Input::ClearToScan).unwrap().place, Place::Constant(1.0));
+    assert_eq!(map.input(Input::ClearToScan).unwrap().place, RegisterPlace::Constant(1.0));
     assert_eq!(map.input(Input::PartId).unwrap().order, WordOrder::Abcd);
-    assert_eq!(map.input(Input::PartName).unwrap().kind, Kind::Ascii { registers: 6 });
+    assert_eq!(map.input(Input::PartName).unwrap().kind, RegisterType::Ascii { registers: 6 });
     let dev_max = map.output(Output::DevMax).unwrap();
-    assert_eq!((dev_max.kind, dev_max.invalid), (Kind::I32, Some(0x8000_0000)));
+    assert_eq!((dev_max.kind, dev_max.invalid), (RegisterType::I32, Some(0x8000_0000)));
     assert_eq!(dev_max.from.unwrap().name(), "gap.max");
-    assert_eq!(map.output(Output::StatusReady).unwrap().place, Place::Bit(2, 15));
+    assert_eq!(map.output(Output::StatusReady).unwrap().place, RegisterPlace::Bit(2, 15));
     assert_eq!((press.write.to_string().as_str(), press.write.max_writes_per_s), ("300..=369", 5));
 }
 

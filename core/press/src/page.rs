@@ -8,7 +8,10 @@ pub use alarms::alarms_csv;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use platen_plant::press::{Block, Field, Input, Kind, Output, Place, Press, Role, Table, Unit};
+use platen_plant::Unit;
+use platen_plant::press::{
+    Block, Input, Output, Press, RegisterField, RegisterPlace, RegisterTable, RegisterType, Role,
+};
 
 use serde::Serialize;
 
@@ -19,16 +22,19 @@ struct Row {
     offset: Option<u16>,
     bit: Option<u8>,
     name: &'static str,
-    field: Field,
+    field: RegisterField,
     meaning: &'static str,
     /// The number that the plant file asks for elsewhere than in the field.
     must_be: Option<u16>,
 }
 
-fn rows<N: Copy>(fields: &BTreeMap<N, Field>, about: impl Fn(N) -> (&'static str, &'static str)) -> Vec<Row> {
-    let row = |(&name, field): (&N, &Field)| {
+fn rows<N: Copy>(
+    fields: &BTreeMap<N, RegisterField>,
+    about: impl Fn(N) -> (&'static str, &'static str),
+) -> Vec<Row> {
+    let row = |(&name, field): (&N, &RegisterField)| {
         let (name, meaning) = about(name);
-        let bit = if let Place::Bit(_, bit) = field.place { Some(bit) } else { None };
+        let bit = if let RegisterPlace::Bit(_, bit) = field.place { Some(bit) } else { None };
         Row { offset: field.place.offset(), bit, name, field: field.clone(), meaning, must_be: None }
     };
     let mut rows: Vec<_> = fields.iter().map(row).collect();
@@ -58,7 +64,7 @@ impl Row {
     /// The same in Modicon notation.
     fn modicon(&self, block: &Block) -> String {
         let Some(offset) = self.offset else { return "-".into() };
-        let first = if block.table == Table::Holding { 400_001 } else { 300_001 };
+        let first = if block.table == RegisterTable::Holding { 400_001 } else { 300_001 };
         self.numbers(first + u32::from(block.start) + u32::from(offset))
     }
 
@@ -73,9 +79,12 @@ impl Row {
     fn kind(&self) -> String {
         let field = &self.field;
         let list = if field.count > 1 { format!("{} x ", field.count) } else { String::new() };
-        let order =
-            if matches!(field.kind, Kind::U32 | Kind::I32 | Kind::F32) { field.order.name() } else { "" };
-        let text = if let Kind::Ascii { registers } = field.kind {
+        let order = if matches!(field.kind, RegisterType::U32 | RegisterType::I32 | RegisterType::F32) {
+            field.order.name()
+        } else {
+            ""
+        };
+        let text = if let RegisterType::Ascii { registers } = field.kind {
             format!(" {}", 2 * registers)
         } else {
             String::new()
@@ -100,9 +109,9 @@ impl Row {
     fn step(&self) -> String {
         let field = &self.field;
         match (field.unit, field.scale) {
-            (Unit::One, 1.0) => String::new(),
-            (Unit::One, scale) => scale.to_string(),
-            (unit, scale) => format!("{scale} {}", unit.name()),
+            (Unit::ONE, 1.0) => String::new(),
+            (Unit::ONE, scale) => scale.to_string(),
+            (unit, scale) => format!("{scale} {}", unit.symbol()),
         }
     }
 
@@ -113,7 +122,7 @@ impl Row {
         if let Some(number) = self.must_be {
             notes.push(format!("must be {number}"));
         }
-        if let Place::Constant(number) = field.place {
+        if let RegisterPlace::Constant(number) = field.place {
             notes.push(format!("always {number}"));
         }
         if let Some(expected) = field.expect {
@@ -124,7 +133,12 @@ impl Row {
         }
         if field.min.is_some() || field.max.is_some() {
             let limit = |limit: Option<f64>| limit.map_or(String::new(), |limit| limit.to_string());
-            notes.push(format!("plausible {}..{} {}", limit(field.min), limit(field.max), field.unit.name()));
+            notes.push(format!(
+                "plausible {}..{} {}",
+                limit(field.min),
+                limit(field.max),
+                field.unit.symbol()
+            ));
         }
         if field.active_low {
             notes.push("0 = yes".into());
@@ -148,7 +162,7 @@ pub fn map_markdown(press: &Press) -> String {
     page += "Addresses are zero-based, as on the wire; beside them in 6-digit notation.\n";
     list(&mut page, "Connection", &rules::connection(press));
     list(&mut page, "How to read the tables", &rules::notation(press));
-    let functions = |table| if table == Table::Holding { "function 3" } else { "function 4" };
+    let functions = |table| if table == RegisterTable::Holding { "function 3" } else { "function 4" };
     let (read, write) = (&map.read, &map.write);
     let (to_host, to_press) = if press.role == Role::Server {
         ("the press writes", format!("the press reads {} registers with function 3", write.count))

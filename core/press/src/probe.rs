@@ -1,6 +1,6 @@
 //! Which order of words and which address a press means: every reading of the registers round an address.
 
-use platen_plant::press::{Kind, WordOrder};
+use platen_plant::press::{RegisterType, WordOrder};
 
 use crate::codec::{bits, raw_number};
 
@@ -10,7 +10,7 @@ pub struct Reading {
     /// Registers away from the address asked for: manuals that count from 1 give one too many.
     pub shift: i8,
     /// How the 32 bits are read.
-    pub kind: Kind,
+    pub kind: RegisterType,
     /// Order of the words and bytes.
     pub order: WordOrder,
     /// The two registers.
@@ -32,7 +32,7 @@ pub fn readings(around: &[u16]) -> Vec<Reading> {
     let mut readings = Vec::new();
     for (shift, words) in (-1i8..=1).zip(around.windows(2)) {
         let words = [words[0], words[1]];
-        for kind in [Kind::F32, Kind::I32, Kind::U32] {
+        for kind in [RegisterType::F32, RegisterType::I32, RegisterType::U32] {
             for order in WordOrder::ALL {
                 if let Some(bits) = bits(kind, order, &words) {
                     readings.push(Reading { shift, kind, order, words, number: raw_number(kind, bits) });
@@ -50,7 +50,7 @@ mod tests {
     /// Raw words from the bits of -12.5 (C1480000) and of 0x12345678, never from a library's names of the orders.
     #[test]
     fn names_the_order_and_the_shift_of_known_words() {
-        let found = |around: &[u16], expected: f64| -> Vec<(i8, Kind, WordOrder)> {
+        let found = |around: &[u16], expected: f64| -> Vec<(i8, RegisterType, WordOrder)> {
             let right = readings(around).into_iter().filter(|reading| reading.is(expected));
             right.map(|reading| (reading.shift, reading.kind, reading.order)).collect()
         };
@@ -61,12 +61,12 @@ mod tests {
             (WordOrder::Dcba, [0x0000, 0x48C1]),
         ] {
             let [a, b] = words;
-            assert_eq!(found(&[9, a, b, 9], -12.5), [(0, Kind::F32, order)]);
-            assert_eq!(found(&[a, b, 9, 9], -12.5), [(-1, Kind::F32, order)]);
-            assert_eq!(found(&[9, 9, a, b], -12.5), [(1, Kind::F32, order)]);
+            assert_eq!(found(&[9, a, b, 9], -12.5), [(0, RegisterType::F32, order)]);
+            assert_eq!(found(&[a, b, 9, 9], -12.5), [(-1, RegisterType::F32, order)]);
+            assert_eq!(found(&[9, 9, a, b], -12.5), [(1, RegisterType::F32, order)]);
         }
         let both = found(&[0, 0x5678, 0x1234, 0], f64::from(0x1234_5678));
-        assert_eq!(both, [(0, Kind::I32, WordOrder::Cdab), (0, Kind::U32, WordOrder::Cdab)]);
+        assert_eq!(both, [(0, RegisterType::I32, WordOrder::Cdab), (0, RegisterType::U32, WordOrder::Cdab)]);
         assert_eq!(found(&[1, 2, 3, 4], -12.5), []);
     }
 

@@ -7,7 +7,7 @@
 
 use std::time::Duration;
 
-use platen_plant::press::{Mode, Output, Place, Press, RegisterMap};
+use platen_plant::press::{Mode, Output, Press, RegisterMap, RegisterPlace};
 use tokio::time::Instant;
 
 use crate::{Client, HostImage, Link, LinkError};
@@ -167,11 +167,11 @@ impl Reconciler {
     fn shows_valid(&self, words: &[u16]) -> bool {
         let field = self.map.output(Output::StatusResultValid);
         field.is_some_and(|field| match field.place {
-            Place::Bit(offset, bit) => {
+            RegisterPlace::Bit(offset, bit) => {
                 words.get(usize::from(offset)).is_some_and(|word| (word >> bit & 1 == 1) != field.active_low)
             }
-            Place::Register(offset) => words.get(usize::from(offset)).is_some_and(|&word| word != 0),
-            Place::Constant(_) => false,
+            RegisterPlace::Register(offset) => words.get(usize::from(offset)).is_some_and(|&word| word != 0),
+            RegisterPlace::Constant(_) => false,
         })
     }
 

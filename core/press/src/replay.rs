@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use platen_plant::press::{Field, Output, Place, Press, RegisterMap};
+use platen_plant::press::{Output, Press, RegisterField, RegisterMap, RegisterPlace};
 
 use crate::codec::{bits, raw_number};
 use crate::{
@@ -167,9 +167,9 @@ fn stand_in() -> Measurement {
 
 /// The number in a field of the host's block.
 fn number(map: &RegisterMap, output: Output, words: &[u16]) -> Option<u16> {
-    let field: &Field = map.output(output)?;
+    let field: &RegisterField = map.output(output)?;
     let start = usize::from(field.place.offset()?);
-    if let Place::Bit(_, bit) = field.place {
+    if let RegisterPlace::Bit(_, bit) = field.place {
         return Some(u16::from((words.get(start)? >> bit & 1 == 1) != field.active_low));
     }
     let words = words.get(start..start + usize::from(field.kind.registers()))?;

@@ -4,13 +4,13 @@
 
 use std::time::Duration;
 
-use platen_plant::press::{Link, Press, Table};
+use platen_plant::press::{Link, Press, RegisterTable};
 use platen_press::{Client, LinkError, ModbusLink};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
 const BLOCK: platen_plant::press::Block =
-    platen_plant::press::Block { table: Table::Holding, start: 0, count: 3 };
+    platen_plant::press::Block { table: RegisterTable::Holding, start: 0, count: 3 };
 
 /// A peer that answers each request frame of each connection with what `answer` makes of it.
 async fn peer(

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use bench::{Memory, Plc, SharedPlc};
 use platen_model::StrokeKey;
-use platen_plant::press::{Block, Link, Press, Quiet, Serial, Table, Transport};
+use platen_plant::press::{Block, Link, Press, Quiet, RegisterTable, Serial, Transport};
 use platen_press::{Answer, Client, ModbusLink, channels, run_press};
 use serialport::{SerialPort, TTYPort};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -190,7 +190,7 @@ async fn no_read_returns_what_another_asked_for() {
         if !client.connected() {
             client.connect().await.unwrap();
         }
-        let block = Block { table: Table::Holding, start: i % 20 * 8, count: 8 };
+        let block = Block { table: RegisterTable::Holding, start: i % 20 * 8, count: 8 };
         match client.read(&block, 8).await {
             Ok(words) if words[0] == block.start => right += 1,
             Ok(_) => wrong += 1,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::document::Reported;
-use crate::{Table, Unit};
+use crate::{TomlTable, Unit};
 
 /// Where the calibration stands and when it holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct CalibrationUse {
 }
 
 impl CalibrationUse {
-    pub(super) fn read(mut table: Table<'_>, plant_folder: &Path) -> Result<Self, Reported> {
+    pub(super) fn read(mut table: TomlTable<'_>, plant_folder: &Path) -> Result<Self, Reported> {
         let file = table.name("file").map(|file| plant_folder.join(file)).required();
         let max_age = time(&mut table, "max_age", Unit::DAY).optional();
         let warm_up = time(&mut table, "warm_up", Unit::MINUTE).or(Duration::ZERO);
@@ -28,7 +28,7 @@ impl CalibrationUse {
 }
 
 /// A time as a text with its unit, or in `unit` where it names none.
-fn time<'d>(table: &mut Table<'d>, key: &str, unit: Unit) -> crate::Field<'d, Duration> {
+fn time<'d>(table: &mut TomlTable<'d>, key: &str, unit: Unit) -> crate::TomlKey<'d, Duration> {
     table.string(key).try_map(|text| {
         let value = unit.read(&text)?;
         Duration::try_from_secs_f64(unit.to(value, Unit::SECOND))

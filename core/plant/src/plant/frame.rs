@@ -1,6 +1,6 @@
 //! `[frame]`: how the scanner stands to the press and the plate.
 
-use crate::Table;
+use crate::TomlTable;
 use crate::document::Reported;
 
 /// Rows of a rotation may be written with few digits: this far from orthonormal is still meant as one. Three digits.
@@ -44,7 +44,7 @@ impl Default for RigidTransform {
 }
 
 impl Frame {
-    pub(super) fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+    pub(super) fn read(mut table: TomlTable<'_>) -> Result<Self, Reported> {
         let press_from_scanner = table.section("press_from_scanner").and_then(RigidTransform::read);
         let u_axis = table.vector::<3>("u_axis").check(|axis| match dot(axis, axis) > 0.0 {
             true => Ok(()),
@@ -59,7 +59,7 @@ impl Frame {
 }
 
 impl RegionOfInterest {
-    fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+    fn read(mut table: TomlTable<'_>) -> Result<Self, Reported> {
         let min = table.vector::<3>("min_mm").required();
         let max = table.vector::<3>("max_mm").located().required();
         let document = table.document();
@@ -75,7 +75,7 @@ impl RegionOfInterest {
 }
 
 impl RigidTransform {
-    fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+    fn read(mut table: TomlTable<'_>) -> Result<Self, Reported> {
         let default = Self::default();
         let rotation = table.matrix::<3, 3>("rotation").try_map(orthonormal).or(default.rotation);
         let translation =

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use crate::document::{Document, Reported};
 use crate::press::Press;
-use crate::{Error, Faults, Table};
+use crate::{Error, Faults, TomlTable};
 
 /// Used where the plant file names no flattening.
 const FLATTENING: &str = "elastic";
@@ -135,7 +135,7 @@ impl PlantFile {
         document.finish(plant)
     }
 
-    fn read(mut root: Table<'_>, stem: &str, folder: &Path) -> Result<Self, Reported> {
+    fn read(mut root: TomlTable<'_>, stem: &str, folder: &Path) -> Result<Self, Reported> {
         let default = Self::default();
         let plant = root.section("plant").and_then(|mut table| {
             let name = table.name("name").or(stem.to_owned());
@@ -144,7 +144,7 @@ impl PlantFile {
             Ok((name?, seed?))
         });
         let scanner = root.table("scanner").optional();
-        let window = |table: &mut Table<'_>| table.choice("window", &WINDOWS).or(default.scan_window);
+        let window = |table: &mut TomlTable<'_>| table.choice("window", &WINDOWS).or(default.scan_window);
         let scanner =
             scanner.and_then(|table| table.map(|table| PluginUse::read_with(table, window)).transpose());
         let press = root.table("press").optional();

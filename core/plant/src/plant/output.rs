@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::document::Reported;
-use crate::node::Kind;
+use crate::node::NodeKind;
 use crate::table::number;
-use crate::{Table, Unit};
+use crate::{TomlTable, Unit};
 
 /// Raw scans are some tens of megabytes each: a month of strokes fits a usual disk.
 const KEEP_SCANS: Duration = Duration::from_secs(30 * 86_400);
@@ -38,13 +38,13 @@ impl Output {
         Self { folder: results, history, keep_scans: KeepScans::For(KEEP_SCANS) }
     }
 
-    pub(super) fn read(mut table: Table<'_>, plant_folder: &Path) -> Result<Self, Reported> {
+    pub(super) fn read(mut table: TomlTable<'_>, plant_folder: &Path) -> Result<Self, Reported> {
         let default = Self::in_folder(plant_folder);
         let folder = table.name("folder").map(|folder| plant_folder.join(folder)).or(default.folder);
         let history = table.name("history").map(|history| plant_folder.join(history)).optional();
         let keep_scans = table.node("keep_scans").try_map(|node| match (&node.kind, number(node)) {
-            (Kind::String(word), _) if word == "always" => Ok(KeepScans::Always),
-            (Kind::String(text), _) => {
+            (NodeKind::String(word), _) if word == "always" => Ok(KeepScans::Always),
+            (NodeKind::String(text), _) => {
                 Unit::DAY.read(text).map_err(|fault| format!("{fault}, or \"always\"")).and_then(keep)
             }
             (_, Some(days)) => keep(days),

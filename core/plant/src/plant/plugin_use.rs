@@ -1,8 +1,8 @@
 //! One plugin as the plant file names it.
 
 use crate::document::Reported;
-use crate::field::Located;
-use crate::{Fault, RawOptions, Table};
+use crate::key::Located;
+use crate::{Fault, RawOptions, TomlTable};
 
 /// One plugin as the plant file names it, its options not yet checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,14 +21,14 @@ impl PluginUse {
         Self { plugin: plugin.to_owned(), options: RawOptions::none(plugin), template: None }
     }
 
-    pub(super) fn read(table: Table<'_>) -> Result<Self, Reported> {
+    pub(super) fn read(table: TomlTable<'_>) -> Result<Self, Reported> {
         Self::read_with(table, |_| Ok(())).map(|(plugin, ())| plugin)
     }
 
     /// A plugin in a table that holds further keys, which `more` reads.
     pub(super) fn read_with<T>(
-        mut table: Table<'_>,
-        more: impl FnOnce(&mut Table<'_>) -> Result<T, Reported>,
+        mut table: TomlTable<'_>,
+        more: impl FnOnce(&mut TomlTable<'_>) -> Result<T, Reported>,
     ) -> Result<(Self, T), Reported> {
         let plugin = table.name("plugin").located().required();
         let options = table.options("options");

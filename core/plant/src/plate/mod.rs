@@ -11,7 +11,7 @@ use std::path::Path;
 use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Template};
 
 use crate::document::{Document, Reported};
-use crate::{Error, Faults, Table};
+use crate::{Error, Faults, TomlTable};
 use place::{Names, Rectangle};
 
 /// Smallest and largest side of a plate, millimetres: wide round the 2-5 m of the trade, narrow enough to catch metres.
@@ -67,7 +67,7 @@ impl PlateFile {
         document.finish(file)
     }
 
-    fn read(mut root: Table<'_>) -> Result<Self, Reported> {
+    fn read(mut root: TomlTable<'_>) -> Result<Self, Reported> {
         let mut rectangle = None;
         let plate = root.table("plate").required().and_then(|table| read_plate(table, &mut rectangle));
         let target = root.table("target").optional();
@@ -93,9 +93,9 @@ impl PlateFile {
 
 /// Reads every element of an array of tables; `read` also gets the names taken so far.
 fn read_all<'d, T>(
-    root: &mut Table<'d>,
+    root: &mut TomlTable<'d>,
     key: &str,
-    mut read: impl FnMut(Table<'d>, &mut Names) -> T,
+    mut read: impl FnMut(TomlTable<'d>, &mut Names) -> T,
 ) -> Result<Vec<T>, Reported> {
     let mut names = Names::default();
     let mut all = Vec::new();
@@ -107,7 +107,7 @@ fn read_all<'d, T>(
 }
 
 /// Also sets `rectangle`, when both sides are sound, whatever else is not.
-fn read_plate(mut table: Table<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
+fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
     let id = table.name("id").required();
     let width = table.number("width_mm").in_range(SIDE_MM).required();
     let height = table.number("height_mm").in_range(SIDE_MM).required();
@@ -144,7 +144,7 @@ fn read_plate(mut table: Table<'_>, rectangle: &mut Option<Rectangle>) -> Result
 }
 
 fn read_marker(
-    mut table: Table<'_>,
+    mut table: TomlTable<'_>,
     names: &mut Names,
     plate: Option<Rectangle>,
 ) -> Result<Marker, Reported> {
@@ -154,13 +154,13 @@ fn read_marker(
     Ok(Marker { name: name?, at: at? })
 }
 
-fn read_support(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Support, Reported> {
+fn read_support(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Support, Reported> {
     let at = place::point(&mut table, "at_mm", plate);
     table.finish();
     Ok(Support { at: at? })
 }
 
-fn read_line(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {
+fn read_line(mut table: TomlTable<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {
     let name = names.take(&mut table);
     let from = place::point(&mut table, "from_mm", plate);
     let to = place::point(&mut table, "to_mm", plate);
@@ -177,7 +177,7 @@ fn read_line(mut table: Table<'_>, names: &mut Names, plate: Option<Rectangle>) 
 }
 
 fn read_station(
-    mut table: Table<'_>,
+    mut table: TomlTable<'_>,
     names: &mut Names,
     plate: Option<Rectangle>,
 ) -> Result<Station, Reported> {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{metres, millimetres};
 use crate::document::Reported;
-use crate::{Place, Table};
+use crate::{Place, TomlTable};
 
 /// The plate's original rectangle, metres.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +23,7 @@ impl Rectangle {
 
 /// A point in millimetres on the plate, its edge included; metres.
 pub(super) fn point(
-    table: &mut Table<'_>,
+    table: &mut TomlTable<'_>,
     key: &str,
     plate: Option<Rectangle>,
 ) -> Result<[f64; 2], Reported> {
@@ -52,7 +52,7 @@ pub(super) struct Names {
 
 impl Names {
     /// The table's name, which no table before it has.
-    pub(super) fn take(&mut self, table: &mut Table<'_>) -> Result<String, Reported> {
+    pub(super) fn take(&mut self, table: &mut TomlTable<'_>) -> Result<String, Reported> {
         let name = table.name("name").located().required()?;
         self.claim(table, name.value, name.place)
     }
@@ -60,7 +60,7 @@ impl Names {
     /// Notes that `name` is taken at `place`.
     pub(super) fn claim(
         &mut self,
-        table: &Table<'_>,
+        table: &TomlTable<'_>,
         name: String,
         place: Place,
     ) -> Result<String, Reported> {

@@ -7,8 +7,8 @@ use platen_model::{Facing, RadiusOf, Target, TargetShape};
 use super::place::Rectangle;
 use super::{metres, millimetres};
 use crate::document::Reported;
-use crate::field::Located;
-use crate::{Document, Table};
+use crate::key::Located;
+use crate::{Document, TomlTable};
 
 #[derive(Debug, Clone, Copy)]
 enum Word {
@@ -27,7 +27,7 @@ const SHAPES: &[(&str, Word)] = &[
     ("torus", Word::Torus),
 ];
 
-pub(super) fn read(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Target, Reported> {
+pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Target, Reported> {
     // Without the shape nobody knows which keys belong here: only this one is reported.
     let word = table.choice("shape", SHAPES).required()?;
     let shape = shape_of(word, &mut table, plate);
@@ -48,7 +48,11 @@ pub(super) fn read(mut table: Table<'_>, plate: Option<Rectangle>) -> Result<Tar
     faces?;
     Ok(Target { shape: shape?, ..target })
 }
-fn shape_of(word: Word, table: &mut Table<'_>, plate: Option<Rectangle>) -> Result<TargetShape, Reported> {
+fn shape_of(
+    word: Word,
+    table: &mut TomlTable<'_>,
+    plate: Option<Rectangle>,
+) -> Result<TargetShape, Reported> {
     match word {
         Word::Flat => Ok(TargetShape::Flat),
         Word::Sphere => Ok(TargetShape::Sphere { radius: radius(table, "radius_mm", plate)? }),
@@ -75,11 +79,11 @@ fn shape_of(word: Word, table: &mut Table<'_>, plate: Option<Rectangle>) -> Resu
 }
 
 /// Direction of the straight lines. Required: no direction is the usual one.
-fn axis(table: &mut Table<'_>) -> Result<f64, Reported> {
+fn axis(table: &mut TomlTable<'_>) -> Result<f64, Reported> {
     table.number("axis_deg").in_range(-180.0..=180.0).map(f64::to_radians).required()
 }
 
-fn radius(table: &mut Table<'_>, key: &str, plate: Option<Rectangle>) -> Result<f64, Reported> {
+fn radius(table: &mut TomlTable<'_>, key: &str, plate: Option<Rectangle>) -> Result<f64, Reported> {
     table.number(key).check(|mm| reaches(*mm, *mm, plate)).map(metres).required()
 }
 

@@ -5,8 +5,8 @@ use platen_model::{Centre, ReferenceLine, Seat, Template};
 use super::place::Names;
 use super::{NamedLine, metres, millimetres};
 use crate::document::Reported;
-use crate::field::Located;
-use crate::{Document, Table, nearest};
+use crate::key::Located;
+use crate::{Document, TomlTable, nearest};
 
 /// A rule of the trade: what a template takes from it unless the file says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ pub const PRESETS: &[Preset] = &[
 ];
 
 pub(super) fn read(
-    mut table: Table<'_>,
+    mut table: TomlTable<'_>,
     names: &mut Names,
     lines: Result<&[NamedLine], Reported>,
 ) -> Result<Template, Reported> {
@@ -95,7 +95,7 @@ impl Preset {
 
 /// Length and limit of the board, millimetres, from the file or from its preset.
 fn board(
-    table: &mut Table<'_>,
+    table: &mut TomlTable<'_>,
     preset: &Result<Option<Located<Preset>>, Reported>,
 ) -> (Result<Located<f64>, Reported>, Result<f64, Reported>) {
     let chord = table.number("chord_mm").above(0.0).located();
@@ -111,7 +111,7 @@ fn board(
 }
 
 /// The name given, or one from the place in the file: the second template is T2.
-fn name(table: &mut Table<'_>, names: &mut Names) -> Result<String, Reported> {
+fn name(table: &mut TomlTable<'_>, names: &mut Names) -> Result<String, Reported> {
     let default = Located { value: format!("T{}", names.number), place: table.place().clone() };
     let name = table.name("name").located().or(default)?;
     names.claim(table, name.value, name.place)
@@ -141,10 +141,10 @@ fn on_line<'a>(
 }
 
 /// `centre_mm`: a number along the line, or "worst".
-fn centre(table: &mut Table<'_>) -> Result<Option<Located<Centre>>, Reported> {
+fn centre(table: &mut TomlTable<'_>) -> Result<Option<Located<Centre>>, Reported> {
     let centre = table.node("centre_mm").try_map(|node| match (&node.kind, crate::table::number(node)) {
         (_, Some(mm)) => Ok(Centre::At(metres(mm))),
-        (crate::node::Kind::String(word), _) if word == "worst" => Ok(Centre::Worst),
+        (crate::node::NodeKind::String(word), _) if word == "worst" => Ok(Centre::Worst),
         _ => Err(format!("found {}, expected a number or \"worst\"", node.describe())),
     });
     centre.located().optional()

@@ -93,7 +93,8 @@ mod tests {
 
     #[test]
     fn an_empty_block_allows_nothing() {
-        let allow = WriteAllow::block(&Block { table: crate::press::Table::Holding, start: 0, count: 0 });
+        let allow =
+            WriteAllow::block(&Block { table: crate::press::RegisterTable::Holding, start: 0, count: 0 });
         assert!(allow.check(0, 1).is_err());
     }
 }

@@ -1,131 +1,10 @@
 //! One field of a register map: where it stands, how its words are read, and what its number means.
 
-/// What a field's number measures; a unit must measure the same.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dimension {
-    /// One bit.
-    Switch,
-    /// A pure number: a counter, a code, an identity.
-    Count,
-    /// Characters.
-    Text,
-    /// Metres inside.
-    Length,
-    /// Radians inside.
-    Angle,
-    /// A share of one inside.
-    Share,
-    /// Newtons inside.
-    Force,
-    /// Degrees Celsius inside.
-    Temperature,
-    /// Seconds inside.
-    Time,
-}
-
-/// Unit of a scaled register value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// A pure number.
-    One,
-    /// Metre.
-    Metre,
-    /// Millimetre.
-    Millimetre,
-    /// Micrometre.
-    Micrometre,
-    /// International inch, 25.4 mm.
-    Inch,
-    /// Radian.
-    Radian,
-    /// Degree.
-    Degree,
-    /// Hundredth.
-    Percent,
-    /// Newton.
-    Newton,
-    /// Kilonewton.
-    Kilonewton,
-    /// Degree Celsius.
-    Celsius,
-    /// Second.
-    Second,
-    /// Millisecond.
-    Millisecond,
-}
-
-impl Unit {
-    /// All of them.
-    pub const ALL: &'static [Self] = &[
-        Self::One,
-        Self::Metre,
-        Self::Millimetre,
-        Self::Micrometre,
-        Self::Inch,
-        Self::Radian,
-        Self::Degree,
-        Self::Percent,
-        Self::Newton,
-        Self::Kilonewton,
-        Self::Celsius,
-        Self::Second,
-        Self::Millisecond,
-    ];
-
-    /// The unit's sign in the plant file and on the map's page.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::One => "1",
-            Self::Metre => "m",
-            Self::Millimetre => "mm",
-            Self::Micrometre => "um",
-            Self::Inch => "in",
-            Self::Radian => "rad",
-            Self::Degree => "deg",
-            Self::Percent => "%",
-            Self::Newton => "N",
-            Self::Kilonewton => "kN",
-            Self::Celsius => "degC",
-            Self::Second => "s",
-            Self::Millisecond => "ms",
-        }
-    }
-
-    /// The unit of this sign, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|unit| unit.name() == name)
-    }
-
-    /// How many of the inside unit (metre, radian, share of one, newton, degree Celsius, second) one of it is.
-    pub fn factor(self) -> f64 {
-        match self {
-            Self::One | Self::Metre | Self::Radian | Self::Newton | Self::Celsius | Self::Second => 1.0,
-            Self::Millimetre | Self::Millisecond => 1e-3,
-            Self::Micrometre => 1e-6,
-            Self::Inch => 0.0254,
-            Self::Degree => std::f64::consts::PI / 180.0,
-            Self::Percent => 1e-2,
-            Self::Kilonewton => 1e3,
-        }
-    }
-
-    /// Whether a field of this dimension may have this unit.
-    pub fn measures(self, dimension: Dimension) -> bool {
-        match self {
-            Self::One => !matches!(dimension, Dimension::Length | Dimension::Angle | Dimension::Force),
-            Self::Metre | Self::Millimetre | Self::Micrometre | Self::Inch => dimension == Dimension::Length,
-            Self::Radian | Self::Degree => dimension == Dimension::Angle,
-            Self::Percent => dimension == Dimension::Share,
-            Self::Newton | Self::Kilonewton => dimension == Dimension::Force,
-            Self::Celsius => dimension == Dimension::Temperature,
-            Self::Second | Self::Millisecond => dimension == Dimension::Time,
-        }
-    }
-}
+use crate::Unit;
 
 /// How the words of a field are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum RegisterType {
     /// One bit of a register.
     Bool,
     /// Unsigned, one register.
@@ -145,7 +24,7 @@ pub enum Kind {
     },
 }
 
-impl Kind {
+impl RegisterType {
     /// Registers of one value.
     pub fn registers(self) -> u16 {
         match self {
@@ -217,7 +96,7 @@ impl WordOrder {
 
 /// Where a field stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Place {
+pub enum RegisterPlace {
     /// From this register of its block on.
     Register(u16),
     /// One bit (0 the lowest) of this register of its block.
@@ -226,7 +105,7 @@ pub enum Place {
     Constant(f64),
 }
 
-impl Place {
+impl RegisterPlace {
     /// First register in the block, `None` for a constant.
     pub fn offset(self) -> Option<u16> {
         match self {
@@ -240,11 +119,11 @@ impl Place {
 ///
 /// The number a field means is `raw * scale` in `unit`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Field {
+pub struct RegisterField {
     /// Where it stands.
-    pub place: Place,
+    pub place: RegisterPlace,
     /// How its words are read.
-    pub kind: Kind,
+    pub kind: RegisterType,
     /// Values one after the other; 1 but for lists.
     pub count: u16,
     /// Order of the words of a 32-bit value.
@@ -269,16 +148,16 @@ pub struct Field {
     pub from: Option<platen_model::Measure>,
 }
 
-impl Field {
+impl RegisterField {
     /// A field of one register or more, at `offset` of its block: scale 1, no unit, no limits.
-    pub fn register(offset: u16, kind: Kind) -> Self {
+    pub fn register(offset: u16, kind: RegisterType) -> Self {
         Self {
-            place: Place::Register(offset),
+            place: RegisterPlace::Register(offset),
             kind,
             count: 1,
             order: WordOrder::Abcd,
             scale: 1.0,
-            unit: Unit::One,
+            unit: Unit::ONE,
             invalid: None,
             expect: None,
             min: None,
@@ -291,7 +170,7 @@ impl Field {
 
     /// One bit of the register at `offset`.
     pub fn bit(offset: u16, bit: u8) -> Self {
-        Self { place: Place::Bit(offset, bit), ..Self::register(offset, Kind::Bool) }
+        Self { place: RegisterPlace::Bit(offset, bit), ..Self::register(offset, RegisterType::Bool) }
     }
 
     /// The same field with a scale and a unit.
@@ -307,7 +186,7 @@ impl Field {
     /// Registers it takes in its block; 0 for a constant.
     pub fn registers(&self) -> u16 {
         match self.place {
-            Place::Constant(_) => 0,
+            RegisterPlace::Constant(_) => 0,
             _ => self.kind.registers() * self.count,
         }
     }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{Field, Input, Output};
+use super::{Input, Output, RegisterField};
 
 /// The Modbus kinds of register that a block can be read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Table {
+pub enum RegisterTable {
     /// Holding registers: read by function 3, written by function 16.
     #[default]
     Holding,
@@ -14,7 +14,7 @@ pub enum Table {
     Input,
 }
 
-impl Table {
+impl RegisterTable {
     /// The name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
@@ -28,7 +28,7 @@ impl Table {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     /// Kind of the registers.
-    pub table: Table,
+    pub table: RegisterTable,
     /// Address of the first, zero-based, as on the wire.
     pub start: u16,
     /// How many.
@@ -58,14 +58,14 @@ pub enum AddressBase {
 
 impl AddressBase {
     /// The number that the plant file has for the first register of `table`.
-    pub fn first(self, table: Table) -> u32 {
+    pub fn first(self, table: RegisterTable) -> u32 {
         match (self, table) {
             (Self::Zero, _) => 0,
             (Self::One, _) => 1,
-            (Self::FiveDigits, Table::Holding) => 40_001,
-            (Self::FiveDigits, Table::Input) => 30_001,
-            (Self::SixDigits, Table::Holding) => 400_001,
-            (Self::SixDigits, Table::Input) => 300_001,
+            (Self::FiveDigits, RegisterTable::Holding) => 40_001,
+            (Self::FiveDigits, RegisterTable::Input) => 30_001,
+            (Self::SixDigits, RegisterTable::Holding) => 400_001,
+            (Self::SixDigits, RegisterTable::Input) => 300_001,
         }
     }
 }
@@ -128,21 +128,21 @@ pub struct RegisterMap {
     /// Registers that the host writes.
     pub write: Block,
     /// What the press tells the host; a field that is not here does not exist on this press.
-    pub inputs: BTreeMap<Input, Field>,
+    pub inputs: BTreeMap<Input, RegisterField>,
     /// What the host tells the press.
-    pub outputs: BTreeMap<Output, Field>,
+    pub outputs: BTreeMap<Output, RegisterField>,
     /// The stroke counter of the press.
     pub counter: Counter,
 }
 
 impl RegisterMap {
     /// The field of an input, if this press has it.
-    pub fn input(&self, input: Input) -> Option<&Field> {
+    pub fn input(&self, input: Input) -> Option<&RegisterField> {
         self.inputs.get(&input)
     }
 
     /// The field of an output, if this press has it.
-    pub fn output(&self, output: Output) -> Option<&Field> {
+    pub fn output(&self, output: Output) -> Option<&RegisterField> {
         self.outputs.get(&output)
     }
 

@@ -9,9 +9,9 @@ mod pph1;
 mod read;
 
 pub use allow::{Refused, WriteAllow};
-pub use field::{Dimension, Field, Kind, Place, Unit, WordOrder};
+pub use field::{RegisterField, RegisterPlace, RegisterType, WordOrder};
 pub use link::{Link, Parity, Quiet, Serial, Socket, Transport};
-pub use map::{AddressBase, Block, Counter, Profile, RegisterMap, Table};
+pub use map::{AddressBase, Block, Counter, Profile, RegisterMap, RegisterTable};
 pub use names::{Input, Output};
 pub use pph1::{INVALID_I16, INVALID_U16, MAP_VERSION, STATIONS};
 

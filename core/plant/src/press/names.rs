@@ -4,7 +4,7 @@
 
 use platen_model::Measure;
 
-use crate::press::Dimension;
+use crate::Dimension;
 
 /// One enum with a name and a meaning per variant, from one list.
 macro_rules! names {
@@ -127,14 +127,14 @@ names! {
         DevMin "dev_min" Length "deepest place below the best-fitting target, negative"
         DevRms "dev_rms" Length "root mean square distance from the best-fitting target"
         DevP95 "dev_p95" Length "95 % of the plate lie nearer than this to the best-fitting target"
-        InTol "in_tol" Share "share of the area that gaps by no more than the tolerance under the target laid on the plate"
+        InTol "in_tol" Ratio "share of the area that gaps by no more than the tolerance under the target laid on the plate"
         Tolerance "tolerance" Length "tolerance that was applied"
-        Coverage "coverage" Share "share of the target that was measured"
+        Coverage "coverage" Ratio "share of the target that was measured"
         MaxX "max_x" Length "place of dev_max in the plate frame, u"
         MaxY "max_y" Length "place of dev_max in the plate frame, v"
         MinX "min_x" Length "place of dev_min in the plate frame, u"
         MinY "min_y" Length "place of dev_min in the plate frame, v"
-        RadiusDev "radius_dev" Share "deviation of the curvature from the target's"
+        RadiusDev "radius_dev" Ratio "deviation of the curvature from the target's"
         Station "station" Length "figures at the stations of the plate file, in its order: deviation under the target laid on the plate, gap, or curvature deficit (then 1/km where it says mm)"
         ScanTime "scan_time" Time "duration of the scan"
         EvalTime "eval_time" Time "duration of the evaluation"

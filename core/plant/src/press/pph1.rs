@@ -5,7 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use super::{AddressBase, Block, Counter, Field, Input, Kind, Output, Profile, RegisterMap, Table, Unit};
+use super::{
+    AddressBase, Block, Counter, Input, Output, Profile, RegisterField, RegisterMap, RegisterTable,
+    RegisterType,
+};
+use crate::Unit;
 
 /// Raw value of an i16 field that has no value.
 pub const INVALID_I16: u32 = 0x8000;
@@ -16,72 +20,72 @@ pub const STATIONS: u16 = 20;
 /// The only version of this map.
 pub const MAP_VERSION: u16 = 1;
 
-fn u16_at(offset: u16) -> Field {
-    Field::register(offset, Kind::U16)
+fn u16_at(offset: u16) -> RegisterField {
+    RegisterField::register(offset, RegisterType::U16)
 }
 
-fn i16_at(offset: u16) -> Field {
-    Field::register(offset, Kind::I16)
+fn i16_at(offset: u16) -> RegisterField {
+    RegisterField::register(offset, RegisterType::I16)
 }
 
-fn u32_at(offset: u16) -> Field {
-    Field::register(offset, Kind::U32)
+fn u32_at(offset: u16) -> RegisterField {
+    RegisterField::register(offset, RegisterType::U32)
 }
 
 /// A signed result in hundredths of a millimetre.
-fn signed_mm(offset: u16) -> Field {
-    i16_at(offset).scaled(0.01, Unit::Millimetre).invalid(INVALID_I16)
+fn signed_mm(offset: u16) -> RegisterField {
+    i16_at(offset).scaled(0.01, Unit::MILLIMETRE).invalid(INVALID_I16)
 }
 
 /// An unsigned result in hundredths of a millimetre.
-fn unsigned_mm(offset: u16) -> Field {
-    u16_at(offset).scaled(0.01, Unit::Millimetre).invalid(INVALID_U16)
+fn unsigned_mm(offset: u16) -> RegisterField {
+    u16_at(offset).scaled(0.01, Unit::MILLIMETRE).invalid(INVALID_U16)
 }
 
 /// A place on the plate in millimetres.
-fn place_mm(offset: u16) -> Field {
-    i16_at(offset).scaled(1.0, Unit::Millimetre).invalid(INVALID_I16)
+fn place_mm(offset: u16) -> RegisterField {
+    i16_at(offset).scaled(1.0, Unit::MILLIMETRE).invalid(INVALID_I16)
 }
 
 /// A share in tenths of a percent.
-fn share(offset: u16) -> Field {
-    u16_at(offset).scaled(0.1, Unit::Percent).invalid(INVALID_U16)
+fn share(offset: u16) -> RegisterField {
+    u16_at(offset).scaled(0.1, Unit::PERCENT).invalid(INVALID_U16)
 }
 
 /// A duration in hundredths of a second.
-fn duration(offset: u16) -> Field {
-    u16_at(offset).scaled(10.0, Unit::Millisecond).invalid(INVALID_U16)
+fn duration(offset: u16) -> RegisterField {
+    u16_at(offset).scaled(10.0, Unit::MILLISECOND).invalid(INVALID_U16)
 }
 
-fn inputs() -> BTreeMap<Input, Field> {
+fn inputs() -> BTreeMap<Input, RegisterField> {
     BTreeMap::from([
-        (Input::MapVersion, Field { expect: Some(i64::from(MAP_VERSION)), ..u16_at(0) }),
+        (Input::MapVersion, RegisterField { expect: Some(i64::from(MAP_VERSION)), ..u16_at(0) }),
         (Input::Heartbeat, u16_at(1)),
-        (Input::Enable, Field::bit(2, 0)),
-        (Input::Trigger, Field::bit(2, 1)),
-        (Input::Ack, Field::bit(2, 2)),
-        (Input::Abort, Field::bit(2, 3)),
-        (Input::ErrorReset, Field::bit(2, 4)),
-        (Input::ClearToScan, Field::bit(2, 5)),
-        (Input::DryRun, Field::bit(2, 6)),
-        (Input::PartEnd, Field::bit(2, 7)),
-        (Input::Rescan, Field::bit(2, 8)),
-        (Input::Baseline, Field::bit(2, 9)),
+        (Input::Enable, RegisterField::bit(2, 0)),
+        (Input::Trigger, RegisterField::bit(2, 1)),
+        (Input::Ack, RegisterField::bit(2, 2)),
+        (Input::Abort, RegisterField::bit(2, 3)),
+        (Input::ErrorReset, RegisterField::bit(2, 4)),
+        (Input::ClearToScan, RegisterField::bit(2, 5)),
+        (Input::DryRun, RegisterField::bit(2, 6)),
+        (Input::PartEnd, RegisterField::bit(2, 7)),
+        (Input::Rescan, RegisterField::bit(2, 8)),
+        (Input::Baseline, RegisterField::bit(2, 9)),
         (Input::StrokeId, u16_at(3)),
         (Input::SessionId, u16_at(4)),
         (Input::RecipeId, u16_at(5)),
         (Input::PressState, u16_at(6)),
         (Input::PressId, u16_at(7)),
         (Input::PartId, u32_at(8)),
-        (Input::PartName, Field::register(10, Kind::Ascii { registers: 8 })),
+        (Input::PartName, RegisterField::register(10, RegisterType::Ascii { registers: 8 })),
         (Input::BendIndex, u16_at(18)),
-        (Input::Thickness, u16_at(19).scaled(0.01, Unit::Millimetre)),
-        (Input::PressForce, u16_at(20).scaled(1.0, Unit::Kilonewton)),
-        (Input::RamDepth, i16_at(21).scaled(0.01, Unit::Millimetre)),
-        (Input::PlateX, i16_at(22).scaled(1.0, Unit::Millimetre)),
-        (Input::PlateY, i16_at(23).scaled(1.0, Unit::Millimetre)),
-        (Input::PlateRot, i16_at(24).scaled(0.01, Unit::Degree)),
-        (Input::Temperature, i16_at(25).scaled(0.1, Unit::Celsius)),
+        (Input::Thickness, u16_at(19).scaled(0.01, Unit::MILLIMETRE)),
+        (Input::PressForce, u16_at(20).scaled(1.0, Unit::KILONEWTON)),
+        (Input::RamDepth, i16_at(21).scaled(0.01, Unit::MILLIMETRE)),
+        (Input::PlateX, i16_at(22).scaled(1.0, Unit::MILLIMETRE)),
+        (Input::PlateY, i16_at(23).scaled(1.0, Unit::MILLIMETRE)),
+        (Input::PlateRot, i16_at(24).scaled(0.01, Unit::DEGREE)),
+        (Input::Temperature, i16_at(25).scaled(0.1, Unit::CELSIUS)),
         (Input::PlcUnixS, u32_at(26)),
         (Input::PlcMs, u16_at(28)),
         (Input::Attempt, u16_at(29)),
@@ -90,24 +94,24 @@ fn inputs() -> BTreeMap<Input, Field> {
     ])
 }
 
-fn outputs() -> BTreeMap<Output, Field> {
+fn outputs() -> BTreeMap<Output, RegisterField> {
     BTreeMap::from([
         (Output::MapVersion, u16_at(0)),
         (Output::Heartbeat, u16_at(1)),
-        (Output::StatusReady, Field::bit(2, 0)),
-        (Output::StatusBusy, Field::bit(2, 1)),
-        (Output::StatusResultValid, Field::bit(2, 2)),
-        (Output::StatusPass, Field::bit(2, 3)),
-        (Output::StatusFail, Field::bit(2, 4)),
-        (Output::StatusError, Field::bit(2, 5)),
-        (Output::StatusWarning, Field::bit(2, 6)),
-        (Output::StatusScanDone, Field::bit(2, 7)),
-        (Output::StatusMissedStroke, Field::bit(2, 8)),
-        (Output::StatusSimulated, Field::bit(2, 9)),
-        (Output::StatusStorageDegraded, Field::bit(2, 10)),
-        (Output::StatusCalibrationInvalid, Field::bit(2, 11)),
-        (Output::StatusNotMeasured, Field::bit(2, 12)),
-        (Output::StatusCannotTell, Field::bit(2, 13)),
+        (Output::StatusReady, RegisterField::bit(2, 0)),
+        (Output::StatusBusy, RegisterField::bit(2, 1)),
+        (Output::StatusResultValid, RegisterField::bit(2, 2)),
+        (Output::StatusPass, RegisterField::bit(2, 3)),
+        (Output::StatusFail, RegisterField::bit(2, 4)),
+        (Output::StatusError, RegisterField::bit(2, 5)),
+        (Output::StatusWarning, RegisterField::bit(2, 6)),
+        (Output::StatusScanDone, RegisterField::bit(2, 7)),
+        (Output::StatusMissedStroke, RegisterField::bit(2, 8)),
+        (Output::StatusSimulated, RegisterField::bit(2, 9)),
+        (Output::StatusStorageDegraded, RegisterField::bit(2, 10)),
+        (Output::StatusCalibrationInvalid, RegisterField::bit(2, 11)),
+        (Output::StatusNotMeasured, RegisterField::bit(2, 12)),
+        (Output::StatusCannotTell, RegisterField::bit(2, 13)),
         (Output::AckStrokeId, u16_at(3)),
         (Output::ResultStrokeId, u16_at(4)),
         (Output::SessionEcho, u16_at(5)),
@@ -126,8 +130,8 @@ fn outputs() -> BTreeMap<Output, Field> {
         (Output::MaxY, place_mm(18)),
         (Output::MinX, place_mm(19)),
         (Output::MinY, place_mm(20)),
-        (Output::RadiusDev, i16_at(21).scaled(0.1, Unit::Percent).invalid(INVALID_I16)),
-        (Output::Station, Field { count: STATIONS, ..signed_mm(22) }),
+        (Output::RadiusDev, i16_at(21).scaled(0.1, Unit::PERCENT).invalid(INVALID_I16)),
+        (Output::Station, RegisterField { count: STATIONS, ..signed_mm(22) }),
         (Output::ScanTime, duration(42)),
         (Output::EvalTime, duration(43)),
         (Output::StrokeToResultTime, duration(44)),
@@ -153,8 +157,8 @@ fn map(profile: Profile, read_count: u16, write_count: u16) -> RegisterMap {
     RegisterMap {
         profile,
         address_base: AddressBase::Zero,
-        read: Block { table: Table::Holding, start: 0, count: read_count },
-        write: Block { table: Table::Holding, start: 100, count: write_count },
+        read: Block { table: RegisterTable::Holding, start: 0, count: read_count },
+        write: Block { table: RegisterTable::Holding, start: 100, count: write_count },
         inputs: BTreeMap::new(),
         outputs: BTreeMap::new(),
         counter: Counter::default(),
@@ -171,11 +175,14 @@ impl RegisterMap {
     /// gap and deviations behind it. The press acknowledges a result by dropping "go".
     pub fn word() -> Self {
         Self {
-            inputs: BTreeMap::from([(Input::Trigger, Field { debounce_reads: 2, ..Field::bit(0, 0) })]),
+            inputs: BTreeMap::from([(
+                Input::Trigger,
+                RegisterField { debounce_reads: 2, ..RegisterField::bit(0, 0) },
+            )]),
             outputs: BTreeMap::from([
-                (Output::StatusBusy, Field::bit(0, 1)),
-                (Output::StatusResultValid, Field::bit(0, 2)),
-                (Output::StatusError, Field::bit(0, 3)),
+                (Output::StatusBusy, RegisterField::bit(0, 1)),
+                (Output::StatusResultValid, RegisterField::bit(0, 2)),
+                (Output::StatusError, RegisterField::bit(0, 3)),
                 (Output::DevMax, signed_mm(1)),
                 (Output::DevMin, signed_mm(2)),
                 (Output::GapMax, unsigned_mm(3)),
@@ -190,16 +197,16 @@ impl RegisterMap {
     pub fn bits() -> Self {
         Self {
             inputs: BTreeMap::from([
-                (Input::Trigger, Field { debounce_reads: 2, ..Field::bit(0, 0) }),
-                (Input::Ack, Field::bit(0, 1)),
+                (Input::Trigger, RegisterField { debounce_reads: 2, ..RegisterField::bit(0, 0) }),
+                (Input::Ack, RegisterField::bit(0, 1)),
             ]),
             outputs: BTreeMap::from([
-                (Output::StatusReady, Field::bit(0, 0)),
-                (Output::StatusBusy, Field::bit(0, 1)),
-                (Output::StatusResultValid, Field::bit(0, 2)),
-                (Output::StatusPass, Field::bit(0, 3)),
-                (Output::StatusFail, Field::bit(0, 4)),
-                (Output::StatusError, Field::bit(0, 5)),
+                (Output::StatusReady, RegisterField::bit(0, 0)),
+                (Output::StatusBusy, RegisterField::bit(0, 1)),
+                (Output::StatusResultValid, RegisterField::bit(0, 2)),
+                (Output::StatusPass, RegisterField::bit(0, 3)),
+                (Output::StatusFail, RegisterField::bit(0, 4)),
+                (Output::StatusError, RegisterField::bit(0, 5)),
                 (Output::DevMax, signed_mm(1)),
                 (Output::DevMin, signed_mm(2)),
                 (Output::GapMax, unsigned_mm(3)),

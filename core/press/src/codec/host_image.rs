@@ -1,7 +1,7 @@
 //! The registers of the host: what it wants them to be, and their words.
 
 use crc::{CRC_16_MODBUS, Crc};
-use platen_plant::press::{Field, Output, Place, RegisterMap};
+use platen_plant::press::{Output, RegisterField, RegisterMap, RegisterPlace};
 
 use super::{press_image::show_number, words};
 use crate::{Code, Figures, Publication, Verdict};
@@ -115,17 +115,17 @@ impl HostImage {
         block
     }
 
-    fn put(&self, output: Output, field: &Field, heartbeat: u16, block: &mut [u16]) {
+    fn put(&self, output: Output, field: &RegisterField, heartbeat: u16, block: &mut [u16]) {
         if let Some(on) = self.switch(output) {
             let raw = on != field.active_low;
             match field.place {
-                Place::Bit(offset, bit) => {
+                RegisterPlace::Bit(offset, bit) => {
                     if let Some(word) = block.get_mut(usize::from(offset)) {
                         *word |= u16::from(raw) << bit;
                     }
                 }
-                Place::Register(offset) => put_words(block, offset, &[u16::from(raw)]),
-                Place::Constant(_) => {}
+                RegisterPlace::Register(offset) => put_words(block, offset, &[u16::from(raw)]),
+                RegisterPlace::Constant(_) => {}
             }
             return;
         }
@@ -161,7 +161,7 @@ pub fn saturates(map: &RegisterMap, figures: &Figures) -> bool {
 }
 
 /// The figure in one value of a field; `None` where there is none and in fields of the handshake.
-fn figure(figures: &Figures, output: Output, field: &Field, index: usize) -> Option<f64> {
+fn figure(figures: &Figures, output: Output, field: &RegisterField, index: usize) -> Option<f64> {
     match field.from.or(output.measure()) {
         Some(measure) => figures.values.get(&measure).copied(),
         None if output == Output::Station => figures.stations.get(index).copied().flatten(),
@@ -198,11 +198,11 @@ fn checksum(map: &RegisterMap, block: &[u16]) -> u16 {
 
 /// Every field of a write block as read back, by name, as a person reads it: for `dump` and `watch`.
 pub fn describe_outputs(map: &RegisterMap, block: &[u16]) -> Vec<(Output, String)> {
-    let show = |(&output, field): (&Output, &Field)| {
+    let show = |(&output, field): (&Output, &RegisterField)| {
         let value = |index: u16| {
             let start = usize::from(field.place.offset()? + index * field.kind.registers());
             let words = block.get(start..start + usize::from(field.kind.registers()))?;
-            if let Place::Bit(_, bit) = field.place {
+            if let RegisterPlace::Bit(_, bit) = field.place {
                 return Some(u16::from((words[0] >> bit & 1 == 1) != field.active_low).to_string());
             }
             let bits = words::bits(field.kind, field.order, words)?;
@@ -220,7 +220,7 @@ mod tests {
     use super::*;
     use crate::{Measurement, StrokeKey, Timestamp};
     use platen_model::Measure;
-    use platen_plant::press::{Field, Kind};
+    use platen_plant::press::{RegisterField, RegisterType};
 
     fn publication() -> Publication {
         let values = [
@@ -317,7 +317,8 @@ mod tests {
     #[test]
     fn a_figure_can_be_moved_and_stand_in_a_float() {
         let mut map = RegisterMap::pph1();
-        let float = Field { from: Some(Measure::GapMax), ..Field::register(62, Kind::F32) };
+        let float =
+            RegisterField { from: Some(Measure::GapMax), ..RegisterField::register(62, RegisterType::F32) };
         map.outputs.insert(Output::DevMax, float);
         let words = image().encode(&map, 0);
         assert_eq!(words[10], 0, "its old register is reserved now");

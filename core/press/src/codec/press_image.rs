@@ -1,6 +1,7 @@
 //! The registers of the press as a typed image.
 
-use platen_plant::press::{Field, Input, Kind, Place, Profile, RegisterMap, Unit};
+use platen_plant::Unit;
+use platen_plant::press::{Input, Profile, RegisterField, RegisterMap, RegisterPlace, RegisterType};
 
 use super::words;
 use crate::{StrokeData, Timestamp};
@@ -66,12 +67,12 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Registers of one field, if the press has it and they were read.
-    fn registers(&self, field: &Field) -> Option<&[u16]> {
+    fn registers(&self, field: &RegisterField) -> Option<&[u16]> {
         let start = usize::from(field.place.offset()?);
         self.words.get(start..start + usize::from(field.registers()))
     }
 
-    fn raw(&self, input: Input) -> Option<(&Field, u32)> {
+    fn raw(&self, input: Input) -> Option<(&RegisterField, u32)> {
         let field = self.map.input(input)?;
         let words = self.registers(field)?;
         Some((field, words::bits(field.kind, field.order, words)?))
@@ -80,7 +81,7 @@ impl Reader<'_> {
     /// A number in the inside unit.
     fn number(&self, input: Input) -> Option<f64> {
         let field = self.map.input(input)?;
-        if let Place::Constant(number) = field.place {
+        if let RegisterPlace::Constant(number) = field.place {
             return Some(number * field.unit.factor());
         }
         let (field, bits) = self.raw(input)?;
@@ -99,12 +100,12 @@ impl Reader<'_> {
     fn switch(&self, input: Input) -> Option<bool> {
         let field = self.map.input(input)?;
         match field.place {
-            Place::Constant(number) => Some(number != 0.0),
-            Place::Bit(offset, bit) => {
+            RegisterPlace::Constant(number) => Some(number != 0.0),
+            RegisterPlace::Bit(offset, bit) => {
                 let word = self.words.get(usize::from(offset))?;
                 Some((word >> bit & 1 == 1) != field.active_low)
             }
-            Place::Register(_) => {
+            RegisterPlace::Register(_) => {
                 let (field, bits) = self.raw(input)?;
                 Some((bits != 0) != field.active_low)
             }
@@ -113,7 +114,11 @@ impl Reader<'_> {
 
     fn text(&self, input: Input) -> Option<String> {
         let field = self.map.input(input)?;
-        if matches!(field.kind, Kind::Ascii { .. }) { words::text(self.registers(field)?) } else { None }
+        if matches!(field.kind, RegisterType::Ascii { .. }) {
+            words::text(self.registers(field)?)
+        } else {
+            None
+        }
     }
 
     fn wrong(&self, press_id: u16) -> Option<Wrong> {
@@ -199,10 +204,12 @@ impl PressImage {
 /// Every field that was read, by name, as a person reads it: for `dump` and `watch`.
 pub fn describe_inputs(map: &RegisterMap, words: &[u16]) -> Vec<(Input, String)> {
     let reader = Reader { map, words };
-    let show = |(&input, field): (&Input, &Field)| {
+    let show = |(&input, field): (&Input, &RegisterField)| {
         let text = match field.kind {
-            Kind::Ascii { .. } => reader.text(input).unwrap_or_else(|| "-".into()),
-            Kind::Bool => reader.switch(input).map_or_else(|| "-".into(), |on| u8::from(on).to_string()),
+            RegisterType::Ascii { .. } => reader.text(input).unwrap_or_else(|| "-".into()),
+            RegisterType::Bool => {
+                reader.switch(input).map_or_else(|| "-".into(), |on| u8::from(on).to_string())
+            }
             _ => reader.number(input).map_or_else(|| "-".into(), |number| show_number(field, number)),
         };
         (input, text)
@@ -211,13 +218,13 @@ pub fn describe_inputs(map: &RegisterMap, words: &[u16]) -> Vec<(Input, String)>
 }
 
 /// A number of the inside unit in the field's own unit, with the digits that its scale has.
-pub(super) fn show_number(field: &Field, number: f64) -> String {
-    let digits = if field.kind == Kind::F32 {
+pub(super) fn show_number(field: &RegisterField, number: f64) -> String {
+    let digits = if field.kind == RegisterType::F32 {
         3
     } else {
         (-field.scale.abs().log10()).ceil().clamp(0.0, 6.0) as usize
     };
-    let unit = if field.unit == Unit::One { String::new() } else { format!(" {}", field.unit.name()) };
+    let unit = if field.unit == Unit::ONE { String::new() } else { format!(" {}", field.unit.symbol()) };
     format!("{:.digits$}{unit}", number / field.unit.factor())
 }
 

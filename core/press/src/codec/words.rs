@@ -1,6 +1,6 @@
 //! Numbers and texts in 16-bit registers.
 
-use platen_plant::press::{Field, Kind, WordOrder};
+use platen_plant::press::{RegisterField, RegisterType, WordOrder};
 
 /// The bits of the 32-bit value in two registers.
 fn join(order: WordOrder, words: [u16; 2]) -> u32 {
@@ -25,61 +25,63 @@ fn split(order: WordOrder, bits: u32) -> [u16; 2] {
 }
 
 /// The bits of one value: `words` are its registers. Empty for texts.
-pub(crate) fn bits(kind: Kind, order: WordOrder, words: &[u16]) -> Option<u32> {
+pub(crate) fn bits(kind: RegisterType, order: WordOrder, words: &[u16]) -> Option<u32> {
     match (kind.registers(), words) {
         (1, &[word]) => Some(u32::from(word)),
-        (2, &[first, second]) if !matches!(kind, Kind::Ascii { .. }) => Some(join(order, [first, second])),
+        (2, &[first, second]) if !matches!(kind, RegisterType::Ascii { .. }) => {
+            Some(join(order, [first, second]))
+        }
         _ => None,
     }
 }
 
 /// The registers of the bits of one value.
-pub(super) fn registers(kind: Kind, order: WordOrder, bits: u32) -> Vec<u16> {
+pub(super) fn registers(kind: RegisterType, order: WordOrder, bits: u32) -> Vec<u16> {
     if kind.registers() == 2 { split(order, bits).to_vec() } else { vec![bits as u16] }
 }
 
 /// The raw number that the bits of one value mean.
-pub(crate) fn raw_number(kind: Kind, bits: u32) -> f64 {
+pub(crate) fn raw_number(kind: RegisterType, bits: u32) -> f64 {
     match kind {
-        Kind::Bool | Kind::U16 | Kind::Ascii { .. } => f64::from(bits as u16),
-        Kind::I16 => f64::from(bits as u16 as i16),
-        Kind::U32 => f64::from(bits),
-        Kind::I32 => f64::from(bits as i32),
-        Kind::F32 => f64::from(f32::from_bits(bits)),
+        RegisterType::Bool | RegisterType::U16 | RegisterType::Ascii { .. } => f64::from(bits as u16),
+        RegisterType::I16 => f64::from(bits as u16 as i16),
+        RegisterType::U32 => f64::from(bits),
+        RegisterType::I32 => f64::from(bits as i32),
+        RegisterType::F32 => f64::from(f32::from_bits(bits)),
     }
 }
 
-fn raw_bits(kind: Kind, raw: f64) -> u32 {
+fn raw_bits(kind: RegisterType, raw: f64) -> u32 {
     match kind {
-        Kind::Bool | Kind::U16 | Kind::Ascii { .. } => u32::from(raw as u16),
-        Kind::I16 => u32::from(raw as i16 as u16),
-        Kind::U32 => raw as u32,
-        Kind::I32 => raw as i32 as u32,
-        Kind::F32 => (raw as f32).to_bits(),
+        RegisterType::Bool | RegisterType::U16 | RegisterType::Ascii { .. } => u32::from(raw as u16),
+        RegisterType::I16 => u32::from(raw as i16 as u16),
+        RegisterType::U32 => raw as u32,
+        RegisterType::I32 => raw as i32 as u32,
+        RegisterType::F32 => (raw as f32).to_bits(),
     }
 }
 
 /// The bits that mean "no value": the field's own, else the value farthest from every plausible one.
-pub(super) fn invalid_bits(field: &Field) -> u32 {
+pub(super) fn invalid_bits(field: &RegisterField) -> u32 {
     field.invalid.unwrap_or(match field.kind {
-        Kind::Bool | Kind::Ascii { .. } => 0,
-        Kind::U16 => 0xFFFF,
-        Kind::I16 => 0x8000,
-        Kind::U32 => 0xFFFF_FFFF,
-        Kind::I32 => 0x8000_0000,
-        Kind::F32 => f32::NAN.to_bits(),
+        RegisterType::Bool | RegisterType::Ascii { .. } => 0,
+        RegisterType::U16 => 0xFFFF,
+        RegisterType::I16 => 0x8000,
+        RegisterType::U32 => 0xFFFF_FFFF,
+        RegisterType::I32 => 0x8000_0000,
+        RegisterType::F32 => f32::NAN.to_bits(),
     })
 }
 
 /// The bits of a number of the inside unit, and whether it had to be cut to what the field can hold. It is cut at the
 /// same magnitude on both sides (an i16 at -32767 and 32767) and never becomes the invalid value.
-pub(super) fn number_bits(field: &Field, number: Option<f64>) -> (u32, bool) {
+pub(super) fn number_bits(field: &RegisterField, number: Option<f64>) -> (u32, bool) {
     let invalid = invalid_bits(field);
     let (Some(number), Some((low, high))) = (number.filter(|n| n.is_finite()), field.kind.range()) else {
         return (invalid, false);
     };
     let raw = number / field.unit.factor() / field.scale;
-    if field.kind == Kind::F32 {
+    if field.kind == RegisterType::F32 {
         return (raw_bits(field.kind, raw.clamp(low, high)), !(low..=high).contains(&raw));
     }
     let raw = raw.round();
@@ -92,14 +94,14 @@ pub(super) fn number_bits(field: &Field, number: Option<f64>) -> (u32, bool) {
 }
 
 /// The bits of a count of the handshake: every value is one, none means "no value".
-pub(super) fn count_bits(field: &Field, count: u32) -> u32 {
+pub(super) fn count_bits(field: &RegisterField, count: u32) -> u32 {
     let (low, high) = field.kind.range().unwrap_or((0.0, 0.0));
     raw_bits(field.kind, f64::from(count).clamp(low, high))
 }
 
 /// The number, in the inside unit, that the bits of a field mean. `None` when they mean "no value", are no number, or
 /// lie outside the field's limits.
-pub(super) fn number(field: &Field, bits: u32) -> Option<f64> {
+pub(super) fn number(field: &RegisterField, bits: u32) -> Option<f64> {
     if field.invalid == Some(bits) {
         return None;
     }
@@ -122,7 +124,7 @@ pub(super) fn text(words: &[u16]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use platen_plant::press::Unit;
+    use platen_plant::Unit;
 
     /// Raw words from the IEEE 754 bits of -12.5 (C1480000), never from a library's own names of the orders.
     #[test]
@@ -134,10 +136,18 @@ mod tests {
             (WordOrder::Dcba, [0x0000, 0x48C1]),
         ];
         for (order, words) in golden {
-            let field = Field { order, ..Field::register(0, Kind::F32) };
+            let field = RegisterField { order, ..RegisterField::register(0, RegisterType::F32) };
             let (bits_out, cut) = number_bits(&field, Some(-12.5));
-            assert_eq!((registers(Kind::F32, order, bits_out), cut), (words.to_vec(), false), "{order:?}");
-            assert_eq!(number(&field, bits(Kind::F32, order, &words).unwrap()), Some(-12.5), "{order:?}");
+            assert_eq!(
+                (registers(RegisterType::F32, order, bits_out), cut),
+                (words.to_vec(), false),
+                "{order:?}"
+            );
+            assert_eq!(
+                number(&field, bits(RegisterType::F32, order, &words).unwrap()),
+                Some(-12.5),
+                "{order:?}"
+            );
         }
         let orders = [
             (WordOrder::Abcd, [0x1234, 0x5678]),
@@ -146,16 +156,18 @@ mod tests {
             (WordOrder::Dcba, [0x7856, 0x3412]),
         ];
         for (order, words) in orders {
-            assert_eq!(bits(Kind::U32, order, &words), Some(0x1234_5678), "{order:?}");
-            assert_eq!(registers(Kind::U32, order, 0x1234_5678), words, "{order:?}");
+            assert_eq!(bits(RegisterType::U32, order, &words), Some(0x1234_5678), "{order:?}");
+            assert_eq!(registers(RegisterType::U32, order, 0x1234_5678), words, "{order:?}");
         }
     }
 
     #[test]
     fn hundredths_of_a_millimetre_saturate_and_never_wrap_or_turn_invalid() {
-        let signed = Field::register(0, Kind::I16).scaled(0.01, Unit::Millimetre).invalid(0x8000);
-        let unsigned = Field::register(0, Kind::U16).scaled(0.01, Unit::Millimetre).invalid(0xFFFF);
-        let check = |field: &Field, metres: Option<f64>, word: u32, cut: bool| {
+        let signed =
+            RegisterField::register(0, RegisterType::I16).scaled(0.01, Unit::MILLIMETRE).invalid(0x8000);
+        let unsigned =
+            RegisterField::register(0, RegisterType::U16).scaled(0.01, Unit::MILLIMETRE).invalid(0xFFFF);
+        let check = |field: &RegisterField, metres: Option<f64>, word: u32, cut: bool| {
             assert_eq!(number_bits(field, metres), (word, cut), "{metres:?}");
         };
         check(&signed, Some(0.0041), 410, false);
@@ -175,15 +187,19 @@ mod tests {
 
     #[test]
     fn limits_and_the_invalid_value_make_a_number_missing() {
-        let thickness = Field { min: Some(3.0), max: Some(120.0), ..Field::register(0, Kind::U16) };
-        let thickness = thickness.scaled(0.01, Unit::Millimetre).invalid(0xFFFF);
+        let thickness = RegisterField {
+            min: Some(3.0),
+            max: Some(120.0),
+            ..RegisterField::register(0, RegisterType::U16)
+        };
+        let thickness = thickness.scaled(0.01, Unit::MILLIMETRE).invalid(0xFFFF);
         assert_eq!(number(&thickness, 3500), Some(0.035));
         assert_eq!(number(&thickness, 299), None);
         assert_eq!(number(&thickness, 12_001), None);
         assert_eq!(number(&thickness, 0xFFFF), None);
-        let float = Field::register(0, Kind::F32);
+        let float = RegisterField::register(0, RegisterType::F32);
         assert_eq!(number(&float, f32::NAN.to_bits()), None);
-        let signed = Field::register(0, Kind::I16).scaled(0.01, Unit::Degree);
+        let signed = RegisterField::register(0, RegisterType::I16).scaled(0.01, Unit::DEGREE);
         assert!((number(&signed, 0xDCD8).unwrap() + 90.0f64.to_radians()).abs() < 1e-12, "-90.00 degrees");
     }
 

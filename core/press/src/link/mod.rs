@@ -20,7 +20,7 @@ pub use served::ServedLink;
 
 use std::fmt;
 
-use platen_plant::press::Table;
+use platen_plant::press::RegisterTable;
 use rtu::DRAIN_MAX;
 
 /// One Modbus request. Nothing else is ever sent: functions 3, 4 and 16, and 43 by people's tools.
@@ -29,7 +29,7 @@ pub enum Request {
     /// Read consecutive registers.
     Read {
         /// Kind of the registers.
-        table: Table,
+        table: RegisterTable,
         /// Address of the first.
         start: u16,
         /// How many.
@@ -51,7 +51,7 @@ impl fmt::Display for Request {
         let (verb, table, start, count) = match self {
             Self::Identify => return f.write_str("asking who it is"),
             Self::Read { table, start, count } => ("reading", *table, *start, usize::from(*count)),
-            Self::Write { start, words } => ("writing", Table::Holding, *start, words.len()),
+            Self::Write { start, words } => ("writing", RegisterTable::Holding, *start, words.len()),
         };
         let last = usize::from(start) + count.max(1) - 1;
         write!(f, "{verb} {} registers {start}..={last}", table.name())

@@ -1,6 +1,6 @@
 //! Modbus over tokio-modbus: one task per connection owns it.
 
-use platen_plant::press::{self, Quiet, Table, Transport};
+use platen_plant::press::{self, Quiet, RegisterTable, Transport};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::AbortHandle;
 use tokio_modbus::client::{self, Client as _, Context};
@@ -98,8 +98,10 @@ async fn own(mut context: Context, mut calls: mpsc::Receiver<Call>) {
 async fn call(context: &mut Context, request: Request) -> Result<Response, TransportError> {
     use tokio_modbus::{Request as Wire, Response as WireResponse};
     let wire = match request {
-        Request::Read { table: Table::Holding, start, count } => Wire::ReadHoldingRegisters(start, count),
-        Request::Read { table: Table::Input, start, count } => Wire::ReadInputRegisters(start, count),
+        Request::Read { table: RegisterTable::Holding, start, count } => {
+            Wire::ReadHoldingRegisters(start, count)
+        }
+        Request::Read { table: RegisterTable::Input, start, count } => Wire::ReadInputRegisters(start, count),
         Request::Write { start, words } => Wire::WriteMultipleRegisters(start, words.into()),
         Request::Identify => Wire::ReadDeviceIdentification(ReadCode::Basic, 0),
     };

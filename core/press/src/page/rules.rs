@@ -1,6 +1,6 @@
 //! What stands beside the tables: how the two find each other, how the tables are read, and what the press must do.
 
-use platen_plant::press::{Input, Kind, Mode, Output, Parity, Press, Role, Transport};
+use platen_plant::press::{Input, Mode, Output, Parity, Press, RegisterType, Role, Transport};
 
 /// How the two find each other.
 pub(super) fn connection(press: &Press) -> Vec<String> {
@@ -87,14 +87,14 @@ pub(super) fn notation(press: &Press) -> Vec<String> {
         "1 step: what one count of the register means. i16 is signed, two's complement.".to_owned(),
     ];
     let fields = || map.inputs.values().chain(map.outputs.values()).filter(|f| f.place.offset().is_some());
-    if fields().any(|field| matches!(field.kind, Kind::U32 | Kind::I32 | Kind::F32)) {
+    if fields().any(|field| matches!(field.kind, RegisterType::U32 | RegisterType::I32 | RegisterType::F32)) {
         lines.push(
             "32 bits in two registers, A the highest byte and D the lowest: ABCD has the high word in the first register, \
              CDAB in the second; BADC and DCBA are these with the bytes of each register swapped."
                 .into(),
         );
     }
-    if fields().any(|field| matches!(field.kind, Kind::Ascii { .. })) {
+    if fields().any(|field| matches!(field.kind, RegisterType::Ascii { .. })) {
         lines.push("ascii: two characters a register, the first in its high byte; 0 after the last.".into());
     }
     if map.outputs.contains_key(&Output::GapU) || map.outputs.contains_key(&Output::MaxX) {

@@ -38,7 +38,7 @@ fn exchanges(press: &Press) -> Vec<Exchange> {
     let (read, write) = (press.map.read, press.map.write);
     let fast = if press.link.is_serial() { press.map.fast_count() } else { read.count };
     let reading = |what, registers: u16| {
-        let function = if read.table == platen_plant::press::Table::Holding { 3 } else { 4 };
+        let function = if read.table == platen_plant::press::RegisterTable::Holding { 3 } else { 4 };
         Exchange { what, function, registers, bytes: 8 + 5 + 2 * u32::from(registers) }
     };
     let mut exchanges = vec![reading("poll", fast)];

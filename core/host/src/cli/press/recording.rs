@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use platen_plant::press::{Block, Press, Table};
+use platen_plant::press::{Block, Press, RegisterTable};
 use platen_press::{Client, LinkError, ModbusLink, Sample, Side};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -46,7 +46,7 @@ impl Line {
             t_utc: jiff::Timestamp::now(),
             dir: "read".into(),
             unit: press.link.unit,
-            fc: if block.table == Table::Holding { 3 } else { 4 },
+            fc: if block.table == RegisterTable::Holding { 3 } else { 4 },
             addr: block.start,
             words,
             exception,

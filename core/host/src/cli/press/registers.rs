@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use platen_plant::press::{Block, Press, Table};
+use platen_plant::press::{Block, Press, RegisterTable};
 use platen_press::{Client, LinkError, ModbusLink, Reading, describe_inputs, describe_outputs, readings};
 use serde_json::{Map, Value as Json, json};
 
@@ -120,7 +120,7 @@ async fn read_range(client: &mut Client<ModbusLink>, range: Range) -> Result<Vec
 
 async fn holding(client: &mut Client<ModbusLink>, start: u32, count: u32) -> Result<Vec<u16>, LinkError> {
     // Both fit: ranges end at 65536, chunks are short.
-    let block = Block { table: Table::Holding, start: start as u16, count: count as u16 };
+    let block = Block { table: RegisterTable::Holding, start: start as u16, count: count as u16 };
     client.read(&block, block.count).await
 }
 
@@ -209,7 +209,7 @@ pub(super) fn probe_order(common: &Common, press: &Press, at: u16, expect: f64) 
         ]
     }));
     output::table(&rows)?;
-    let counted_from = press.map.address_base.first(Table::Holding) as i32;
+    let counted_from = press.map.address_base.first(RegisterTable::Holding) as i32;
     for it in &right {
         output::line(&format!(
             "in the plant file: {{ at = \"@{}\", type = \"{}\", order = \"{}\" }}",

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::field::Name;
-use super::map::Located;
-use crate::Place as FilePlace;
+use super::map::LocatedMap;
+use crate::Place;
 use crate::document::{Document, Reported};
-use crate::press::{Block, Field, Input, Kind, Output, Place, Profile, Table, WriteAllow};
+use crate::press::{
+    Block, Input, Output, Profile, RegisterField, RegisterPlace, RegisterTable, RegisterType, WriteAllow,
+};
 
 /// Reports every conflict of a map.
-pub(super) fn map(document: &Document, located: &Located, write: &WriteAllow) -> Result<(), Reported> {
+pub(super) fn map(document: &Document, located: &LocatedMap, write: &WriteAllow) -> Result<(), Reported> {
     let map = &located.map;
     let mut faults = Faults { document, located, found: None };
     faults.direction(&map.inputs, &located.inputs, &map.read);
@@ -22,12 +24,12 @@ pub(super) fn map(document: &Document, located: &Located, write: &WriteAllow) ->
 
 struct Faults<'a> {
     document: &'a Document,
-    located: &'a Located,
+    located: &'a LocatedMap,
     found: Option<Reported>,
 }
 
 impl Faults<'_> {
-    fn add(&mut self, place: &FilePlace, message: String) {
+    fn add(&mut self, place: &Place, message: String) {
         self.found = Some(self.document.fault(place, message));
     }
 
@@ -40,8 +42,8 @@ impl Faults<'_> {
     /// Fields that cross the end of their block, and fields that share a register.
     fn direction<N: Name>(
         &mut self,
-        fields: &BTreeMap<N, Field>,
-        places: &BTreeMap<N, FilePlace>,
+        fields: &BTreeMap<N, RegisterField>,
+        places: &BTreeMap<N, Place>,
         block: &Block,
     ) {
         let mut taken: Vec<Vec<(N, Option<u8>)>> = vec![Vec::new(); usize::from(block.count)];
@@ -55,7 +57,7 @@ impl Faults<'_> {
                 self.add(&place, format!("`{}` needs {needs}, but its block ends with {last}", name.name()));
                 continue;
             }
-            let bit = if let Place::Bit(_, bit) = field.place { Some(bit) } else { None };
+            let bit = if let RegisterPlace::Bit(_, bit) = field.place { Some(bit) } else { None };
             let mut clash = None;
             let registers = taken.iter_mut().enumerate().take(end as usize).skip(usize::from(offset));
             for (register, holders) in registers {
@@ -76,7 +78,7 @@ impl Faults<'_> {
         one: (N, Option<u8>),
         other: (N, Option<u8>),
         register: String,
-        places: &BTreeMap<N, FilePlace>,
+        places: &BTreeMap<N, Place>,
     ) {
         let at = |(name, _): (N, Option<u8>)| places.get(&name);
         let later = at(other).map(|place| place.offset) > at(one).map(|place| place.offset);
@@ -95,7 +97,7 @@ impl Faults<'_> {
         let (read, write) = (self.located.map.read, self.located.map.write);
         let (ours, theirs) = (write.addresses(), read.addresses());
         let start = ours.start.max(theirs.start);
-        if read.table == Table::Holding && start < ours.end.min(theirs.end) {
+        if read.table == RegisterTable::Holding && start < ours.end.min(theirs.end) {
             let register = self.register(&read, start - theirs.start);
             let place = self.located.write_place.clone();
             self.add(
@@ -146,15 +148,17 @@ impl Faults<'_> {
         for (name, place) in missing {
             self.add(&place, format!("the profile {profile} cannot do without `{name}`"));
         }
-        let constant =
-            map.inputs.get(&Input::Trigger).is_some_and(|field| matches!(field.place, Place::Constant(_)));
+        let constant = map
+            .inputs
+            .get(&Input::Trigger)
+            .is_some_and(|field| matches!(field.place, RegisterPlace::Constant(_)));
         if constant {
             let place = self.located.inputs.get(&Input::Trigger).unwrap_or(&self.located.place).clone();
             self.add(&place, "a trigger that never changes triggers nothing".to_owned());
         }
         for (name, field) in &map.outputs {
             let too_wide = *name == Output::ResultSeq && field.kind.registers() > 1;
-            let text = matches!(field.kind, Kind::Ascii { .. });
+            let text = matches!(field.kind, RegisterType::Ascii { .. });
             if too_wide || text {
                 let place = self.located.outputs.get(name).unwrap_or(&self.located.place).clone();
                 self.add(&place, format!("`{name}` must be a number in one register"));

@@ -6,12 +6,12 @@ use std::time::Duration;
 use platen_model::Measure;
 
 use crate::document::Reported;
-use crate::node::Kind as NodeKind;
+use crate::node::NodeKind;
 use crate::press::names::dimension_of;
 use crate::press::{
-    AddressBase, Block, Counter, Dimension, Field, Input, Kind, Output, Place, Unit, WordOrder,
+    AddressBase, Block, Counter, Input, Output, RegisterField, RegisterPlace, RegisterType, WordOrder,
 };
-use crate::{Place as FilePlace, Table as Cursor};
+use crate::{Dimension, Place, TomlTable, Unit};
 
 /// What fields are called and what they measure.
 pub(super) trait Name: Copy + Ord + 'static {
@@ -42,8 +42,8 @@ impl Name for Output {
 
 /// The fields of one direction, and where the file speaks of them.
 pub(super) struct Given<N> {
-    pub(super) fields: BTreeMap<N, Field>,
-    pub(super) places: BTreeMap<N, FilePlace>,
+    pub(super) fields: BTreeMap<N, RegisterField>,
+    pub(super) places: BTreeMap<N, Place>,
 }
 
 /// What fields have in common, and what they say about more than themselves.
@@ -59,8 +59,8 @@ impl FieldReader {
     /// Every field of a direction: the profile's, unless the file says otherwise.
     pub(super) fn fields<N: Name>(
         &mut self,
-        mut table: Cursor<'_>,
-        built_in: BTreeMap<N, Field>,
+        mut table: TomlTable<'_>,
+        built_in: BTreeMap<N, RegisterField>,
         all: &[N],
     ) -> Result<Given<N>, Reported> {
         let mut given = Given { fields: built_in, places: BTreeMap::new() };
@@ -88,10 +88,10 @@ impl FieldReader {
     /// What the file says about one field: nothing, that it does not exist, or where and what it is.
     fn one<N: Name>(
         &mut self,
-        table: &mut Cursor<'_>,
+        table: &mut TomlTable<'_>,
         name: N,
-        built_in: Option<&Field>,
-    ) -> Result<Option<(Option<Field>, FilePlace)>, Reported> {
+        built_in: Option<&RegisterField>,
+    ) -> Result<Option<(Option<RegisterField>, Place)>, Reported> {
         if !table.has(name.name()) {
             // Asked for, so that it counts as a known key.
             return table.node(name.name()).optional().map(|_| None);
@@ -112,16 +112,19 @@ impl FieldReader {
 
     fn table<N: Name>(
         &mut self,
-        mut table: Cursor<'_>,
+        mut table: TomlTable<'_>,
         name: N,
-        built_in: Option<&Field>,
-        place: &FilePlace,
-    ) -> Result<Field, Reported> {
+        built_in: Option<&RegisterField>,
+        place: &Place,
+    ) -> Result<RegisterField, Reported> {
         let document = table.document();
         let dimension = name.dimension();
-        let default = built_in.cloned().unwrap_or_else(|| Field {
+        let default = built_in.cloned().unwrap_or_else(|| RegisterField {
             order: self.order,
-            ..Field::register(0, if dimension == Dimension::Switch { Kind::Bool } else { Kind::U16 })
+            ..RegisterField::register(
+                0,
+                if dimension == Dimension::Switch { RegisterType::Bool } else { RegisterType::U16 },
+            )
         });
         let at = self.place(&mut table, name, built_in.map(|field| field.place));
         let kind = read_kind(&mut table, dimension, default.kind);
@@ -152,7 +155,7 @@ impl FieldReader {
         };
         table.finish();
         let own = own?;
-        let field = Field {
+        let field = RegisterField {
             place: at?,
             kind: kind?,
             count: own.count,
@@ -174,22 +177,24 @@ impl FieldReader {
     /// `at = 3`, `at = "2.1"`, `at = "@1234"`, `at = "@1234.5"`, or `const = 1`.
     fn place<N: Name>(
         &self,
-        table: &mut Cursor<'_>,
+        table: &mut TomlTable<'_>,
         name: N,
-        built_in: Option<Place>,
-    ) -> Result<Place, Reported> {
+        built_in: Option<RegisterPlace>,
+    ) -> Result<RegisterPlace, Reported> {
         let constant = if N::INPUT { table.number("const").optional() } else { Ok(None) };
         let at = table.node("at").try_map(|node| match &node.kind {
-            NodeKind::Integer(offset) => self.offset(*offset).map(Place::Register),
+            NodeKind::Integer(offset) => self.offset(*offset).map(RegisterPlace::Register),
             NodeKind::String(text) => self.parse_place(text),
             _ => Err(format!("found {}, expected 3, \"2.1\", \"@1234\" or \"@1234.5\"", node.describe())),
         });
         let at = at.try_map(|at| match (name.dimension(), at) {
-            (Dimension::Switch, _) | (_, Place::Register(_) | Place::Constant(_)) => Ok(at),
-            (_, Place::Bit(..)) => Err("a bit holds a switch only; this field needs a register".to_owned()),
+            (Dimension::Switch, _) | (_, RegisterPlace::Register(_) | RegisterPlace::Constant(_)) => Ok(at),
+            (_, RegisterPlace::Bit(..)) => {
+                Err("a bit holds a switch only; this field needs a register".to_owned())
+            }
         });
         if let Some(number) = constant? {
-            return Ok(Place::Constant(number));
+            return Ok(RegisterPlace::Constant(number));
         }
         match built_in {
             Some(place) => at.or(place),
@@ -197,7 +202,7 @@ impl FieldReader {
         }
     }
 
-    fn parse_place(&self, text: &str) -> Result<Place, String> {
+    fn parse_place(&self, text: &str) -> Result<RegisterPlace, String> {
         let wrong = || format!("found {text:?}, expected 3, \"2.1\", \"@1234\" or \"@1234.5\"");
         let (absolute, rest) = text.strip_prefix('@').map_or((false, text), |rest| (true, rest));
         let (register, bit) =
@@ -205,8 +210,8 @@ impl FieldReader {
         let register: i64 = register.trim().parse().map_err(|_| wrong())?;
         let register = if absolute { self.offset_of(register)? } else { self.offset(register)? };
         match bit.map(str::parse::<u8>) {
-            None => Ok(Place::Register(register)),
-            Some(Ok(bit @ 0..=15)) => Ok(Place::Bit(register, bit)),
+            None => Ok(RegisterPlace::Register(register)),
+            Some(Ok(bit @ 0..=15)) => Ok(RegisterPlace::Bit(register, bit)),
             Some(Ok(bit)) => Err(format!("found bit {bit}, a register has bits 0 to 15")),
             Some(Err(_)) => Err(wrong()),
         }
@@ -230,7 +235,12 @@ impl FieldReader {
     }
 
     /// The keys that only fields of the press have; some say something about the press as a whole.
-    fn input_keys(&mut self, table: &mut Cursor<'_>, name: &str, default: &Field) -> Result<Own, Reported> {
+    fn input_keys(
+        &mut self,
+        table: &mut TomlTable<'_>,
+        name: &str,
+        default: &RegisterField,
+    ) -> Result<Own, Reported> {
         let expect = table.integer("expect").optional();
         let debounce = if name == Input::Trigger.name() {
             table
@@ -267,10 +277,10 @@ struct Own {
 }
 
 fn output_keys(
-    table: &mut Cursor<'_>,
+    table: &mut TomlTable<'_>,
     name: &str,
     dimension: Dimension,
-    default: &Field,
+    default: &RegisterField,
 ) -> Result<Own, Reported> {
     let count = if name == Output::Station.name() {
         table.integer("count").in_range(1..=100).map(|count| count as u16).or(default.count)
@@ -293,31 +303,36 @@ fn output_keys(
 }
 
 /// The type; `None` for a text without a length.
-fn read_kind(table: &mut Cursor<'_>, dimension: Dimension, default: Kind) -> Result<Option<Kind>, Reported> {
+fn read_kind(
+    table: &mut TomlTable<'_>,
+    dimension: Dimension,
+    default: RegisterType,
+) -> Result<Option<RegisterType>, Reported> {
     if dimension == Dimension::Text {
         let kind = table.choice("type", &[("ascii", ())]).optional();
         let registers = table.integer("length").in_range(1..=60).map(|registers| registers as u16).optional();
         kind?;
-        let kept = if let Kind::Ascii { registers } = default { Some(registers) } else { None };
-        return Ok(registers?.or(kept).map(|registers| Kind::Ascii { registers }));
+        let kept = if let RegisterType::Ascii { registers } = default { Some(registers) } else { None };
+        return Ok(registers?.or(kept).map(|registers| RegisterType::Ascii { registers }));
     }
-    let numbers = [Kind::U16, Kind::I16, Kind::U32, Kind::I32, Kind::F32].map(|kind| (kind.name(), kind));
-    let bits = [(Kind::Bool.name(), Kind::Bool), (Kind::U16.name(), Kind::U16)];
+    let numbers =
+        [RegisterType::U16, RegisterType::I16, RegisterType::U32, RegisterType::I32, RegisterType::F32]
+            .map(|kind| (kind.name(), kind));
+    let bits =
+        [(RegisterType::Bool.name(), RegisterType::Bool), (RegisterType::U16.name(), RegisterType::U16)];
     let kinds = if dimension == Dimension::Switch { &bits[..] } else { &numbers[..] };
     table.choice("type", kinds).or(default).map(Some)
 }
 
-fn read_unit(table: &mut Cursor<'_>, dimension: Dimension, default: Unit) -> Result<Unit, Reported> {
+fn read_unit(table: &mut TomlTable<'_>, dimension: Dimension, default: Unit) -> Result<Unit, Reported> {
     if matches!(dimension, Dimension::Switch | Dimension::Text) {
-        return Ok(Unit::One);
+        return Ok(Unit::ONE);
     }
-    let units: Vec<_> =
-        Unit::ALL.iter().filter(|unit| unit.measures(dimension)).map(|unit| (unit.name(), *unit)).collect();
-    table.choice("unit", &units).or(default)
+    table.choice("unit", &Unit::fitting(dimension)).or(default)
 }
 
 /// `invalid = "0x8000"` or `invalid = 32768`.
-fn read_invalid(table: &mut Cursor<'_>) -> Result<Option<u32>, Reported> {
+fn read_invalid(table: &mut TomlTable<'_>) -> Result<Option<u32>, Reported> {
     let field = table.node("invalid").try_map(|node| {
         let value = match &node.kind {
             NodeKind::Integer(value) => u32::try_from(*value).ok(),
@@ -332,10 +347,9 @@ fn read_invalid(table: &mut Cursor<'_>) -> Result<Option<u32>, Reported> {
 }
 
 /// What can be wrong within one field.
-fn check_field(field: &Field, dimension: Dimension) -> Result<(), String> {
-    if !field.unit.measures(dimension) && !matches!(dimension, Dimension::Switch | Dimension::Text) {
-        let units: Vec<_> =
-            Unit::ALL.iter().filter(|unit| unit.measures(dimension)).map(|unit| unit.name()).collect();
+fn check_field(field: &RegisterField, dimension: Dimension) -> Result<(), String> {
+    if !field.unit.fits(dimension) {
+        let units: Vec<_> = Unit::fitting(dimension).into_iter().map(|(symbol, _)| symbol).collect();
         return Err(format!("needs its unit; allowed {}", units.join(", ")));
     }
     let Some((low, high)) = field.kind.range() else { return Ok(()) };

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::ms;
 use crate::document::Reported;
 use crate::press::{Link, Parity, Quiet, Serial, Transport};
-use crate::{Located, Place, Table};
+use crate::{Located, Place, TomlTable};
 
 /// What the words travel over.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,7 @@ enum Way {
 }
 
 /// Reads the link, and where its type stands.
-pub(super) fn read(mut table: Table<'_>) -> Result<(Link, Option<Place>), Reported> {
+pub(super) fn read(mut table: TomlTable<'_>) -> Result<(Link, Option<Place>), Reported> {
     let document = table.document();
     let ways = [("tcp", Way::Tcp), ("rtu", Way::Rtu), ("rtu-over-tcp", Way::RtuOverTcp)];
     let way = table.choice("type", &ways).located().optional();
@@ -103,7 +103,7 @@ impl Link {
     }
 }
 
-fn read_peers(table: &mut Table<'_>) -> Result<Vec<IpAddr>, Reported> {
+fn read_peers(table: &mut TomlTable<'_>) -> Result<Vec<IpAddr>, Reported> {
     let document = table.document();
     let peers = table.strings("peers").optional()?.unwrap_or_default();
     let address = |peer: &Located<String>| {
@@ -115,7 +115,7 @@ fn read_peers(table: &mut Table<'_>) -> Result<Vec<IpAddr>, Reported> {
     peers.iter().map(address).collect()
 }
 
-fn read_serial(table: &mut Table<'_>) -> Result<Serial, Reported> {
+fn read_serial(table: &mut TomlTable<'_>) -> Result<Serial, Reported> {
     let device = table.name("device").map(PathBuf::from).required();
     let baud =
         table.integer("baud").in_range(300..=4_000_000).map(|baud| baud.unsigned_abs() as u32).required();

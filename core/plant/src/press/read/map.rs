@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use super::field::{FieldReader, Given};
 use crate::document::Reported;
-use crate::press::{AddressBase, Block, Counter, Input, Output, Profile, RegisterMap, Table, WordOrder};
-use crate::{Place, Table as Cursor};
+use crate::press::{
+    AddressBase, Block, Counter, Input, Output, Profile, RegisterMap, RegisterTable, WordOrder,
+};
+use crate::{Place, TomlTable};
 
 /// Most registers in one read and in one write (Modbus Application Protocol V1.1b3, 6.3 and 6.12).
 const MOST_READ: i64 = 125;
@@ -15,7 +17,7 @@ const MOST_WRITTEN: i64 = 123;
 
 /// A register map and where the file says what of it.
 #[derive(Debug)]
-pub(super) struct Located {
+pub(super) struct LocatedMap {
     pub(super) map: RegisterMap,
     /// Where the file speaks of a field; the others are the profile's.
     pub(super) inputs: BTreeMap<Input, Place>,
@@ -26,10 +28,10 @@ pub(super) struct Located {
     pub(super) heartbeat_in: Option<Duration>,
 }
 
-impl Located {
+impl LocatedMap {
     /// The registers of `"100..=163"` or `"100"`, counted as the map counts holding registers.
     pub(super) fn range(&self, text: &str) -> Result<RangeInclusive<u16>, String> {
-        let first = self.map.address_base.first(Table::Holding);
+        let first = self.map.address_base.first(RegisterTable::Holding);
         let address = |text: &str| {
             let number = text.trim().parse::<u32>().ok().and_then(|number| number.checked_sub(first));
             number.and_then(|address| u16::try_from(address).ok())
@@ -45,7 +47,7 @@ impl Located {
     }
 }
 
-pub(super) fn read_map(mut table: Cursor<'_>, profile: Profile) -> Result<Located, Reported> {
+pub(super) fn read_map(mut table: TomlTable<'_>, profile: Profile) -> Result<LocatedMap, Reported> {
     let place = table.place().clone();
     let built_in = RegisterMap::of(profile);
     let bases = [
@@ -69,8 +71,8 @@ pub(super) fn read_map(mut table: Cursor<'_>, profile: Profile) -> Result<Locate
         let document = block.document();
         let write = read_block(block, built_in.write, address_base, MOST_WRITTEN)?;
         match write.table {
-            Table::Holding => Ok(write),
-            Table::Input => {
+            RegisterTable::Holding => Ok(write),
+            RegisterTable::Input => {
                 Err(document.fault(&write_place, "input registers cannot be written; use holding"))
             }
         }
@@ -100,17 +102,17 @@ pub(super) fn read_map(mut table: Cursor<'_>, profile: Profile) -> Result<Locate
     let (Given { fields: inputs, places: input_places }, Given { fields: outputs, places: output_places }) =
         (inputs?, outputs?);
     let map = RegisterMap { profile, address_base, read, write, inputs, outputs, counter };
-    Ok(Located { map, inputs: input_places, outputs: output_places, place, write_place, heartbeat_in })
+    Ok(LocatedMap { map, inputs: input_places, outputs: output_places, place, write_place, heartbeat_in })
 }
 
 fn read_block(
-    mut table: Cursor<'_>,
+    mut table: TomlTable<'_>,
     built_in: Block,
     base: AddressBase,
     most: i64,
 ) -> Result<Block, Reported> {
     let document = table.document();
-    let tables = [("holding", Table::Holding), ("input", Table::Input)];
+    let tables = [("holding", RegisterTable::Holding), ("input", RegisterTable::Input)];
     let kind = table.choice("table", &tables).or(built_in.table);
     let start = table.integer("start").located().optional();
     let count = table.integer("count").in_range(1..=most).map(|count| count as u16).or(built_in.count);

@@ -11,15 +11,15 @@ use super::{
     Mode, NoAck, OnInterrupted, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts, WriteAllow,
 };
 use crate::document::Reported;
-use crate::{Located, Table};
-use map::{Located as LocatedMap, read_map};
+use crate::{Located, TomlTable};
+use map::{LocatedMap, read_map};
 
 /// One day: no time limit of a press is longer.
 const DAY_MS: i64 = 86_400_000;
 
 impl Press {
     /// Reads the table `[press]`.
-    pub(crate) fn read(mut table: Table<'_>) -> Result<Self, Reported> {
+    pub(crate) fn read(mut table: TomlTable<'_>) -> Result<Self, Reported> {
         let document = table.document();
         let name = table.name("name").required();
         let press_id = table.integer("press_id").in_range(0..=65_535).map(|id| id as u16).required();
@@ -69,12 +69,12 @@ impl Press {
 }
 
 /// A key in milliseconds.
-fn ms(table: &mut Table<'_>, key: &str, least: i64) -> Result<Option<Duration>, Reported> {
+fn ms(table: &mut TomlTable<'_>, key: &str, least: i64) -> Result<Option<Duration>, Reported> {
     let field = table.integer(key).in_range(least..=DAY_MS);
     field.map(|ms| Duration::from_millis(ms.unsigned_abs())).optional()
 }
 
-fn read_timeouts(mut table: Table<'_>) -> Result<Timeouts, Reported> {
+fn read_timeouts(mut table: TomlTable<'_>) -> Result<Timeouts, Reported> {
     let default = Timeouts::default();
     let scan = ms(&mut table, "scan_ms", 1);
     let evaluate = ms(&mut table, "evaluate_ms", 1);
@@ -92,7 +92,7 @@ fn read_timeouts(mut table: Table<'_>) -> Result<Timeouts, Reported> {
     })
 }
 
-fn read_policy(mut table: Table<'_>) -> Result<Policy, Reported> {
+fn read_policy(mut table: TomlTable<'_>) -> Result<Policy, Reported> {
     let missed = [("warn", OnMissed::Warn), ("error", OnMissed::Error), ("block", OnMissed::Block)];
     let on_missed_stroke = table.choice("on_missed_stroke", &missed).or(OnMissed::default());
     let interrupted = [("report", OnInterrupted::Report), ("rescan", OnInterrupted::Rescan)];
@@ -111,7 +111,7 @@ fn read_policy(mut table: Table<'_>) -> Result<Policy, Reported> {
 }
 
 /// `[press.write]`; addresses as the map counts them.
-fn read_write(mut table: Table<'_>, map: &LocatedMap) -> Result<WriteAllow, Reported> {
+fn read_write(mut table: TomlTable<'_>, map: &LocatedMap) -> Result<WriteAllow, Reported> {
     let document = table.document();
     let allow = table.strings("allow").optional();
     let rate = table.integer("max_writes_per_s").in_range(1..=10_000).optional();

@@ -6,10 +6,10 @@ use std::ops::RangeInclusive;
 use crate::document::{Document, Reported};
 use crate::source::Place;
 
-/// The value of one key. Checks chain; [`Field::required`], [`Field::optional`] or [`Field::or`] ends the chain.
+/// The value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
 #[derive(Debug)]
 #[must_use = "end the chain with required(), optional() or or()"]
-pub struct Field<'d, T> {
+pub struct TomlKey<'d, T> {
     document: &'d Document,
     place: Place,
     state: Result<Option<T>, Reported>,
@@ -24,22 +24,22 @@ pub struct Located<T> {
     pub place: Place,
 }
 
-impl<'d, T> Field<'d, T> {
+impl<'d, T> TomlKey<'d, T> {
     pub(crate) fn new(document: &'d Document, place: Place, state: Result<Option<T>, Reported>) -> Self {
         Self { document, place, state }
     }
 
     /// Converts the value; the text of a refusal becomes the fault.
-    pub fn try_map<U>(self, convert: impl FnOnce(T) -> Result<U, String>) -> Field<'d, U> {
+    pub fn try_map<U>(self, convert: impl FnOnce(T) -> Result<U, String>) -> TomlKey<'d, U> {
         let Self { document, place, state } = self;
         let state = state.and_then(|value| {
             value.map(convert).transpose().map_err(|message| document.fault(&place, message))
         });
-        Field { document, place, state }
+        TomlKey { document, place, state }
     }
 
     /// Converts the value.
-    pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> Field<'d, U> {
+    pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> TomlKey<'d, U> {
         self.try_map(|value| Ok(convert(value)))
     }
 
@@ -49,7 +49,7 @@ impl<'d, T> Field<'d, T> {
     }
 
     /// Adds the place.
-    pub fn located(self) -> Field<'d, Located<T>> {
+    pub fn located(self) -> TomlKey<'d, Located<T>> {
         let place = self.place.clone();
         self.map(|value| Located { value, place })
     }
@@ -80,7 +80,7 @@ impl<'d, T> Field<'d, T> {
     }
 }
 
-impl<T: PartialOrd + Display> Field<'_, T> {
+impl<T: PartialOrd + Display> TomlKey<'_, T> {
     /// Refuses values outside `range`.
     pub fn in_range(self, range: RangeInclusive<T>) -> Self {
         self.check(|value| match range.contains(value) {
