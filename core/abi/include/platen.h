@@ -1,14 +1,14 @@
-/* platen.h - what crosses the boundary between platen and a plugin library, major version 1.
+/* platen.h - C interface between platen and its plugins, major version 1.
  *
  * A plugin is a shared library that exports one constant, `const platen_entry platen_entry_1`.
- * Structs begin with struct_size and grow only at their end: a reader uses what both sides have.
+ * Structs begin with struct_size and grow only at their end: a reader MUST use only the fields that both sides have.
  *
  *   [inst]  calls of one instance: serialised, always the same thread
  *   [any]   any thread, may run at the same time as an [inst] call
  *
- * Rules: no exception leaves a call (C++: catch (...) in each); inputs are not written; memory of frames comes from
- * buffer_alloc and is emitted or freed before run returns; run returns by the deadline or soon after cancel; cancel
- * returns at once; success means complete data. Metres, radians, UTF-8 with NUL. Little endian.
+ * A plugin MUST let no exception leave a call (C++: catch (...) in each) and MUST NOT write to inputs. Memory of frames comes
+ * from buffer_alloc and MUST be emitted or freed before run returns. run MUST return by the deadline or soon after cancel;
+ * cancel MUST return at once. PLATEN_OK from run means complete data. Metres, radians, UTF-8 with NUL, little endian.
  */
 #ifndef PLATEN_H
 #define PLATEN_H
@@ -21,7 +21,7 @@ extern "C" {
 
 #define PLATEN_ABI_MINOR 0
 
-typedef int32_t platen_status; /* < 0 failed, <= PLATEN_E_VENDOR the plugin's own */
+typedef int32_t platen_status; /* < 0: failure; <= PLATEN_E_VENDOR: defined by the plugin */
 enum {
   PLATEN_OK = 0,
   PLATEN_E_CANCELLED = -1,
@@ -52,7 +52,7 @@ typedef struct platen_error {
   char hint[256];    /* what to do, one sentence */
 } platen_error;
 
-/* One piece of work; borrowed for the call. Times of the host's monotonic clock (now_mono_ns) unless named utc. */
+/* One job, borrowed for the call. Times are of the host's monotonic clock (now_mono_ns) unless named utc. */
 typedef struct platen_job {
   uint32_t struct_size, reserved;
   uint64_t job_id, stroke_no;
@@ -109,7 +109,7 @@ typedef struct platen_option {
   const char *const *choices; /* NULL at the end */
 } platen_option;
 
-/* One option's value: checked, defaulted, in the declared unit. */
+/* Value of one option: checked, with its default applied, in the declared unit. */
 typedef struct platen_value {
   const char *name;
   int32_t type, from_default;
@@ -122,7 +122,7 @@ typedef struct platen_value {
 
 enum { PLATEN_DESC_HARDWARE = 1 };
 
-/* Static data, no I/O to produce. */
+/* Descriptor of a plugin: static data, available without I/O. */
 typedef struct platen_desc {
   uint32_t struct_size, flags;
   const char *id, *kind, *name, *vendor, *version, *doc, *url, *license; /* kind: scanner, flattening, comparison */
@@ -158,7 +158,7 @@ struct platen_instance {
   platen_status (*run)(platen_instance *, const platen_job *, const platen_frame *in, uint32_t n_in,
                        platen_error *);                  /* [inst] one job, emits its results */
   void (*cancel)(platen_instance *, uint64_t job_id);    /* [any] wakes run, returns at once */
-  void (*close)(platen_instance *);                      /* [inst] joins own threads */
+  void (*close)(platen_instance *);                      /* [inst] joins its own threads */
   void (*destroy)(platen_instance *);                    /* [inst] no host call after it */
   const void *(*get_extension)(platen_instance *, const char *id); /* [any] */
 };
@@ -173,7 +173,7 @@ typedef struct platen_entry {
                           platen_instance **, platen_error *); /* touches no hardware */
 } platen_entry;
 
-/* ---- Payloads: a header at the start of the buffer, then arrays aligned to 8 bytes, pointed to by offset. ---- */
+/* ---- Payloads: a header at the start of the buffer, then arrays aligned to 8 bytes, at the offsets in the header. ---- */
 
 typedef struct platen_span {
   uint64_t offset, count; /* bytes from the start of the buffer; scalar elements. 0, 0: absent */
@@ -198,7 +198,7 @@ typedef struct platen_scan {
   uint32_t seam_column;                                                /* first of the back face, UINT32_MAX: one face */
   uint16_t intensity_min, intensity_max;
   double acquired_unix_s;        /* 0: unknown */
-  platen_span instrument, notes; /* UTF-8; notes one sentence a line */
+  platen_span instrument, notes; /* UTF-8; notes: one sentence per line */
 } platen_scan;
 
 typedef struct platen_column {
@@ -223,7 +223,7 @@ typedef struct platen_window {
 typedef struct platen_mesh {
   uint32_t struct_size, reserved;
   double width, height, thickness;
-  uint32_t corners[4]; /* places in the boundary loop of (0,0), (W,0), (W,H), (0,H) */
+  uint32_t corners[4]; /* positions in the boundary loop of (0,0), (W,0), (W,H), (0,H) */
   double corner_sigma[8], edge_sigma[4], edge_length[4];
   platen_span vertices;  /* f64, 3 each, mid-surface */
   platen_span triangles; /* u32, 3 each, counter-clockwise seen from the scanner */
@@ -240,7 +240,7 @@ typedef struct platen_chart {
 /* Mid-surface S(u, v): bicubic B-spline over uniform knots, three beyond each end. Grids are v outer, u inner. */
 typedef struct platen_surface {
   uint32_t struct_size, mask_u, mask_v;
-  float noise_share; /* of the covariance: scatter of the scan, the rest what smoothing takes from the shape; 0: not told, all */
+  float noise_share; /* share of the covariance that is noise of the scan, the rest is smoothing bias; 0: unknown, all */
   double thickness;
   platen_span knots_u, knots_v;
   platen_span control;          /* f64, 3 each */

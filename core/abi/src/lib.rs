@@ -1,17 +1,24 @@
-//! The C tables that cross a library boundary. `include/platen.h` says the same in C.
+//! C boundary between platen and its plugins: function tables, descriptors and payload headers. `include/platen.h` is the
+//! same boundary in C.
 //!
-//! A plugin is a shared library with one exported data symbol, [`ENTRY_SYMBOL`], of type [`Entry`]; everything
-//! else is reached from it. The major number of the boundary is in the symbol's name; within a major version
-//! structs grow only at their end and begin with `struct_size`, so that either side can be the older one: a
-//! reader uses what both sides have.
+//! A plugin is a shared library that exports one data symbol, [`ENTRY_SYMBOL`], of type [`Entry`]; everything else is reached
+//! from it.
 //!
-//! - Memory of data belongs to the host: the plugin asks for a buffer, fills it, emits it. Inputs are read-only.
-//! - Calls marked `[inst]` of one instance are serialised and always come from the same thread; those marked
-//!   `[any]` may come from any thread at any time.
-//! - No exception and no panic crosses the boundary. Strings are UTF-8 with a NUL at the end.
-//! - Lengths are metres, angles radians, times nanoseconds or seconds as named.
+//! # Versions
 //!
-//! Payloads (what a [`Frame`]'s buffer holds) are described in [`payload`].
+//! The major version is part of the symbol's name. Within a major version structs begin with `struct_size` and grow only at
+//! their end, so either side may be the older one: a reader MUST use only the fields that both sides have. [`ABI_MINOR`] is the
+//! minor version; payload formats carry their own version in their name (`platen.mesh/2`).
+//!
+//! # Rules
+//!
+//! - Memory of frames belongs to the host: a plugin requests a buffer, fills it, and emits or frees it. Inputs are read-only.
+//! - `[inst]` calls of one instance are serialised and always come from the same thread. `[any]` calls may come from any
+//!   thread at any time.
+//! - No exception and no panic MAY cross the boundary. Strings are UTF-8 with a terminating NUL.
+//! - Lengths are in metres, angles in radians, times in nanoseconds or seconds as named.
+//!
+//! [`payload`] describes the contents of a [`Frame`]'s buffer.
 #![allow(unsafe_code, reason = "this crate is the boundary: it casts between bytes and repr(C) structs")]
 
 pub mod payload;
@@ -19,8 +26,8 @@ mod table;
 
 pub use table::*;
 
-/// Symbol that a plugin library exports: a constant of type [`Entry`].
+/// Name of the exported constant of type [`Entry`].
 pub const ENTRY_SYMBOL: &std::ffi::CStr = c"platen_entry_1";
 
-/// Minor version of the boundary described here.
+/// Minor version of the boundary.
 pub const ABI_MINOR: u32 = 0;

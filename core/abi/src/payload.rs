@@ -1,11 +1,11 @@
-//! What a frame's buffer holds: a small header, then arrays that the header points to by offset.
+//! Payload of a frame: a header, then arrays at the offsets given in the header.
 //!
-//! Every array lies in the same buffer, aligned to 8 bytes, little endian. Nothing in a buffer is trusted:
-//! [`read`] and [`slice`] check sizes, offsets and alignment before anything is looked at.
+//! All arrays lie in the same buffer, aligned to 8 bytes, little endian. Buffers are not trusted: [`read`] and [`slice()`]
+//! check sizes, offsets and alignment before any access.
 
 use std::ffi::CStr;
 
-/// A number that may have any bit pattern.
+/// Plain number type, valid with any bit pattern.
 ///
 /// # Safety
 /// Implementors have no padding and no invalid values.
@@ -23,7 +23,7 @@ unsafe impl Pod for f64 {}
 // SAFETY: an array of plain numbers has no padding.
 unsafe impl<T: Pod, const N: usize> Pod for [T; N] {}
 
-/// A header: begins with `struct_size`, then numbers and [`Span`]s without padding.
+/// Payload header: `struct_size`, then numbers and [`Span`]s without padding.
 ///
 /// # Safety
 /// Implementors are `repr(C)`, consist of numbers only, have no padding and begin with `struct_size: u32`.
@@ -32,13 +32,13 @@ pub unsafe trait Header: Copy + 'static {
     const FORMAT: &'static CStr;
 }
 
-/// Where an array lies: byte offset from the start of the buffer and number of its elements. 0, 0: absent.
+/// Position of an array: byte offset from the start of the buffer, and number of scalar elements. 0, 0: absent.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Span {
     /// Bytes from the start of the buffer.
     pub offset: u64,
-    /// Scalar elements; a list of n points in space has 3 n.
+    /// Number of scalars; n points in space have 3 n.
     pub count: u64,
 }
 
@@ -63,7 +63,7 @@ macro_rules! header {
 header! {
     /// First frame of a scan, driver to host. Azimuths run counter-clockwise, rows go down from `elevation_start`.
     Scan = c"platen.scan/1" {
-        /// 1: no real instrument stood there.
+        /// 1: simulated, without a real instrument.
         flags: u32,
         /// Rows of the lattice.
         n_rows: u32,
@@ -87,7 +87,7 @@ header! {
         acquired_unix_s: f64,
         /// UTF-8: maker, model, serial number.
         instrument: Span,
-        /// UTF-8: one sentence a line, what the driver decided or changed.
+        /// UTF-8: decisions and corrections of the driver, one sentence per line.
         notes: Span,
     }
 }
@@ -115,13 +115,13 @@ header! {
 }
 
 header! {
-    /// Last frame of a scan, driver to host. No end, no scan.
+    /// Last frame of a scan, driver to host. A scan without it is discarded.
     ScanEnd = c"platen.scan-end/1" {
         /// Columns sent.
         columns: u32,
         /// Valid cells sent.
         points: u64,
-        /// Columns at the start, in time, that must not be used.
+        /// Number of columns, first in time, that must not be used.
         warm_up_columns: u32,
         /// 0 complete, 1 aborted, 2 failed.
         outcome: u32,
@@ -129,7 +129,7 @@ header! {
 }
 
 header! {
-    /// The part of the dome to scan, host to driver; without it, everything.
+    /// Part of the field of view to scan, host to driver; without it, all of it.
     Window = c"platen.window/1" {
         /// 0.
         reserved: u32,
@@ -177,7 +177,7 @@ header! {
 }
 
 header! {
-    /// Place of every vertex on the rectangle, flattening to host.
+    /// Place (u, v) of every vertex on the flat plate, flattening to host.
     Chart = c"platen.chart/1" {
         /// 0.
         reserved: u32,
@@ -197,8 +197,7 @@ header! {
         mask_u: u32,
         /// Mask cells along v.
         mask_v: u32,
-        /// Share of the covariance that is scatter of the scan, the rest what smoothing takes from the plate's own shape; 0: not
-        /// told, all of it.
+        /// Share of the covariance that is noise of the scan; the rest is smoothing bias. 0: unknown, taken as all of it.
         noise_share: f32,
         /// Thickness of the plate.
         thickness: f64,
@@ -219,7 +218,7 @@ header! {
 }
 
 impl Surface {
-    /// Share of the covariance that is scatter of the scan: all of it where the writer does not tell.
+    /// Returns the share of the covariance that is noise of the scan; 1 where the writer gives none.
     pub fn scatter_share(&self) -> f32 {
         if self.noise_share == 0.0 { 1.0 } else { self.noise_share }
     }
@@ -254,19 +253,19 @@ pub const TASK: &CStr = c"platen.task/1";
 /// Format of a comparison's findings: UTF-8 JSON, no header.
 pub const FINDINGS: &CStr = c"platen.findings/1";
 
-/// Why a buffer cannot be read.
+/// Fault of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Malformed {
     /// The header is longer than the buffer or shorter than this version's.
     Header {
         /// Size of the buffer.
         bytes: usize,
-        /// Size that the header claims.
+        /// Size stated in the header.
         struct_size: u32,
     },
     /// An array lies outside the buffer.
     OutOfBounds {
-        /// Where it claims to lie.
+        /// Position stated in the header.
         span: Span,
         /// Size of the buffer.
         bytes: usize,
@@ -307,7 +306,7 @@ impl std::error::Error for Malformed {}
 /// Reads the header at the start of a buffer.
 ///
 /// # Errors
-/// [`Malformed::Header`] when it is not all there.
+/// [`Malformed::Header`] when it is incomplete.
 pub fn read<H: Header>(bytes: &[u8]) -> Result<H, Malformed> {
     let struct_size = bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b));
     if bytes.len() < size_of::<H>()
@@ -320,7 +319,7 @@ pub fn read<H: Header>(bytes: &[u8]) -> Result<H, Malformed> {
     Ok(unsafe { bytes.as_ptr().cast::<H>().read_unaligned() })
 }
 
-/// The elements of an array; `T` may be a number or a fixed array of numbers such as `[f64; 3]`.
+/// Returns the elements of an array; `T` may be a number or a fixed array of numbers such as `[f64; 3]`.
 ///
 /// # Errors
 /// When the array does not lie in the buffer, is not aligned, or its length is no multiple of the element's.
@@ -346,10 +345,10 @@ pub fn slice<T: Element>(bytes: &[u8], span: Span) -> Result<&[T], Malformed> {
     Ok(unsafe { std::slice::from_raw_parts(data, n) })
 }
 
-/// Text of an array of bytes; what is not UTF-8 is replaced.
+/// Returns the text of an array of bytes, with invalid UTF-8 replaced.
 ///
 /// # Errors
-/// As [`slice`].
+/// As [`slice()`].
 pub fn text(bytes: &[u8], span: Span) -> Result<String, Malformed> {
     Ok(String::from_utf8_lossy(slice::<u8>(bytes, span)?).into_owned())
 }
@@ -371,14 +370,14 @@ macro_rules! element {
 }
 element!(u8 u16 u32 f32 f64);
 
-/// Plans a buffer: how many bytes, and where each array goes.
+/// Layout of a buffer: its size and the position of each array.
 #[derive(Debug)]
 pub struct Layout {
     bytes: usize,
 }
 
 impl Layout {
-    /// Begins with room for header `H`.
+    /// Begins a layout with header `H`.
     #[must_use]
     pub fn of<H: Header>() -> Self {
         Self { bytes: size_of::<H>().next_multiple_of(8) }
@@ -391,7 +390,7 @@ impl Layout {
         if n == 0 { Span::default() } else { span }
     }
 
-    /// Bytes needed.
+    /// Returns the size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.bytes
@@ -447,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_put_is_read() {
+    fn written_arrays_are_read_back() {
         let bytes = grid();
         let header: Grid = read(&bytes).unwrap();
         assert_eq!(text(&bytes, header.name).unwrap(), "gap");
@@ -456,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn lies_are_refused() {
+    fn inconsistent_headers_are_refused() {
         let bytes = grid();
         let header: Grid = read(&bytes).unwrap();
         let end = bytes.len() as u64;

@@ -1,8 +1,8 @@
-//! Tables of functions and descriptions, field by field as in `include/platen.h`.
+//! Function tables and descriptors, field by field as in `include/platen.h`.
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// Result of a call: 0 or one of [`status`], at or below [`status::VENDOR`] a plugin's own.
+/// Result of a call: one of [`status`]; values at or below [`status::VENDOR`] are defined by the plugin.
 pub type Status = i32;
 
 /// Values of [`Status`].
@@ -15,9 +15,9 @@ pub mod status {
     pub const TIMEOUT: i32 = -2;
     /// The options contradict each other or the plant.
     pub const CONFIG: i32 = -3;
-    /// Not something this plugin can do.
+    /// The plugin does not support the request.
     pub const UNSUPPORTED: i32 = -4;
-    /// The named thing does not exist.
+    /// The named file, device or plugin does not exist.
     pub const NOT_FOUND: i32 = -5;
     /// The device is not reachable.
     pub const DISCONNECTED: i32 = -6;
@@ -27,13 +27,13 @@ pub mod status {
     pub const DENIED: i32 = -8;
     /// Reading or writing failed.
     pub const IO: i32 = -9;
-    /// There is nothing to deliver.
+    /// No data is available.
     pub const NO_DATA: i32 = -10;
-    /// The input or the device's data is wrong.
+    /// The input or the device's data is invalid.
     pub const BAD_DATA: i32 = -11;
-    /// No memory.
+    /// Memory is exhausted.
     pub const MEMORY: i32 = -12;
-    /// The call does not fit the state of the instance.
+    /// The call is not allowed in the state of the instance.
     pub const STATE: i32 = -13;
     /// A fault of the plugin itself.
     pub const INTERNAL: i32 = -14;
@@ -43,15 +43,15 @@ pub mod status {
 
 /// Bits of [`Error::flags`].
 pub mod error_flag {
-    /// Trying again may help.
+    /// A retry may succeed.
     pub const RETRYABLE: u32 = 1;
-    /// The device is gone until it is opened again.
+    /// The device is lost until it is opened again.
     pub const DEVICE_LOST: u32 = 2;
-    /// The instance must be made anew.
+    /// The instance must be destroyed and created again.
     pub const RECREATE: u32 = 4;
 }
 
-/// Filled by the callee when it fails; memory of the caller.
+/// Error struct: memory of the caller, filled by the callee when it fails.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Error {
@@ -63,13 +63,13 @@ pub struct Error {
     pub vendor_code: i32,
     /// 0.
     pub reserved: u32,
-    /// What happened, one sentence, UTF-8, NUL at the end.
+    /// Description of the failure, one sentence, UTF-8, NUL at the end.
     pub message: [c_char; 512],
-    /// What to do, one sentence, UTF-8, NUL at the end.
+    /// Remedy, one sentence, UTF-8, NUL at the end.
     pub hint: [c_char; 256],
 }
 
-/// One piece of work; borrowed for the call.
+/// One job, borrowed for the call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Job {
@@ -77,19 +77,19 @@ pub struct Job {
     pub struct_size: u32,
     /// 0.
     pub reserved: u32,
-    /// Unique in the host's life; 0 is no job.
+    /// Unique in the lifetime of the host; 0 is no job.
     pub job_id: u64,
-    /// Stroke that this work belongs to, 0 when none.
+    /// Stroke of the job, 0 when it belongs to none.
     pub stroke_no: u64,
-    /// When the press triggered, host's monotonic clock.
+    /// Time of the press's trigger, host's monotonic clock.
     pub trigger_mono_ns: i64,
-    /// The same in UTC since 1970.
+    /// The same, UTC since 1970.
     pub trigger_utc_ns: i64,
-    /// When the result is worthless, host's monotonic clock.
+    /// Time after which the result is discarded, host's monotonic clock.
     pub deadline_mono_ns: i64,
 }
 
-/// Memory of the host.
+/// Buffer of the host.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Buffer {
@@ -97,11 +97,11 @@ pub struct Buffer {
     pub data: *mut c_void,
     /// Size.
     pub bytes: u64,
-    /// The host's mark.
+    /// Identifier of the buffer, set by the host.
     pub token: u64,
 }
 
-/// A named text beside a frame.
+/// Attribute of a frame: a named text.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Attr {
@@ -121,7 +121,7 @@ pub mod frame_flag {
     pub const LAST: u32 = 4;
 }
 
-/// One piece of data on its way.
+/// Frame: one payload with its format.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
@@ -129,19 +129,19 @@ pub struct Frame {
     pub struct_size: u32,
     /// Bits of [`frame_flag`].
     pub flags: u32,
-    /// What the buffer holds, e.g. `platen.column/2`.
+    /// Format of the payload, e.g. `platen.column/2`.
     pub format: *const c_char,
     /// Coordinate frame, e.g. `scanner`.
     pub frame_id: *const c_char,
-    /// When it was measured, host's monotonic clock, 0 unknown.
+    /// Time of measurement, host's monotonic clock; 0: unknown.
     pub mono_ns: i64,
-    /// Number of things in it (points, vertices).
+    /// Number of elements (points, vertices).
     pub count: u64,
-    /// The data. Emitting hands it to the host.
+    /// Payload. Emitting transfers it to the host.
     pub buffer: Buffer,
-    /// Named texts.
+    /// Attributes.
     pub attrs: *const Attr,
-    /// How many.
+    /// Number of elements.
     pub n_attrs: u32,
     /// 0.
     pub reserved: u32,
@@ -169,17 +169,17 @@ pub mod option_type {
 
 /// Bits of [`OptionDecl::flags`].
 pub mod option_flag {
-    /// There is no default and the plant must give it.
+    /// Required: it has no default.
     pub const REQUIRED: u32 = 1;
-    /// Not to be shown in logs and records.
+    /// Must not appear in logs and records.
     pub const SECRET: u32 = 2;
     /// Rarely needed.
     pub const ADVANCED: u32 = 4;
-    /// Still read, no longer to be used.
+    /// Deprecated, still accepted.
     pub const DEPRECATED: u32 = 8;
-    /// `min` counts.
+    /// `min` is valid.
     pub const HAS_MIN: u32 = 16;
-    /// `max` counts.
+    /// `max` is valid.
     pub const HAS_MAX: u32 = 32;
 }
 
@@ -199,7 +199,7 @@ pub struct OptionDecl {
     pub name: *const c_char,
     /// Unit of a number, or null.
     pub unit: *const c_char,
-    /// What it does, in sentences.
+    /// Description, in sentences.
     pub doc: *const c_char,
     /// Default as TOML text, or null.
     pub default_text: *const c_char,
@@ -211,7 +211,7 @@ pub struct OptionDecl {
     pub choices: *const *const c_char,
 }
 
-/// One option's value, checked, defaulted, in the declared unit.
+/// Value of one option: checked, with its default applied, in the declared unit.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Value {
@@ -219,7 +219,7 @@ pub struct Value {
     pub name: *const c_char,
     /// One of [`option_type`].
     pub kind: i32,
-    /// 1 when the plant file did not give it.
+    /// 1 when it is the default.
     pub from_default: i32,
     /// Whole number or truth value.
     pub i: i64,
@@ -229,7 +229,7 @@ pub struct Value {
     pub s: *const c_char,
     /// Numbers, or null.
     pub list: *const f64,
-    /// How many.
+    /// Number of elements.
     pub n: u64,
 }
 
@@ -239,7 +239,7 @@ pub mod desc_flag {
     pub const HARDWARE: u32 = 1;
 }
 
-/// What a plugin is; static data, no I/O to produce.
+/// Descriptor of a plugin: static data, available without I/O.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Desc {
@@ -251,25 +251,25 @@ pub struct Desc {
     pub id: *const c_char,
     /// `scanner`, `flattening` or `comparison`.
     pub kind: *const c_char,
-    /// Name for people.
+    /// Display name.
     pub name: *const c_char,
-    /// Maker.
+    /// Vendor.
     pub vendor: *const c_char,
     /// Version of the plugin.
     pub version: *const c_char,
-    /// What it does, in sentences.
+    /// Description, in sentences.
     pub doc: *const c_char,
-    /// Where to read more, or null.
+    /// URL of the documentation, or null.
     pub url: *const c_char,
     /// SPDX expression.
     pub license: *const c_char,
-    /// Formats read, null at the end; or null.
+    /// Input formats, null-terminated; or null.
     pub inputs: *const *const c_char,
-    /// Formats written, null at the end; or null.
+    /// Output formats, null-terminated; or null.
     pub outputs: *const *const c_char,
     /// Options.
     pub options: *const OptionDecl,
-    /// How many.
+    /// Number of elements.
     pub n_options: u32,
     /// 0.
     pub reserved: u32,
@@ -278,41 +278,41 @@ pub struct Desc {
 /// Log levels: 1 error, 2 warn, 3 info, 4 debug, 5 trace.
 pub type Level = i32;
 
-/// What the host offers. All `[any]`; valid until `deinit` returns.
+/// Function table of the host. All `[any]`; valid until `deinit` returns.
 #[repr(C)]
 #[derive(Debug)]
 pub struct Host {
     /// Size of this struct.
     pub struct_size: u32,
-    /// Minor version of the boundary that the host speaks.
+    /// Minor version of the boundary, host side.
     pub abi_minor: u32,
-    /// The host's own.
+    /// Private data of the host.
     pub ctx: *mut c_void,
     /// Name of the host.
     pub name: *const c_char,
     /// Its version.
     pub version: *const c_char,
-    /// Non-zero when a message of this level would be kept.
+    /// Returns non-zero when messages of this level are logged.
     pub log_enabled: unsafe extern "C" fn(*const Host, Level) -> c_int,
     /// Logs a message for a job, 0 for none.
     pub log: unsafe extern "C" fn(*const Host, u64, Level, *const c_char),
-    /// Says how far a job is, 0 to 1, and in which phase. Never extends a deadline.
+    /// Reports progress of a job: fraction from 0 to 1, phase. Does not extend the deadline.
     pub progress: unsafe extern "C" fn(*const Host, u64, f64, *const c_char),
-    /// Non-zero when the job was cancelled or its deadline is past.
+    /// Returns non-zero when the job was cancelled or its deadline has passed.
     pub cancelled: unsafe extern "C" fn(*const Host, u64) -> c_int,
-    /// Memory for one frame of a job: bytes, alignment (a power of two).
+    /// Allocates a buffer for one frame of a job: bytes, alignment (a power of two).
     pub buffer_alloc: unsafe extern "C" fn(*const Host, u64, u64, u32, *mut Buffer) -> Status,
-    /// Gives back a buffer that will not be emitted.
+    /// Frees a buffer that will not be emitted.
     pub buffer_free: unsafe extern "C" fn(*const Host, *mut Buffer),
-    /// Hands a frame to the host, buffer included, whatever the answer.
+    /// Transfers a frame with its buffer to the host, whatever the returned status.
     pub emit: unsafe extern "C" fn(*const Host, u64, *const Frame) -> Status,
-    /// A named table, or null.
+    /// Returns an extension table by name, or null.
     pub get_extension: unsafe extern "C" fn(*const Host, *const c_char) -> *const c_void,
-    /// The host's monotonic clock.
+    /// Returns the host's monotonic clock.
     pub now_mono_ns: unsafe extern "C" fn(*const Host) -> i64,
 }
 
-/// One configured plugin at work.
+/// Instance of a plugin with its options.
 #[repr(C)]
 #[derive(Debug)]
 pub struct Instance {
@@ -320,43 +320,43 @@ pub struct Instance {
     pub struct_size: u32,
     /// 0.
     pub reserved: u32,
-    /// The plugin's own.
+    /// Private data of the plugin.
     pub data: *mut c_void,
-    /// What it is.
+    /// Descriptor.
     pub desc: *const Desc,
-    /// `[inst]` Connects to what it needs; may block.
+    /// `[inst]` Connects to devices; may block.
     pub open: unsafe extern "C" fn(*mut Instance, *mut Error) -> Status,
     /// `[inst]` Prepares for the next trigger; may be null.
     pub arm: Option<unsafe extern "C" fn(*mut Instance, *const Job, *mut Error) -> Status>,
-    /// `[inst]` Does one job, emitting its results.
+    /// `[inst]` Runs one job and emits its results.
     pub run: unsafe extern "C" fn(*mut Instance, *const Job, *const Frame, u32, *mut Error) -> Status,
     /// `[any]` Wakes a blocked `run` of this job and returns at once.
     pub cancel: unsafe extern "C" fn(*mut Instance, u64),
-    /// `[inst]` Disconnects; joins own threads.
+    /// `[inst]` Disconnects, and joins the threads of the plugin.
     pub close: unsafe extern "C" fn(*mut Instance),
     /// `[inst]` Ends the instance; no host call after it.
     pub destroy: unsafe extern "C" fn(*mut Instance),
-    /// `[any]` A named table, or null.
+    /// `[any]` Returns an extension table by name, or null.
     pub get_extension: unsafe extern "C" fn(*mut Instance, *const c_char) -> *const c_void,
 }
 
-/// The exported table of a library.
+/// Exported table of a library.
 #[repr(C)]
 #[derive(Debug)]
 pub struct Entry {
     /// Size of this struct.
     pub struct_size: u32,
-    /// Minor version of the boundary that the plugin was built for.
+    /// Minor version of the boundary, plugin side.
     pub abi_minor: u32,
-    /// Once, before `create`: the host and the folder of the library.
+    /// Called once, before `create`, with the host and the folder of the library.
     pub init: unsafe extern "C" fn(*const Host, *const c_char, *mut Error) -> Status,
-    /// Once, after the last `destroy`.
+    /// Called once, after the last `destroy`.
     pub deinit: unsafe extern "C" fn(),
-    /// How many plugins are in the library.
+    /// Returns the number of plugins in the library.
     pub count: unsafe extern "C" fn() -> u32,
-    /// What plugin `index` is, null when there is none; constant, also before `init`.
+    /// Returns the descriptor of plugin `index`, null when there is none; constant, also before `init`.
     pub desc: unsafe extern "C" fn(u32) -> *const Desc,
-    /// Makes an instance from checked values; touches no hardware.
+    /// Creates an instance from checked values; accesses no hardware.
     pub create: unsafe extern "C" fn(
         *const Host,
         *const c_char,
@@ -367,7 +367,7 @@ pub struct Entry {
     ) -> Status,
 }
 
-/// Extension of a scanner instance: how long a scan takes.
+/// Extension of a scanner instance: duration of a scan.
 pub const EXT_ESTIMATE: &std::ffi::CStr = c"platen.ext.estimate/1";
 
 /// Table of [`EXT_ESTIMATE`].
@@ -378,7 +378,7 @@ pub struct Estimate {
     pub struct_size: u32,
     /// 0.
     pub reserved: u32,
-    /// `[inst]` Seconds that a scan of the window (null: everything) takes, negative when unknown.
+    /// `[inst]` Returns the duration of a scan of the window (null: all of it) in seconds, negative when unknown.
     pub scan_seconds: unsafe extern "C" fn(*mut Instance, *const crate::payload::Window) -> f64,
 }
 

@@ -1,4 +1,4 @@
-//! Comparisons.
+//! Comparison plugins: trait, inputs, frames of the boundary.
 
 use std::ffi::c_char;
 
@@ -11,44 +11,44 @@ use crate::shim::{Input, Plugin, describe, malformed};
 use crate::sink::Payload;
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 
-/// Compares the plate with the stroke before, with the baseline, or with its target.
+/// Plugin that compares the plate with the stroke before, with the baseline, or with its target.
 pub trait Comparison: Send + Sized + 'static {
-    /// What it is.
+    /// Description of the plugin.
     const INFO: Info;
-    /// Its options.
+    /// Options of the plugin; `()` for none.
     type Options: Options;
 
-    /// Takes the options.
+    /// Creates the plugin from checked options.
     ///
     /// # Errors
     /// When the options contradict each other.
     fn new(options: Self::Options) -> Result<Self>;
 
-    /// Compares. A function of its arguments: same inputs, same report, to the last bit.
+    /// Returns the report of a comparison. Deterministic: equal inputs give equal reports, to the last bit.
     ///
     /// # Errors
-    /// When the task cannot be done, or the job was cancelled.
+    /// When the task cannot be carried out, or the job was cancelled.
     fn compare(&mut self, job: &Job<'_>, inputs: &Inputs) -> Result<Report>;
 }
 
-/// What a comparison works on.
+/// Inputs of a comparison.
 #[derive(Debug, Clone)]
 pub struct Inputs {
-    /// What is asked.
+    /// Plate, target, lines, templates, stations, calibration.
     pub task: Task,
-    /// The plate now.
+    /// Surface of this scan.
     pub now: Surface,
-    /// The plate at the stroke before.
+    /// Surface of the stroke before.
     pub before: Option<Surface>,
-    /// The plate before the first stroke.
+    /// Surface of the blank, before the first stroke.
     pub baseline: Option<Surface>,
 }
 
 impl Inputs {
-    /// The surface that a comparison goes against: `before` or `baseline`; `None` when there is no such scan.
+    /// Returns the earlier surface by name, `before` or `baseline`; `None` when there is no such scan.
     ///
     /// # Errors
-    /// When it is not of the same plate: scans of one plate agree on its size, which comes from the plate file.
+    /// [`ErrorKind::BadData`] when it is of another plate: scans of one plate have equal size, from the plate file.
     pub fn earlier(&self, against: &str) -> Result<Option<&Surface>> {
         const SAME_SIZE: f64 = 1e-6;
         let earlier = if against == "before" { &self.before } else { &self.baseline };
@@ -65,7 +65,7 @@ impl Inputs {
     }
 }
 
-/// A comparison as a plugin.
+/// Adapter of a [`Comparison`] to the boundary.
 #[derive(Debug)]
 pub struct ComparisonPlugin<C>(C);
 

@@ -1,23 +1,23 @@
-//! Errors for the person who must act.
+//! Errors of plugins, by the person who must act.
 
 use platen_abi::{error_flag, status};
 
-/// Result of a plugin's work.
+/// Result of a plugin's method.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Whose turn it is.
+/// Kind of an error; the status code on the boundary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum ErrorKind {
     /// The job was cancelled.
     Cancelled = status::CANCELLED,
-    /// Something did not answer in time.
+    /// The deadline passed, or a device did not answer in time.
     Timeout = status::TIMEOUT,
     /// The options contradict each other or the plant.
     Config = status::CONFIG,
-    /// Not something this plugin can do.
+    /// The plugin does not support the request.
     Unsupported = status::UNSUPPORTED,
-    /// The named thing does not exist.
+    /// The named file, device or plugin does not exist.
     NotFound = status::NOT_FOUND,
     /// The device is not reachable.
     Disconnected = status::DISCONNECTED,
@@ -27,19 +27,19 @@ pub enum ErrorKind {
     Denied = status::DENIED,
     /// Reading or writing failed.
     Io = status::IO,
-    /// There is nothing to deliver.
+    /// No data is available.
     NoData = status::NO_DATA,
-    /// The input or the device's data is wrong.
+    /// The input or the device's data is invalid.
     BadData = status::BAD_DATA,
-    /// No memory.
+    /// Memory is exhausted.
     Memory = status::MEMORY,
-    /// The call does not fit the state.
+    /// The call is not allowed in this state.
     State = status::STATE,
     /// A fault of the plugin itself.
     Internal = status::INTERNAL,
 }
 
-/// What happened, in one sentence, and what to do, in another.
+/// Error: one sentence on what happened, and one on what to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
     pub(crate) kind: ErrorKind,
@@ -49,33 +49,33 @@ pub struct Error {
 }
 
 impl Error {
-    /// An error of this kind; `message` says where and what.
+    /// Makes an error; `message` states where and what, in one sentence.
     pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
         Self { kind, message: message.into(), hint: String::new(), flags: 0 }
     }
 
-    /// Adds what to do about it.
+    /// Adds the hint: what to do, in one sentence.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = hint.into();
         self
     }
 
-    /// Says that trying again may help.
+    /// Marks the error as temporary: a retry may succeed.
     #[must_use]
     pub fn retryable(mut self) -> Self {
         self.flags |= error_flag::RETRYABLE;
         self
     }
 
-    /// Says that the device is gone until it is opened again.
+    /// Marks the device as lost until it is opened again.
     #[must_use]
     pub fn device_lost(mut self) -> Self {
         self.flags |= error_flag::DEVICE_LOST;
         self
     }
 
-    /// Whose turn it is.
+    /// Returns the kind.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }

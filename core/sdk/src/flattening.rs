@@ -1,4 +1,4 @@
-//! Flattenings.
+//! Flattening plugins: trait, frames of the boundary.
 
 use std::ffi::c_char;
 
@@ -10,27 +10,28 @@ use crate::shim::{Input, Plugin, describe, malformed};
 use crate::sink::Payload;
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 
-/// Gives every vertex of the mid-surface mesh its place on the original plate; the mesh says where the boundary lies.
+/// Plugin that assigns each vertex of the mid-surface mesh its place (u, v) on the original plate.
 pub trait Flattening: Send + Sized + 'static {
-    /// What it is.
+    /// Description of the plugin.
     const INFO: Info;
-    /// Its options.
+    /// Options of the plugin; `()` for none.
     type Options: Options;
 
-    /// Takes the options.
+    /// Creates the plugin from checked options.
     ///
     /// # Errors
     /// When the options contradict each other.
     fn new(options: Self::Options) -> Result<Self>;
 
-    /// Computes the chart of `mesh`. A function of its arguments: same mesh, same chart, to the last bit.
+    /// Returns the chart of `mesh`: (u, v) per vertex in metres, optionally strain and uncertainty. The mesh contains the
+    /// places of its boundary. Deterministic: equal meshes give equal charts, to the last bit.
     ///
     /// # Errors
     /// When the mesh cannot be flattened, or the job was cancelled.
     fn flatten(&mut self, job: &Job<'_>, mesh: &DiskMesh) -> Result<Chart>;
 }
 
-/// A flattening as a plugin.
+/// Adapter of a [`Flattening`] to the boundary.
 #[derive(Debug)]
 pub struct FlatteningPlugin<F>(F);
 

@@ -1,10 +1,10 @@
-//! The nodes at which comparisons give their fields.
+//! Grid of the fields that comparisons return.
 
 use platen_shape::Surface;
 
 use platen_model::{Field, NodeState};
 
-/// Even nodes over the whole plate, v outer, u inner; every fifth is a node of the result's own grid.
+/// Uniform grid over the whole plate, v outer, u inner; every fifth node is a node of the result's grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlateGrid {
     width: f64,
@@ -17,37 +17,37 @@ impl PlateGrid {
     /// Number of nodes.
     pub const NODES: usize = Self::SIDE * Self::SIDE;
 
-    /// The grid over the rectangle of a surface.
+    /// Makes the grid over the rectangle of a surface.
     #[must_use]
     pub fn new(surface: &Surface) -> Self {
         Self { width: surface.width(), height: surface.height() }
     }
 
-    /// Place of a node on the plate.
+    /// Returns the place of a node on the plate, (u, v) in metres.
     #[must_use]
     pub fn at(&self, node: usize) -> [f64; 2] {
         let along = |k: usize, length: f64| length * k as f64 / (Self::SIDE - 1) as f64;
         [along(node % Self::SIDE, self.width), along(node / Self::SIDE, self.height)]
     }
 
-    /// `f(u, v)` at every node.
+    /// Returns `f(u, v)` at every node.
     pub fn map<T>(&self, mut f: impl FnMut(f64, f64) -> T) -> Vec<T> {
         (0..Self::NODES).map(|node| self.at(node)).map(|[u, v]| f(u, v)).collect()
     }
 
-    /// Area that a node stands for, square metres.
+    /// Returns the area of a cell, square metres.
     #[must_use]
     pub fn cell(&self) -> f64 {
         self.width * self.height / ((Self::SIDE - 1) * (Self::SIDE - 1)) as f64
     }
 
-    /// A field with one number a node.
+    /// Makes a field with one number per node.
     #[must_use]
     pub fn scalar(&self, name: &str, unit: &str, values: Vec<f64>, state: Vec<NodeState>) -> Field {
         self.field(name, unit, 1, values, state)
     }
 
-    /// A field with several numbers a node.
+    /// Makes a field with several numbers per node, components innermost.
     #[must_use]
     pub fn field(
         &self,
@@ -61,9 +61,9 @@ impl PlateGrid {
         Field { name, unit, nodes: [Self::SIDE; 2], components, values, state }
     }
 
-    /// Nodes that hang together (by their sides) and share a label; nodes with label 0 belong to none.
+    /// Returns the connected components of equal label (4-neighbourhood). Nodes with label 0 belong to none.
     #[must_use]
-    pub fn patches(label: &[i8]) -> Vec<Vec<usize>> {
+    pub fn connected_components(label: &[i8]) -> Vec<Vec<usize>> {
         let mut visited = vec![false; label.len()];
         let mut patches = Vec::new();
         for first in (0..label.len()).filter(|&node| label[node] != 0) {
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patches_hang_together_by_sides_and_do_not_wrap_round() {
+    fn components_are_connected_by_sides_and_do_not_wrap_round() {
         let mut label = vec![0_i8; PlateGrid::NODES];
         // A row's last node and the next row's first are no neighbours; diagonal nodes are none either.
         for node in [100, 101, 5 * 101 + 5, 6 * 101 + 6] {
@@ -113,7 +113,7 @@ mod tests {
         }
         // Two senses side by side are two patches.
         (label[2000], label[2001], label[2002]) = (1, 1, -1);
-        let patches = PlateGrid::patches(&label);
+        let patches = PlateGrid::connected_components(&label);
         assert_eq!(patches, [vec![100], vec![101], vec![510], vec![612], vec![2000, 2001], vec![2002]]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a plugin says of itself.
+//! Static description of a plugin.
 
 use std::ffi::CStr;
 
@@ -15,7 +15,8 @@ pub struct Info {
 }
 
 impl Info {
-    /// `id` as in plant files, a name for people, what it does in sentences, its version.
+    /// Makes a description: `id` as in plant files, display name, one or two sentences, version. Vendor and licence are those of
+    /// platen unless set by [`by`](Self::by).
     pub const fn new(
         id: &'static CStr,
         name: &'static CStr,
@@ -25,7 +26,7 @@ impl Info {
         Self { id, name, doc, version, vendor: c"platen", license: c"MIT OR Apache-2.0", flags: 0 }
     }
 
-    /// Who made it, and its licence as an SPDX expression.
+    /// Sets the vendor, and the licence as an SPDX expression.
     #[must_use]
     pub const fn by(mut self, vendor: &'static CStr, license: &'static CStr) -> Self {
         self.vendor = vendor;
@@ -33,7 +34,7 @@ impl Info {
         self
     }
 
-    /// It drives hardware.
+    /// Marks the plugin as driving hardware.
     #[must_use]
     pub const fn hardware(mut self) -> Self {
         self.flags |= platen_abi::desc_flag::HARDWARE;

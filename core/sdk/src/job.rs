@@ -1,4 +1,4 @@
-//! The work at hand: deadline, cancelling, progress, memory.
+//! Job of a plugin: deadline, cancellation, progress, host memory.
 
 use std::ffi::{CStr, CString};
 use std::sync::{Mutex, PoisonError};
@@ -8,10 +8,10 @@ use platen_abi as abi;
 
 use crate::{Error, ErrorKind, Result};
 
-/// What wakes a blocking call of the plugin when its job is cancelled.
+/// Callback that wakes a blocking call of the plugin when its job is cancelled.
 pub(crate) type Waker = Mutex<Option<Box<dyn Fn() + Send>>>;
 
-/// One piece of work. Borrowed for the call.
+/// One job, borrowed for the call.
 #[derive(Clone, Copy)]
 pub struct Job<'a> {
     pub(crate) raw: &'a abi::Job,
@@ -26,17 +26,17 @@ impl std::fmt::Debug for Job<'_> {
 }
 
 impl<'a> Job<'a> {
-    /// Unique in the host's life.
+    /// Returns the id, unique in the lifetime of the host.
     pub fn id(&self) -> u64 {
         self.raw.job_id
     }
 
-    /// Stroke that this work belongs to, 0 when none.
+    /// Returns the number of the stroke, 0 when the job belongs to none.
     pub fn stroke(&self) -> u64 {
         self.raw.stroke_no
     }
 
-    /// Err when the job was cancelled or its deadline is past. Ask often: at least every 50 ms of work.
+    /// Fails when the job was cancelled or its deadline has passed. Call it at least every 50 ms of work.
     ///
     /// # Errors
     /// [`ErrorKind::Cancelled`].
@@ -49,29 +49,29 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Time left until the deadline, zero when it is past.
+    /// Returns the time left until the deadline, zero when it has passed.
     pub fn remaining(&self) -> Duration {
         // SAFETY: as above.
         let now = unsafe { (self.host.now_mono_ns)(self.host) };
         Duration::from_nanos(self.raw.deadline_mono_ns.saturating_sub(now).max(0).unsigned_abs())
     }
 
-    /// Says how far the work is, 0 to 1, and in which phase.
+    /// Reports progress: a fraction from 0 to 1 and the name of the phase. Progress does not extend the deadline.
     pub fn progress(&self, fraction: f64, phase: &str) {
         let phase = CString::new(phase.replace('\0', " ")).unwrap_or_default();
         // SAFETY: the string lives for the call.
         unsafe { (self.host.progress)(self.host, self.raw.job_id, fraction, phase.as_ptr()) };
     }
 
-    /// `wake` is called from another thread when the job is cancelled, until the guard is dropped: close a socket
-    /// with it, so that a blocking read returns. It must return at once.
+    /// Registers `wake`, which is called from another thread when the job is cancelled, until the guard is dropped. Typically
+    /// it closes a socket, so that a blocking read returns. It must return at once.
     #[must_use]
     pub fn on_cancel(&self, wake: impl Fn() + Send + 'static) -> CancelGuard<'a> {
         *self.waker.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(wake));
         CancelGuard { waker: self.waker }
     }
 
-    /// A buffer of the host, zeroed.
+    /// Allocates a zeroed buffer of the host.
     pub(crate) fn buffer(&self, bytes: usize) -> Result<OwnedBuffer<'a>> {
         let mut raw = abi::Buffer { data: std::ptr::null_mut(), bytes: 0, token: 0 };
         // SAFETY: `raw` lives for the call.
@@ -83,7 +83,7 @@ impl<'a> Job<'a> {
         Ok(OwnedBuffer { raw, bytes, host: self.host })
     }
 
-    /// Hands a buffer to the host.
+    /// Passes a buffer to the host as a frame of `format`.
     pub(crate) fn emit(&self, format: &CStr, count: u64, flags: u32, buffer: OwnedBuffer<'_>) -> Result<()> {
         let frame = abi::Frame {
             struct_size: size_of::<abi::Frame>() as u32,
@@ -109,7 +109,7 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Takes the waker away again when the blocking call is over.
+/// Registration of a waker; ends when dropped.
 pub struct CancelGuard<'a> {
     waker: &'a Waker,
 }
@@ -126,7 +126,7 @@ impl Drop for CancelGuard<'_> {
     }
 }
 
-/// A buffer of the host that goes back when it is not emitted.
+/// Buffer of the host; freed on drop unless emitted.
 pub(crate) struct OwnedBuffer<'a> {
     raw: abi::Buffer,
     bytes: usize,

@@ -1,12 +1,15 @@
-//! For authors of plugins in Rust: a safe skin over the C boundary of `platen-abi`.
+//! SDK for plugins in Rust: safe traits over the C boundary of `platen-abi`.
 //!
-//! A plugin is a crate of type `cdylib` that implements one of three traits and exports it with one line:
+//! A plugin is a crate of type `cdylib` that implements one of three traits and exports the implementation with
+//! [`export!`]:
 //!
-//! | kind | trait | turns |
-//! |---|---|---|
-//! | scanner | [`Scanner`] | a trigger into a lattice, column by column |
-//! | flattening | `Flattening` (feature `flattening`) | a mid-surface mesh into (u, v) |
-//! | comparison | `Comparison` (feature `comparison`) | surfaces and a task into findings and fields |
+//! | kind | trait | input | output |
+//! |---|---|---|---|
+//! | scanner | [`Scanner`] | trigger, window | lattice, column by column |
+//! | flattening | `Flattening` (feature `flattening`) | mid-surface mesh | (u, v) of each vertex |
+//! | comparison | `Comparison` (feature `comparison`) | surfaces, task | figures, verdicts, sentences, fields |
+//!
+//! # Example
 //!
 //! ```
 //! use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
@@ -44,8 +47,23 @@
 //! # fn main() {}
 //! ```
 //!
-//! A field of type `Option<T>` need not be given; one without default must be. Panics are caught in the shim and
-//! become errors. What a plugin logs with `tracing` arrives in the host's log with the job's id.
+//! # Options
+//!
+//! [`options!`] declares each option once; validation, `platen plugins describe`, the JSON Schema and the typed value follow
+//! from the declaration. A field of type `Option<T>` is optional; any other field without a default is required. The host
+//! checks the plant file before the plugin is created.
+//!
+//! # Errors, panics, log
+//!
+//! An [`Error`] consists of a kind, a sentence (where and what) and a hint (what to do). Panics are caught in the exported
+//! functions and become errors of kind [`ErrorKind::Internal`]; the crate must be built with `panic = "unwind"`. Events of
+//! `tracing` are forwarded to the host's log with the id of the job.
+//!
+//! # Threads and time
+//!
+//! All methods of one plugin instance are called one at a time, from the same thread. A job has a deadline and can be
+//! cancelled at any time: call [`Job::check`] at least every 50 ms of work, or register [`Job::on_cancel`] around a blocking
+//! call.
 #![allow(unsafe_code, reason = "this crate is the plugin's side of the boundary")]
 
 mod error;

@@ -1,4 +1,5 @@
-//! Carries what a plugin logs with `tracing` to the host, whose subscriber the library cannot see.
+//! Forwards the plugin's `tracing` events to the host. A library has its own `tracing` globals and cannot use the host's
+//! subscriber.
 
 use std::cell::Cell;
 use std::ffi::CString;
@@ -12,7 +13,7 @@ thread_local! {
     static JOB: Cell<u64> = const { Cell::new(0) };
 }
 
-/// Names the job that this thread works on, for its log lines.
+/// Runs `work` with `job_id` as the job of this thread's log lines.
 pub(crate) fn in_job<T>(job_id: u64, work: impl FnOnce() -> T) -> T {
     let before = JOB.replace(job_id);
     let result = work();
@@ -27,7 +28,7 @@ unsafe impl Send for ToHost {}
 // SAFETY: as above.
 unsafe impl Sync for ToHost {}
 
-/// Makes the host the receiver of this library's `tracing` events.
+/// Installs the host as the subscriber of this library's `tracing` events.
 pub(crate) fn install(host: &'static abi::Host) {
     // A second `init` in the same process finds the first subscriber in place, which serves as well.
     let _ = tracing::subscriber::set_global_default(ToHost(host));

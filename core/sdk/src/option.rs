@@ -1,18 +1,18 @@
-//! Options: declared once, from which come validation, `describe`, schema and the values.
+//! Options: one declaration gives validation, `describe`, schema and typed values.
 
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
 
 use platen_abi::{OptionDecl, Value, option_flag, option_type};
 
-/// A struct declared with [`options!`](crate::options).
+/// Options struct, declared with [`options!`](crate::options).
 pub trait Options: Sized {
-    /// The table that the host reads.
+    /// Table of declarations, read by the host.
     const TABLE: &'static [OptionDecl];
-    /// Takes the values that the host checked.
+    /// Makes the struct from the values that the host checked.
     ///
     /// # Errors
-    /// When one is missing, which is the host's fault.
+    /// When a value is missing: a fault of the host.
     fn from_values(values: &Values<'_>) -> crate::Result<Self>;
 }
 
@@ -24,7 +24,7 @@ impl Options for () {
     }
 }
 
-/// Values as they came from the host.
+/// Values as received from the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Values<'a>(pub(crate) &'a [Value]);
 
@@ -35,7 +35,7 @@ impl<'a> Values<'a> {
         Some(Received { value })
     }
 
-    /// The value of one option.
+    /// Returns the value of one option.
     ///
     /// # Errors
     /// When it is missing or of another type.
@@ -45,13 +45,13 @@ impl<'a> Values<'a> {
             let name = name.to_string_lossy();
             crate::Error::new(
                 crate::ErrorKind::Internal,
-                format!("the host gave no sound value for option {name}"),
+                format!("the host gave no valid value for option {name}"),
             )
         })
     }
 }
 
-/// One value behind the boundary.
+/// One value as received.
 #[derive(Debug, Clone, Copy)]
 pub struct Received<'a> {
     value: &'a Value,
@@ -67,13 +67,13 @@ impl Received<'_> {
     }
 }
 
-/// Types that a field of an options struct can have.
+/// Type of a field of an options struct.
 pub trait OptionType: Sized {
-    /// Code of the type on the boundary.
+    /// Type code on the boundary.
     const TYPE: i32;
     /// False for `Option<T>`.
     const REQUIRED: bool = true;
-    /// Takes the value; `None` when it is missing or of another type.
+    /// Converts the value; `None` when it is missing or of another type.
     #[doc(hidden)]
     fn receive(received: Option<Received<'_>>) -> Option<Self>;
 }
@@ -120,7 +120,7 @@ impl<T: OptionType> OptionType for Option<T> {
     }
 }
 
-/// What [`options!`](crate::options) collects of one field.
+/// Declaration of one field, collected by [`options!`](crate::options).
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy)]
 pub struct Declared {
@@ -140,7 +140,7 @@ const fn pointer(text: Option<&'static str>) -> *const c_char {
     }
 }
 
-/// Row of the table. The texts end in NUL, as the macro makes them.
+/// Makes a row of the table. The texts must end in NUL; the macro appends it.
 #[doc(hidden)]
 pub const fn declare<T: OptionType>(declared: Declared) -> OptionDecl {
     let mut flags = 0;
@@ -180,7 +180,7 @@ pub const fn declare<T: OptionType>(declared: Declared) -> OptionDecl {
     }
 }
 
-/// Declares a struct of options; see the crate's example.
+/// Declares a struct of options; see the example of the crate.
 ///
 /// Each field is `/// doc`, `name: Type`, optionally `= default`, `, unit "m"`, `, min 0.0`, `, max 1.0`,
 /// `, choices ["a", "b"]`, in this order, and a semicolon.

@@ -1,4 +1,4 @@
-//! Scanner drivers.
+//! Scanner plugins: trait, and the sink of a scan.
 
 use platen_abi::{frame_flag, payload};
 use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, Window};
@@ -6,20 +6,20 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, Window};
 use crate::sink::Payload;
 use crate::{Error, ErrorKind, Info, Job, Options, Result};
 
-/// Turns a trigger into a lattice, column by column.
+/// Plugin that turns a trigger into a lattice, column by column.
 pub trait Scanner: Send + Sized + 'static {
-    /// What it is.
+    /// Description of the plugin.
     const INFO: Info;
-    /// Its options.
+    /// Options of the plugin; `()` for none.
     type Options: Options;
 
-    /// Takes the options. Touches no hardware and no file.
+    /// Creates the plugin from checked options. Must not access hardware or files.
     ///
     /// # Errors
     /// When the options contradict each other.
     fn new(options: Self::Options) -> Result<Self>;
 
-    /// Connects; may block.
+    /// Connects to the device; may block.
     ///
     /// # Errors
     /// When the device does not answer, with what to do about it.
@@ -27,7 +27,7 @@ pub trait Scanner: Send + Sized + 'static {
         Ok(())
     }
 
-    /// Seconds that a scan of `window` (everything, when `None`) takes, when known.
+    /// Returns the duration of a scan of `window` in seconds, if known; `None` is the full field of view.
     fn estimate_s(&mut self, window: Option<&Window>) -> Option<f64> {
         let _ = window;
         None
@@ -36,22 +36,22 @@ pub trait Scanner: Send + Sized + 'static {
     /// Prepares for the next trigger.
     ///
     /// # Errors
-    /// When the device cannot scan now.
+    /// When the device is not ready to scan.
     fn arm(&mut self, job: &Job<'_>) -> Result<()> {
         job.check()
     }
 
-    /// Scans: one [`ScanSink::begin`], the columns in any order, one [`ScanSink::end`].
+    /// Scans: calls [`ScanSink::begin`] once, [`ScanSink::column`] for the columns in any order, [`ScanSink::end`] once.
     ///
     /// # Errors
-    /// When the scan did not become complete.
+    /// When the scan is not complete.
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()>;
 
-    /// Disconnects; joins own threads.
+    /// Disconnects, and joins the threads that the plugin started.
     fn close(&mut self) {}
 }
 
-/// Where a scan goes.
+/// Sink of one scan.
 #[derive(Debug)]
 pub struct ScanSink<'a> {
     pub(crate) job: Job<'a>,
@@ -62,18 +62,18 @@ pub struct ScanSink<'a> {
 }
 
 impl ScanSink<'_> {
-    /// The part of the dome that is wanted; everything when `None`. A driver that cannot restrict itself sends all.
+    /// Returns the requested part of the field of view; `None` requests all of it. A driver without such a feature sends all.
     pub fn window(&self) -> Option<&Window> {
         self.window.as_ref()
     }
 
-    /// Says what is coming. Once, first.
+    /// Sends the header. Must be called once, first.
     ///
     /// # Errors
-    /// When called twice, or cancelled.
+    /// When called twice, or the job is cancelled.
     pub fn begin(&mut self, header: &ScanHeader) -> Result<()> {
         if self.n_rows.is_some() {
-            return Err(Error::new(ErrorKind::Internal, "the scan was begun twice"));
+            return Err(Error::new(ErrorKind::Internal, "begin was called twice for one scan"));
         }
         let notes = header.notes.join("\n");
         let mut layout = payload::Layout::of::<payload::Scan>();
@@ -106,10 +106,11 @@ impl ScanSink<'_> {
     /// Sends one column.
     ///
     /// # Errors
-    /// When the column is not sound, the scan was not begun, or the job is cancelled.
+    /// When the column is invalid, the header is missing, or the job is cancelled.
     pub fn column(&mut self, column: &Column) -> Result<()> {
-        let n_rows =
-            self.n_rows.ok_or_else(|| Error::new(ErrorKind::Internal, "a column came before the header"))?;
+        let n_rows = self
+            .n_rows
+            .ok_or_else(|| Error::new(ErrorKind::Internal, "a column was sent before the header"))?;
         column.check(n_rows).map_err(|e| Error::new(ErrorKind::BadData, e.to_string()))?;
         let n = column.len();
         let mut layout = payload::Layout::of::<payload::Column>();
@@ -136,16 +137,13 @@ impl ScanSink<'_> {
         payload.emit::<payload::Column>(&self.job, n as u64, self.flags())
     }
 
-    /// Says that all columns were sent. Once, last: without it there was no scan.
+    /// Ends the scan. Must be called once, last: a scan without end is discarded.
     ///
     /// # Errors
-    /// When the scan was not begun or has ended.
+    /// When the header is missing or the scan has ended already.
     pub fn end(&mut self, end: &ScanEnd) -> Result<()> {
         if self.n_rows.is_none() || self.ended {
-            return Err(Error::new(
-                ErrorKind::Internal,
-                "the scan's end came without its beginning, or twice",
-            ));
+            return Err(Error::new(ErrorKind::Internal, "end was called without begin, or twice"));
         }
         let head = payload::ScanEnd {
             struct_size: size_of::<payload::ScanEnd>() as u32,

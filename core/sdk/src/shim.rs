@@ -1,4 +1,4 @@
-//! The C functions behind [`export!`](crate::export): each catches panics and turns errors into the caller's struct.
+//! C functions behind [`export!`](crate::export). Each catches panics and writes errors into the caller's struct.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -11,7 +11,7 @@ use platen_abi as abi;
 pub use crate::option::{Declared, declare};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Scanner, Values, job, logging};
 
-/// One frame that the host handed in.
+/// Input frame from the host.
 #[derive(Debug, Clone, Copy)]
 pub struct Input<'a> {
     pub(crate) format: &'a CStr,
@@ -23,7 +23,7 @@ pub struct Input<'a> {
     pub(crate) bytes: &'a [u8],
 }
 
-/// The three kinds behind one set of C functions.
+/// Common interface of the three kinds behind the C functions.
 pub trait Plugin: Send + Sized + 'static {
     const DESC: abi::Desc;
     fn create(values: &Values<'_>) -> Result<Self>;
@@ -41,7 +41,7 @@ pub trait Plugin: Send + Sized + 'static {
     fn close(&mut self) {}
 }
 
-/// Descriptor of a plugin of this kind.
+/// Makes the descriptor of a plugin.
 pub const fn describe<O: Options>(
     kind: &'static CStr,
     info: Info,
@@ -67,7 +67,7 @@ pub const fn describe<O: Options>(
     }
 }
 
-/// A scanner as a plugin.
+/// Adapter of a [`Scanner`] to the boundary.
 #[derive(Debug)]
 pub struct ScannerPlugin<S>(S);
 
@@ -107,7 +107,7 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
         if sink.ended {
             Ok(())
         } else {
-            Err(Error::new(ErrorKind::Internal, "the driver returned without ending the scan"))
+            Err(Error::new(ErrorKind::Internal, "the driver returned without calling end"))
         }
     }
     fn close(&mut self) {
@@ -128,7 +128,7 @@ pub(crate) fn malformed(error: &abi::payload::Malformed) -> Error {
     Error::new(ErrorKind::BadData, format!("the host sent a malformed frame: {error}"))
 }
 
-/// Behind one `platen_instance`. `raw` comes first: a pointer to it is a pointer to the whole.
+/// State behind one `platen_instance`. `raw` is the first field, so a pointer to it is a pointer to the state.
 #[repr(C)]
 struct State<P> {
     raw: abi::Instance,
@@ -142,7 +142,7 @@ thread_local! {
     static LAST_PANIC: RefCell<Option<String>> = const { RefCell::new(None) };
 }
 
-/// Runs `work`, catching panics, and tells the caller what went wrong.
+/// Runs `work`, catching panics; writes an error to the caller's struct and returns its status.
 ///
 /// # Safety
 /// `out` is null or a caller's `platen_error` with its `struct_size` set.
@@ -188,7 +188,7 @@ fn copy_text(out: &mut [c_char], text: &str) {
     }
 }
 
-/// The exported table of a library with one plugin.
+/// Makes the exported table of a library with one plugin.
 pub const fn entry<P: Plugin>() -> abi::Entry {
     abi::Entry {
         struct_size: size_of::<abi::Entry>() as u32,
@@ -288,7 +288,7 @@ unsafe extern "C" fn create<P: Plugin>(
     }
 }
 
-/// The parts of an instance that an `[inst]` call uses.
+/// Returns the parts of an instance that an `[inst]` call uses.
 ///
 /// # Safety
 /// `instance` came from [`create`] and no other `[inst]` call is running.
@@ -299,7 +299,7 @@ unsafe fn parts<'a, P>(instance: *mut abi::Instance) -> (&'a mut P, &'static abi
 }
 
 unsafe extern "C" fn open<P: Plugin>(instance: *mut abi::Instance, error: *mut abi::Error) -> abi::Status {
-    // SAFETY: `[inst]` call on an instance of ours.
+    // SAFETY: `[inst]` call on an instance from `create`.
     unsafe { guard(error, || parts::<P>(instance).0.open()) }
 }
 
@@ -308,7 +308,7 @@ unsafe extern "C" fn arm<P: Plugin>(
     job: *const abi::Job,
     error: *mut abi::Error,
 ) -> abi::Status {
-    // SAFETY: `[inst]` call on an instance of ours; the job is borrowed for the call.
+    // SAFETY: `[inst]` call on an instance from `create`; the job is borrowed for the call.
     unsafe {
         guard(error, || {
             let (plugin, host, waker) = parts::<P>(instance);
@@ -325,7 +325,7 @@ unsafe extern "C" fn run<P: Plugin>(
     n_frames: u32,
     error: *mut abi::Error,
 ) -> abi::Status {
-    // SAFETY: `[inst]` call on an instance of ours; job and frames are borrowed for the call.
+    // SAFETY: `[inst]` call on an instance from `create`; job and frames are borrowed for the call.
     unsafe {
         guard(error, || {
             let (plugin, host, waker) = parts::<P>(instance);
@@ -372,7 +372,7 @@ unsafe extern "C" fn cancel<P: Plugin>(instance: *mut abi::Instance, _job_id: u6
 }
 
 unsafe extern "C" fn close<P: Plugin>(instance: *mut abi::Instance) {
-    // SAFETY: `[inst]` call on an instance of ours.
+    // SAFETY: `[inst]` call on an instance from `create`.
     let _ = unsafe {
         guard(std::ptr::null_mut(), || {
             parts::<P>(instance).0.close();
@@ -410,7 +410,7 @@ unsafe extern "C" fn scan_seconds<P: Plugin>(
     window: *const abi::payload::Window,
 ) -> f64 {
     let mut seconds = -1.0;
-    // SAFETY: `[inst]` call on an instance of ours; the window is null or borrowed for the call.
+    // SAFETY: `[inst]` call on an instance from `create`; the window is null or borrowed for the call.
     let _ = unsafe {
         guard(std::ptr::null_mut(), || {
             let window = window.as_ref().map(from_window);
@@ -437,7 +437,7 @@ macro_rules! export {
         #[cfg(panic = "abort")]
         compile_error!("a plugin must be built with panic = \"unwind\": its panics become errors");
 
-        /// The library's table.
+        /// Table of the library.
         #[allow(non_upper_case_globals, unsafe_code, reason = "the name is the boundary's")]
         #[unsafe(no_mangle)]
         pub static platen_entry_1: $crate::abi::Entry = $crate::shim::entry::<$shim>();

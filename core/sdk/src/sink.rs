@@ -1,11 +1,11 @@
-//! Writes headers and arrays into buffers of the host.
+//! Payload writer: header and arrays into a buffer of the host.
 
 use platen_abi::payload::{self, Header, Layout};
 
 use crate::Result;
 use crate::job::{Job, OwnedBuffer};
 
-/// A buffer of the host with a planned layout.
+/// Buffer of the host with a planned layout.
 pub(crate) struct Payload<'a>(OwnedBuffer<'a>);
 
 impl<'a> Payload<'a> {

@@ -39,7 +39,7 @@ pub(crate) fn add(
         .collect();
     let least = (options.min_patch / grid.cell()).ceil() as usize;
     let patches: Vec<Vec<usize>> =
-        PlateGrid::patches(&label).into_iter().filter(|patch| patch.len() >= least).collect();
+        PlateGrid::connected_components(&label).into_iter().filter(|patch| patch.len() >= least).collect();
 
     let bands = bands(surfaces, grid, &patches, &change);
     let unchanged = |i: usize| if known(i) { NodeState::Unchanged } else { NodeState::Unseen };

@@ -75,7 +75,7 @@ fn drop_patches(state: &mut [NodeState], normal: &[f64], drop: impl Fn(&[usize])
         .zip(normal)
         .map(|(state, d)| if *state == NodeState::Seen { d.signum() as i8 } else { 0 })
         .collect();
-    for patch in PlateGrid::patches(&label).into_iter().filter(|patch| drop(patch)) {
+    for patch in PlateGrid::connected_components(&label).into_iter().filter(|patch| drop(patch)) {
         patch.into_iter().for_each(|place| state[place] = NodeState::Unchanged);
     }
 }

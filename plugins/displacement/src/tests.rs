@@ -13,7 +13,7 @@ const HEIGHT: f64 = 2.0;
 /// Noise of 24,000 points that stands for 0.5 mm on the 167,000 of a scan at 6 mm.
 const SIGMA: f64 = 0.19e-3;
 
-/// Numbers of a seed. Those of seeds in a row go together in this generator, so seeds are taken far apart.
+/// Returns a generator. Consecutive seeds of this generator are correlated, so seeds are spread out.
 fn spread(seed: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
@@ -211,8 +211,8 @@ fn share_above_lod(pairs: &[detect::Changes]) -> f64 {
     pairs.iter().map(|pair| pair.above_lod).sum::<f64>() / pairs.len() as f64
 }
 
-/// What null pairs show in excess of what is stated, pooled over the plate, and the false change of other pairs with it, beside
-/// that without it.
+/// Returns the false change without calibration, the excess scatter of null pairs over the stated one (pooled), and the false change of
+/// other pairs with that calibration.
 fn calibrated(seeds: u64, amplitude: f64, judged: u64) -> [f64; 3] {
     let calibrating = null_pairs(seeds..seeds + judged * 3 / 5, amplitude, 0.0);
     let pooled = |square: fn(&detect::Changes) -> f64| calibrating.iter().map(square).sum::<f64>();

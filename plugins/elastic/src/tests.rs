@@ -81,7 +81,7 @@ fn developable_plates_are_exact_to_second_order_of_the_mesh() {
     check(&half_bent(5.0, 2.5), [5.0, 2.5]);
 }
 
-/// Shape, section 2.2: 0.23 mm in the mean, 0.39 mm at most, when the fibres keep their length. The uncertainty says so.
+/// Shape, section 2.2: 0.23 mm in the mean, 0.39 mm at most, when the fibres keep their length. So is the stated uncertainty.
 #[test]
 fn on_a_sphere_of_stiff_fibres_the_error_is_the_uncertainty() {
     let size = [2.5, 5.0];
@@ -108,7 +108,7 @@ fn on_a_sphere_of_least_energy_it_is_right() {
     }
 }
 
-/// The strain of a sphere of stiff fibres is known: none along the fibres, shrunk across them. What is reported differs by
+/// The strain of a sphere of stiff fibres is known: none along the fibres, shrunk across them. The reported strain differs by
 /// the law, but its curl does not: Gauss's curvature is owed by any law.
 #[test]
 fn the_strain_owes_the_curvature_of_the_sphere() {
@@ -166,11 +166,11 @@ fn the_chart_does_not_depend_on_where_the_plate_lies() {
 }
 
 #[test]
-fn it_stops_when_told() {
+fn it_stops_at_cancellation() {
     let plate = ClosedForm::new(sphere_of_fibres(9.0, [3.0, 2.5]), [3.0, 2.5], [9, 8], 0.3, 8);
     let stop = || platen_sdk::Error::new(platen_sdk::ErrorKind::Cancelled, "stop");
-    let told = elastic(&plate.mesh().unwrap(), 0.3, || Err(stop()));
-    assert_eq!(told.unwrap_err(), stop());
+    let stopped = elastic(&plate.mesh().unwrap(), 0.3, || Err(stop()));
+    assert_eq!(stopped.unwrap_err(), stop());
 }
 
 /// Small meshes of every kind: noise up to the size of the cells. No panic, every number finite, no inverted triangle.

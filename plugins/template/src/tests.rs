@@ -19,7 +19,7 @@ const WIDTH: f64 = 3.0;
 const HEIGHT: f64 = 2.0;
 const THICKNESS: f64 = 0.04;
 
-/// Numbers of a seed. Those of seeds in a row go together in this generator, so seeds are taken far apart.
+/// Returns a generator. Consecutive seeds of this generator are correlated, so seeds are spread out.
 fn spread(seed: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
