@@ -1,14 +1,14 @@
 //! A TOML file that is being read, and the faults found so far.
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
 use toml::de::DeTable;
 
-use crate::node::{Entry, Node};
+use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
-use crate::syntax::Syntax;
 use crate::{Error, Fault, Faults, TomlTable};
 
 /// Proof that a fault has been recorded: only [`Document`] makes it, so a reader that returns it cannot refuse a file
@@ -48,20 +48,37 @@ pub struct Document {
     source: Arc<Source>,
     path: String,
     root: Node,
-    syntax: Syntax,
+    /// Bytes of the errors of syntax.
+    syntax_errors: Vec<Range<usize>>,
     faults: RefCell<Vec<Fault>>,
 }
 
 impl Document {
-    /// Parses `text`; syntax faults are kept until [`Document::finish`], and the rest of the file is read as well.
+    /// Parses `text`. Faults of syntax are kept until [`Document::finish`], and the rest of the file is read as well.
+    ///
+    /// The parser recovers from an error and goes on, so one slip may have several errors and may hide keys. Of the errors
+    /// in one value or one line only the first is reported, the value is skipped, and no key is reported as missing.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
         let source = Source { file: file.into(), text: text.into() };
-        let (table, errors) = DeTable::parse_recoverable(&source.text);
-        let mut root = Node::from_table(&table);
-        let syntax = Syntax::sort_out(&source, &root, &errors);
-        root.break_values(&|value| syntax.breaks(&source, value));
-        let faults = RefCell::new(syntax.faults.clone());
-        Self { source: Arc::new(source), path: String::new(), root, syntax, faults }
+        let (table, mut errors) = DeTable::parse_recoverable(&source.text);
+        errors.sort_by_key(|error| span(error).start);
+        let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
+        let root = Node::from_document(&table, &spans);
+        let mut faults = Vec::new();
+        let mut end = None;
+        for (error, at) in errors.iter().zip(&spans) {
+            if end.is_some_and(|end| at.start <= end) {
+                continue;
+            }
+            faults.push(
+                source.fault(&Place { key: String::new(), offset: at.start }, error.message().to_owned()),
+            );
+            let line = source.text.get(at.start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+            let line_end = at.start + line.len();
+            end = Some(root.broken_at(at).map_or(line_end, |value| value.end.max(line_end)));
+        }
+        let faults = RefCell::new(faults);
+        Self { source: Arc::new(source), path: String::new(), root, syntax_errors: spans, faults }
     }
 
     /// Reads and parses a file.
@@ -84,7 +101,7 @@ impl Document {
 
     /// A part of a file that was read before, to be read on its own.
     pub(crate) fn part(source: Arc<Source>, path: String, root: Node) -> Self {
-        Self { source, path, root, syntax: Syntax::default(), faults: RefCell::default() }
+        Self { source, path, root, syntax_errors: Vec::new(), faults: RefCell::default() }
     }
 
     /// The cursor over the whole file.
@@ -94,7 +111,7 @@ impl Document {
 
     /// Records a fault at `place`.
     pub fn fault(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if !self.syntax.covers(place.offset) {
+        if !self.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
             self.faults.borrow_mut().push(self.source.fault(place, message.into()));
         }
         Reported(())
@@ -102,7 +119,7 @@ impl Document {
 
     /// Records that something is not there, unless broken syntax may have swallowed it.
     pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if self.syntax.broken.is_empty() {
+        if self.syntax_errors.is_empty() {
             return self.fault(place, message);
         }
         Reported(())
@@ -141,4 +158,8 @@ impl Document {
     fn entries(&self) -> &[Entry] {
         self.root.as_table().unwrap_or_default()
     }
+}
+
+fn span(error: &toml::de::Error) -> Range<usize> {
+    error.span().unwrap_or(0..0)
 }

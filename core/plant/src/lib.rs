@@ -18,7 +18,6 @@ pub mod plate;
 pub mod press;
 mod schema;
 mod source;
-mod syntax;
 mod table;
 mod unit;
 

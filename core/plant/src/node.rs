@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
 /// A value and where it stands.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,13 +38,12 @@ pub(crate) struct Entry {
 }
 
 impl Node {
-    /// Takes over a parsed table, its keys in the order of the text.
-    pub(crate) fn from_table(table: &Spanned<DeTable<'_>>) -> Self {
-        Self { span: table.span(), kind: NodeKind::Table(entries(table.get_ref())) }
+    /// Converts a parsed document. An inline value that overlaps one of `errors` becomes [`NodeKind::Broken`].
+    pub(crate) fn from_document(document: &Spanned<DeTable<'_>>, errors: &[Range<usize>]) -> Self {
+        Self { span: document.span(), kind: NodeKind::Table(entries(document.get_ref(), errors)) }
     }
 
-    /// Takes over a parsed value.
-    pub(crate) fn from_value(value: &Spanned<DeValue<'_>>) -> Self {
+    fn from_value(value: &Spanned<DeValue<'_>>, errors: &[Range<usize>]) -> Self {
         let kind = match value.get_ref() {
             DeValue::Boolean(value) => NodeKind::Bool(*value),
             DeValue::Integer(value) => i64::from_str_radix(value.as_str(), value.radix())
@@ -56,8 +55,10 @@ impl Node {
             },
             DeValue::String(value) => NodeKind::String(value.to_string()),
             DeValue::Datetime(_) => NodeKind::Datetime,
-            DeValue::Array(array) => NodeKind::Array(array.iter().map(Self::from_value).collect()),
-            DeValue::Table(table) => NodeKind::Table(entries(table)),
+            DeValue::Array(array) => {
+                NodeKind::Array(array.iter().map(|value| Self::from_value(value, errors)).collect())
+            }
+            DeValue::Table(table) => NodeKind::Table(entries(table, errors)),
         };
         Self { span: value.span(), kind }
     }
@@ -81,16 +82,13 @@ impl Node {
         }
     }
 
-    /// Marks every value below this one for which `is_broken` holds, whole, with all that it holds.
-    pub(crate) fn break_values(&mut self, is_broken: &impl Fn(&Self) -> bool) {
-        let visit = |value: &mut Self| match is_broken(value) {
-            true => value.kind = NodeKind::Broken,
-            false => value.break_values(is_broken),
-        };
-        match &mut self.kind {
-            NodeKind::Table(entries) => entries.iter_mut().for_each(|entry| visit(&mut entry.value)),
-            NodeKind::Array(values) => values.iter_mut().for_each(visit),
-            _ => {}
+    /// Returns the span of the broken value that an error at `span` touches.
+    pub(crate) fn broken_at(&self, error: &Range<usize>) -> Option<Range<usize>> {
+        match &self.kind {
+            NodeKind::Broken => touch(error, &self.span).then(|| self.span.clone()),
+            NodeKind::Table(entries) => entries.iter().find_map(|entry| entry.value.broken_at(error)),
+            NodeKind::Array(values) => values.iter().find_map(|value| value.broken_at(error)),
+            _ => None,
         }
     }
 
@@ -103,15 +101,24 @@ impl Node {
     }
 }
 
-fn entries(table: &DeTable<'_>) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = table
-        .iter()
-        .map(|(key, value)| Entry {
-            key: key.get_ref().to_string(),
-            key_span: key.span(),
-            value: Node::from_value(value),
-        })
-        .collect();
+/// Converts a table, its keys in the order of the text.
+fn entries(table: &DeTable<'_>, errors: &[Range<usize>]) -> Vec<Entry> {
+    let entry = |(key, value): (&Spanned<DeString<'_>>, &Spanned<DeValue<'_>>)| {
+        let (key_span, span) = (key.span(), value.span());
+        // The span of a table under a header is that of the header, which contains the key.
+        let inline = key_span.end <= span.start;
+        let value = match inline && errors.iter().any(|error| touch(error, &span)) {
+            true => Node { span, kind: NodeKind::Broken },
+            false => Node::from_value(value, errors),
+        };
+        Entry { key: key.get_ref().to_string(), key_span, value }
+    };
+    let mut entries: Vec<Entry> = table.iter().map(entry).collect();
     entries.sort_by_key(|entry| entry.key_span.start);
     entries
+}
+
+/// Returns whether two spans overlap or adjoin: the parser places an unclosed value's error behind it.
+pub(crate) fn touch(a: &Range<usize>, b: &Range<usize>) -> bool {
+    a.start <= b.end && b.start <= a.end
 }

@@ -1,7 +1,5 @@
 //! The text of a file and the places in it.
 
-use std::ops::Range;
-
 use crate::Fault;
 
 /// The text of one file, with its name as the user gave it.
@@ -34,13 +32,6 @@ impl Source {
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         let line = before.bytes().filter(|&byte| byte == b'\n').count() + 1;
         (line, before[line_start..].trim_start_matches('\u{feff}').chars().count() + 1)
-    }
-
-    /// Bytes of the line that holds `offset`, without its line end.
-    pub(crate) fn line_of(&self, offset: usize) -> Range<usize> {
-        let (before, after) = self.text.split_at_checked(offset).unwrap_or((&self.text, ""));
-        let start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        start..before.len() + after.find('\n').unwrap_or(after.len())
     }
 
     /// A fault at `place`.
