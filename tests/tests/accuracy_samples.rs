@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use platen_host::accuracy::{Accuracy, Truth, rms};
-use platen_host::plugin::{Catalogue, JobSpec, Scanner};
-use platen_host::rig::{self, Rig};
-use platen_host::stroke::{self, Baseline, Measured};
+use platen_bench::accuracy::{Accuracy, Truth, rms};
+use platen_engine::pipeline::{self, Pipeline};
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
+use platen_engine::stroke::{self, Baseline};
 use platen_plant::{PlantFile, Value};
+use platen_shape::Measured;
 use platen_shape::PlateSpec;
 use platen_sim_plate::Pose;
 use serde_json::Value as Json;
@@ -93,18 +94,18 @@ impl Sample {
 /// The product's own pipeline, from a driver to the measured plate.
 struct Lab {
     catalogue: Catalogue,
-    rig: Rig,
+    rig: Pipeline,
 }
 
 impl Lab {
     fn new() -> Self {
         let catalogue = Catalogue::new(Some(platen_tests::built()));
-        let rig = Rig::of(&PlantFile::default(), &catalogue).unwrap();
+        let rig = Pipeline::of(&PlantFile::default(), &catalogue).unwrap();
         Self { catalogue, rig }
     }
 
     fn measure(&mut self, driver: &str, options: Vec<(&str, Value)>, spec: &PlateSpec) -> Measured {
-        let (library, values) = rig::load_with(&self.catalogue, driver, options).unwrap();
+        let (library, values) = pipeline::load_with(&self.catalogue, driver, options).unwrap();
         let scanner = Scanner::create(&library, &values).unwrap();
         scanner.instance().open(LIMIT).unwrap();
         let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), None, spec, None).unwrap();

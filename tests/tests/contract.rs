@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use platen_host::plugin::{Catalogue, JobSpec, Kind, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Kind, PluginError, ScanEvent, Scanner};
 use platen_plant::{OptionValue, Value};
 use platen_scan::Lattice;
 

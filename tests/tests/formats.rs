@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use platen_host::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
-use platen_host::rig;
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
 use platen_plant::Value;
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
@@ -195,7 +195,7 @@ fn mirrored(ptx: &Path) -> PathBuf {
 fn read(path: &Path) -> Lattice {
     let catalogue = Catalogue::new(Some(platen_tests::built()));
     let options = [("file", Value::Path(path.into()))];
-    let (library, values) = rig::load_with(&catalogue, "faro-file", options).unwrap();
+    let (library, values) = pipeline::load_with(&catalogue, "faro-file", options).unwrap();
     let scanner = Scanner::create(&library, &values).unwrap();
     let mut lattice = None;
     let end = scanner.scan(JobSpec::untriggered(Duration::from_secs(100)), None, &mut |event| {

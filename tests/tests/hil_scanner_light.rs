@@ -22,9 +22,9 @@ mod stream;
 
 use std::f64::consts::PI;
 
-use platen_host::plugin::{Catalogue, JobSpec};
-use platen_host::rig::Rig;
-use platen_host::stroke::{self, Baseline, NotMeasured};
+use platen_engine::pipeline::Pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec};
+use platen_engine::stroke::{self, Baseline, NotMeasured};
 use platen_plant::PlantFile;
 use platen_scan::Window;
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
@@ -78,7 +78,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let text =
         "[plant]\nname = 't'\n[flattening]\nplugin = 'harmonic'\n[[comparison]]\nplugin = 'template'\n";
     let plant = PlantFile::parse("plant.toml", text).unwrap();
-    let mut rig = Rig::of(&plant, &Catalogue::new(Some(platen_tests::built()))).unwrap();
+    let mut rig = Pipeline::of(&plant, &Catalogue::new(Some(platen_tests::built()))).unwrap();
     let truth = Plate::new(&scene.plate).unwrap();
     let [width, height, thickness] = [truth.width(), truth.height(), truth.thickness()];
     let u_axis = Some(truth.corners()[1] - truth.corners()[0]).map(|u| Vec3::new(u.x, u.y, u.z));

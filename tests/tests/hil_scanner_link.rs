@@ -41,7 +41,7 @@ mod stream;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use platen_host::plugin::PluginError;
+use platen_engine::plugin::PluginError;
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeTally};
 use stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 

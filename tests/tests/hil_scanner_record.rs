@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use platen_host::plugin::{JobSpec, ScanEvent};
+use platen_engine::plugin::{JobSpec, ScanEvent};
 use platen_scan::{Face, Lattice, Window};
 use platen_sim_scanner::stream::{
     Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Shop, Values, Wanted, column_payload,

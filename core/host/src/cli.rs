@@ -2,17 +2,17 @@
 
 mod bench;
 mod calibrate;
-mod cell;
+pub mod cell;
 mod check;
 mod convert;
 mod demo;
 mod history;
 mod inspect;
 mod measure;
-mod output;
+pub mod output;
 mod plugins;
-mod press;
-mod run;
+pub mod press;
+pub mod run;
 mod scan;
 mod scan_source;
 mod setup;
@@ -24,10 +24,10 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::files::FilesError;
-use crate::plugin::{Catalogue, PluginError};
-use crate::rig::RigError;
 use crate::scan_file::ScanFileError;
+use platen_engine::pipeline::PipelineError;
+use platen_engine::plugin::{Catalogue, PluginError};
+use platen_report::output_folder::FilesError;
 
 /// Measures plates on a press, stroke by stroke.
 #[derive(Debug, Parser)]
@@ -46,18 +46,18 @@ struct Cli {
 
 /// What every verb takes.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct Common {
+pub struct Common {
     /// Folder to look for plugins in first
     #[arg(long, global = true, value_name = "DIR")]
-    plugins: Option<PathBuf>,
+    pub plugins: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long, global = true)]
-    pub(crate) json: bool,
+    pub json: bool,
 }
 
 impl Common {
     /// Where plugins are looked for.
-    pub(crate) fn catalogue(&self) -> Catalogue {
+    pub fn catalogue(&self) -> Catalogue {
         Catalogue::new(self.plugins.as_deref())
     }
 }
@@ -90,13 +90,14 @@ enum Verb {
     History(history::Command),
     /// What plugins are installed, and their options
     Plugins(plugins::Command),
-    /// The paper's tables beside this machine's figures, on simulated scans
-    Bench(bench::Command),
+    /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
+    #[command(disable_help_flag = true)]
+    Bench(bench::Arguments),
 }
 
 /// Why a verb ended without its result.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum CliError {
+pub enum CliError {
     /// The user or the plant file is to be corrected: exit 2.
     #[error("{0}")]
     Usage(String),
@@ -117,10 +118,10 @@ impl From<platen_plant::Error> for CliError {
     }
 }
 
-impl From<RigError> for CliError {
-    fn from(error: RigError) -> Self {
+impl From<PipelineError> for CliError {
+    fn from(error: PipelineError) -> Self {
         match error {
-            RigError::Plugin(error) => error.into(),
+            PipelineError::Plugin(error) => error.into(),
             wrong => Self::Usage(wrong.to_string()),
         }
     }
@@ -149,17 +150,7 @@ impl From<std::io::Error> for CliError {
 
 /// Runs the command line.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
-        Err(error) => {
-            let code = if error.use_stderr() { 2 } else { 0 };
-            // A closed pipe at this point is nobody's loss.
-            let _ = error.print();
-            return ExitCode::from(code);
-        }
-    };
-    start_log();
-    let result = match &cli.verb {
+    run_program::<Cli>(|cli| match &cli.verb {
         Verb::Demo(command) => demo::run(&cli.common, command),
         Verb::Run(command) => run::run(&cli.common, command),
         Verb::Scan(command) => scan::run(&cli.common, command),
@@ -173,9 +164,23 @@ pub fn main() -> ExitCode {
         Verb::Verify(command) => verify::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
-        Verb::Bench(command) => bench::run(&cli.common, command),
+        Verb::Bench(arguments) => bench::run(&cli.common, "bench", arguments),
+    })
+}
+
+/// Parses the command line of a program, starts its log, runs it and returns its exit code: 0 done, 1 failed, 2 bad usage.
+pub fn run_program<P: Parser>(run: impl FnOnce(&P) -> Result<ExitCode, CliError>) -> ExitCode {
+    let program = match P::try_parse() {
+        Ok(program) => program,
+        Err(error) => {
+            let code = if error.use_stderr() { 2 } else { 0 };
+            // Nothing is left to report a closed pipe to.
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
     };
-    match result {
+    start_log();
+    match run(&program) {
         Ok(code) => code,
         Err(error) => {
             output::error(&error.to_string());

@@ -5,14 +5,15 @@
 //! the history before anything is promised to the press; the stroke before and the baseline are asked from there, so
 //! that a restart changes nothing.
 
-mod archive;
-mod bench;
 mod disk;
-mod earlier;
+mod measurement_worker;
+
 mod figures;
 mod journal;
+mod previous_scans;
 mod prometheus;
 mod region;
+mod scan_retention;
 mod status;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,12 +27,12 @@ use platen_plant::press::Press;
 use platen_press::{Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
-pub use bench::StrokeReport;
+pub use measurement_worker::StrokeReport;
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
-use crate::plugin::{CancelToken, Catalogue};
-use crate::rig::{Rig, RigError};
-use bench::{Bench, Task};
+use measurement_worker::{MeasurementWorker, Task};
+use platen_engine::pipeline::{Pipeline, PipelineError};
+use platen_engine::plugin::{CancelToken, Catalogue};
 
 /// Time for the last scan to reach its file when the host stops.
 const LAST_SCAN: Duration = Duration::from_secs(20);
@@ -41,7 +42,7 @@ const LAST_SCAN: Duration = Duration::from_secs(20);
 pub enum HostError {
     /// A plugin or a file is wrong.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Pipeline(#[from] PipelineError),
     /// The history cannot be used.
     #[error("{0}")]
     History(#[from] HistoryError),
@@ -76,12 +77,12 @@ pub async fn run(
 ) -> Result<(), HostError> {
     let history = History::open(&plant.output.history, press.press_id, Timestamp::now())?;
     let history = Arc::new(Mutex::new(history));
-    let rig = Rig::of(plant, catalogue)?;
+    let rig = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (tasks, inbox) = std::sync::mpsc::channel();
     let lost = Arc::default();
-    let ends = bench::Ends { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
-    let bench = Bench::new(plant, catalogue, rig, &press, Arc::clone(&history), ends);
+    let ends = measurement_worker::Ends { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
+    let bench = MeasurementWorker::new(plant, catalogue, rig, &press, Arc::clone(&history), ends);
     let bench = std::thread::Builder::new().name("bench".into()).spawn(move || bench.serve(&inbox));
     let bench = bench.map_err(HostError::Thread)?;
 

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use platen_scan::{Column, ScanEnd, ScanHeader, State};
 
-use crate::plugin::ScanEvent;
+use platen_engine::plugin::ScanEvent;
 
 /// A format of lattices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

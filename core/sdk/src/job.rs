@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use platen_abi as abi;
 
+use crate::exchange::Encode;
 use crate::{Error, ErrorKind, Result};
 
 /// Callback that wakes a blocking call of the plugin when its job is cancelled.
@@ -72,7 +73,7 @@ impl<'a> Job<'a> {
     }
 
     /// Allocates a zeroed buffer of the host.
-    pub(crate) fn buffer(&self, bytes: usize) -> Result<OwnedBuffer<'a>> {
+    fn buffer(&self, bytes: usize) -> Result<OwnedBuffer<'a>> {
         let mut raw = abi::Buffer { data: std::ptr::null_mut(), bytes: 0, token: 0 };
         // SAFETY: `raw` lives for the call.
         let status =
@@ -83,8 +84,14 @@ impl<'a> Job<'a> {
         Ok(OwnedBuffer { raw, bytes, host: self.host })
     }
 
+    /// Sends a value to the host.
+    pub(crate) fn send<T: Encode>(&self, value: &T, flags: u32) -> Result<()> {
+        let buffer = value.encode(|bytes| self.buffer(bytes))?;
+        self.emit(T::FORMAT, value.count(), flags, buffer)
+    }
+
     /// Passes a buffer to the host as a frame of `format`.
-    pub(crate) fn emit(&self, format: &CStr, count: u64, flags: u32, buffer: OwnedBuffer<'_>) -> Result<()> {
+    fn emit(&self, format: &CStr, count: u64, flags: u32, buffer: OwnedBuffer<'_>) -> Result<()> {
         let frame = abi::Frame {
             struct_size: size_of::<abi::Frame>() as u32,
             flags,
@@ -127,14 +134,14 @@ impl Drop for CancelGuard<'_> {
 }
 
 /// Buffer of the host; freed on drop unless emitted.
-pub(crate) struct OwnedBuffer<'a> {
+struct OwnedBuffer<'a> {
     raw: abi::Buffer,
     bytes: usize,
     host: &'a abi::Host,
 }
 
-impl OwnedBuffer<'_> {
-    pub(crate) fn bytes(&mut self) -> &mut [u8] {
+impl AsMut<[u8]> for OwnedBuffer<'_> {
+    fn as_mut(&mut self) -> &mut [u8] {
         // SAFETY: the host gave at least `bytes` zeroed bytes, which are ours until emitted or freed.
         unsafe { std::slice::from_raw_parts_mut(self.raw.data.cast(), self.bytes) }
     }

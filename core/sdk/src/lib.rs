@@ -67,6 +67,7 @@
 #![allow(unsafe_code, reason = "this crate is the plugin's side of the boundary")]
 
 mod error;
+pub mod exchange;
 mod info;
 mod job;
 mod logging;
@@ -74,7 +75,6 @@ mod option;
 mod scanner;
 #[doc(hidden)]
 pub mod shim;
-mod sink;
 
 #[cfg(feature = "comparison")]
 mod comparison;

@@ -1,9 +1,8 @@
 //! Scanner plugins: trait, and the sink of a scan.
 
-use platen_abi::{frame_flag, payload};
-use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, Window};
+use platen_abi::frame_flag;
+use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
-use crate::sink::Payload;
 use crate::{Error, ErrorKind, Info, Job, Options, Result};
 
 /// Plugin that turns a trigger into a lattice, column by column.
@@ -75,32 +74,9 @@ impl ScanSink<'_> {
         if self.n_rows.is_some() {
             return Err(Error::new(ErrorKind::Internal, "begin was called twice for one scan"));
         }
-        let notes = header.notes.join("\n");
-        let mut layout = payload::Layout::of::<payload::Scan>();
-        let head = payload::Scan {
-            struct_size: size_of::<payload::Scan>() as u32,
-            flags: u32::from(header.simulated),
-            n_rows: header.n_rows,
-            n_columns: header.n_columns,
-            azimuth_start: header.azimuth_start,
-            azimuth_step: header.azimuth_step,
-            elevation_start: header.elevation_start,
-            elevation_step: header.elevation_step,
-            seam_column: header.seam_column.unwrap_or(u32::MAX),
-            intensity_min: header.intensity_range.0,
-            intensity_max: header.intensity_range.1,
-            acquired_unix_s: header.acquired_unix_s.unwrap_or(0.0),
-            instrument: layout.add::<u8>(header.instrument.len()),
-            notes: layout.add::<u8>(notes.len()),
-        };
-        let mut payload = Payload::new(&self.job, &layout)?;
-        payload
-            .header(&head)
-            .array(head.instrument, header.instrument.as_bytes())
-            .array(head.notes, notes.as_bytes());
         self.n_rows = Some(header.n_rows);
         self.simulated = header.simulated;
-        payload.emit::<payload::Scan>(&self.job, 0, self.flags())
+        self.job.send(header, self.flags())
     }
 
     /// Sends one column.
@@ -112,29 +88,7 @@ impl ScanSink<'_> {
             .n_rows
             .ok_or_else(|| Error::new(ErrorKind::Internal, "a column was sent before the header"))?;
         column.check(n_rows).map_err(|e| Error::new(ErrorKind::BadData, e.to_string()))?;
-        let n = column.len();
-        let mut layout = payload::Layout::of::<payload::Column>();
-        let head = payload::Column {
-            struct_size: size_of::<payload::Column>() as u32,
-            index: column.index,
-            face: u32::from(column.face == Face::Back),
-            first_row: column.first_row,
-            range_m: layout.add::<f64>(n),
-            azimuth: layout.add::<f64>(n),
-            elevation: layout.add::<f64>(n),
-            intensity: layout.add::<u16>(n),
-            state: layout.add::<u8>(n),
-        };
-        let state: Vec<u8> = column.state.iter().map(|s| *s as u8).collect();
-        let mut payload = Payload::new(&self.job, &layout)?;
-        payload
-            .header(&head)
-            .array(head.range_m, &column.range_m)
-            .array(head.azimuth, &column.azimuth)
-            .array(head.elevation, &column.elevation)
-            .array(head.intensity, &column.intensity)
-            .array(head.state, &state);
-        payload.emit::<payload::Column>(&self.job, n as u64, self.flags())
+        self.job.send(column, self.flags())
     }
 
     /// Ends the scan. Must be called once, last: a scan without end is discarded.
@@ -145,21 +99,8 @@ impl ScanSink<'_> {
         if self.n_rows.is_none() || self.ended {
             return Err(Error::new(ErrorKind::Internal, "end was called without begin, or twice"));
         }
-        let head = payload::ScanEnd {
-            struct_size: size_of::<payload::ScanEnd>() as u32,
-            columns: end.columns,
-            points: end.points,
-            warm_up_columns: end.warm_up_columns,
-            outcome: match end.outcome {
-                Outcome::Complete => 0,
-                Outcome::Aborted => 1,
-                Outcome::Failed => 2,
-            },
-        };
-        let mut payload = Payload::new(&self.job, &payload::Layout::of::<payload::ScanEnd>())?;
-        payload.header(&head);
         self.ended = true;
-        payload.emit::<payload::ScanEnd>(&self.job, 0, self.flags() | frame_flag::LAST)
+        self.job.send(end, self.flags() | frame_flag::LAST)
     }
 
     fn flags(&self) -> u32 {

@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use platen_abi as abi;
 
+use crate::exchange::{Decode, DecodeError, from_raw_window};
 pub use crate::option::{Declared, declare};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Scanner, Values, job, logging};
 
@@ -96,12 +97,10 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
         self.0.estimate_s(window)
     }
     fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()> {
-        let window = inputs
-            .iter()
-            .find(|input| input.format == <abi::payload::Window as abi::payload::Header>::FORMAT)
-            .map(|input| abi::payload::read::<abi::payload::Window>(input.bytes).map(|w| from_window(&w)))
-            .transpose()
-            .map_err(|e| malformed(&e))?;
+        let window = inputs.iter().find(|input| input.format == <platen_scan::Window as Decode>::FORMAT);
+        let window = window
+            .map(|input| platen_scan::Window::decode(input.bytes).map_err(|e| refused(&e)))
+            .transpose()?;
         let mut sink = crate::ScanSink { job: *job, window, n_rows: None, simulated: false, ended: false };
         self.0.capture(job, &mut sink)?;
         if sink.ended {
@@ -115,17 +114,13 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
     }
 }
 
-fn from_window(window: &abi::payload::Window) -> platen_scan::Window {
-    platen_scan::Window {
-        azimuth_start: window.azimuth_start,
-        azimuth_width: window.azimuth_width,
-        elevation_min: window.elevation_min,
-        elevation_max: window.elevation_max,
+pub(crate) fn refused(error: &DecodeError) -> Error {
+    match error {
+        DecodeError::Malformed(malformed) => {
+            Error::new(ErrorKind::BadData, format!("the host sent a malformed frame: {malformed}"))
+        }
+        DecodeError::Invalid(why) => Error::new(ErrorKind::BadData, why.clone()),
     }
-}
-
-pub(crate) fn malformed(error: &abi::payload::Malformed) -> Error {
-    Error::new(ErrorKind::BadData, format!("the host sent a malformed frame: {error}"))
 }
 
 /// State behind one `platen_instance`. `raw` is the first field, so a pointer to it is a pointer to the state.
@@ -413,7 +408,7 @@ unsafe extern "C" fn scan_seconds<P: Plugin>(
     // SAFETY: `[inst]` call on an instance from `create`; the window is null or borrowed for the call.
     let _ = unsafe {
         guard(std::ptr::null_mut(), || {
-            let window = window.as_ref().map(from_window);
+            let window = window.as_ref().map(from_raw_window);
             seconds = parts::<P>(instance).0.estimate_s(window.as_ref()).unwrap_or(-1.0);
             Ok(())
         })

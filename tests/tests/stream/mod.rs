@@ -5,8 +5,8 @@ use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use platen_host::plugin::{Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
-use platen_host::rig;
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
 use platen_plant::PlantFile;
 use platen_scan::{Lattice, ScanEnd, Window};
 use platen_sim_plate::{PlateState, Shape};
@@ -46,7 +46,7 @@ pub(crate) fn driver(address: SocketAddr, options: &str) -> Scanner {
     );
     std::fs::write(&file, text).unwrap();
     let plant = PlantFile::load(&file).unwrap();
-    rig::scanner(&plant, &Catalogue::new(Some(platen_tests::built()))).unwrap()
+    pipeline::scanner(&plant, &Catalogue::new(Some(platen_tests::built()))).unwrap()
 }
 
 /// 31 x 32 cells on the plate, at the coarsest resolution.

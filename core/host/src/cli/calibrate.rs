@@ -11,12 +11,13 @@ use platen_shape::{Surface, TargetSurface};
 use serde::Serialize;
 
 use super::{CliError, Common, measure, output};
-use crate::calibration::Calibration;
-use crate::plugin::{PluginError, Surfaces};
-use crate::rig::{self, Rig};
-use crate::stroke::Baseline;
-use crate::{files, progress};
+use crate::progress;
+use platen_engine::calibration::Calibration;
+use platen_engine::pipeline::Pipeline;
+use platen_engine::plugin::{PluginError, Surfaces};
+use platen_engine::stroke::Baseline;
 use platen_model::units::mm;
+use platen_report::output_folder;
 
 /// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
 /// supports, metres.
@@ -99,7 +100,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let shape = artefact_shape(command, &plate)?;
     plant.comparisons = vec![PluginUse::by_default("displacement")];
     let catalogue = common.catalogue();
-    let mut rig = Rig::of(&plant, &catalogue)?;
+    let mut rig = Pipeline::of(&plant, &catalogue)?;
 
     let mut surfaces: Vec<Surface> = Vec::new();
     let mut instrument = String::new();
@@ -133,7 +134,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         sigma_correlated,
         sigma_true,
     };
-    files::replace(&file, calibration.to_toml().as_bytes())?;
+    output_folder::replace(&file, calibration.to_toml().as_bytes())?;
     let found = Found {
         made: calibration.made,
         instrument: calibration.instrument,
@@ -159,17 +160,21 @@ fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetS
         return Ok(None);
     }
     let usage = |why: String| CliError::Usage(format!("{}: {why}", command.plate.display()));
-    let shape = rig::target(plate).map_err(|e| usage(e.to_string()))?;
+    let shape = plate
+        .target
+        .map(|target| TargetSurface::of_plate(&target, &plate.plate))
+        .transpose()
+        .map_err(|e| usage(e.to_string()))?;
     shape.map(Some).ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))
 }
 
 /// What every two of the scans differ by, along the normal, the plate's own movement taken away.
 fn null_pairs(
-    rig: &Rig,
+    rig: &Pipeline,
     plate: &PlateFile,
     surfaces: &[Surface],
 ) -> Result<(Vec<PairRecord>, Pooled), CliError> {
-    let task = rig::task(plate, None, false);
+    let task = plate.task(0.0, None, false);
     let (mut pairs, mut pooled) = (Vec::new(), Pooled::default());
     for (i, now) in surfaces.iter().enumerate() {
         for (k, before) in surfaces[..i].iter().enumerate() {

@@ -12,29 +12,30 @@ use super::CliError;
 
 /// `platen-sim press`, ended with this program.
 #[derive(Debug)]
-pub(super) struct Cell {
+pub struct Cell {
     child: Child,
     /// Where the press serves Modbus; `None` on a serial line.
-    pub(super) modbus: Option<SocketAddr>,
+    pub modbus: Option<SocketAddr>,
     /// Where it says what the plate looks like.
-    pub(super) plate: SocketAddr,
+    pub plate: SocketAddr,
     line: Option<BufReader<TcpStream>>,
 }
 
 /// One result as the press took it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Taken {
+pub struct Taken {
     stroke: u16,
     session: u16,
     attempt: u16,
     /// From trigger to the host's echo, milliseconds, on the press's clock.
-    pub(super) accepted_ms: f64,
+    pub accepted_ms: f64,
     /// From trigger to the result.
-    pub(super) result_ms: f64,
+    pub result_ms: f64,
 }
 
 impl Taken {
-    pub(super) fn is(&self, stroke: u16, session: u16, attempt: u16) -> bool {
+    /// Whether it is the result of this stroke.
+    pub fn is(&self, stroke: u16, session: u16, attempt: u16) -> bool {
         (self.stroke, self.session, self.attempt) == (stroke, session, attempt)
     }
 }
@@ -45,7 +46,7 @@ fn failed(what: &str) -> impl Fn(std::io::Error) -> CliError + '_ {
 
 impl Cell {
     /// Starts the program that lies beside this one; `options` overrule the file.
-    pub(super) fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
+    pub fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
         let program =
             std::env::current_exe()?.with_file_name(format!("platen-sim{}", std::env::consts::EXE_SUFFIX));
         let what = format!("{}: cannot be started (`cargo build --release` makes it)", program.display());
@@ -70,7 +71,11 @@ impl Cell {
         Ok(Self { child, modbus: port("modbus"), plate, line: None })
     }
 
-    pub(super) fn ask(&mut self, question: &str) -> Result<Json, CliError> {
+    /// Sends a line to the control port and returns the answer.
+    ///
+    /// # Errors
+    /// The control port does not answer with JSON.
+    pub fn ask(&mut self, question: &str) -> Result<Json, CliError> {
         let line = match &mut self.line {
             Some(line) => line,
             None => {
@@ -86,19 +91,19 @@ impl Cell {
     }
 
     /// The press has made its strokes, or its plate has passed.
-    pub(super) fn is_done(&mut self) -> Result<bool, CliError> {
+    pub fn is_done(&mut self) -> Result<bool, CliError> {
         Ok(self.ask(r#"{"get":"stats"}"#)?["stats"]["done"] == true)
     }
 
     /// The words that the host has written.
-    pub(super) fn registers(&mut self) -> Result<Vec<u16>, CliError> {
+    pub fn registers(&mut self) -> Result<Vec<u16>, CliError> {
         let answer = self.ask(r#"{"get":"registers"}"#)?;
         let words = answer["registers"]["h"].as_array().cloned().unwrap_or_default();
         Ok(words.iter().filter_map(|word| u16::try_from(word.as_u64()?).ok()).collect())
     }
 
     /// Results as the press took them, in order.
-    pub(super) fn taken(&mut self) -> Result<Vec<Taken>, CliError> {
+    pub fn taken(&mut self) -> Result<Vec<Taken>, CliError> {
         let answer = self.ask(r#"{"get":"stats"}"#)?;
         let all = answer["stats"]["taken"].as_array().cloned().unwrap_or_default();
         let word = |taken: &Json, name: &str| u16::try_from(taken[name].as_u64()?).ok();

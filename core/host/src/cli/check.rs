@@ -7,7 +7,7 @@ use clap::Args;
 use platen_plant::{Error as PlantError, PlantFile, PlateFile, PluginUse, check_options};
 
 use super::{CliError, Common, output};
-use crate::plugin::{Catalogue, Kind};
+use platen_engine::plugin::{Catalogue, Kind};
 
 #[derive(Debug, Args)]
 #[command(

@@ -13,9 +13,9 @@ use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
-use crate::report::{self, ReportError};
 use pick::RunRef;
 use platen_model::units::mm;
+use platen_report::plate_report::{self, ReportError};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \
@@ -101,7 +101,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             let (plant, archive) = open(plant)?;
             let folder = out.as_ref().unwrap_or(&plant.output.folder);
             std::fs::create_dir_all(folder)?;
-            let path = report::write(&archive, &plant.name, *plate, folder)?;
+            let path = plate_report::write(&archive, &plant.name, *plate, folder)?;
             if common.json {
                 output::json(&serde_json::json!({ "report": path }))?;
             } else {

@@ -11,9 +11,9 @@ use platen_scan::{Column, ScanHeader, State};
 
 use super::scan_source::{self, READ_LIMIT};
 use super::{CliError, Common, output};
-use crate::plugin::ScanEvent;
 use crate::scan_file::ScanFileError;
 use picture::RangePicture;
+use platen_engine::plugin::ScanEvent;
 
 #[derive(Debug, Args)]
 #[command(

@@ -12,11 +12,14 @@ use platen_shape::Surface;
 use super::scan_source::{self, READ_LIMIT};
 use super::setup::Setup;
 use super::{CliError, Common, output};
-use crate::plugin::{Catalogue, JobSpec, Surfaces};
-use crate::record::{Context, ResultRecord};
-use crate::rig::{self, Rig};
-use crate::stroke::{self, Baseline, Last, Measured, Scanned};
-use crate::{calibration, files, progress};
+use crate::progress;
+use platen_engine::calibration::{self, Calibration};
+use platen_engine::pipeline::Pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, Surfaces};
+use platen_engine::stroke::{self, Baseline, PreviousPose};
+use platen_report::output_folder;
+use platen_report::result::{Context, ResultRecord};
+use platen_shape::{Measured, Scanned};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
@@ -42,7 +45,7 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     if let Some(out) = command.out.as_ref().filter(|out| out.exists()) {
-        return Err(CliError::Usage(files::FilesError::Exists(out.clone()).to_string()));
+        return Err(CliError::Usage(output_folder::FilesError::Exists(out.clone()).to_string()));
     }
     let catalogue = common.catalogue();
     let (plant, plate) = command.setup.load()?;
@@ -51,7 +54,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let found = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
         found.map_err(|why| tracing::warn!("{why}; only noise is in the uncertainties")).ok()
     });
-    let mut rig = Rig::of(&plant, &catalogue)?;
+    let mut rig = Pipeline::of(&plant, &catalogue)?;
     // In the order in which they were taken: which corner is (0, 0) goes on from one to the next.
     let mut measure = |scan: &Path, last: Option<&Surface>, baseline: Baseline<'_>| {
         measure_file(&catalogue, &mut rig, scan, &plate, last, baseline)
@@ -70,7 +73,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let surfaces =
         Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
     let start = Instant::now();
-    let task = rig::task(&plate, calibration.as_ref(), false);
+    let task = Calibration::task(calibration.as_ref(), &plate, false);
     let reports = stroke::compare(&rig, &task, surfaces);
     let compare = start.elapsed();
     let verdict = stroke::verdict(&reports);
@@ -90,8 +93,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let mut written = Vec::new();
     if let Some(out) = &command.out {
         let surface = &now.measurement.surface;
-        written = files::write(out, &record, surface)?;
-        written.extend(files::illustrate(out, &record, surface, &sound, &[])?);
+        written = output_folder::write(out, &record, surface)?;
+        written.extend(output_folder::illustrate(out, &record, surface, &sound, &[])?);
     }
     if common.json {
         output::json(&record)?;
@@ -107,7 +110,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 /// Measures one scan file with the file driver; `last` is the plate at the scan before.
 pub(super) fn measure_file(
     catalogue: &Catalogue,
-    rig: &mut Rig,
+    rig: &mut Pipeline,
     scan: &Path,
     plate: &PlateFile,
     last: Option<&Surface>,
@@ -119,7 +122,7 @@ pub(super) fn measure_file(
     let spec = rig.spec(plate);
     let job = JobSpec::untriggered(READ_LIMIT);
     let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
-    let last = last.map(|surface| Last { surface, fed_by: None });
+    let last = last.map(|surface| PreviousPose { surface, fed_by: None });
     let measured = stroke::measure_scanned(rig, &scanned, &spec, last, baseline).map_err(|e| failed(&e))?;
     Ok((scanned, measured))
 }

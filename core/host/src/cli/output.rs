@@ -5,7 +5,7 @@ use std::io::Write as _;
 use super::CliError;
 
 /// Prints one line to stdout; a closed pipe ends the output quietly.
-pub(crate) fn line(text: &str) -> Result<(), CliError> {
+pub fn line(text: &str) -> Result<(), CliError> {
     match writeln!(std::io::stdout(), "{text}") {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => Ok(other?),
@@ -13,13 +13,13 @@ pub(crate) fn line(text: &str) -> Result<(), CliError> {
 }
 
 /// Prints a document as JSON.
-pub(crate) fn json(document: &impl serde::Serialize) -> Result<(), CliError> {
+pub fn json(document: &impl serde::Serialize) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(document).map_err(|e| CliError::Failed(e.to_string()))?;
     line(&text)
 }
 
 /// Prints a table: columns as wide as their widest cell, the first row is the head.
-pub(crate) fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
+pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
     let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |k: usize| {
         rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -34,7 +34,7 @@ pub(crate) fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
 }
 
 /// Prints one error to stderr.
-pub(crate) fn error(text: &str) {
+pub fn error(text: &str) {
     // Nowhere is left to report a failing stderr.
     let _ = writeln!(std::io::stderr(), "platen: {text}");
 }

@@ -7,7 +7,7 @@ use platen_plant::{OptionDecl, OptionType};
 use serde_json::{Value as Json, json};
 
 use super::{CliError, Common, output};
-use crate::plugin::{Descriptor, Listed};
+use platen_engine::plugin::{Descriptor, Listed};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen plugins list\n  platen plugins describe faro-file\n  \

@@ -6,8 +6,7 @@ mod line;
 mod recording;
 mod registers;
 mod reset;
-mod soak;
-mod trial;
+pub mod trial;
 mod write_test;
 
 use std::path::{Path, PathBuf};
@@ -165,7 +164,8 @@ enum Verb {
         file: PathBuf,
     },
     /// Strokes without end against a simulated press with a bad line: nothing wrong, doubled or lost
-    Soak(soak::Options),
+    #[command(disable_help_flag = true)]
+    Soak(super::bench::Arguments),
     /// Clears the latched faults of the running host
     Reset {
         /// Plant file of the host
@@ -175,7 +175,7 @@ enum Verb {
 
 /// Why a verb failed, by who must act.
 #[derive(Debug, thiserror::Error)]
-enum Failure {
+pub enum Failure {
     /// The plant file, the command line or the system.
     #[error(transparent)]
     Cli(#[from] CliError),
@@ -221,7 +221,11 @@ impl Failure {
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
-    let done = dispatch(common, &command.verb);
+    report(common, dispatch(common, &command.verb))
+}
+
+/// Prints a failure as JSON where JSON is asked for, and passes it on.
+pub fn report(common: &Common, done: Result<ExitCode, Failure>) -> Result<ExitCode, CliError> {
     if let (true, Err(failure)) = (common.json, &done) {
         let (error, cause) = (failure.to_string(), failure.cause());
         output::json(&serde_json::json!({ "error": error, "cause": cause }))?;
@@ -249,7 +253,7 @@ fn dispatch(common: &Common, verb: &Verb) -> Result<ExitCode, Failure> {
             recording::record(common, &load(plant)?, file, for_s.map(std::time::Duration::from_secs))?;
         }
         Verb::Replay { plant, file } => return recording::replay(common, &load(plant)?, file),
-        Verb::Soak(options) => return soak::run(common, options),
+        Verb::Soak(arguments) => return Ok(super::bench::run(common, "soak", arguments)?),
         Verb::Reset { plant } => return reset::run(common, &PlantFile::load(plant).map_err(CliError::from)?),
     }
     Ok(ExitCode::SUCCESS)

@@ -49,12 +49,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 }
 
 /// The runtime of the press side: polling needs little, but must not wait for a scan.
-pub(super) fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
+pub fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
 }
 
 /// Turns true on SIGTERM and Ctrl-C.
-pub(super) fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
+pub fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
     use tokio::signal::unix::{SignalKind, signal};
     let (stop, stopped) = watch::channel(false);
     let mut terminate = signal(SignalKind::terminate())?;
@@ -74,7 +74,7 @@ pub(super) fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
 impl From<HostError> for CliError {
     fn from(error: HostError) -> Self {
         match error {
-            HostError::Rig(error) => error.into(),
+            HostError::Pipeline(error) => error.into(),
             other => Self::Failed(other.to_string()),
         }
     }

@@ -9,8 +9,9 @@ use platen_plant::PlantFile;
 use platen_scan::Window;
 
 use super::{CliError, Common, output, scan_source};
+use crate::progress;
 use crate::scan_file::{self, Format, ScanFileError, Written};
-use crate::{progress, rig};
+use platen_engine::pipeline;
 
 /// Longest scan: a full dome takes many minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(7200);
@@ -33,7 +34,7 @@ pub(super) struct Command {
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     check_output(&command.output)?;
     let plant = PlantFile::load(&command.plant)?;
-    let scanner = rig::scanner(&plant, &common.catalogue())?;
+    let scanner = pipeline::scanner(&plant, &common.catalogue())?;
     progress::phase("connecting to the scanner");
     scanner.instance().open(OPEN_LIMIT)?;
     let written = scan_file::write(&command.output, |sink| {

@@ -7,9 +7,10 @@ use platen_plant::Value;
 use platen_scan::{ScanEnd, Window};
 
 use super::CliError;
-use crate::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use crate::progress;
 use crate::scan_file::Sink;
-use crate::{progress, rig};
+use platen_engine::pipeline;
+use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
 
 /// A file of the finest full dome takes minutes to read.
 pub(super) const READ_LIMIT: Duration = Duration::from_secs(1800);
@@ -20,7 +21,7 @@ const SHOW_EVERY: u32 = 32;
 pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Result<Scanner, CliError> {
     let file = ("file", Value::Path(std::path::absolute(scan)?));
     let cloud = cloud.map(|cloud| ("cloud", Value::Int(i64::from(cloud))));
-    let (library, values) = rig::load_with(catalogue, "faro-file", [file].into_iter().chain(cloud))?;
+    let (library, values) = pipeline::load_with(catalogue, "faro-file", [file].into_iter().chain(cloud))?;
     let scanner = Scanner::create(&library, &values)?;
     scanner.instance().open(READ_LIMIT).map_err(|e| CliError::Failed(format!("{}: {e}", scan.display())))?;
     Ok(scanner)

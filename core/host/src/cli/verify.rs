@@ -12,10 +12,12 @@ use serde::Serialize;
 
 use super::setup::Setup;
 use super::{CliError, Common, measure, output};
-use crate::rig::Rig;
-use crate::stroke::{Baseline, Measured, Scanned};
-use crate::{files, progress};
+use crate::progress;
+use platen_engine::pipeline::Pipeline;
+use platen_engine::stroke::Baseline;
 use platen_model::units::{metres, mm};
+use platen_report::output_folder;
+use platen_shape::{Measured, Scanned};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \
@@ -83,7 +85,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         )));
     }
     plant.comparisons = Vec::new();
-    let mut rig = Rig::of(&plant, &catalogue)?;
+    let mut rig = Pipeline::of(&plant, &catalogue)?;
     let (scanned, measured) =
         measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None, Baseline::None)?;
     progress::done();
@@ -92,7 +94,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     if let Some(file) = &command.picture {
         let drawn = picture::draw(&scanned.patch, &measured.measurement, &plate, &discs);
         let drawn = drawn.map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
-        files::replace(file, drawn.as_bytes())?;
+        output_folder::replace(file, drawn.as_bytes())?;
     }
     let found = record(command, &plate, &discs);
     if common.json {

@@ -4,9 +4,9 @@ use platen_model::Measure;
 use platen_model::{Code, Figures, Measurement, Timestamp, Verdict};
 use platen_plant::PlateFile;
 
-use crate::plugin::PluginError;
-use crate::stroke::Measured;
+use platen_engine::plugin::PluginError;
 use platen_model::Report;
+use platen_shape::Measured;
 
 /// What goes to the press. Figures that no comparison gave stay out and show as invalid.
 pub(super) fn measurement(

@@ -7,7 +7,7 @@ use platen_scan::{Window, wrap_azimuth};
 use platen_shape::outline::Outline;
 use platen_shape::{RegionOfInterest, Vec3};
 
-use crate::stroke::Scanned;
+use platen_shape::Scanned;
 
 /// Room round the last stroke's plate, metres: its edges rise by some centimetres a stroke, and a press feeds it by a few
 /// decimetres. A plate that went farther is scanned again in the base window.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
 use super::disk;
-use crate::files;
+use platen_report::output_folder;
 
 /// The newest alarm, as the dispatcher hears it.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
@@ -220,5 +220,5 @@ pub(super) async fn keep(
 fn write(folder: &Path, record: &StatusRecord) -> Result<(), String> {
     std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let text = serde_json::to_vec_pretty(record).map_err(|e| e.to_string())?;
-    files::put(folder, FILE, &text).map(drop).map_err(|e| e.to_string())
+    output_folder::put(folder, FILE, &text).map(drop).map_err(|e| e.to_string())
 }

@@ -8,7 +8,7 @@ pub use template::{PRESETS, Preset};
 
 use std::path::Path;
 
-use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Template};
+use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Task, Template};
 
 use crate::document::{Document, Reported};
 use crate::{Error, Faults, TomlTable};
@@ -60,6 +60,25 @@ impl PlateFile {
     /// Every fault of the text.
     pub fn parse(file: &str, text: &str) -> Result<Self, Faults> {
         Self::take(Document::parse(file, text))
+    }
+
+    /// Returns the task of the comparisons for this plate. `sigma_correlated` and `sigma_true` are those of the scanner's
+    /// calibration, metres: 0 and `None` without one.
+    pub fn task(&self, sigma_correlated: f64, sigma_true: Option<f64>, supports_changed: bool) -> Task {
+        Task {
+            plate: self.plate.id.clone(),
+            width: self.plate.width,
+            height: self.plate.height,
+            thickness: self.plate.thickness,
+            target: self.target,
+            reference_lines: self.reference_lines.clone(),
+            templates: self.templates.clone(),
+            stations: self.stations.clone(),
+            sigma_correlated,
+            sigma_true,
+            supports: self.supports.clone(),
+            supports_changed,
+        }
     }
 
     fn take(document: Document) -> Result<Self, Faults> {

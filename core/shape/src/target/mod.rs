@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use crate::Vec3;
 use crate::surface::Curvature;
 use cone::Cone;
-use platen_model::{Facing, RadiusOf, Target, TargetShape};
+use platen_model::{Facing, Plate, RadiusOf, Target, TargetShape};
 
 pub use placement::Placement;
 
@@ -82,6 +82,14 @@ pub enum TargetError {
 }
 
 impl TargetSurface {
+    /// Returns the target of a plate.
+    ///
+    /// # Errors
+    /// As [`TargetSurface::new`].
+    pub fn of_plate(target: &Target, plate: &Plate) -> Result<Self, TargetError> {
+        Self::new(target, plate.width, plate.height, plate.thickness)
+    }
+
     /// The target of a plate of `width` x `height` x `thickness` metres.
     ///
     /// Radii become those of the mid-surface: half a thickness more than inside, less than outside. A cone's radii are

@@ -9,14 +9,16 @@ use platen_shape::Surface;
 use serde_json::json;
 
 use super::{RunRef, open};
-use crate::calibration::Calibration;
 use crate::cli::{CliError, Common, output};
-use crate::picture::Caption;
-use crate::plugin::{Catalogue, Comparison, Surfaces};
-use crate::record::{PlateRecord, figure};
-use crate::{files, past, progress, rig};
+use crate::progress;
+use platen_engine::calibration::Calibration;
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Comparison, Surfaces};
 use platen_model::Report;
 use platen_model::units::mm;
+use platen_report::picture::Caption;
+use platen_report::result::{PlateRecord, figure};
+use platen_report::{history_view, output_folder};
 
 /// The comparisons that need two surfaces.
 const COMPARISONS: [&str; 2] = ["displacement", "curvature"];
@@ -36,7 +38,7 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     if let Some(out) = command.out.as_ref().filter(|out| out.exists()) {
-        return Err(CliError::Usage(files::FilesError::Exists(out.clone()).to_string()));
+        return Err(CliError::Usage(output_folder::FilesError::Exists(out.clone()).to_string()));
     }
     let (plant, archive) = open(&command.plant)?;
     let (first, second) = (command.first.find(&archive)?, command.second.find(&archive)?);
@@ -44,10 +46,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     same_size(&first, &before, &second, &now)?;
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
-    let rested = first.document.as_deref().and_then(|document| past::kept(document).supports);
+    let rested = first.document.as_deref().and_then(|document| history_view::kept(document).supports);
     // What the record is compared by today, however old it is.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
-    let task = rig::task(&plate, calibration.as_ref(), past::moved(rested.as_deref(), &plate));
+    let task =
+        Calibration::task(calibration.as_ref(), &plate, history_view::moved(rested.as_deref(), &plate));
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));
@@ -93,20 +96,20 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
 }
 
 fn name(stroke: &Stroke) -> String {
-    format!("run {} (plate {}, stroke {})", stroke.run_id, stroke.plate, past::label(stroke))
+    format!("run {} (plate {}, stroke {})", stroke.run_id, stroke.plate, history_view::label(stroke))
 }
 
 /// The comparison as the plant configures it, else with its defaults.
 fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Comparison, CliError> {
     let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
     let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
-    Ok(rig::comparison(catalogue, &wanted)?)
+    Ok(pipeline::comparison(catalogue, &wanted)?)
 }
 
 fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
     let gone = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
     let document = stroke.document.as_deref().ok_or_else(|| gone("was not measured"))?;
-    files::surface_beside(document).map_err(|_| gone("its surface is not kept any more"))
+    output_folder::surface_beside(document).map_err(|_| gone("its surface is not kept any more"))
 }
 
 /// Places of two plates are the same only where their rectangles are.
@@ -139,7 +142,7 @@ fn write(
     let record = PlateRecord::new(plate, now, None);
     let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);
     // Two strokes side by side are judged by nobody: the verdict is that of the second.
-    let caption = Caption { plate: &title, stroke: None, verdict: past::verdict(strokes[1]) };
+    let caption = Caption { plate: &title, stroke: None, verdict: history_view::verdict(strokes[1]) };
     let reports: Vec<&Report> = reports.iter().collect();
-    Ok(files::fields(out, now, &reports, &record, &caption)?)
+    Ok(output_folder::fields(out, now, &reports, &record, &caption)?)
 }

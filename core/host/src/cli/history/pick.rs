@@ -5,7 +5,7 @@ use std::str::FromStr;
 use platen_history::{Archive, Filter, Stroke};
 
 use crate::cli::CliError;
-use crate::past;
+use platen_report::history_view;
 
 /// A run id, or plate:stroke.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,8 +38,8 @@ impl RunRef {
             Self::Run(run_id) => Ok(archive.stroke(*run_id)?),
             Self::OfPlate(plate, name) => {
                 let strokes = archive.strokes(&Filter { plate: Some(*plate), ..Filter::default() })?;
-                let names: Vec<String> = strokes.iter().map(past::label).collect();
-                let found = strokes.into_iter().rev().find(|stroke| past::label(stroke) == *name);
+                let names: Vec<String> = strokes.iter().map(history_view::label).collect();
+                let found = strokes.into_iter().rev().find(|stroke| history_view::label(stroke) == *name);
                 found.ok_or_else(|| {
                     let known = if names.is_empty() { "no strokes".to_owned() } else { names.join(", ") };
                     CliError::Usage(format!("plate {plate} has no stroke {name}; it has {known}"))

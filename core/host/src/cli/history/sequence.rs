@@ -3,17 +3,22 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use platen_engine::pipeline;
+use platen_engine::plugin::Surfaces;
+use platen_model::Task;
+use platen_plant::PluginUse;
+use platen_shape::Surface;
 
 use super::open;
 use crate::cli::{CliError, Common, output};
 use crate::progress;
-use crate::sequence::{Bend, Sequence, SequenceError, SequenceStroke, Summary};
+use platen_report::sequence::{Bend, Sequence, SequenceError, SequenceStroke, Summary};
 
 #[derive(Debug, Args)]
 #[command(
     after_help = "feed: across the straight lines, from the strongest bend of the stroke before. re-hit: a bend that lies on an earlier one.\n\
                         overshoot: the gap where the board says \"bent too far\". energy left: elastic energy from the measured to the\n\
-                        target's curvature, as a share of the first stroke's. Formulas: documentation of platen_host::sequence."
+                        target's curvature, as a share of the first stroke's. Formulas: documentation of platen_report::sequence."
 )]
 pub(super) struct Command {
     /// Plant file
@@ -24,17 +29,19 @@ pub(super) struct Command {
 
 impl From<SequenceError> for CliError {
     fn from(error: SequenceError) -> Self {
-        match error {
-            SequenceError::Rig(error) => error.into(),
-            other => Self::Failed(other.to_string()),
-        }
+        Self::Failed(error.to_string())
     }
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (plant, archive) = open(&command.plant)?;
     let say = |what: &str| progress::phase(what);
-    let sequence = Sequence::of(&archive, &plant, &common.catalogue(), command.plate, &say)?;
+    let curvature = pipeline::comparison(&common.catalogue(), &PluginUse::by_default("curvature"))?;
+    let compare = |task: &Task, before: &Surface, now: &Surface| {
+        let surfaces = Surfaces { now, before: Some(before), baseline: None };
+        curvature.compare(task, surfaces).map_err(|error| error.to_string())
+    };
+    let sequence = Sequence::of(&archive, &plant, command.plate, &compare, &say)?;
     progress::done();
     if common.json {
         return output::json(&sequence);

@@ -19,7 +19,7 @@ use super::{Common, Failure, output};
 use crate::progress;
 
 /// The figures by which a result can be told from every other stroke's: number as a gap, session as its place.
-pub(super) fn stand_in(key: StrokeKey) -> Measurement {
+pub fn stand_in(key: StrokeKey) -> Measurement {
     let [high, low] = key.session.to_be_bytes().map(f64::from);
     let values = [
         (Measure::GapMax, f64::from(key.stroke % 60_000) * 1e-5),
@@ -33,7 +33,7 @@ pub(super) fn stand_in(key: StrokeKey) -> Measurement {
 
 /// What the stand-in of scanner and evaluation saw.
 #[derive(Debug)]
-pub(super) enum Seen {
+pub enum Seen {
     /// A scan was ordered.
     Scan(StrokeKey),
     /// An alarm came.
@@ -41,7 +41,7 @@ pub(super) enum Seen {
 }
 
 /// Scanner and evaluation that answer at once; tells what it was asked until the press side ends.
-pub(super) async fn serve(
+pub async fn serve(
     mut orders: mpsc::UnboundedReceiver<Order>,
     answers: mpsc::UnboundedSender<Answer>,
     seen: mpsc::UnboundedSender<Seen>,

@@ -1,0 +1,54 @@
+//! The program `platen-bench`, which `platen bench` and `platen press soak` start: off the path of a plant's computer.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `bench` | command line of `platen bench` |
+//! | `tables` | tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", beside this machine's figures |
+//! | `seeds`, `strokes` | accuracy over many seeds: plates of every shape, strokes, templates |
+//! | `scale` | time and memory from 1.6 to 44 million cells |
+//! | `soak` | strokes against a simulated press on a faulty line |
+//! | `accuracy` | the difference of a measurement from the known truth |
+//! | `scene`, `stages`, `figures`, `machine` | simulated scans, timed stages, statistics, the computer |
+
+pub mod accuracy;
+mod bench;
+mod figures;
+mod machine;
+mod scale;
+mod scene;
+mod seeds;
+mod soak;
+mod stages;
+mod strokes;
+mod tables;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use platen_host::cli::{self, Common};
+
+/// Benchmarks and long runs; started by `platen bench` and `platen press soak`.
+#[derive(Debug, Parser)]
+#[command(name = "platen", version, disable_help_subcommand = true)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
+    Bench(bench::Command),
+    /// Run strokes against a simulated press on a faulty line: none wrong, doubled or lost
+    Soak(soak::Options),
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    cli::run_program::<Cli>(|cli| match &cli.verb {
+        Verb::Bench(command) => bench::run(&cli.common, command),
+        Verb::Soak(options) => soak::run(&cli.common, options),
+    })
+}

@@ -1,0 +1,5 @@
+//! The program `platen-bench`.
+
+fn main() -> std::process::ExitCode {
+    platen_bench::main()
+}

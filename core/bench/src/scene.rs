@@ -1,0 +1,220 @@
+//! Simulated scans with known truth: a described plate, seen through the simulated scanner's driver library.
+//!
+//! Scan and truth come from one call of the driver: the columns over the plugin boundary, the truth through the file of its option
+//! `truth_file`. Every seed has errors of its own and moves and turns the plate a little, so that the lattice falls
+//! differently on its edges each time.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use platen_plant::Value;
+use platen_scan::{Column, ScanHeader, Window};
+use platen_shape::extract::Extractor;
+use platen_shape::{Patch, PlateSpec, Vec3};
+
+use crate::accuracy::Truth;
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
+use platen_engine::stroke::NotMeasured;
+use platen_host::cli::CliError;
+use platen_model::units::metres;
+
+/// Casting the rays of a full dome takes minutes on a slow machine.
+const SCAN_LIMIT: Duration = Duration::from_secs(3600);
+/// Angle between cells of the scans of `accuracy`: 6 mm at 7 m.
+const STEP_DEG: f64 = 0.05;
+/// Enough round their plates to see where they end.
+const MARGIN_DEG: f64 = 2.0;
+/// The plate is moved by up to this much from seed to seed, metres: many lattice steps.
+const SHIFT: f64 = 0.05;
+/// And turned by up to this much, degrees.
+const TURN_DEG: f64 = 3.0;
+
+/// A plate in front of the scanner.
+#[derive(Debug, Clone)]
+pub(super) struct Scene {
+    /// Name in tables and files.
+    pub(super) name: String,
+    /// Extent along u and v and thickness, millimetres.
+    pub(super) size_mm: [f64; 3],
+    /// The `[shape]` table of the simulator's description.
+    pub(super) shape: String,
+    /// Middle of the mid-surface in the scanner frame, millimetres.
+    pub(super) centre_mm: [f64; 3],
+    /// Direction of u, counter-clockwise from the direction of sight.
+    pub(super) yaw_deg: f64,
+}
+
+/// How a scene is scanned.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Setting {
+    /// Angle between cells.
+    pub(super) step_deg: f64,
+    /// What is scanned round the plate.
+    pub(super) margin_deg: f64,
+    /// Standard deviation of a range at 10 m.
+    pub(super) noise_mm: f64,
+    /// Of all errors.
+    pub(super) seed: u64,
+    /// Threads that cast rays.
+    pub(super) threads: usize,
+}
+
+impl Setting {
+    /// As the scans of `accuracy` are taken.
+    pub(super) fn of_accuracy(noise_mm: f64, seed: u64) -> Self {
+        Self { step_deg: STEP_DEG, margin_deg: MARGIN_DEG, noise_mm, seed, threads: 1 }
+    }
+}
+
+/// A scan in memory, with its truth.
+#[derive(Debug)]
+pub(super) struct Shot {
+    /// What the driver said.
+    pub(super) header: ScanHeader,
+    /// The lattice.
+    pub(super) columns: Vec<Column>,
+    /// What a measurement should find.
+    pub(super) truth: Truth,
+    /// What is known of the plate beforehand.
+    pub(super) spec: PlateSpec,
+}
+
+impl Scene {
+    /// Nine places to be found again, millimetres.
+    fn markers_mm(&self) -> Vec<[f64; 2]> {
+        let [width, height, _] = self.size_mm;
+        let shares = [0.1, 0.5, 0.9];
+        shares.iter().flat_map(|v| shares.map(|u| [u * width, v * height])).collect()
+    }
+
+    /// What is known of the plate before it is scanned.
+    fn spec(&self) -> PlateSpec {
+        let [width, height, thickness] = self.size_mm.map(metres);
+        let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
+        PlateSpec {
+            width,
+            height,
+            thickness,
+            face_inset: 0.0,
+            u_axis: Some(Vec3::new(cos, sin, 0.0)),
+            region: None,
+        }
+    }
+
+    /// The simulator's description of the plate as it lies for this seed.
+    fn description(&self, seed: u64) -> String {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut swing = |reach: f64| reach * (2.0 * random.f64() - 1.0);
+        let centre = self.centre_mm.map(|mm| mm + 1000.0 * swing(SHIFT));
+        let yaw = self.yaw_deg + swing(TURN_DEG);
+        let [width, height, thickness] = self.size_mm;
+        format!(
+            "[blank]\nwidth_mm = {width:?}\nheight_mm = {height:?}\nthickness_mm = {thickness:?}\nmarkers_mm = {:?}\n\
+             [shape]\n{}\n[pose]\ncentre_mm = {centre:?}\nyaw_deg = {yaw:?}\n",
+            self.markers_mm(),
+            self.shape,
+        )
+    }
+
+    /// Scans into memory; description and truth stay in `folder`.
+    pub(super) fn scan(
+        &self,
+        catalogue: &Catalogue,
+        folder: &Path,
+        setting: Setting,
+    ) -> Result<Shot, CliError> {
+        let (scanner, truth) = self.scanner(catalogue, folder, setting)?;
+        let mut header = None;
+        let mut columns = Vec::new();
+        let job = JobSpec::untriggered(SCAN_LIMIT);
+        scanner.scan(job, None, &mut |event| {
+            match event {
+                ScanEvent::Begin(begun) => header = Some(begun),
+                ScanEvent::Column(column) => columns.push(column),
+            }
+            ControlFlow::Continue(())
+        })?;
+        let header = header.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
+        let truth = Truth::read(&truth).map_err(|e| CliError::Failed(e.to_string()))?;
+        Ok(Shot { header, columns, truth, spec: self.spec() })
+    }
+
+    /// Scans and extracts at once, each column with `push`: nothing of the scan is kept but what the extractor keeps.
+    pub(super) fn stream(
+        &self,
+        catalogue: &Catalogue,
+        folder: &Path,
+        setting: Setting,
+        window: Option<&Window>,
+        mut push: impl FnMut(&mut Extractor, &Column) -> ControlFlow<()>,
+    ) -> Result<(ScanHeader, PlateSpec, Extractor), CliError> {
+        let (scanner, _) = self.scanner(catalogue, folder, setting)?;
+        let spec = self.spec();
+        let mut extractor = None;
+        scanner.scan(
+            JobSpec::untriggered(SCAN_LIMIT),
+            window,
+            &mut |event| match (event, &mut extractor) {
+                (ScanEvent::Begin(header), _) => {
+                    let empty = Extractor::new(&header, &spec);
+                    extractor = Some((header, empty));
+                    ControlFlow::Continue(())
+                }
+                (ScanEvent::Column(column), Some((_, extractor))) => push(extractor, &column),
+                (ScanEvent::Column(_), None) => ControlFlow::Break(()),
+            },
+        )?;
+        let (header, extractor) =
+            extractor.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
+        Ok((header, spec, extractor))
+    }
+
+    /// The driver set to this scene, and where its truth will lie.
+    fn scanner(
+        &self,
+        catalogue: &Catalogue,
+        folder: &Path,
+        setting: Setting,
+    ) -> Result<(Scanner, PathBuf), CliError> {
+        let file = |ending: &str| -> Result<PathBuf, CliError> {
+            let name =
+                format!("{}-{}um-{}.{ending}", self.name, (1000.0 * setting.noise_mm).round(), setting.seed);
+            Ok(std::path::absolute(folder.join(name))?)
+        };
+        let (plate, truth) = (file("toml")?, file("json")?);
+        std::fs::write(&plate, self.description(setting.seed))?;
+        let whole = |n: u64| Value::Int(i64::try_from(n).unwrap_or(i64::MAX));
+        let options = [
+            ("plate_file", Value::Path(plate)),
+            ("truth_file", Value::Path(truth.clone())),
+            ("step_deg", Value::Float(setting.step_deg)),
+            ("margin_deg", Value::Float(setting.margin_deg)),
+            ("noise_mm", Value::Float(setting.noise_mm)),
+            ("seed", whole(setting.seed)),
+            ("threads", whole(setting.threads as u64)),
+            ("warm_up_columns", whole(0)),
+        ];
+        let (library, values) = pipeline::load_with(catalogue, "simulated", options)?;
+        let scanner = Scanner::create(&library, &values)?;
+        scanner.instance().open(SCAN_LIMIT)?;
+        Ok((scanner, truth))
+    }
+}
+
+impl Shot {
+    /// Cells of the lattice.
+    pub(super) fn n_cells(&self) -> usize {
+        self.columns.iter().map(Column::len).sum()
+    }
+
+    /// The plate's face, from the lattice in memory.
+    pub(super) fn extract(&self) -> Result<Patch, NotMeasured> {
+        let mut extractor = Extractor::new(&self.header, &self.spec);
+        for column in &self.columns {
+            extractor.push(column)?;
+        }
+        Ok(extractor.finish()?)
+    }
+}

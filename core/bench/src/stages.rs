@@ -1,0 +1,88 @@
+//! One measurement of a scan in memory, stage by stage, in processor time.
+
+use std::time::Duration;
+
+use platen_shape::Patch;
+use platen_shape::measure::{Measurement, Timings, measure};
+use platen_shape::outline::{Outline, outline};
+
+use crate::machine::cpu_time;
+use crate::scene::Shot;
+use platen_engine::plugin::Flattening;
+use platen_engine::stroke::NotMeasured;
+
+/// Processor time of each stage.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Stages {
+    /// From the lattice to the plate's face.
+    pub(super) extract: Duration,
+    /// Loop, corners, edges.
+    pub(super) outline: Duration,
+    /// Smooth face, mid-surface, mesh.
+    pub(super) mesh: Duration,
+    /// Flattening.
+    pub(super) flatten: Duration,
+    /// S(u, v) and its covariance.
+    pub(super) surface: Duration,
+}
+
+impl Stages {
+    /// All of them.
+    pub(super) fn total(&self) -> Duration {
+        self.extract + self.outline + self.mesh + self.flatten + self.surface
+    }
+}
+
+/// The plate as seen, and the time until then.
+pub(super) struct Seen {
+    pub(super) patch: Patch,
+    pub(super) outline: Outline,
+    times: [Duration; 2],
+}
+
+/// What came out, and after how long.
+pub(super) struct Run {
+    pub(super) seen: Seen,
+    pub(super) measurement: Measurement,
+    pub(super) stages: Stages,
+}
+
+/// Finds the plate in a scan.
+pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
+    let start = cpu_time();
+    let patch = shot.extract()?;
+    let extracted = cpu_time();
+    let outline = outline(&patch, &shot.spec)?;
+    let times = [extracted.saturating_sub(start), cpu_time().saturating_sub(extracted)];
+    Ok(Seen { patch, outline, times })
+}
+
+/// Measures a plate that was found.
+pub(super) fn shape(
+    shot: &Shot,
+    seen: &Seen,
+    flattening: &mut Flattening,
+) -> Result<Measurement, NotMeasured> {
+    Ok(measure(&seen.patch, &seen.outline, &shot.spec, &shot.spec.rectangle(), flattening, &mut cpu_time)?)
+}
+
+/// Finds and measures.
+pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMeasured> {
+    let seen = see(shot)?;
+    let measurement = shape(shot, &seen, flattening)?;
+    let [extract, outline] = seen.times;
+    let Timings { mesh, flatten, surface } = measurement.timings;
+    let stages = Stages { extract, outline, mesh, flatten, surface };
+    Ok(Run { seen, measurement, stages })
+}
+
+/// The middle of several times; of an even number, the smaller of the two in the middle.
+pub(super) fn median(mut times: Vec<Duration>) -> Duration {
+    times.sort_unstable();
+    times.get(times.len().saturating_sub(1) / 2).copied().unwrap_or_default()
+}
+
+/// Milliseconds with a thousandth.
+pub(super) fn ms(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e6).round() / 1e3
+}

@@ -1,0 +1,250 @@
+//! Errors of what is said of a stroke, and of a template, on pairs of simulated scans.
+//!
+//! A plate with two bend bands is scanned, gets a third one, is scanned, and scanned again with nothing done: a stroke and a
+//! null pair. Between scans it is moved and turned, as on a press.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::{Map, Value as Json, json};
+
+use platen_model::{Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template};
+use platen_plant::Value;
+use platen_shape::{Placement, Surface, Vec3};
+
+use crate::accuracy::{Truth, rms};
+use crate::scene::{Scene, Setting, Shot};
+use crate::{bench, figures, stages};
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Comparison, Flattening, Surfaces};
+use platen_host::cli::CliError;
+use platen_model::units::{metres, mm};
+use platen_model::{Field, NodeState, Report};
+
+/// Extent and thickness of the plates, millimetres.
+const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
+/// Middles of the bands, millimetres from the plate's middle, before and after the stroke.
+const BEFORE: &[f64] = &[-800.0, 0.0];
+pub(super) const AFTER: &[f64] = &[-800.0, 0.0, 700.0];
+/// Width of a band and angle by which it bends: 0.16 1/m at its middle, as press strokes leave.
+const BAND_MM: f64 = 300.0;
+const BAND_DEG: f64 = 1.4;
+
+/// Radius of the plate under the template and that of the template, mid-surface, metres; length of the board.
+const ROLLED: f64 = 9.0;
+const WANTED: f64 = 8.5;
+const BOARD: f64 = 2.0;
+
+const COMPARISON_LIMIT: Duration = Duration::from_secs(60);
+
+/// Errors of one plate's strokes: metres, radians, shares.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StrokeErrors {
+    /// Displacement after alignment, along the normal and as a vector, root mean square.
+    displacement_normal: f64,
+    displacement_vector: f64,
+    /// Bend angle of the new band.
+    angle: f64,
+    /// Gap of a board in the balanced seat.
+    gap: f64,
+    /// Share of the plate above the level of detection in a null pair, before patches are judged.
+    false_change: f64,
+}
+
+type StrokeFigure = (&'static str, &'static str, fn(&StrokeErrors) -> f64, usize);
+
+const FIGURES: [StrokeFigure; 5] = [
+    ("displacement_normal_rms_mm", "displacement normal mm", |e| mm(e.displacement_normal), 3),
+    ("displacement_vector_rms_mm", "vector mm", |e| mm(e.displacement_vector), 3),
+    ("band_angle_error_deg", "bend angle deg", |e| e.angle.to_degrees(), 4),
+    ("template_gap_error_mm", "template gap mm", |e| mm(e.gap), 3),
+    ("false_change_share", "null pair above LoD", |e| e.false_change, 3),
+];
+
+pub(super) fn head() -> Vec<String> {
+    std::iter::once("noise mm").chain(FIGURES.map(|(_, head, ..)| head)).map(str::to_owned).collect()
+}
+
+pub(super) fn row(noise_mm: f64, all: &[StrokeErrors]) -> Vec<String> {
+    let cells = FIGURES.map(|(_, _, value, digits)| {
+        let [mean, worst] = figures::mean_and_worst(all.iter().map(value));
+        format!("{mean:.digits$} / {worst:.digits$}")
+    });
+    std::iter::once(format!("{noise_mm}")).chain(cells).collect()
+}
+
+pub(super) fn document(all: &[StrokeErrors]) -> Map<String, Json> {
+    let entry = |(name, _, value, _): &StrokeFigure| {
+        let [mean, worst] = figures::mean_and_worst(all.iter().map(value));
+        ((*name).to_owned(), json!({ "mean": mean, "worst": worst }))
+    };
+    FIGURES.iter().map(entry).collect()
+}
+
+/// The `[shape]` table of a plate with these bands.
+pub(super) fn bands(at_mm: &[f64]) -> String {
+    let band = |at: &f64| format!("{{ at_mm = {at:?}, width_mm = {BAND_MM:?}, angle_deg = {BAND_DEG:?} }}");
+    let bands: Vec<String> = at_mm.iter().map(band).collect();
+    format!("shape = \"bands\"\naxis_deg = 90.0\nbands = [{}]", bands.join(", "))
+}
+
+/// The plugins that say something of a stroke.
+pub(super) struct Tools {
+    flattening: Flattening,
+    displacement: Comparison,
+    curvature: Comparison,
+    template: Comparison,
+}
+
+impl Tools {
+    /// The first of the flattenings, and the comparisons; single places count as changed, not only patches.
+    pub(super) fn load(catalogue: &Catalogue, names: &[String]) -> Result<Self, CliError> {
+        let flattening = bench::flattenings(catalogue, names)?.into_iter().next();
+        let comparison = |name: &str, option: Option<(&str, Value)>| -> Result<Comparison, CliError> {
+            let (library, values) = pipeline::load_with(catalogue, name, option)?;
+            Ok(Comparison::create(&library, &values, COMPARISON_LIMIT)?)
+        };
+        Ok(Self {
+            flattening: flattening.ok_or_else(|| CliError::Usage("give at least one --flattening".into()))?,
+            displacement: comparison("displacement", Some(("min_patch", Value::Float(0.0))))?,
+            curvature: comparison("curvature", None)?,
+            template: comparison("template", None)?,
+        })
+    }
+}
+
+/// Scans a plate before and after a stroke and once more, and a rolled one, and judges what is said of them.
+pub(super) fn errors(
+    catalogue: &Catalogue,
+    folder: &Path,
+    tools: &mut Tools,
+    noise_mm: f64,
+    seed: u64,
+) -> Result<StrokeErrors, CliError> {
+    let failed =
+        |e: &dyn std::fmt::Display| CliError::Failed(format!("stroke at {noise_mm} mm, seed {seed}: {e}"));
+    let mut measured = |name: &str, shape: String, number: u64| -> Result<(Shot, Surface), CliError> {
+        let scene = Scene {
+            name: format!("stroke-{name}"),
+            size_mm: SIZE_MM,
+            shape,
+            centre_mm: [6000.0, 0.0, -3600.0],
+            yaw_deg: 10.0,
+        };
+        // Four scans a seed, none with the errors of another.
+        let setting = Setting::of_accuracy(noise_mm, seed.wrapping_mul(4).wrapping_add(number));
+        let shot = scene.scan(catalogue, folder, setting)?;
+        let run = stages::run(&shot, &mut tools.flattening).map_err(|e| failed(&e))?;
+        Ok((shot, run.measurement.surface))
+    };
+    let (before_shot, before) = measured("before", bands(BEFORE), 0)?;
+    let (after_shot, after) = measured("after", bands(AFTER), 1)?;
+    let (_, again) = measured("again", bands(AFTER), 2)?;
+    let rolled = format!("shape = \"cylinder\"\nradius_mm = {:?}\naxis_deg = 90.0", 1000.0 * ROLLED);
+    let (_, rolled) = measured("rolled", rolled, 3)?;
+
+    let task = task();
+    let compare = |comparison: &Comparison, now: &Surface, before: Option<&Surface>| {
+        comparison.compare(&task, Surfaces { now, before, baseline: None }).map_err(|e| failed(&e))
+    };
+    let moved = compare(&tools.displacement, &after, Some(&before))?;
+    let bent = compare(&tools.curvature, &after, Some(&before))?;
+    let null = compare(&tools.displacement, &again, Some(&after))?;
+    let laid = compare(&tools.template, &rolled, None)?;
+
+    let missing = |what: &str| failed(&format!("no {what} in what the plugin found"));
+    let field = moved.fields.iter().find(|field| field.name == "displacement" && field.components == 3);
+    let field = field.ok_or_else(|| missing("displacement"))?;
+    let [displacement_normal, displacement_vector] =
+        displacement(field, &after, [&before_shot.truth, &after_shot.truth]);
+    let angle = figure(&bent, "bend.1.angle").ok_or_else(|| missing("bend.1.angle"))?;
+    let gap = laid.findings.templates.first().ok_or_else(|| missing("template"))?.max_gap;
+    let false_change = figure(&null, "displacement.above_lod")
+        .ok_or_else(|| missing("share above the level of detection"))?;
+    Ok(StrokeErrors {
+        displacement_normal,
+        displacement_vector,
+        angle: angle - BAND_DEG.to_radians(),
+        gap: gap - true_gap(),
+        false_change,
+    })
+}
+
+fn figure(report: &Report, name: &str) -> Option<f64> {
+    report.findings.figures.iter().find(|figure| figure.name == name).map(|figure| figure.value)
+}
+
+fn task() -> Task {
+    let [width, height, thickness] = SIZE_MM.map(metres);
+    Task {
+        plate: "bench".into(),
+        width,
+        height,
+        thickness,
+        target: Some(Target {
+            shape: TargetShape::Cylinder { radius: WANTED, axis: std::f64::consts::FRAC_PI_2 },
+            radius_of: RadiusOf::Mid,
+            scanned_face: Facing::Inside,
+        }),
+        reference_lines: vec![ReferenceLine {
+            name: "middle".into(),
+            from: [0.0, 0.5 * height],
+            to: [width, 0.5 * height],
+        }],
+        templates: vec![Template {
+            name: "board".into(),
+            line: "middle".into(),
+            chord: BOARD,
+            centre: Centre::At(0.5 * width),
+            limit: 0.003,
+            seat: Seat::Balanced,
+            source: None,
+        }],
+        stations: Vec::new(),
+        sigma_correlated: 0.0,
+        sigma_true: None,
+        supports: Vec::new(),
+        supports_changed: false,
+    }
+}
+
+/// A board of the wanted face's radius touches the flatter plate with its middle; its ends stand off by the difference of
+/// the sagittas.
+fn true_gap() -> f64 {
+    let half_thickness = metres(0.5 * SIZE_MM[2]);
+    let sagitta = |radius: f64| radius - (radius * radius - 0.25 * BOARD * BOARD).sqrt();
+    sagitta(WANTED - half_thickness) - sagitta(ROLLED - half_thickness)
+}
+
+/// Error of a displacement field at the truth's places, along the normal and as a vector, root mean square. The plate's own
+/// motion is not part of it: true places before are moved rigidly onto where the field says that places were.
+fn displacement(field: &Field, now: &Surface, truth: [&Truth; 2]) -> [f64; 2] {
+    let [before, after] = truth.map(|truth| &truth.grid);
+    let [n_u, n_v] = field.nodes;
+    let mut known = Vec::new();
+    for k in 0..after.nu * after.nv {
+        let (i, j) = (k % after.nu, k / after.nu);
+        // The field's grid is a multiple of the truth's.
+        let node = j * (n_v - 1) / (after.nv - 1) * n_u + i * (n_u - 1) / (after.nu - 1);
+        if field.state[node] != NodeState::Unseen {
+            let moved = Vec3::from_column_slice(&field.values[3 * node..3 * node + 3]);
+            let u = now.width() * i as f64 / (after.nu - 1) as f64;
+            let v = now.height() * j as f64 / (after.nv - 1) as f64;
+            known.push((k, moved, now.face(u, v), now.normal(u, v)));
+        }
+    }
+    let from: Vec<Vec3> = known.iter().map(|(k, ..)| Vec3::from(before.position_m[*k])).collect();
+    let to: Vec<Vec3> = known.iter().map(|(_, moved, face, _)| face - moved).collect();
+    let motion = Placement::of_pairs(from.iter().copied().zip(to));
+    let errors: Vec<(Vec3, Vec3)> = known
+        .iter()
+        .zip(&from)
+        .map(|((k, moved, _, normal), was)| {
+            (moved - (Vec3::from(after.position_m[*k]) - motion.moved(was)), *normal)
+        })
+        .collect();
+    [
+        rms(errors.iter().map(|(error, normal)| error.dot(normal))),
+        rms(errors.iter().map(|(error, _)| error.norm())),
+    ]
+}

@@ -1,0 +1,206 @@
+//! What is known of a scanner beyond its noise: the file that `platen calibrate` writes, and whether it holds.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use jiff::Timestamp;
+use platen_model::Task;
+use platen_plant::plant::CalibrationUse;
+use platen_plant::{Document, Error as PlantError, PlateFile, Reported, TomlTable};
+
+use platen_model::units::{metres, mm};
+
+/// Standard deviations above this are no scanner's: a plate was bent, or the scanner moved. Millimetres.
+const LARGEST_SIGMA_MM: f64 = 20.0;
+
+/// What is known of a scanner at its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// When it was found out.
+    pub made: Timestamp,
+    /// Scanner that it belongs to: maker, model, serial number.
+    pub instrument: String,
+    /// Plate or artefact that was scanned.
+    pub plate: String,
+    /// Scans that were taken.
+    pub scans: usize,
+    /// Correlated error of a pair of scans, one sigma, metres.
+    pub sigma_correlated: f64,
+    /// Systematic error of a gap, one sigma, metres; known only from an artefact of known shape.
+    pub sigma_true: Option<f64>,
+}
+
+/// Why a plant's calibration does not hold.
+#[derive(Debug, thiserror::Error)]
+pub enum Invalid {
+    /// There is none, or it cannot be read.
+    #[error("calibration: {0}; run platen calibrate")]
+    Absent(#[from] PlantError),
+    /// It is too old.
+    #[error("calibration: {} is {age_d:.0} days old, {limit_d:.0} are allowed; run platen calibrate", .file.display())]
+    TooOld {
+        /// The file.
+        file: PathBuf,
+        /// Its age, days.
+        age_d: f64,
+        /// Largest age, days.
+        limit_d: f64,
+    },
+    /// The scanner is cold.
+    #[error("calibration: the scanner is still warming up, {left_min:.0} minutes are left")]
+    Cold {
+        /// Minutes until it is warm.
+        left_min: f64,
+    },
+}
+
+impl Calibration {
+    /// Returns the task of the comparisons for a plate, by a scanner with this calibration, if any.
+    pub fn task(calibration: Option<&Self>, plate: &PlateFile, supports_changed: bool) -> Task {
+        let sigma_correlated = calibration.map_or(0.0, |calibration| calibration.sigma_correlated);
+        plate.task(
+            sigma_correlated,
+            calibration.and_then(|calibration| calibration.sigma_true),
+            supports_changed,
+        )
+    }
+
+    /// Reads a calibration file.
+    ///
+    /// # Errors
+    /// Every fault of the file.
+    pub fn load(path: &Path) -> Result<Self, PlantError> {
+        let document = Document::load(path)?;
+        let read = Self::read(document.root());
+        Ok(document.finish(read)?)
+    }
+
+    fn read(mut root: TomlTable<'_>) -> Result<Self, Reported> {
+        let table = root.table("calibration").required();
+        root.finish();
+        let mut table = table?;
+        let made = table.string("made").try_map(|text| {
+            text.parse::<Timestamp>()
+                .map_err(|_| format!("found {text:?}, expected a time like 2026-05-04T10:00:00Z"))
+        });
+        let made = made.required();
+        let instrument = table.string("instrument").required();
+        let plate = table.name("plate").required();
+        let scans = table.integer("scans").at_least(1).required();
+        let correlated =
+            table.number("sigma_correlated_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(metres).required();
+        let systematic =
+            table.number("sigma_true_mm").in_range(0.0..=LARGEST_SIGMA_MM).map(metres).optional();
+        table.finish();
+        Ok(Self {
+            made: made?,
+            instrument: instrument?,
+            plate: plate?,
+            scans: usize::try_from(scans?).unwrap_or(usize::MAX),
+            sigma_correlated: correlated?,
+            sigma_true: systematic?,
+        })
+    }
+
+    /// The calibration file as text.
+    pub fn to_toml(&self) -> String {
+        // A text of JSON is one of TOML.
+        let text = |text: &str| serde_json::Value::from(text).to_string();
+        let mut file = format!(
+            "# Written by platen calibrate. One sigma, of a position between two scans and of a template's gap.\n\
+             [calibration]\nmade = \"{}\"\ninstrument = {}\nplate = {}\nscans = {}\nsigma_correlated_mm = {:.4}\n",
+            self.made,
+            text(&self.instrument),
+            text(&self.plate),
+            self.scans,
+            mm(self.sigma_correlated)
+        );
+        if let Some(sigma) = self.sigma_true {
+            file += &format!("sigma_true_mm = {:.4}\n", mm(sigma));
+        }
+        file
+    }
+}
+
+/// The plant's calibration, if it holds `now`, the scanner having been in reach for `in_reach`.
+///
+/// # Errors
+/// Why it does not hold.
+pub fn in_force(wanted: &CalibrationUse, now: Timestamp, in_reach: Duration) -> Result<Calibration, Invalid> {
+    let calibration = Calibration::load(&wanted.file)?;
+    let age = now.duration_since(calibration.made).as_secs_f64();
+    let days = |seconds: f64| seconds / 86_400.0;
+    match wanted.max_age.map(|limit| limit.as_secs_f64()) {
+        Some(limit) if age > limit => {
+            return Err(Invalid::TooOld {
+                file: wanted.file.clone(),
+                age_d: days(age),
+                limit_d: days(limit),
+            });
+        }
+        _ => {}
+    }
+    match wanted.warm_up.checked_sub(in_reach) {
+        Some(left) if !left.is_zero() => Err(Invalid::Cold { left_min: (left.as_secs_f64() / 60.0).ceil() }),
+        _ => Ok(calibration),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn calibration() -> Calibration {
+        Calibration {
+            made: "2026-05-04T10:00:00Z".parse().unwrap(),
+            instrument: "a \"maker\", 7".into(),
+            plate: "CAL".into(),
+            scans: 5,
+            sigma_correlated: 0.0375e-3,
+            sigma_true: Some(0.125e-3),
+        }
+    }
+
+    fn wanted(folder: &Path, days: Option<u64>, minutes: u64) -> CalibrationUse {
+        let max_age = days.map(|days| Duration::from_secs(days * 86_400));
+        CalibrationUse { file: folder.join("cal.toml"), max_age, warm_up: Duration::from_secs(60 * minutes) }
+    }
+
+    #[test]
+    fn a_file_comes_back_and_every_fault_of_one_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cal.toml");
+        for calibration in [calibration(), Calibration { sigma_true: None, ..calibration() }] {
+            std::fs::write(&path, calibration.to_toml()).unwrap();
+            assert_eq!(Calibration::load(&path).unwrap(), calibration);
+        }
+        let text = calibration().to_toml().replace("0.0375", "-1").replace("2026-05-04T10:00:00Z", "May");
+        std::fs::write(&path, text).unwrap();
+        let faults = Calibration::load(&path).unwrap_err().to_string();
+        assert!(
+            faults.contains("cal.toml:3:8: calibration.made") && faults.contains("sigma_correlated_mm"),
+            "{faults}"
+        );
+    }
+
+    #[test]
+    fn a_calibration_holds_until_it_is_too_old_and_only_on_a_warm_scanner() {
+        let folder = tempfile::tempdir().unwrap();
+        let now: Timestamp = "2026-05-14T10:00:00Z".parse().unwrap();
+        let hour = Duration::from_secs(3600);
+        let says = |wanted: &CalibrationUse, in_reach| {
+            in_force(wanted, now, in_reach).map(|c| c.scans).map_err(|e| e.to_string())
+        };
+        assert!(says(&wanted(folder.path(), None, 0), hour).unwrap_err().contains("run platen calibrate"));
+        std::fs::write(folder.path().join("cal.toml"), calibration().to_toml()).unwrap();
+        assert_eq!(says(&wanted(folder.path(), None, 0), Duration::ZERO), Ok(5));
+        assert_eq!(says(&wanted(folder.path(), Some(11), 30), hour), Ok(5));
+        assert!(
+            says(&wanted(folder.path(), Some(9), 0), hour)
+                .unwrap_err()
+                .contains("10 days old, 9 are allowed")
+        );
+        let cold = says(&wanted(folder.path(), None, 30), Duration::from_secs(61)).unwrap_err();
+        assert!(cold.contains("warming up, 29 minutes"), "{cold}");
+    }
+}

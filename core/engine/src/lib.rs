@@ -1,0 +1,15 @@
+//! The measuring part of the host: plugins, the pipeline of a plant, and the stroke.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `plugin` | plugin libraries: found by name, checked, loaded; scanner, flattening and comparison behind safe types |
+//! | `pipeline` | the plugins of one plant file, configured, and the place of the scanner |
+//! | `calibration` | the calibration file of a scanner and the conditions under which it is valid |
+//! | `stroke` | one stroke in the order of its data: scan, patch, outline, measurement, reports, verdict |
+//!
+//! Another program that measures plates links this crate; `platen` adds the press, the record and the command line.
+
+pub mod calibration;
+pub mod pipeline;
+pub mod plugin;
+pub mod stroke;

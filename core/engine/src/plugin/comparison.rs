@@ -1,0 +1,80 @@
+//! Comparisons as the host sees them.
+
+use std::time::Duration;
+
+use platen_model::{Field, Findings, Report, Task};
+use platen_plant::OptionValue;
+use platen_sdk::exchange::DecodeError;
+use platen_shape::Surface;
+
+use super::instance::InputFrame;
+use super::{Instance, JobSpec, Kind, Library, PluginError};
+
+/// A comparison with its options.
+#[derive(Debug)]
+pub struct Comparison {
+    instance: Instance,
+    limit: Duration,
+}
+
+/// The surfaces of a plate that a comparison may look at.
+#[derive(Debug, Clone, Copy)]
+pub struct Surfaces<'a> {
+    /// The plate now.
+    pub now: &'a Surface,
+    /// The plate at the stroke before.
+    pub before: Option<&'a Surface>,
+    /// The plate before the first stroke.
+    pub baseline: Option<&'a Surface>,
+}
+
+impl Comparison {
+    /// Makes a comparison of checked options; `limit` is the time for one plate.
+    ///
+    /// # Errors
+    /// As [`Instance::create`].
+    pub fn create(library: &Library, values: &[OptionValue], limit: Duration) -> Result<Self, PluginError> {
+        let instance = Instance::create(library, Kind::Comparison, values)?;
+        instance.open(limit)?;
+        Ok(Self { instance, limit })
+    }
+
+    /// Name in plant files.
+    pub fn name(&self) -> &str {
+        self.instance.name()
+    }
+
+    /// Compares.
+    ///
+    /// # Errors
+    /// The plugin's reason, its deadline, or what was wrong with what it sent.
+    pub fn compare(&self, task: &Task, surfaces: Surfaces<'_>) -> Result<Report, PluginError> {
+        let misbehaved =
+            |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };
+        let mut inputs = vec![InputFrame::new(task, None), InputFrame::new(surfaces.now, Some(c"now"))];
+        inputs.extend(surfaces.before.map(|s| InputFrame::new(s, Some(c"before"))));
+        inputs.extend(surfaces.baseline.map(|s| InputFrame::new(s, Some(c"baseline"))));
+
+        let mut job = self.instance.start(JobSpec::untriggered(self.limit), inputs);
+        let (mut findings, mut fields) = (None, Vec::new());
+        while let Some(frame) = job.next_frame() {
+            if frame.is::<Findings>() && findings.is_none() {
+                let read = frame.decode::<Findings>();
+                findings = Some(read.map_err(|e| misbehaved(format!("findings that cannot be read: {e}")))?);
+            } else if frame.is::<Field>() {
+                let field = frame.decode().map_err(|e| match e {
+                    DecodeError::Malformed(malformed) => {
+                        misbehaved(format!("a malformed field: {malformed}"))
+                    }
+                    DecodeError::Invalid(_) => misbehaved("a field that does not fit its grid".into()),
+                });
+                fields.push(field?);
+            } else {
+                return Err(misbehaved(format!("a frame {} out of turn", frame.format)));
+            }
+        }
+        job.finish()?;
+        let findings = findings.ok_or_else(|| misbehaved("success without findings".into()))?;
+        Ok(Report { comparison: self.instance.name().to_owned(), findings, fields })
+    }
+}

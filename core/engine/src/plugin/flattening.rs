@@ -1,0 +1,65 @@
+//! Flattenings as the host sees them.
+
+use std::time::Duration;
+
+use platen_plant::OptionValue;
+use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
+
+use super::instance::InputFrame;
+use super::{Instance, JobSpec, Kind, Library, PluginError};
+
+/// A flattening with its options.
+#[derive(Debug)]
+pub struct Flattening {
+    instance: Instance,
+    limit: Duration,
+}
+
+impl Flattening {
+    /// Makes a flattening of checked options; `limit` is the time for one mesh.
+    ///
+    /// # Errors
+    /// As [`Instance::create`].
+    pub fn create(library: &Library, values: &[OptionValue], limit: Duration) -> Result<Self, PluginError> {
+        let instance = Instance::create(library, Kind::Flattening, values)?;
+        instance.open(limit)?;
+        Ok(Self { instance, limit })
+    }
+
+    /// Name in plant files.
+    pub fn name(&self) -> &str {
+        self.instance.name()
+    }
+
+    fn run(&self, mesh: &DiskMesh) -> Result<Chart, PluginError> {
+        let misbehaved =
+            |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };
+        let mut job =
+            self.instance.start(JobSpec::untriggered(self.limit), vec![InputFrame::new(mesh, None)]);
+        let mut answer = None;
+        while let Some(frame) = job.next_frame() {
+            if !frame.is::<Chart>() || answer.is_some() {
+                return Err(misbehaved(format!("a frame {} out of turn", frame.format)));
+            }
+            answer = Some(frame.decode().map_err(|e| misbehaved(format!("a malformed chart: {e}")))?);
+        }
+        job.finish()?;
+        answer.ok_or_else(|| misbehaved("success without a chart".into()))
+    }
+}
+
+impl Flatten for Flattening {
+    fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError> {
+        let chart = self.run(mesh).map_err(|error| match error {
+            PluginError::Stopped { .. } | PluginError::Hangs { .. } => {
+                FlattenError::Stopped { reason: error.to_string() }
+            }
+            other => FlattenError::Refused {
+                message: other.to_string(),
+                hint: "try another [flattening] plugin, or scan again".into(),
+            },
+        })?;
+        chart.check(mesh)?;
+        Ok(chart)
+    }
+}

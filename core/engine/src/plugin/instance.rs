@@ -1,0 +1,426 @@
+//! One configured plugin at work, on a thread of its own.
+#![allow(unsafe_code, reason = "calls through the plugin's table")]
+
+use std::ffi::{CStr, CString};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use platen_abi as abi;
+use platen_abi::payload;
+use platen_plant::OptionValue;
+use platen_scan::Window;
+use platen_sdk::exchange::{AlignedBuffer, Decode, DecodeError, Encode, to_raw_window};
+
+use super::job::{self, CancelToken, EmittedFrame, Event, JobSpec, Listed};
+use super::values::Values;
+use super::{Kind, Library, PluginError, host_table};
+
+/// Time that a plugin has to return once it was cancelled. A plugin that outlasts it ends the host, so that a busy
+/// computer must not look like a hanging plugin.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// How often a waiting job looks whether it was cancelled.
+const CANCEL_POLL: Duration = Duration::from_millis(20);
+
+/// Frames under way between a plugin and its consumer: enough to keep both busy, few enough to bound memory.
+const FRAMES_UNDER_WAY: usize = 64;
+
+/// A frame for a plugin.
+#[derive(Debug)]
+pub(super) struct InputFrame {
+    pub(super) format: &'static CStr,
+    pub(super) role: Option<&'static CStr>,
+    pub(super) buffer: AlignedBuffer,
+}
+
+impl InputFrame {
+    pub(super) fn new<T: Encode>(value: &T, role: Option<&'static CStr>) -> Self {
+        Self { format: T::FORMAT, role, buffer: value.to_buffer() }
+    }
+}
+
+type Reply<T> = SyncSender<T>;
+
+enum Command {
+    Open(Reply<Result<(), PluginError>>),
+    Estimate(Option<payload::Window>, Reply<Option<f64>>),
+    Arm(abi::Job, Reply<Result<(), PluginError>>),
+    Run(abi::Job, Vec<InputFrame>, SyncSender<Event>),
+}
+
+/// The C instance. Only `cancel` may be called through it from other threads.
+#[derive(Debug, Clone, Copy)]
+struct Raw(*mut abi::Instance);
+// SAFETY: the boundary allows `cancel` from any thread; all else is called by the instance's own thread.
+unsafe impl Send for Raw {}
+
+/// One configured plugin. Dropping it closes and destroys the plugin's instance.
+#[derive(Debug)]
+pub struct Instance {
+    name: String,
+    commands: Option<Sender<Command>>,
+    raw: Raw,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Instance {
+    /// Makes an instance of a plugin with checked option values. Touches no hardware.
+    ///
+    /// # Errors
+    /// Wrong kind, or the plugin's own reason to refuse the values.
+    pub fn create(library: &Library, kind: Kind, values: &[OptionValue]) -> Result<Self, PluginError> {
+        let descriptor = library.descriptor();
+        let name = descriptor.id.clone();
+        if descriptor.kind != kind {
+            let found = descriptor.kind.name().to_owned();
+            return Err(PluginError::WrongKind { name, found, needed: kind.name() });
+        }
+        let (commands, inbox) = channel();
+        let (made, created) = sync_channel(1);
+        let (entry, id, values) = (library.entry(), name.clone(), Values::new(values));
+        let thread = std::thread::Builder::new().name(name.clone()).spawn(move || {
+            let raw = create(entry, &id, &values);
+            if let Ok(raw) = raw {
+                // The instance's `[inst]` calls all come from this thread.
+                let _ = made.send(Ok(Raw(raw)));
+                serve(raw, &id, &inbox);
+            } else if let Err(error) = raw {
+                let _ = made.send(Err(error));
+            }
+        });
+        let failed = |message: String| PluginError::Failed { name: name.clone(), message, retryable: false };
+        let thread = thread.map_err(|e| failed(format!("no thread for it: {e}")))?;
+        let raw = created.recv().map_err(|_| failed("its thread ended".into()))??;
+        Ok(Self { name, commands: Some(commands), raw, thread: Some(thread) })
+    }
+
+    /// Name in plant files.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn ask<T>(&self, limit: Duration, command: impl FnOnce(Reply<T>) -> Command) -> Result<T, PluginError> {
+        let start = Instant::now();
+        let (reply, answer) = sync_channel(1);
+        if let Some(commands) = &self.commands {
+            // A thread that ended shows as a disconnected answer below.
+            let _ = commands.send(command(reply));
+        }
+        answer.recv_timeout(limit).map_err(|e| match e {
+            RecvTimeoutError::Timeout => self.hangs(start),
+            RecvTimeoutError::Disconnected => self.died(),
+        })
+    }
+
+    fn hangs(&self, start: Instant) -> PluginError {
+        PluginError::Hangs { name: self.name.clone(), elapsed_ms: start.elapsed().as_millis() as u64 }
+    }
+
+    fn died(&self) -> PluginError {
+        PluginError::Misbehaved { name: self.name.clone(), what: "its thread ended".into() }
+    }
+
+    /// Connects to what the plugin needs.
+    ///
+    /// # Errors
+    /// The plugin's reason, or that it hangs.
+    pub fn open(&self, limit: Duration) -> Result<(), PluginError> {
+        self.ask(limit, Command::Open)?
+    }
+
+    /// Seconds that a scan of the window takes, when the plugin knows.
+    ///
+    /// # Errors
+    /// When the plugin hangs.
+    pub fn estimate_s(&self, window: Option<&Window>, limit: Duration) -> Result<Option<f64>, PluginError> {
+        let window = window.map(to_raw_window);
+        self.ask(limit, |reply| Command::Estimate(window, reply))
+    }
+
+    /// Prepares for the next trigger.
+    ///
+    /// # Errors
+    /// The plugin's reason, or that it hangs.
+    pub fn arm(&self, spec: JobSpec) -> Result<(), PluginError> {
+        let (reports, _receiver) = sync_channel(1);
+        let listed = job::begin(Instant::now() + spec.limit, reports);
+        let raw = raw_job(&listed, &spec);
+        self.ask(spec.limit + GRACE, |reply| Command::Arm(raw, reply))?
+    }
+
+    /// Starts a job.
+    pub(super) fn start(&self, spec: JobSpec, inputs: Vec<InputFrame>) -> RunningJob<'_> {
+        let (reports, inbox) = sync_channel(FRAMES_UNDER_WAY);
+        let started = Instant::now();
+        let listed = job::begin(started + spec.limit, reports.clone());
+        let raw = raw_job(&listed, &spec);
+        if let Some(commands) = &self.commands {
+            // A thread that ended shows as a disconnected inbox.
+            let _ = commands.send(Command::Run(raw, inputs, reports));
+        }
+        RunningJob {
+            instance: self,
+            listed,
+            inbox,
+            started,
+            token: spec.cancel,
+            cancelled_at: None,
+            result: None,
+        }
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        drop(self.commands.take());
+        if let Some(thread) = self.thread.take() {
+            let end = Instant::now() + GRACE;
+            while !thread.is_finished() && Instant::now() < end {
+                std::thread::park_timeout(Duration::from_millis(2));
+            }
+            if thread.is_finished() {
+                let _ = thread.join();
+            } else {
+                tracing::warn!(plugin = self.name, "the plugin does not return from closing; left behind");
+            }
+        }
+    }
+}
+
+/// A frame that a plugin emitted.
+#[derive(Debug)]
+pub struct Emitted {
+    /// What the bytes are.
+    pub format: String,
+    /// Bits of `platen_abi::frame_flag`.
+    pub flags: u32,
+    buffer: AlignedBuffer,
+}
+
+impl Emitted {
+    /// The data; nothing of it is to be trusted.
+    pub fn bytes(&self) -> &[u8] {
+        self.buffer.as_ref()
+    }
+
+    /// Whether the frame has the format of `T`.
+    pub fn is<T: Decode>(&self) -> bool {
+        self.format.as_bytes() == T::FORMAT.to_bytes()
+    }
+
+    /// Reads the value in the frame.
+    ///
+    /// # Errors
+    /// As [`Decode::decode`].
+    pub fn decode<T: Decode>(&self) -> Result<T, DecodeError> {
+        T::decode(self.bytes())
+    }
+}
+
+/// A job in progress. Dropping it before its end cancels it.
+#[derive(Debug)]
+pub struct RunningJob<'a> {
+    instance: &'a Instance,
+    listed: Listed,
+    inbox: Receiver<Event>,
+    started: Instant,
+    token: CancelToken,
+    cancelled_at: Option<Instant>,
+    result: Option<Result<(), PluginError>>,
+}
+
+impl RunningJob<'_> {
+    /// The next frame; `None` at the end of the job.
+    pub fn next_frame(&mut self) -> Option<Emitted> {
+        while self.result.is_none() {
+            if self.token.is_cancelled() && self.cancelled_at.is_none() {
+                self.cancel();
+            }
+            let until = self.cancelled_at.map_or(self.listed.0.deadline, |at| at + GRACE);
+            let left = until.saturating_duration_since(Instant::now());
+            match self.inbox.recv_timeout(left.min(CANCEL_POLL)) {
+                Ok(Event::Frame(EmittedFrame { format, flags, buffer })) if self.cancelled_at.is_none() => {
+                    return Some(Emitted { format, flags, buffer });
+                }
+                Ok(Event::Frame(_)) => {}
+                Ok(Event::Done(result)) => self.result = Some(self.judge(result)),
+                Err(RecvTimeoutError::Timeout) if left > CANCEL_POLL => {}
+                Err(RecvTimeoutError::Timeout) if self.cancelled_at.is_none() => self.cancel(),
+                Err(RecvTimeoutError::Timeout) => self.result = Some(Err(self.instance.hangs(self.started))),
+                Err(RecvTimeoutError::Disconnected) => self.result = Some(Err(self.instance.died())),
+            }
+        }
+        None
+    }
+
+    /// A plugin that was stopped is reported as stopped, whatever it made of it.
+    fn judge(&self, result: Result<(), PluginError>) -> Result<(), PluginError> {
+        if self.cancelled_at.is_none() && !(result.is_err() && self.listed.0.is_stopped()) {
+            return result;
+        }
+        let late = Instant::now() >= self.listed.0.deadline;
+        Err(PluginError::Stopped {
+            name: self.instance.name.clone(),
+            elapsed_ms: self.started.elapsed().as_millis() as u64,
+            why: if late { "its deadline passed" } else { "it was cancelled" },
+        })
+    }
+
+    /// Cancels the job; frames that still come are dropped.
+    pub fn cancel(&mut self) {
+        self.cancelled_at = Some(Instant::now());
+        self.listed.0.cancelled.store(true, Ordering::Relaxed);
+        let raw = self.instance.raw.0;
+        // SAFETY: `cancel` may be called at any time while the instance lives, which `self.instance` ensures.
+        unsafe { ((*raw).cancel)(raw, self.listed.0.id) };
+    }
+
+    /// Waits for the end, dropping frames that still come.
+    ///
+    /// # Errors
+    /// Why the job failed.
+    pub fn finish(mut self) -> Result<(), PluginError> {
+        while self.next_frame().is_some() {}
+        self.result.take().unwrap_or(Ok(()))
+    }
+
+    /// Name of the plugin, for messages.
+    pub fn name(&self) -> &str {
+        &self.instance.name
+    }
+}
+
+impl Drop for RunningJob<'_> {
+    fn drop(&mut self) {
+        if self.result.is_none() && self.cancelled_at.is_none() {
+            self.cancel();
+        }
+    }
+}
+
+fn raw_job(listed: &Listed, spec: &JobSpec) -> abi::Job {
+    let since_trigger = spec.trigger.elapsed();
+    let utc = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(since_trigger);
+    abi::Job {
+        struct_size: size_of::<abi::Job>() as u32,
+        reserved: 0,
+        job_id: listed.0.id,
+        stroke_no: spec.stroke,
+        trigger_mono_ns: job::mono_ns(spec.trigger),
+        trigger_utc_ns: i64::try_from(utc.as_nanos()).unwrap_or(i64::MAX),
+        deadline_mono_ns: job::mono_ns(listed.0.deadline),
+    }
+}
+
+fn create(entry: &abi::Entry, name: &str, values: &Values) -> Result<*mut abi::Instance, PluginError> {
+    let id = CString::new(name).unwrap_or_default();
+    let (mut error, mut instance) = (host_table::empty_error(), std::ptr::null_mut());
+    let rows = values.as_slice();
+    // SAFETY: everything passed lives for the call.
+    let status = unsafe {
+        let host = host_table::get();
+        (entry.create)(host, id.as_ptr(), rows.as_ptr(), rows.len() as u32, &raw mut instance, &raw mut error)
+    };
+    if status != abi::status::OK {
+        return Err(PluginError::RefusedOptions {
+            name: name.to_owned(),
+            message: host_table::message(&error),
+        });
+    }
+    // SAFETY: null, or the instance that the plugin made.
+    match unsafe { instance.as_ref() } {
+        Some(made) if made.struct_size as usize >= size_of::<abi::Instance>() => Ok(instance),
+        _ => Err(PluginError::Misbehaved { name: name.to_owned(), what: "it made no sound instance".into() }),
+    }
+}
+
+/// The thread of one instance: works off commands until the host lets go, then closes and destroys.
+fn serve(raw: *mut abi::Instance, name: &str, inbox: &Receiver<Command>) {
+    // SAFETY: of all calls here: `[inst]` calls of a live instance, all from this thread.
+    let table = unsafe { &*raw };
+    let mut opened = false;
+    while let Ok(command) = inbox.recv() {
+        match command {
+            Command::Open(reply) => {
+                // SAFETY: as above.
+                let result = call(name, |error| unsafe { (table.open)(raw, error) });
+                opened = result.is_ok();
+                let _ = reply.send(result);
+            }
+            // SAFETY: as above.
+            Command::Estimate(window, reply) => drop(reply.send(unsafe { estimate(raw, window.as_ref()) })),
+            Command::Arm(job, reply) => {
+                let result = table.arm.map_or(Ok(()), |arm| {
+                    // SAFETY: as above.
+                    call(name, |error| unsafe { arm(raw, &raw const job, error) })
+                });
+                let _ = reply.send(result);
+            }
+            Command::Run(job, inputs, reports) => {
+                let attrs: Vec<Option<abi::Attr>> = inputs.iter().map(role).collect();
+                let frames: Vec<abi::Frame> = inputs.iter().zip(&attrs).map(frame).collect();
+                // SAFETY: as above; frames and attributes live for the call.
+                let result = call(name, |error| unsafe {
+                    (table.run)(raw, &raw const job, frames.as_ptr(), frames.len() as u32, error)
+                });
+                let _ = reports.send(Event::Done(result));
+            }
+        }
+    }
+    // SAFETY: as above; nothing is called after `destroy`.
+    unsafe {
+        if opened {
+            (table.close)(raw);
+        }
+        (table.destroy)(raw);
+    }
+}
+
+fn role(input: &InputFrame) -> Option<abi::Attr> {
+    input.role.map(|role| abi::Attr { key: c"role".as_ptr(), value: role.as_ptr() })
+}
+
+fn frame((input, attr): (&InputFrame, &Option<abi::Attr>)) -> abi::Frame {
+    let bytes = input.buffer.as_ref();
+    abi::Frame {
+        struct_size: size_of::<abi::Frame>() as u32,
+        flags: 0,
+        format: input.format.as_ptr(),
+        frame_id: c"scanner".as_ptr(),
+        mono_ns: 0,
+        count: 0,
+        buffer: abi::Buffer { data: bytes.as_ptr().cast_mut().cast(), bytes: bytes.len() as u64, token: 0 },
+        attrs: attr.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
+        n_attrs: u32::from(attr.is_some()),
+        reserved: 0,
+    }
+}
+
+fn call(name: &str, call: impl FnOnce(*mut abi::Error) -> abi::Status) -> Result<(), PluginError> {
+    let mut error = host_table::empty_error();
+    match call(&raw mut error) {
+        abi::status::OK => Ok(()),
+        _ => Err(PluginError::Failed {
+            name: name.to_owned(),
+            message: host_table::message(&error),
+            retryable: error.flags & abi::error_flag::RETRYABLE != 0,
+        }),
+    }
+}
+
+/// # Safety
+/// `[inst]` call of a live instance.
+unsafe fn estimate(raw: *mut abi::Instance, window: Option<&payload::Window>) -> Option<f64> {
+    // SAFETY: as the caller promises; the table, when given, is as long as it says.
+    let seconds = unsafe {
+        let table =
+            ((*raw).get_extension)(raw, abi::EXT_ESTIMATE.as_ptr()).cast::<abi::Estimate>().as_ref()?;
+        if (table.struct_size as usize) < size_of::<abi::Estimate>() {
+            return None;
+        }
+        (table.scan_seconds)(raw, window.map_or(std::ptr::null(), std::ptr::from_ref))
+    };
+    (seconds >= 0.0).then_some(seconds)
+}

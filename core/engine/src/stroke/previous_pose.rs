@@ -1,0 +1,48 @@
+//! How the corners of a plate are told apart after its first scan: u goes on as it ran.
+
+use nalgebra::Rotation3;
+use platen_shape::{Surface, Vec3};
+
+/// The plate at its last scan, from which (0, 0) goes on.
+#[derive(Debug, Clone, Copy)]
+pub struct PreviousPose<'a> {
+    /// Its shape and place then.
+    pub surface: &'a Surface,
+    /// How far the press says that it turned the plate since, radians.
+    pub fed_by: Option<f64>,
+}
+
+impl PreviousPose<'_> {
+    /// Direction of growing u now, scanner frame: as it was, turned by what the press says about its own z.
+    pub(super) fn u_axis(&self, press_z: Vec3) -> Vec3 {
+        let (width, middle) = (self.surface.width(), 0.5 * self.surface.height());
+        let along_u = self.surface.point(width, middle) - self.surface.point(0.0, middle);
+        Rotation3::new(press_z * self.fed_by.unwrap_or(0.0)) * along_u
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use platen_shape::surface::{Mask, SplineFit, UniformKnots};
+
+    use super::*;
+
+    #[test]
+    fn u_goes_on_from_the_last_scan_and_turns_with_the_press() {
+        // Radians: of a spline's normal equations, which stiffen as points without noise ask for more smoothing.
+        const ROUNDING: f64 = 1e-7;
+        let mut fit = SplineFit::new(UniformKnots::new(0.0, 2.0, 4), UniformKnots::new(0.0, 1.0, 4));
+        for i in 0..400 {
+            let (u, v) = (0.1 * (f64::from(i % 20) + 0.5), 0.05 * (f64::from(i / 20) + 0.5));
+            fit.add(u, v, [5.0 + u, v, -3.0], 1e6);
+        }
+        let mask = Mask::unseen(2.0, 1.0, 1.0);
+        let surface = Surface::new(fit.solve([0.0, 0.0, 1.0]).unwrap(), 0.04, mask);
+        let u_axis = |fed_by, press_z| PreviousPose { surface: &surface, fed_by }.u_axis(press_z).normalize();
+        assert!((u_axis(None, Vec3::z()) - Vec3::x()).norm() < ROUNDING);
+        let quarter = Some(std::f64::consts::FRAC_PI_2);
+        assert!((u_axis(quarter, Vec3::z()) - Vec3::y()).norm() < ROUNDING);
+        // A scanner that hangs upside down sees the press turn the other way.
+        assert!((u_axis(quarter, -Vec3::z()) + Vec3::y()).norm() < ROUNDING);
+    }
+}

@@ -1,0 +1,51 @@
+//! What is on record of earlier scans of the plate in hand.
+
+use platen_history::{Archive, Error, Stroke};
+use platen_shape::{Blank, Surface};
+
+use platen_report::{history_view, output_folder};
+
+/// An earlier scan of the plate.
+#[derive(Debug)]
+pub(super) struct Earlier {
+    pub(super) surface: Surface,
+    /// The outline that its (u, v) refer to, where a scan of the blank told it.
+    pub(super) blank: Option<Blank>,
+    /// Where the plate rested.
+    pub(super) supports: Option<String>,
+    /// Feed rotation that the press told, radians.
+    pub(super) plate_rot: Option<f64>,
+}
+
+/// The stroke before a run, and the scan of the blank.
+#[derive(Debug, Default)]
+pub(super) struct PreviousScans {
+    pub(super) before: Option<Earlier>,
+    pub(super) baseline: Option<Earlier>,
+}
+
+impl PreviousScans {
+    /// Those on record whose files are still there; the log tells of others.
+    pub(super) fn of(archive: &Archive, run_id: u32) -> Self {
+        Self { before: load(archive.before(run_id)), baseline: load(archive.baseline(run_id)) }
+    }
+
+    /// The last scan of the plate, whatever it was.
+    pub(super) fn last(&self) -> Option<&Earlier> {
+        self.before.as_ref().or(self.baseline.as_ref())
+    }
+}
+
+fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
+    let stroke = found
+        .inspect_err(|error| tracing::warn!("{error}; this stroke is compared with none"))
+        .ok()
+        .flatten()?;
+    let data = stroke.press_data();
+    let document = stroke.document?;
+    let surface = output_folder::surface_beside(&document)
+        .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
+        .ok()?;
+    let kept = history_view::kept(&document);
+    Some(Earlier { surface, blank: kept.blank(), supports: kept.supports, plate_rot: data.plate_rot })
+}

@@ -1,0 +1,223 @@
+//! Raw scans, kept for a while beside the results that were made of them.
+//!
+//! A scan stays in memory until its result has gone to the press; then a thread of its own writes it as
+//! `run-NNNNNN/scan.e57`, which `platen measure` reads back to the last bit. Scans older than the plant file says are
+//! removed, and nothing but such scans ever is. Results go first: when the disk runs low, or a scan waits while the one
+//! before the last is still being written, the scan is not kept and the log says so.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, SystemTime};
+
+use platen_plant::plant::{KeepScans, Output};
+
+use super::disk;
+use crate::scan_file::{self, ScanFileError};
+use platen_engine::plugin::ScanEvent;
+use platen_engine::stroke::ScanBuffer;
+
+/// Name of a scan in a result's folder.
+const NAME: &str = "scan.e57";
+/// Bytes of a disk that are left to results and to the history.
+const RESERVE: u64 = 1 << 30;
+/// Bytes of a cell in the file: three f64, state, intensity, row and column.
+const CELL_BYTES: u64 = 31;
+/// Scans that wait while one is written.
+const WAITING: usize = 1;
+
+/// A scan on its way to its file.
+#[derive(Debug)]
+struct Order {
+    folder: PathBuf,
+    buffer: ScanBuffer,
+}
+
+/// Writes and removes scans on a thread of its own. Dropping it waits until the last one is written.
+#[derive(Debug)]
+pub(super) struct ScanRetention {
+    orders: Option<SyncSender<Order>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl ScanRetention {
+    /// Starts, and removes what is too old; keeps nothing when the plant file says so.
+    pub(super) fn start(output: &Output) -> Self {
+        let none = Self { orders: None, thread: None };
+        let age = match output.keep_scans {
+            KeepScans::Always => None,
+            KeepScans::For(age) => Some(age),
+        };
+        let (orders, inbox) = sync_channel(WAITING);
+        let folder = output.folder.clone();
+        let thread =
+            std::thread::Builder::new().name("archive".into()).spawn(move || serve(&folder, age, &inbox));
+        match thread {
+            Ok(thread) if age != Some(Duration::ZERO) => Self { orders: Some(orders), thread: Some(thread) },
+            // Without orders it removes what is too old, and ends.
+            Ok(thread) => Self { orders: None, thread: Some(thread) },
+            Err(error) => {
+                tracing::error!("scans are not kept: no thread for them: {error}");
+                none
+            }
+        }
+    }
+
+    /// A buffer for the next scan, when scans are kept.
+    pub(super) fn buffer(&self) -> Option<ScanBuffer> {
+        self.orders.is_some().then(ScanBuffer::default)
+    }
+
+    /// Keeps a scan in the folder of its result, which need not be there.
+    pub(super) fn keep(&self, folder: PathBuf, buffer: Option<ScanBuffer>) {
+        let (Some(orders), Some(buffer)) = (&self.orders, buffer) else { return };
+        match orders.try_send(Order { folder, buffer }) {
+            Ok(()) => {}
+            Err(TrySendError::Full(order)) => {
+                let folder = order.folder.display();
+                tracing::warn!("{folder}: the scan is not kept: the one before is still being written");
+            }
+            Err(TrySendError::Disconnected(order)) => {
+                tracing::error!("{}: the scan is not kept: writing has ended", order.folder.display());
+            }
+        }
+    }
+}
+
+impl Drop for ScanRetention {
+    fn drop(&mut self) {
+        self.orders = None;
+        if let Some(thread) = self.thread.take() {
+            // A thread that failed has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>) {
+    let clean = || {
+        clean(results, age, SystemTime::now()).unwrap_or_else(|e| {
+            tracing::warn!("{}: old scans are not removed: {e}", results.display());
+        });
+    };
+    clean();
+    while let Ok(Order { folder, buffer }) = inbox.recv() {
+        match write(&folder, buffer) {
+            Ok(()) => {}
+            Err(why) => tracing::warn!("{}: the scan is not kept: {why}", folder.display()),
+        }
+        clean();
+    }
+}
+
+fn write(folder: &Path, buffer: ScanBuffer) -> Result<(), String> {
+    let (header, columns, end) = buffer.finish()?;
+    std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+    let cells: usize = columns.iter().map(platen_scan::Column::len).sum();
+    let needed = cells as u64 * CELL_BYTES;
+    check_room(needed, disk::free(folder).map_err(|e| e.to_string())?)?;
+    let written = scan_file::write(&folder.join(NAME), |sink| {
+        let columns = columns.into_iter().map(ScanEvent::Column);
+        let mut events = std::iter::once(ScanEvent::Begin(header)).chain(columns);
+        // The writer remembers why it stopped.
+        let _ = events.try_for_each(sink);
+        Ok::<_, ScanFileError>(end)
+    });
+    written.map(|_| ()).map_err(|e| e.to_string())
+}
+
+/// Refuses a scan of `needed` bytes that would take of the [`RESERVE`].
+fn check_room(needed: u64, free: u64) -> Result<(), String> {
+    if free >= needed.saturating_add(RESERVE) {
+        return Ok(());
+    }
+    let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
+    Err(format!("it needs {needed} MB, {free} MB are free and 1 GB is left to results; make room"))
+}
+
+/// Removes scans older than `age` and what an interrupted host left half-written. Touches no other file.
+fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Result<()> {
+    if !results.exists() {
+        return Ok(());
+    }
+    for run in std::fs::read_dir(results)? {
+        let run = run?;
+        let number = run.file_name().to_string_lossy().strip_prefix("run-").map(str::to_owned);
+        let is_run = number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()));
+        if !is_run || !run.file_type()?.is_dir() {
+            continue;
+        }
+        for file in std::fs::read_dir(run.path())? {
+            let file = file?;
+            let name = file.file_name().to_string_lossy().into_owned();
+            if !file.file_type()?.is_file() || !remove(&name, age, file.metadata()?.modified()?, now) {
+                continue;
+            }
+            std::fs::remove_file(file.path())?;
+            tracing::info!("removed {}", file.path().display());
+        }
+    }
+    Ok(())
+}
+
+/// True for a scan that is too old, and for one that another process left half-written.
+fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTime) -> bool {
+    let old = |limit| now.duration_since(modified).is_ok_and(|age| age > limit);
+    let half = name.strip_prefix(NAME).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
+    match half {
+        Some(process) => process.parse() != Ok(std::process::id()) && process.parse::<u32>().is_ok(),
+        None => name == NAME && age.is_some_and(old),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_gigabyte_is_left_to_results() {
+        assert_eq!(check_room(31_000_000, RESERVE + 31_000_000), Ok(()));
+        let refused = check_room(31_000_000, RESERVE + 30_000_000).unwrap_err();
+        assert!(refused.starts_with("it needs 31 MB, 1103 MB are free"), "{refused}");
+        assert!(check_room(u64::MAX, u64::MAX - 1).is_err());
+    }
+
+    #[test]
+    fn only_own_scans_of_enough_age_are_removed() {
+        const DAY: Duration = Duration::from_secs(86_400);
+        let folder = std::env::temp_dir().join(format!("platen-archive-{}", std::process::id()));
+        let now = SystemTime::now();
+        let put = |name: &str, days: u32| {
+            let path = folder.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, "x").unwrap();
+            std::fs::File::options().write(true).open(&path).unwrap().set_modified(now - DAY * days).unwrap();
+            path
+        };
+        let old = put("run-000001/scan.e57", 61);
+        let half = put("run-000002/scan.e57.1.part", 0);
+        let kept = [
+            put("run-000002/scan.e57", 59),
+            put("run-000001/result.json", 900),
+            put("run-000001/first.e57", 900),
+            put("run-000001/scan.e57.bak.part", 900),
+            put("run-000001/inner/scan.e57", 900),
+            put("run-1/scan.e57", 900),
+            put("run-00000a/scan.e57", 900),
+            put("mine-000001/scan.e57", 900),
+            put("scan.e57", 900),
+        ];
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(folder.join("mine-000001"), folder.join("run-000007")).unwrap();
+        clean(&folder, None, now).unwrap();
+        assert!(old.exists() && !half.exists());
+        clean(&folder, Some(60 * DAY), now).unwrap();
+        assert!(!old.exists());
+        kept.iter().for_each(|path| assert!(path.exists(), "{}", path.display()));
+        // A clock that was set back removes nothing.
+        clean(&folder, Some(60 * DAY), now - 900 * DAY).unwrap();
+        clean(&folder, Some(Duration::ZERO), now).unwrap();
+        assert!(!kept[0].exists() && kept[1].exists());
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

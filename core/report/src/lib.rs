@@ -1,0 +1,21 @@
+//! Measurements for people and for other programs: documents, pictures, meshes, tables.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `result` | the result document `platen.result/1` |
+//! | `picture` | maps, sections and the strip of strokes as SVG |
+//! | `field_export` | the fields of the comparisons as CSV, PLY and VTK |
+//! | `output_folder` | the files of one measurement, complete or absent |
+//! | `history_view` | strokes on record, as pictures and reports need them |
+//! | `plate_report` | the report of a plate: one HTML file |
+//! | `sequence` | bends of a plate in their order, for the comparison of crews |
+//!
+//! This crate has no access to press, plugins or network.
+
+pub mod field_export;
+pub mod history_view;
+pub mod output_folder;
+pub mod picture;
+pub mod plate_report;
+pub mod result;
+pub mod sequence;

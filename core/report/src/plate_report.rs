@@ -1,0 +1,401 @@
+//! The report of one plate: one HTML file that prints on A4, with every stroke, its pictures and its doubts.
+//!
+//! It is made from the documents on record and the pictures beside them, without scripts and without any other file, so
+//! that it can be sent and kept. What was not measured, and what cannot be told, is said in these words. Every text that a
+//! person or a press gave is escaped by the template.
+
+use std::path::{Path, PathBuf};
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord as KeptPlate, Stroke};
+use platen_model::Verdict;
+
+use crate::history_view;
+use crate::result::{CalibrationRecord, ResultRecord};
+use crate::{output_folder, output_folder::FilesError};
+use crate::{
+    picture,
+    picture::{Caption, StripPoint},
+};
+
+const STYLE: &str = include_str!("plate_report/style.css");
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The history cannot be read.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// Nothing is on record.
+    #[error("no stroke of plate {0} is on record; `platen history list` shows the plates")]
+    NoStrokes(u32),
+    /// It cannot be written.
+    #[error(transparent)]
+    Files(#[from] FilesError),
+}
+
+/// One stroke as the report shows it.
+struct Page<'a> {
+    stroke: &'a Stroke,
+    /// Its document, or why there is none.
+    document: Result<ResultRecord, String>,
+    point: StripPoint,
+}
+
+/// Writes the report of a plate as `plate-N.html` into `folder`.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn write(archive: &Archive, plant: &str, plate: u32, folder: &Path) -> Result<PathBuf, ReportError> {
+    let text = report(archive, plant, plate)?;
+    Ok(output_folder::put(folder, &format!("plate-{plate}.html"), text.as_bytes())?)
+}
+
+/// The report of a plate of the history.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn report(archive: &Archive, plant: &str, plate: u32) -> Result<String, ReportError> {
+    let strokes = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() })?;
+    let pages: Vec<Page<'_>> = strokes.iter().map(Page::of).collect();
+    let Some(last) = pages.last() else { return Err(ReportError::NoStrokes(plate)) };
+    let kept = archive.plates()?.into_iter().find(|kept| kept.plate == plate);
+    let newest = pages.iter().rev().find_map(|page| page.document.as_ref().ok().map(|record| (page, record)));
+    let name = newest.map_or_else(|| format!("plate {plate}"), |(_, record)| record.plate.clone());
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "Plate " (name) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    div {
+                        h1 { "Plate " (name) }
+                        p { (part(kept.as_ref())) }
+                        p.quiet { (plant) ", after stroke " (last.point.label) ", " (time(last.stroke)) }
+                    }
+                    (chip(last.point.verdict))
+                }
+                @match newest {
+                    Some((page, record)) => { (summary(&pages, page, record)) }
+                    None => { p.warning { "Not measured: no stroke of this plate has a result." } }
+                }
+                h2 { "Strokes" }
+                (table(&pages))
+                @if let Some((_, record)) = newest { h2 { "Shape checks after the last measured stroke" } (checks(record)) }
+                h2 { "Every stroke" }
+                @for page in &pages { (stroke(page)) }
+                (footer(newest.map(|(_, record)| record)))
+            }
+        }
+    };
+    Ok(markup.into_string())
+}
+
+impl<'a> Page<'a> {
+    fn of(stroke: &'a Stroke) -> Self {
+        let missing = || stroke.reason.clone().unwrap_or_else(|| "no document is on record".to_owned());
+        let document = stroke.document.as_deref().ok_or_else(missing).and_then(|path| {
+            let text = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+            serde_json::from_slice::<ResultRecord>(&text).map_err(|e| format!("{}: {e}", path.display()))
+        });
+        let mut point = history_view::of_stroke(stroke);
+        if let Ok(record) = &document {
+            // The host writes the report before the history has the press's receipt.
+            point = history_view::of_record(stroke, record);
+        }
+        Self { stroke, document, point }
+    }
+
+    /// A picture that was drawn beside the document.
+    fn picture(&self, name: &str) -> Option<Markup> {
+        let path = self
+            .stroke
+            .document
+            .as_deref()?
+            .with_file_name(format!("{}.svg", output_folder::file_name(name)));
+        let svg = std::fs::read_to_string(path).ok().filter(|svg| svg.starts_with("<svg"))?;
+        Some(PreEscaped(svg))
+    }
+
+    /// The map of what is still to do: by curvature where that was compared, else by height.
+    fn to_do(&self) -> Option<Markup> {
+        self.picture("curvature_deficit").or_else(|| self.picture("deviation"))
+    }
+
+    /// The map of what the stroke did.
+    fn done(&self) -> Option<Markup> {
+        self.picture("curvature_change").or_else(|| self.picture("displacement_normal"))
+    }
+
+    fn worst_section(&self) -> Option<Markup> {
+        let board = history_view::worst_board(self.document.as_ref().ok()?)?;
+        self.picture(&format!("section-{}", board.name))
+    }
+}
+
+fn chip(verdict: Verdict) -> Markup {
+    let words = verdict.words();
+    html! { span class={ "verdict " (words.replace(' ', "_")) } { (words.to_uppercase()) } }
+}
+
+fn part(kept: Option<&KeptPlate>) -> String {
+    let Some(kept) = kept else { return String::new() };
+    let part = kept.part_id.map(|id| format!("part {id}, ")).unwrap_or_default();
+    let name = kept.part_name.as_ref().map(|name| format!("{name}, ")).unwrap_or_default();
+    format!("{part}{name}number {} of this history, press {}", kept.plate, kept.press)
+}
+
+/// UTC, to the second.
+fn time(stroke: &Stroke) -> String {
+    stroke.accepted.strftime("%F %T UTC").to_string()
+}
+
+fn summary(pages: &[Page<'_>], page: &Page<'_>, record: &ResultRecord) -> Markup {
+    let plate = &record.plate_file;
+    let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
+    let points: Vec<StripPoint> = pages.iter().map(|page| page.point.clone()).collect();
+    let strip = picture::strip(&points, &caption, &plate.scale).ok().map(PreEscaped);
+    let boards: Vec<String> = record
+        .reference_lines
+        .iter()
+        .flat_map(|line| line.templates.iter().map(move |board| (line, board)))
+        .map(|(line, b)| {
+            format!(
+                "{} on line {}: {:.0} mm, gap at most {:.1} mm",
+                b.name, line.name, b.chord_mm, b.limit_mm
+            )
+        })
+        .collect();
+    html! {
+        @if record.scan.simulated { p.warning { "Simulated scan: no real plate was measured." } }
+        @for sentence in record.says.iter().take(2) { p.says { (sentence) } }
+        dl {
+            dt { "Size" } dd { (format!("{:.0} \u{d7} {:.0} \u{d7} {:.0} mm", plate.width_mm, plate.height_mm, plate.thickness_mm)) }
+            dt { "Target" } dd { (plate.target.as_deref().unwrap_or("none: nothing can be judged")) }
+            dt { "Boards" } dd { @if boards.is_empty() { "none: nothing can be judged" } @for board in &boards { div { (board) } } }
+            @if let Some(outline) = &record.outline { dt { "Outline" } dd { (outline.words()) } }
+            dt { "Rests on" } dd { (record.supports.as_deref().unwrap_or("not recorded")) }
+            dt { "Scanner" } dd { (record.scan.instrument) (seen(record)) }
+            dt { "Calibration" } dd { (calibration(&record.calibration)) }
+            dt { "Software" } dd { (record.software) ", " (record.schema) }
+        }
+        div.pictures {
+            @if let Some(map) = page.to_do() { figure.wide { (map) } } @else { p { "The map of this stroke is not kept." } }
+            @if let Some(section) = page.worst_section() { figure { (section) } }
+            @if let Some(strip) = strip { figure { (strip) } }
+        }
+    }
+}
+
+fn seen(record: &ResultRecord) -> String {
+    let quality = &record.quality;
+    format!(
+        "; {:.0} % of the plate seen, a sample every {:.1} mm, noise {:.2} mm",
+        quality.coverage * 100.0,
+        quality.lattice_step_mm,
+        quality.noise_mm
+    )
+}
+
+fn calibration(state: &CalibrationRecord) -> String {
+    let null_pairs = match state.sigma_correlated_mm {
+        0.0 => "no null pairs taken: changes may be called real a little too often".to_owned(),
+        sigma => format!("correlated error {sigma:.2} mm (one sigma, from null pairs)"),
+    };
+    let artefact = match state.sigma_true_mm {
+        None => "not held against an artefact: uncertainties leave the scanner's own bias out".to_owned(),
+        Some(sigma) => format!("bias against an artefact {sigma:.2} mm (one sigma)"),
+    };
+    format!("{null_pairs}; {artefact}")
+}
+
+fn table(pages: &[Page<'_>]) -> Markup {
+    html! {
+        table {
+            thead { tr {
+                th { "stroke" } th { "time" } th { "verdict" } th.n { "worst gap, mm" } th.n { "at u, v, mm" }
+                th.n { "seen" } th { "what it says" }
+            } }
+            @for page in pages { tr {
+                td { (page.point.label) }
+                td.t { (page.stroke.accepted.strftime("%m-%d %H:%M").to_string()) }
+                td { (chip(page.point.verdict)) }
+                td.n { (gap(&page.point)) }
+                @match &page.document {
+                    Ok(record) => {
+                        td.n { (worst_place(record)) }
+                        td.n { (format!("{:.0} %", record.quality.coverage * 100.0)) }
+                        td { (record.says.first().map_or("", String::as_str)) }
+                    }
+                    Err(why) => { td.n { "\u{2013}" } td.n { "\u{2013}" } td { (why) } }
+                }
+            } }
+        }
+        p.quiet { "\u{b1}: expanded uncertainty, 95 %. A limit is passed or failed only outside it; between, the verdict is \u{201c}cannot tell\u{201d}." }
+    }
+}
+
+fn gap(point: &StripPoint) -> String {
+    match point.gap_mm {
+        Some(gap) => picture::with_uncertainty(gap, point.uncertainty_mm),
+        None => "not measured".to_owned(),
+    }
+}
+
+fn worst_place(record: &ResultRecord) -> String {
+    history_view::worst_board(record).map_or_else(
+        || "\u{2013}".to_owned(),
+        |board| format!("{:.0}, {:.0}", board.max_gap_at_mm[0], board.max_gap_at_mm[1]),
+    )
+}
+
+fn checks(record: &ResultRecord) -> Markup {
+    let rows = record.shape_checks.rows();
+    let half = rows.len().div_ceil(2);
+    html! {
+        div.columns {
+            @for rows in rows.chunks(half) {
+                table {
+                    thead { tr { th { "check" } th.n { "value" } th.n { "\u{b1}" } th { "" } } }
+                    @for (name, check, unit) in rows {
+                        @let digits = if *unit == "mm" { 1 } else { 3 };
+                        tr {
+                            td { (name) @if !check.seen { " (corner not seen)" } }
+                            td.n { (format!("{:.digits$}", check.value)) }
+                            td.n { (format!("{:.digits$}", check.uncertainty)) }
+                            td { (if *unit == "deg" { "\u{b0}" } else { unit }) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn stroke(page: &Page<'_>) -> Markup {
+    html! {
+        section.stroke {
+            h3 {
+                "Stroke " (page.point.label) (chip(page.point.verdict))
+                span.quiet { (time(page.stroke)) ", run " (page.stroke.run_id) }
+            }
+            @match &page.document {
+                Ok(record) => {
+                    @for sentence in &record.says { p { (sentence) } }
+                    div.pictures {
+                        @for picture in [page.to_do(), page.done(), page.worst_section()].into_iter().flatten() {
+                            figure { (picture) }
+                        }
+                    }
+                }
+                Err(why) => { p.says { "Not measured: " (why) } }
+            }
+        }
+    }
+}
+
+fn footer(record: Option<&ResultRecord>) -> Markup {
+    html! {
+        footer {
+            p {
+                "Positions (u, v) are those of the plate's mid-surface, from the marked corner (0, 0). Colours and heights mean the same in every "
+                "picture of this plate: their steps are 1, 2, 5, 10, 20 and 50 times the smallest limit of its boards"
+                @if let Some(record) = record { (format!(" ({:.1} mm)", record.plate_file.scale.limit_mm)) }
+                ". Gray is below the level of detection, hatching was not seen. Measured by "
+                (concat!("platen ", env!("CARGO_PKG_VERSION"))) ", which only measures: it neither starts nor releases motion."
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use platen_history::{Accepted, Finished, History};
+    use platen_model::{StrokeKey, Verdict as Kept};
+
+    use super::*;
+
+    /// A history of one plate with these strokes, none of them with a document.
+    fn archive(folder: &Path, verdicts: &[Option<Kept>], name: &str) -> Archive {
+        let path = folder.join("history.sqlite");
+        let now = jiff::Timestamp::UNIX_EPOCH;
+        let mut history = History::open(&path, 1, now).unwrap();
+        for (number, verdict) in (1..).zip(verdicts) {
+            let key = StrokeKey { press: 1, session: 1, stroke: number, attempt: 0 };
+            let run_id = u32::from(number);
+            let accepted = Accepted {
+                key,
+                run_id,
+                part_id: Some(7),
+                part_name: Some(name.to_owned()),
+                recipe: None,
+                baseline: false,
+                dry_run: false,
+                data: "{}".into(),
+            };
+            history.accept(&accepted, now).unwrap();
+            let Some(verdict) = *verdict else { continue };
+            let finished = Finished {
+                key,
+                run_id,
+                seq: number,
+                verdict,
+                reason: Some(format!("302: <{name}>")),
+                figures: Default::default(),
+                publication: "{}".into(),
+            };
+            history.finish(&finished, now).unwrap();
+        }
+        drop(history);
+        Archive::open(&path).unwrap()
+    }
+
+    #[test]
+    fn a_stroke_without_result_is_not_measured_in_so_many_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let archive = archive(folder.path(), &[Some(Kept::NotMeasured), None], "C9");
+        let text = report(&archive, "North hall", 1).unwrap();
+        assert!(text.contains("Not measured: no stroke of this plate has a result."));
+        assert_eq!(text.matches("class=\"verdict not_measured\"").count(), 1 + 2 + 2, "head, table, strokes");
+        assert!(!text.contains(">PASS<") && !text.contains("0.0 \u{b1}"));
+    }
+
+    #[test]
+    fn what_people_and_presses_write_is_escaped() {
+        let folder = tempfile::tempdir().unwrap();
+        let evil = "<script>alert(1)</script>";
+        let archive = archive(folder.path(), &[Some(Kept::NotMeasured)], evil);
+        let text = report(&archive, evil, 1).unwrap();
+        assert!(!text.contains("<script"), "{text}");
+        assert!(text.contains("&lt;script&gt;"));
+    }
+
+    #[test]
+    fn a_plate_without_strokes_has_no_report() {
+        let folder = tempfile::tempdir().unwrap();
+        let archive = archive(folder.path(), &[None], "C9");
+        let error = report(&archive, "North hall", 4).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "no stroke of plate 4 is on record; `platen history list` shows the plates"
+        );
+    }
+
+    #[test]
+    fn the_report_stands_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let archive = archive(folder.path(), &[Some(Kept::NotMeasured)], "C9");
+        let path = write(&archive, "North hall", 1, folder.path()).unwrap();
+        assert_eq!(path.file_name().unwrap(), "plate-1.html");
+        let text = std::fs::read_to_string(path).unwrap();
+        for link in ["http:", "https:", "src=", "<link", "@import", "url("] {
+            assert!(!text.contains(link), "{link}");
+        }
+    }
+}

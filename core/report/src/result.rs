@@ -1,0 +1,341 @@
+//! The result of one measurement as people and programs read it: `platen.result/1`.
+//!
+//! Inside everything is metres and radians; here lengths that a person reads are millimetres, named `_mm`, positions
+//! are metres, named `_m`. Grids are row-major, v outer, u inner. What is not known is null, never 0.
+
+mod checks;
+mod grid;
+mod lines;
+mod outline;
+mod plate;
+
+pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
+pub use grid::GridRecord;
+pub use lines::{LineRecord, PointRecord, TemplateRecord};
+pub use outline::{OutlineRecord, OutlineSource};
+pub use plate::PlateRecord;
+
+use std::fmt::Display;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value as Json, json};
+
+use platen_model::{Figure, Task, Verdict};
+use platen_plant::PlateFile;
+use platen_shape::evaluate::{self, Place};
+use platen_shape::{EXPANDED, Measured, Scanned, ShapeChecks, Vec3};
+
+use platen_model::Report;
+use platen_model::units::{mm, mm_pair, readable};
+
+/// Version of the document.
+pub const SCHEMA: &str = "platen.result/1";
+
+/// One measurement.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ResultRecord {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Program and version that measured.
+    pub software: String,
+    /// Name of the plate.
+    pub plate: String,
+    /// Stroke, where there is one.
+    pub stroke: Option<u64>,
+    /// Judgement.
+    pub verdict: Verdict,
+    /// Sentences for the operator, most important first.
+    pub says: Vec<String>,
+    /// Where the plate rested.
+    pub supports: Option<String>,
+    /// The plate as its file had it at this stroke.
+    pub plate_file: PlateRecord,
+    /// The outline that (u, v) refer to; null in documents of before it could be another than the rectangle.
+    #[serde(default)]
+    pub outline: Option<OutlineRecord>,
+    /// How far the scanner was calibrated.
+    pub calibration: CalibrationRecord,
+    /// The scan.
+    pub scan: ScanRecord,
+    /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
+    pub corners_m: [[f64; 3]; 4],
+    /// Whether each corner was seen or extrapolated.
+    pub corners_seen: [bool; 4],
+    /// Marked places.
+    pub markers: Vec<MarkerRecord>,
+    /// What tape, square and sight line would show.
+    pub shape_checks: ShapeChecksRecord,
+    /// Lines and the templates on them.
+    pub reference_lines: Vec<LineRecord>,
+    /// Places on an even grid.
+    pub grid: GridRecord,
+    /// S(u, v), the mid-surface.
+    pub surface: SurfaceRecord,
+    /// What each comparison found.
+    pub comparisons: Vec<Json>,
+    /// How good the measurement is.
+    pub quality: QualityRecord,
+    /// Time spent.
+    pub timings_ms: TimingsRecord,
+}
+
+/// How far the scanner was calibrated when this was measured.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct CalibrationRecord {
+    /// Correlated part of the level of detection, one sigma; 0 when no null pairs were taken.
+    pub sigma_correlated_mm: f64,
+    /// Systematic uncertainty against a known artefact, one sigma; null when none was measured.
+    pub sigma_true_mm: Option<f64>,
+}
+
+/// The scan.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ScanRecord {
+    /// Rows of the lattice.
+    pub rows: u32,
+    /// Columns of the lattice.
+    pub columns: u32,
+    /// Valid cells.
+    pub valid: u64,
+    /// Cells on the plate's scanned face.
+    pub plate_points: usize,
+    /// Maker, model, serial number.
+    pub instrument: String,
+    /// No real instrument stood there.
+    pub simulated: bool,
+    /// What the driver decided or changed.
+    pub notes: Vec<String>,
+}
+
+/// A marked place.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct MarkerRecord {
+    /// Name.
+    pub name: String,
+    /// Along u.
+    pub u_mm: f64,
+    /// Along v.
+    pub v_mm: f64,
+    /// On the scanned face, scanner frame.
+    pub position_m: [f64; 3],
+    /// Expanded (95 %), all directions together.
+    pub uncertainty_mm: f64,
+    /// False where the surface was bridged.
+    pub seen: bool,
+}
+
+/// S(u, v).
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SurfaceRecord {
+    /// Of the spline.
+    pub degree: u32,
+    /// Metres.
+    pub knots_u: Vec<f64>,
+    /// Metres.
+    pub knots_v: Vec<f64>,
+    /// Control points, one list a row of constant v.
+    pub control_m: Vec<Vec<[f64; 3]>>,
+    /// Distance of the samples from the surface.
+    pub rms_mm: f64,
+}
+
+/// How good the measurement is.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct QualityRecord {
+    /// Share of the plate that was seen.
+    pub coverage: f64,
+    /// Range noise, one sigma, from the scan itself.
+    pub noise_mm: f64,
+    /// Distance of neighbouring samples.
+    pub lattice_step_mm: f64,
+}
+
+/// Milliseconds of each stage.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TimingsRecord {
+    /// From the start to the last column; extraction runs beside it.
+    pub acquire: f64,
+    /// From the last column to the plate's face.
+    pub extract: f64,
+    /// Boundary loop, corners, edges.
+    pub outline: f64,
+    /// Smooth face, mid-surface, mesh.
+    pub mesh: f64,
+    /// Flattening.
+    pub flatten: f64,
+    /// S(u, v) and its covariance.
+    pub surface: f64,
+    /// All comparisons.
+    pub compare: f64,
+    /// From the last column to the verdict.
+    pub total: f64,
+}
+
+/// What is known of a measurement besides the plate's shape.
+#[derive(Debug, Clone, Copy)]
+pub struct Context<'a, E> {
+    /// Its plate file.
+    pub plate: &'a PlateFile,
+    /// What the comparisons were asked.
+    pub task: &'a Task,
+    /// Where the press stands, scanner frame, when the plant file says so.
+    pub press: Option<Vec3>,
+    /// Stroke, where there is one.
+    pub stroke: Option<u64>,
+    /// Judgement.
+    pub verdict: Verdict,
+    /// What the comparisons found.
+    pub reports: &'a [Result<Report, E>],
+    /// How long they took.
+    pub compare: std::time::Duration,
+}
+
+impl ResultRecord {
+    /// Writes a measurement down.
+    pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
+        let Measured { outline, measurement, .. } = measured;
+        let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
+        Self {
+            schema: SCHEMA.to_owned(),
+            software: concat!("platen ", env!("CARGO_PKG_VERSION")).to_owned(),
+            plate: context.plate.plate.id.clone(),
+            stroke: context.stroke,
+            verdict: context.verdict,
+            says: sentences(context.reports),
+            supports: context.plate.plate.supports.clone(),
+            plate_file: PlateRecord::new(context.plate, &measurement.surface, context.press),
+            outline: Some(OutlineRecord::new(
+                measured.blank.as_ref(),
+                [context.plate.plate.width, context.plate.plate.height],
+            )),
+            calibration: CalibrationRecord {
+                sigma_correlated_mm: mm(context.task.sigma_correlated),
+                sigma_true_mm: context.task.sigma_true.map(mm),
+            },
+            scan: ScanRecord {
+                rows: scanned.header.n_rows,
+                columns: scanned.header.n_columns,
+                valid: scanned.n_valid,
+                plate_points: scanned.patch.samples.len(),
+                instrument: scanned.header.instrument.clone(),
+                simulated: scanned.header.simulated,
+                notes: scanned.header.notes.clone(),
+            },
+            corners_m: measurement.corners.map(Into::into),
+            corners_seen: outline.corners.each_ref().map(|corner| corner.seen),
+            shape_checks: ShapeChecksRecord::new(&ShapeChecks::new(outline, &measurement.surface)),
+            markers: markers(measured, context.plate),
+            reference_lines: lines::record(measurement, context.plate, &sound),
+            grid: GridRecord::new(measurement, &sound),
+            surface: surface(measured),
+            comparisons: context.reports.iter().map(comparison).collect(),
+            quality: QualityRecord {
+                coverage: measurement.quality.coverage,
+                noise_mm: mm(measurement.quality.noise),
+                lattice_step_mm: mm(measurement.quality.lattice_step),
+            },
+            timings_ms: timings(scanned, measured, context.compare),
+        }
+    }
+}
+
+impl ResultRecord {
+    /// Extent of the plate along u and v, millimetres.
+    pub fn extent_mm(&self) -> (f64, f64) {
+        // Three knots lie beyond each end.
+        let end =
+            |knots: &[f64]| knots.len().checked_sub(4).and_then(|k| knots.get(k)).map_or(0.0, |x| mm(*x));
+        (end(&self.surface.knots_u), end(&self.surface.knots_v))
+    }
+}
+
+fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
+    let mut says = Vec::new();
+    for report in reports {
+        match report {
+            Ok(report) => says.extend(report.findings.says.iter().cloned()),
+            Err(error) => says.push(format!("comparison failed: {error}")),
+        }
+    }
+    if !reports.iter().flatten().any(|report| report.findings.verdict.is_some()) {
+        says.push("nothing judged this plate: give it a [target] and a [[template]], or add a comparison that judges".into());
+    }
+    says
+}
+
+fn markers(measured: &Measured, plate: &PlateFile) -> Vec<MarkerRecord> {
+    let record = |marker: &platen_model::Marker| {
+        let Place { u, v, position, sigma, seen } = evaluate::place(
+            &measured.measurement.surface,
+            &measured.measurement.location,
+            marker.at[0],
+            marker.at[1],
+        );
+        let all = sigma.iter().map(|s| s * s).sum::<f64>().sqrt();
+        MarkerRecord {
+            name: marker.name.clone(),
+            u_mm: mm(u),
+            v_mm: mm(v),
+            position_m: position.into(),
+            uncertainty_mm: mm(EXPANDED * all),
+            seen,
+        }
+    };
+    plate.markers.iter().map(record).collect()
+}
+
+fn surface(measured: &Measured) -> SurfaceRecord {
+    let parts = measured.measurement.surface.to_parts();
+    // A bicubic spline over n knots has n - 4 control points in that direction.
+    let n_u = parts.knots_u.len().saturating_sub(4).max(1);
+    SurfaceRecord {
+        degree: 3,
+        control_m: parts.control.chunks(n_u).map(<[_]>::to_vec).collect(),
+        knots_u: parts.knots_u,
+        knots_v: parts.knots_v,
+        rms_mm: mm(measured.measurement.quality.rms),
+    }
+}
+
+fn comparison<E: Display>(report: &Result<Report, E>) -> Json {
+    match report {
+        Ok(report) => json!({
+            "plugin": report.comparison,
+            "verdict": report.findings.verdict,
+            "says": report.findings.says,
+            "figures": report.findings.figures.iter().map(figure).collect::<Vec<_>>(),
+        }),
+        Err(error) => json!({ "verdict": Verdict::CannotTell, "error": error.to_string() }),
+    }
+}
+
+/// A figure in the units that people read.
+pub fn figure(figure: &Figure) -> Json {
+    let (suffix, factor) = readable(&figure.unit);
+    let mut record = Map::new();
+    record.insert("name".into(), json!(figure.name));
+    record.insert(format!("value{suffix}"), json!(figure.value * factor));
+    if let Some(uncertainty) = figure.uncertainty {
+        record.insert(format!("uncertainty{suffix}"), json!(uncertainty * factor));
+    }
+    if let Some(at) = figure.at {
+        record.insert("at_mm".into(), json!(mm_pair(at)));
+    }
+    Json::Object(record)
+}
+
+fn timings(scanned: &Scanned, measured: &Measured, compare: std::time::Duration) -> TimingsRecord {
+    let ms = |time: std::time::Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
+    let stages = measured.measurement.timings;
+    let extract = scanned.extract;
+    TimingsRecord {
+        acquire: ms(scanned.acquire),
+        extract: ms(extract),
+        outline: ms(measured.outline_time),
+        mesh: ms(stages.mesh),
+        flatten: ms(stages.flatten),
+        surface: ms(stages.surface),
+        compare: ms(compare),
+        total: ms(extract + measured.outline_time + stages.mesh + stages.flatten + stages.surface + compare),
+    }
+}

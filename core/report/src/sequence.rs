@@ -1,0 +1,378 @@
+//! The sequence of a plate as numbers that tell crews apart: order and place of bends, overshoot, re-hits, energy left.
+//!
+//! | number | how it is found |
+//! |---|---|
+//! | bend: place, angle, direction, length, width | comparison `curvature` between the surfaces of two strokes in a row; only bands beyond doubt |
+//! | feed | distance from the bend before to this one, across this one's straight lines |
+//! | re-hit | a bend that lies on an earlier one: straight lines within 20 degrees, overlapping along, and across them the middle of each within the other's width |
+//! | bent back | a bend against the target's sense |
+//! | overshoot | the gap under the worst board where its sense is "bent too far", else 0 |
+//! | beyond | share of the seen area whose curvature exceeds the target's by more than the limit of a board means, 8 g / c^2 |
+//! | energy left | [`platen_shape::Forming`]: elastic energy from the measured to the target's curvature, and its share of the first stroke's |
+//!
+//! Force, ram depth and die set are those that the press told. What is not known is null, never 0.
+
+use std::f64::consts::PI;
+
+use jiff::Timestamp;
+use serde::Serialize;
+
+use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
+use platen_model::{Figure, Report, Task, Verdict};
+use platen_plant::{PlantFile, PlateFile};
+use platen_shape::{Forming, Surface, TargetSurface};
+
+use crate::picture::Yardstick;
+use crate::{history_view, output_folder};
+use platen_model::units::{mm, mm_pair};
+
+/// Why there is no sequence.
+#[derive(Debug, thiserror::Error)]
+pub enum SequenceError {
+    /// The history cannot be read.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// Nothing is on record.
+    #[error("no stroke of plate {0} is on record; `platen history list` shows the plates")]
+    NoStrokes(u32),
+    /// The comparison failed.
+    #[error("{0}")]
+    Comparison(String),
+}
+
+/// The sequence of one plate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sequence {
+    /// Its number in the history.
+    pub plate: u32,
+    /// Its strokes, oldest first.
+    pub strokes: Vec<SequenceStroke>,
+    /// The plate in one line.
+    pub summary: Summary,
+}
+
+/// One stroke of a sequence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceStroke {
+    /// Key of its record.
+    pub run_id: u32,
+    /// Its number, or `blank`.
+    pub stroke: String,
+    /// When the press asked for it.
+    pub accepted: Timestamp,
+    /// Judgement.
+    pub verdict: Verdict,
+    /// Die set.
+    pub die_set: Option<u16>,
+    /// Largest force.
+    pub force_kn: Option<f64>,
+    /// Deepest position of the ram.
+    pub ram_depth_mm: Option<f64>,
+    /// Worst gap under a board.
+    pub gap_mm: Option<f64>,
+    /// Its expanded uncertainty (95 %).
+    pub gap_uncertainty_mm: Option<f64>,
+    /// Gap where the board says "bent too far".
+    pub overshoot_mm: Option<f64>,
+    /// Bends that it made, strongest first; null where this stroke or the one before was not measured.
+    pub bends: Option<Vec<Bend>>,
+    /// Energy left.
+    pub energy_left_j: Option<f64>,
+    /// As a share of that of the first stroke on record.
+    pub energy_left_share: Option<f64>,
+    /// Area bent beyond the target.
+    pub beyond_share: Option<f64>,
+}
+
+/// A band that a stroke bent.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bend {
+    /// Middle of the band.
+    pub at_mm: [f64; 2],
+    /// Turn from one side of the band to the other, positive towards the scanner.
+    pub angle_deg: f64,
+    /// Its expanded uncertainty (95 %).
+    pub uncertainty_deg: Option<f64>,
+    /// Direction of its straight lines, from u towards v.
+    pub direction_deg: f64,
+    /// Along the straight lines.
+    pub length_mm: f64,
+    /// Across them.
+    pub width_mm: f64,
+    /// Across its straight lines from the strongest bend of the stroke before.
+    pub feed_mm: Option<f64>,
+    /// The stroke whose bend it lies on.
+    pub rehit_of: Option<String>,
+    /// It turns against the target; null without a target or where that is flat.
+    pub bent_back: Option<bool>,
+}
+
+/// A plate in one line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Strokes, the blank left out.
+    pub strokes: usize,
+    /// Of these, how many were not measured.
+    pub not_measured: usize,
+    /// Bends.
+    pub bends: usize,
+    /// Bends on earlier ones.
+    pub rehits: usize,
+    /// Bends against the target.
+    pub bent_back: usize,
+    /// Strokes after which a board said "bent too far".
+    pub overshoots: usize,
+    /// The most of them.
+    pub overshoot_max_mm: Option<f64>,
+    /// Mean of the feeds.
+    pub feed_mean_mm: Option<f64>,
+    /// Energy left after the last stroke, as a share of the first on record.
+    pub energy_left_share: Option<f64>,
+    /// Number of strokes until the first pass.
+    pub strokes_to_pass: Option<usize>,
+    /// From the first to the last stroke.
+    pub minutes: f64,
+    /// Die sets used, in the order of their first use.
+    pub die_sets: Vec<u16>,
+}
+
+impl Sequence {
+    /// Reads the sequence of a plate on record. `curvature` runs the comparison of that name between the surface before a
+    /// stroke and the surface after it; `progress` receives the name of each stroke.
+    ///
+    /// # Errors
+    /// [`SequenceError`].
+    pub fn of(
+        archive: &Archive,
+        plant: &PlantFile,
+        plate: u32,
+        curvature: &dyn Fn(&Task, &Surface, &Surface) -> Result<Report, String>,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, SequenceError> {
+        let kept = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() })?;
+        if kept.is_empty() {
+            return Err(SequenceError::NoStrokes(plate));
+        }
+        let mut before: Option<Surface> = None;
+        let mut strokes: Vec<SequenceStroke> = Vec::new();
+        for stroke in &kept {
+            progress(&format!("stroke {}", history_view::label(stroke)));
+            let file = stroke.recipe.and_then(|recipe| PlateFile::load(&plant.plate_path(recipe)).ok());
+            let now =
+                stroke.document.as_deref().and_then(|document| output_folder::surface_beside(document).ok());
+            let mut row = SequenceStroke::of(stroke);
+            if let (Some(now), Some(file)) = (&now, &file) {
+                row.add_forming(now, file);
+                if let Some(before) = &before {
+                    let report = curvature(&file.task(0.0, None, false), before, now);
+                    let report = report.map_err(SequenceError::Comparison)?;
+                    row.bends = Some(bends(&report.findings.figures, file, &strokes));
+                }
+            }
+            before = now;
+            strokes.push(row);
+        }
+        let first = strokes.iter().find_map(|row| row.energy_left_j).filter(|energy| *energy > 0.0);
+        for row in &mut strokes {
+            row.energy_left_share = row.energy_left_j.zip(first).map(|(left, first)| left / first);
+        }
+        Ok(Self { plate, summary: Summary::of(&strokes, &kept), strokes })
+    }
+}
+
+impl SequenceStroke {
+    fn of(stroke: &Stroke) -> Self {
+        let told = stroke.press_data();
+        let point = history_view::of_stroke(stroke);
+        Self {
+            run_id: stroke.run_id,
+            stroke: point.label,
+            accepted: stroke.accepted,
+            verdict: point.verdict,
+            die_set: told.die_id,
+            force_kn: told.force.map(|newtons| newtons / 1e3),
+            ram_depth_mm: told.ram_depth.map(mm),
+            gap_mm: point.gap_mm,
+            gap_uncertainty_mm: point.uncertainty_mm,
+            overshoot_mm: point.gap_mm.map(|gap| if point.sense > 0 { gap.abs() } else { 0.0 }),
+            bends: None,
+            energy_left_j: None,
+            energy_left_share: None,
+            beyond_share: None,
+        }
+    }
+
+    fn add_forming(&mut self, surface: &Surface, file: &PlateFile) {
+        let target = target(file);
+        let tolerance = Yardstick::of(file).tolerance_per_m();
+        let forming = target.and_then(|target| Forming::new(surface, &target, tolerance));
+        self.energy_left_j = forming.map(|forming| forming.energy);
+        self.beyond_share = forming.map(|forming| forming.beyond_share);
+    }
+}
+
+/// The bends among the figures of `curvature`: `bend.N.angle` with its place, `.direction`, `.length` and `.width`.
+fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Vec<Bend> {
+    let find = |name: String| figures.iter().find(|figure| figure.name == name);
+    let mut bends = Vec::new();
+    for number in 1.. {
+        let part = |part: &str| find(format!("bend.{number}.{part}"));
+        let (Some(angle), Some(direction), Some(length), Some(width)) =
+            (part("angle"), part("direction"), part("length"), part("width"))
+        else {
+            break;
+        };
+        let Some([u, v]) = angle.at else { break };
+        let mut bend = Bend {
+            at_mm: mm_pair([u, v]),
+            angle_deg: angle.value.to_degrees(),
+            uncertainty_deg: angle.uncertainty.map(f64::to_degrees),
+            direction_deg: direction.value.to_degrees(),
+            length_mm: mm(length.value),
+            width_mm: mm(width.value),
+            feed_mm: None,
+            rehit_of: None,
+            bent_back: bent_back(file, [u, v], direction.value, angle.value),
+        };
+        bend.feed_mm = last_bend(earlier).map(|last| bend.apart(last)[0]);
+        bend.rehit_of = earlier
+            .iter()
+            .find(|stroke| stroke.bends.iter().flatten().any(|other| bend.lies_on(other)))
+            .map(|stroke| stroke.stroke.clone());
+        bends.push(bend);
+    }
+    bends.sort_by(|a, b| b.angle_deg.abs().total_cmp(&a.angle_deg.abs()));
+    bends
+}
+
+fn last_bend(earlier: &[SequenceStroke]) -> Option<&Bend> {
+    earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first())
+}
+
+fn target(file: &PlateFile) -> Option<TargetSurface> {
+    file.target.and_then(|target| TargetSurface::of_plate(&target, &file.plate).ok())
+}
+
+/// Whether a bend turns against the target there; `None` where the target is straight across it.
+fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> Option<bool> {
+    let target = target(file)?;
+    let (sin, cos) = direction.sin_cos();
+    let wanted = target.curvature(u, v).along([-sin, cos]);
+    // 1e-6 1/m: a radius of a thousand kilometres is straight.
+    (wanted.abs() > 1e-6).then_some(wanted * angle < 0.0)
+}
+
+/// Largest angle between the straight lines of two bends that are one place hit twice.
+const SAME_DIRECTION_DEG: f64 = 20.0;
+
+impl Bend {
+    /// How far another bend's middle lies away, across and along this one's straight lines.
+    fn apart(&self, other: &Self) -> [f64; 2] {
+        let (sin, cos) = self.direction_deg.to_radians().sin_cos();
+        let [du, dv] = [0, 1].map(|k| other.at_mm[k] - self.at_mm[k]);
+        [(cos * dv - sin * du).abs(), (cos * du + sin * dv).abs()]
+    }
+
+    fn lies_on(&self, other: &Self) -> bool {
+        let turn = (self.direction_deg - other.direction_deg).to_radians().rem_euclid(PI);
+        let [across, along] = self.apart(other);
+        turn.min(PI - turn).to_degrees() < SAME_DIRECTION_DEG
+            && across < 0.5 * self.width_mm.min(other.width_mm)
+            && along < 0.5 * (self.length_mm + other.length_mm)
+    }
+}
+
+impl Summary {
+    fn of(strokes: &[SequenceStroke], kept: &[Stroke]) -> Self {
+        let bends = || strokes.iter().filter_map(|stroke| stroke.bends.as_ref()).flatten();
+        let real: Vec<&SequenceStroke> =
+            strokes.iter().zip(kept).filter(|(_, kept)| !kept.baseline).map(|(stroke, _)| stroke).collect();
+        let overshoots: Vec<f64> =
+            real.iter().filter_map(|stroke| stroke.overshoot_mm).filter(|mm| *mm > 0.0).collect();
+        let feeds: Vec<f64> =
+            strokes.iter().filter_map(|stroke| stroke.bends.as_ref()?.first()?.feed_mm).collect();
+        let mut die_sets = Vec::new();
+        for die in real.iter().filter_map(|stroke| stroke.die_set) {
+            if !die_sets.contains(&die) {
+                die_sets.push(die);
+            }
+        }
+        let seconds = |row: &SequenceStroke| row.accepted.as_millisecond() as f64 / 1e3;
+        let span = strokes.first().zip(strokes.last()).map_or(0.0, |(a, b)| seconds(b) - seconds(a));
+        Self {
+            strokes: real.len(),
+            not_measured: real.iter().filter(|stroke| stroke.verdict == Verdict::NotMeasured).count(),
+            bends: bends().count(),
+            rehits: bends().filter(|bend| bend.rehit_of.is_some()).count(),
+            bent_back: bends().filter(|bend| bend.bent_back == Some(true)).count(),
+            overshoots: overshoots.len(),
+            overshoot_max_mm: overshoots.into_iter().max_by(f64::total_cmp),
+            feed_mean_mm: (!feeds.is_empty()).then(|| feeds.iter().sum::<f64>() / feeds.len() as f64),
+            energy_left_share: strokes.iter().rev().find_map(|stroke| stroke.energy_left_share),
+            strokes_to_pass: real.iter().position(|stroke| stroke.verdict == Verdict::Pass).map(|k| k + 1),
+            minutes: span / 60.0,
+            die_sets,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bend(at_mm: [f64; 2], direction_deg: f64) -> Bend {
+        Bend {
+            at_mm,
+            angle_deg: 1.0,
+            uncertainty_deg: None,
+            direction_deg,
+            length_mm: 2000.0,
+            width_mm: 100.0,
+            feed_mm: None,
+            rehit_of: None,
+            bent_back: None,
+        }
+    }
+
+    #[test]
+    fn a_rehit_lies_on_an_earlier_bend_in_its_direction() {
+        let first = bend([1000.0, 1250.0], 90.0);
+        assert!(bend([1045.0, 1250.0], 90.0).lies_on(&first));
+        assert!(bend([1000.0, 1250.0], 75.0).lies_on(&first), "a little askew");
+        assert!(!bend([1060.0, 1250.0], 90.0).lies_on(&first), "beside it, though they overlap");
+        assert!(!bend([1000.0, 1250.0], 60.0).lies_on(&first), "across it");
+        assert!(!bend([1000.0, 3300.0], 90.0).lies_on(&first), "beyond its end");
+        // 178 and 2 degrees are one direction.
+        assert!(bend([1000.0, 1250.0], 178.0).lies_on(&bend([1000.0, 1250.0], 2.0)));
+    }
+
+    #[test]
+    fn a_feed_is_measured_across_the_bend() {
+        let [across, along] = bend([1300.0, 1250.0], 90.0).apart(&bend([1000.0, 850.0], 90.0));
+        assert!((across - 300.0).abs() < 1e-9 && (along - 400.0).abs() < 1e-9);
+    }
+
+    fn figure(name: &str, value: f64, at: Option<[f64; 2]>) -> Figure {
+        Figure { name: name.into(), value, unit: "m".into(), uncertainty: Some(0.001), at }
+    }
+
+    #[test]
+    fn bends_are_read_strongest_first_and_know_whether_they_go_the_targets_way() {
+        let text = include_str!("../../../config/plates/plate-009.toml");
+        let file = PlateFile::parse("plate-009.toml", text).unwrap();
+        let one = |number: usize, angle: f64, u: f64| {
+            let name = |part: &str| format!("bend.{number}.{part}");
+            [
+                figure(&name("angle"), angle, Some([u, 1.25])),
+                figure(&name("direction"), std::f64::consts::FRAC_PI_2, None),
+                figure(&name("length"), 2.4, None),
+                figure(&name("width"), 0.1, None),
+            ]
+        };
+        let found = bends(&[one(1, 0.01, 1.0), one(2, -0.02, 2.0)].concat(), &file, &[]);
+        assert_eq!(found.len(), 2);
+        assert_eq!((found[0].at_mm, found[0].bent_back), ([2000.0, 1250.0], Some(true)));
+        assert_eq!((found[1].at_mm, found[1].bent_back), ([1000.0, 1250.0], Some(false)));
+        assert!((found[1].angle_deg - 0.01_f64.to_degrees()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,175 @@
+//! The task of a comparison, its findings and its fields.
+
+use std::ffi::CStr;
+
+use platen_abi::payload::{self, Header, Layout};
+use platen_model::{Field, Findings, NodeState, Task};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::{Decode, DecodeError, Encode};
+
+/// Largest field accepted: 4 million numbers.
+const MAX_FIELD: usize = 1 << 22;
+
+/// Writes a document. The documents of the boundary are plain data, which always have a JSON form.
+fn encode_json<B: AsMut<[u8]>, E>(
+    document: &impl Serialize,
+    allocate: impl FnOnce(usize) -> Result<B, E>,
+) -> Result<B, E> {
+    let text = serde_json::to_vec(document).unwrap_or_default();
+    let mut buffer = allocate(text.len())?;
+    buffer.as_mut().copy_from_slice(&text);
+    Ok(buffer)
+}
+
+fn decode_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
+    serde_json::from_slice(bytes).map_err(|error| DecodeError::Invalid(error.to_string()))
+}
+
+impl Encode for Task {
+    const FORMAT: &'static CStr = payload::TASK;
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        encode_json(self, allocate)
+    }
+}
+
+impl Decode for Task {
+    const FORMAT: &'static CStr = payload::TASK;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        decode_json(bytes)
+    }
+}
+
+impl Encode for Findings {
+    const FORMAT: &'static CStr = payload::FINDINGS;
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        encode_json(self, allocate)
+    }
+}
+
+impl Decode for Findings {
+    const FORMAT: &'static CStr = payload::FINDINGS;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        decode_json(bytes)
+    }
+}
+
+impl Encode for Field {
+    const FORMAT: &'static CStr = payload::Grid::FORMAT;
+
+    fn count(&self) -> u64 {
+        self.state.len() as u64
+    }
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        let state: Vec<u8> = self.state.iter().map(|state| *state as u8).collect();
+        let mut layout = Layout::of::<payload::Grid>();
+        let head = payload::Grid {
+            struct_size: size_of::<payload::Grid>() as u32,
+            reserved: 0,
+            n_u: self.nodes[0] as u32,
+            n_v: self.nodes[1] as u32,
+            components: self.components as u32,
+            reserved_2: 0,
+            name: layout.add::<u8>(self.name.len()),
+            unit: layout.add::<u8>(self.unit.len()),
+            values: layout.add::<f64>(self.values.len()),
+            state: layout.add::<u8>(state.len()),
+        };
+        let mut buffer = allocate(layout.bytes())?;
+        let bytes = buffer.as_mut();
+        payload::put_header(bytes, &head);
+        payload::put(bytes, head.name, self.name.as_bytes());
+        payload::put(bytes, head.unit, self.unit.as_bytes());
+        payload::put(bytes, head.values, &self.values);
+        payload::put(bytes, head.state, &state);
+        Ok(buffer)
+    }
+}
+
+impl Decode for Field {
+    const FORMAT: &'static CStr = payload::Grid::FORMAT;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let head: payload::Grid = payload::read(bytes)?;
+        let state = |code: &u8| match code {
+            1 => NodeState::Seen,
+            2 => NodeState::Unchanged,
+            _ => NodeState::Unseen,
+        };
+        let field = Self {
+            name: payload::text(bytes, head.name)?,
+            unit: payload::text(bytes, head.unit)?,
+            nodes: [head.n_u as usize, head.n_v as usize],
+            components: head.components as usize,
+            values: payload::slice::<f64>(bytes, head.values)?.to_vec(),
+            state: payload::slice::<u8>(bytes, head.state)?.iter().map(state).collect(),
+        };
+        check(&field).map(|()| field)
+    }
+}
+
+/// Refuses a field that does not fit its grid, or that has a value other than a finite number where it was seen.
+pub(crate) fn check(field: &Field) -> Result<(), DecodeError> {
+    let nodes = field.nodes[0].saturating_mul(field.nodes[1]);
+    let numbers = nodes.saturating_mul(field.components);
+    let fits =
+        (1..=MAX_FIELD).contains(&numbers) && field.values.len() == numbers && field.state.len() == nodes;
+    let known = |(i, value): (usize, &f64)| {
+        value.is_finite() || field.state.get(i / field.components) == Some(&NodeState::Unseen)
+    };
+    if fits && field.values.iter().enumerate().all(known) {
+        return Ok(());
+    }
+    Err(DecodeError::Invalid(format!("field {} does not fit its grid", field.name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field() -> Field {
+        Field {
+            name: "deviation".into(),
+            unit: "m".into(),
+            nodes: [3, 2],
+            components: 1,
+            values: vec![0.0, 0.5, -0.25, f64::NAN, 1.0, 2.0],
+            state: vec![
+                NodeState::Seen,
+                NodeState::Unchanged,
+                NodeState::Seen,
+                NodeState::Unseen,
+                NodeState::Seen,
+                NodeState::Seen,
+            ],
+        }
+    }
+
+    #[test]
+    fn a_field_is_read_as_it_was_written() {
+        let read = Field::decode(field().to_buffer().as_ref()).unwrap();
+        assert_eq!((read.name.as_str(), read.unit.as_str(), read.nodes), ("deviation", "m", [3, 2]));
+        assert_eq!((&read.state, read.values[2]), (&field().state, -0.25));
+        assert!(read.values[3].is_nan(), "a node that was not seen may hold anything");
+    }
+
+    #[test]
+    fn a_field_that_does_not_fit_its_grid_is_refused() {
+        let wrong = [
+            Field { nodes: [2, 2], ..field() },
+            Field { components: 0, ..field() },
+            Field { values: vec![f64::NAN; 6], ..field() },
+            Field { state: Vec::new(), ..field() },
+        ];
+        for field in wrong {
+            let refused = Field::decode(field.to_buffer().as_ref()).unwrap_err().to_string();
+            assert_eq!(refused, "field deviation does not fit its grid");
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! Scans: header, columns, end, and the window that is asked for.
+
+use std::ffi::CStr;
+
+use platen_abi::payload::{self, Header, Layout};
+use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window, wrap_azimuth};
+
+use super::{Decode, DecodeError, Encode};
+
+impl Encode for ScanHeader {
+    const FORMAT: &'static CStr = payload::Scan::FORMAT;
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        let notes = self.notes.join("\n");
+        let mut layout = Layout::of::<payload::Scan>();
+        let head = payload::Scan {
+            struct_size: size_of::<payload::Scan>() as u32,
+            flags: u32::from(self.simulated),
+            n_rows: self.n_rows,
+            n_columns: self.n_columns,
+            azimuth_start: self.azimuth_start,
+            azimuth_step: self.azimuth_step,
+            elevation_start: self.elevation_start,
+            elevation_step: self.elevation_step,
+            seam_column: self.seam_column.unwrap_or(u32::MAX),
+            intensity_min: self.intensity_range.0,
+            intensity_max: self.intensity_range.1,
+            acquired_unix_s: self.acquired_unix_s.unwrap_or(0.0),
+            instrument: layout.add::<u8>(self.instrument.len()),
+            notes: layout.add::<u8>(notes.len()),
+        };
+        let mut buffer = allocate(layout.bytes())?;
+        let bytes = buffer.as_mut();
+        payload::put_header(bytes, &head);
+        payload::put(bytes, head.instrument, self.instrument.as_bytes());
+        payload::put(bytes, head.notes, notes.as_bytes());
+        Ok(buffer)
+    }
+}
+
+impl Decode for ScanHeader {
+    const FORMAT: &'static CStr = payload::Scan::FORMAT;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let head: payload::Scan = payload::read(bytes)?;
+        Ok(Self {
+            n_rows: head.n_rows,
+            n_columns: head.n_columns,
+            azimuth_start: head.azimuth_start,
+            azimuth_step: head.azimuth_step,
+            elevation_start: head.elevation_start,
+            elevation_step: head.elevation_step,
+            seam_column: (head.seam_column != u32::MAX).then_some(head.seam_column),
+            intensity_range: (head.intensity_min, head.intensity_max),
+            simulated: head.flags & 1 != 0,
+            instrument: payload::text(bytes, head.instrument)?,
+            acquired_unix_s: (head.acquired_unix_s != 0.0).then_some(head.acquired_unix_s),
+            notes: payload::text(bytes, head.notes)?.lines().map(str::to_owned).collect(),
+        })
+    }
+}
+
+impl Encode for Column {
+    const FORMAT: &'static CStr = payload::Column::FORMAT;
+
+    fn count(&self) -> u64 {
+        self.len() as u64
+    }
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        let n = self.len();
+        let mut layout = Layout::of::<payload::Column>();
+        let head = payload::Column {
+            struct_size: size_of::<payload::Column>() as u32,
+            index: self.index,
+            face: u32::from(self.face == Face::Back),
+            first_row: self.first_row,
+            range_m: layout.add::<f64>(n),
+            azimuth: layout.add::<f64>(n),
+            elevation: layout.add::<f64>(n),
+            intensity: layout.add::<u16>(n),
+            state: layout.add::<u8>(n),
+        };
+        let state: Vec<u8> = self.state.iter().map(|s| *s as u8).collect();
+        let mut buffer = allocate(layout.bytes())?;
+        let bytes = buffer.as_mut();
+        payload::put_header(bytes, &head);
+        payload::put(bytes, head.range_m, &self.range_m);
+        payload::put(bytes, head.azimuth, &self.azimuth);
+        payload::put(bytes, head.elevation, &self.elevation);
+        payload::put(bytes, head.intensity, &self.intensity);
+        payload::put(bytes, head.state, &state);
+        Ok(buffer)
+    }
+}
+
+impl Decode for Column {
+    const FORMAT: &'static CStr = payload::Column::FORMAT;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let head: payload::Column = payload::read(bytes)?;
+        let state = |code: &u8| match code {
+            0 => State::Valid,
+            1 => State::DirectionOnly,
+            _ => State::NoReturn,
+        };
+        Ok(Self {
+            index: head.index,
+            face: if head.face == 0 { Face::Front } else { Face::Back },
+            first_row: head.first_row,
+            range_m: payload::slice::<f64>(bytes, head.range_m)?.to_vec(),
+            azimuth: payload::slice(bytes, head.azimuth)?.iter().map(|a: &f64| wrap_azimuth(*a)).collect(),
+            elevation: payload::slice::<f64>(bytes, head.elevation)?.to_vec(),
+            intensity: payload::slice::<u16>(bytes, head.intensity)?.to_vec(),
+            state: payload::slice::<u8>(bytes, head.state)?.iter().map(state).collect(),
+        })
+    }
+}
+
+impl Encode for ScanEnd {
+    const FORMAT: &'static CStr = payload::ScanEnd::FORMAT;
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        let head = payload::ScanEnd {
+            struct_size: size_of::<payload::ScanEnd>() as u32,
+            columns: self.columns,
+            points: self.points,
+            warm_up_columns: self.warm_up_columns,
+            outcome: match self.outcome {
+                Outcome::Complete => 0,
+                Outcome::Aborted => 1,
+                Outcome::Failed => 2,
+            },
+        };
+        let mut buffer = allocate(Layout::of::<payload::ScanEnd>().bytes())?;
+        payload::put_header(buffer.as_mut(), &head);
+        Ok(buffer)
+    }
+}
+
+impl Decode for ScanEnd {
+    const FORMAT: &'static CStr = payload::ScanEnd::FORMAT;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let head: payload::ScanEnd = payload::read(bytes)?;
+        Ok(Self {
+            columns: head.columns,
+            points: head.points,
+            warm_up_columns: head.warm_up_columns,
+            outcome: match head.outcome {
+                0 => Outcome::Complete,
+                1 => Outcome::Aborted,
+                _ => Outcome::Failed,
+            },
+        })
+    }
+}
+
+/// Returns the window as it crosses the boundary, also as an argument of `estimate`.
+#[must_use]
+pub fn to_raw_window(window: &Window) -> payload::Window {
+    payload::Window {
+        struct_size: size_of::<payload::Window>() as u32,
+        reserved: 0,
+        azimuth_start: window.azimuth_start,
+        azimuth_width: window.azimuth_width,
+        elevation_min: window.elevation_min,
+        elevation_max: window.elevation_max,
+    }
+}
+
+/// Returns the window of such an argument.
+#[must_use]
+pub fn from_raw_window(window: &payload::Window) -> Window {
+    Window {
+        azimuth_start: window.azimuth_start,
+        azimuth_width: window.azimuth_width,
+        elevation_min: window.elevation_min,
+        elevation_max: window.elevation_max,
+    }
+}
+
+impl Encode for Window {
+    const FORMAT: &'static CStr = payload::Window::FORMAT;
+
+    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+        let mut buffer = allocate(size_of::<payload::Window>())?;
+        payload::put_header(buffer.as_mut(), &to_raw_window(self));
+        Ok(buffer)
+    }
+}
+
+impl Decode for Window {
+    const FORMAT: &'static CStr = payload::Window::FORMAT;
+
+    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        Ok(from_raw_window(&payload::read(bytes)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_value_of_a_scan_is_read_as_it_was_written() {
+        let header = ScanHeader {
+            n_rows: 7,
+            n_columns: 9,
+            azimuth_start: 0.1,
+            azimuth_step: 0.002,
+            elevation_start: -0.5,
+            elevation_step: 0.001,
+            seam_column: None,
+            intensity_range: (3, 900),
+            simulated: true,
+            instrument: "maker model 7".into(),
+            acquired_unix_s: Some(1.7e9),
+            notes: vec!["rows reversed".into(), "units: mm".into()],
+        };
+        assert_eq!(ScanHeader::decode(header.to_buffer().as_ref()), Ok(header));
+        let column = Column {
+            index: 4,
+            face: Face::Back,
+            first_row: 2,
+            range_m: vec![1.5, 0.0],
+            azimuth: vec![0.25, 0.26],
+            elevation: vec![0.1, 0.2],
+            intensity: vec![17, 0],
+            state: vec![State::Valid, State::NoReturn],
+        };
+        assert_eq!(Column::decode(column.to_buffer().as_ref()), Ok(column));
+        let end = ScanEnd { columns: 9, points: 61, warm_up_columns: 2, outcome: Outcome::Complete };
+        assert_eq!(ScanEnd::decode(end.to_buffer().as_ref()), Ok(end));
+        let window =
+            Window { azimuth_start: -1.0, azimuth_width: 2.0, elevation_min: -0.75, elevation_max: 0.25 };
+        assert_eq!(Window::decode(window.to_buffer().as_ref()), Ok(window));
+    }
+}
