@@ -97,3 +97,8 @@ pub use platen_abi as abi;
 #[cfg(feature = "comparison")]
 pub use platen_model::{Field, NodeState, Report};
 pub use scanner::{ScanSink, Scanner};
+
+/// Compiles the example of `plugins/README.md` as a test.
+#[cfg(all(doctest, feature = "comparison"))]
+#[doc = include_str!("../../../plugins/README.md")]
+mod plugins_readme {}
