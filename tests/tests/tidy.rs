@@ -12,6 +12,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
             "platen-abi" | "platen-numerics" | "platen-scan" | "platen-plant" | "platen-history"
             | "platen-sim-plate",
         ) => &[],
+        (_, "platen-formats") => &["platen-scan"],
         (_, "platen-shape") => &["platen-numerics", "platen-scan"],
         (_, "platen-sdk") => &["platen-abi", "platen-scan", "platen-shape"],
         (_, "platen-press") => &["platen-plant"],
@@ -19,7 +20,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
             &["platen-abi", "platen-scan", "platen-shape", "platen-plant", "platen-press", "platen-history"]
         }
         (_, "simulated") => &["platen-sdk", "platen-scan", "platen-sim-plate", "platen-sim-scanner"],
-        ("drivers", _) => &["platen-sdk", "platen-scan"],
+        ("drivers", _) => &["platen-sdk", "platen-scan", "platen-formats"],
         ("plugins", _) => &["platen-numerics", "platen-sdk", "platen-shape"],
         (_, "platen-sim-scanner" | "platen-sim-press") => &["platen-sim-plate"],
         (_, "platen-sim") => &["platen-sim-plate", "platen-sim-scanner", "platen-sim-press"],

@@ -11,7 +11,6 @@
 mod angle;
 mod column;
 mod lattice;
-pub mod orient;
 mod scan;
 mod text;
 

@@ -1,34 +1,66 @@
-//! From a trigger to the sink: one file, or the next scan in a watched folder.
+//! Hand-over of one file's scan, or of the next one in a watched folder, to the host.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use platen_scan::orient::Expected;
+use platen_formats::orient::Expected;
+use platen_formats::{Oriented, ScanReader};
 use platen_scan::{Column, ScanEnd, ScanHeader};
 use platen_sdk::{ErrorKind, Job, ScanSink};
 
 use crate::error::{Error, Result};
-use crate::open;
-use crate::source::{Receiver, deliver};
 use crate::watch::{Listing, Watch, list};
 
-/// How a file is read.
+/// Receiver of a scan: the host, or a test.
+pub(crate) trait Receiver {
+    /// Called every 65,536 cells; an error ends the work.
+    fn check(&mut self, fraction: f64, phase: &str) -> Result<()>;
+    /// First.
+    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
+    /// In any order.
+    fn column(&mut self, column: &Column) -> Result<()>;
+    /// Last.
+    fn end(&mut self, end: &ScanEnd) -> Result<()>;
+}
+
+/// Settings of reading.
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
-    /// Which scan of a file that holds several, from 1.
+    /// Number of the scan in a file that holds several, from 1.
     pub(crate) cloud: Option<usize>,
-    /// What the plant says of the scanner.
+    /// Declarations of the plant about the scanner.
     pub(crate) known: Expected,
 }
 
 impl Reading {
     /// Reads one file.
     pub(crate) fn file(&self, path: &Path, out: &mut dyn Receiver, alive: &dyn Fn() -> bool) -> Result<()> {
-        let mut source = open::open(path, self.cloud, alive)?;
-        deliver(source.as_mut(), &self.known, None, out)?;
-        Ok(())
+        let mut reader = ScanReader::open(path, self.cloud, alive)?;
+        let oriented = self.orient(&mut reader, out)?;
+        deliver(reader, &oriented, out)
+    }
+
+    fn orient(&self, reader: &mut ScanReader<'_>, out: &mut dyn Receiver) -> Result<Oriented> {
+        reader.orient(&self.known, |share| out.check(share, "looking at the lattice"))
     }
 }
+
+/// Delivers all columns of an oriented scan.
+fn deliver(mut reader: ScanReader<'_>, oriented: &Oriented, out: &mut dyn Receiver) -> Result<()> {
+    out.begin(oriented.header())?;
+    let mut columns = reader.columns(oriented)?;
+    for number in 0_u32.. {
+        let Some(column) = columns.next() else { break };
+        out.column(&column?)?;
+        if number.is_multiple_of(CHECK_EVERY) {
+            out.check(columns.share(), "reading columns")?;
+        }
+    }
+    out.end(&columns.finish()?)
+}
+
+/// Columns between two reports of progress.
+const CHECK_EVERY: u32 = 64;
 
 /// Where scans arrive.
 #[derive(Debug)]
@@ -48,7 +80,7 @@ pub(crate) struct Folder {
 impl Folder {
     /// Notes what lies there now: none of it is the next scan.
     pub(crate) fn look(&mut self) -> Result<()> {
-        self.before = Some(list(&self.path).map_err(Error::io("listing the watched folder"))?);
+        self.before = Some(list(&self.path).map_err(Error::Folder)?);
         Ok(())
     }
 
@@ -62,8 +94,8 @@ impl Folder {
         glob::Pattern::new(&named)
     }
 
-    /// Waits for the next scan and reads it; `pause` waits between two looks, is told why there is nothing yet,
-    /// and ends the waiting with an error. What lies there afterwards is not the scan of the stroke after.
+    /// Waits for the next scan and delivers it. `pause` waits between two polls, receives the reason why there is no
+    /// scan yet, and ends the wait with an error. Files present afterwards are not the scan of the next stroke.
     pub(crate) fn follow(
         &mut self,
         reading: &Reading,
@@ -79,7 +111,7 @@ impl Folder {
         Ok(())
     }
 
-    /// The checksum of the scan.
+    /// Returns the checksum of the scan delivered.
     fn wait(
         &self,
         mut watch: Watch,
@@ -92,23 +124,27 @@ impl Folder {
             let due = watch.poll(list(&self.path));
             let mut sound = Vec::new();
             for name in due {
-                match open::open(&self.path.join(&name), reading.cloud, alive) {
-                    Ok(source) => sound.push((name, source)),
+                match ScanReader::open(&self.path.join(&name), reading.cloud, alive) {
+                    Ok(reader) => sound.push((name, reader)),
                     Err(error) => watch.refuse(&name, error.to_string()),
                 }
             }
             if sound.len() > 1 {
                 let names: Vec<String> = sound.iter().map(|(name, _)| name.clone()).collect();
-                let why = Error::Ambiguous { names: names.clone() }.to_string();
+                let why = Error::Ambiguous(names.clone()).to_string();
                 names.iter().for_each(|name| watch.refuse(name, why.clone()));
-            } else if let Some((name, mut source)) = sound.pop() {
-                let mut once = Once { out, begun: false };
-                match deliver(source.as_mut(), &reading.known, self.measured, &mut once) {
-                    Ok(checksum) => return Ok(checksum),
-                    // Once columns are on their way there is no second file for this stroke.
-                    Err(error) if once.begun || matches!(error, Error::Host(_)) => {
-                        return Err(error.at(&self.path.join(name)));
+            } else if let Some((name, mut reader)) = sound.pop() {
+                let path = self.path.join(&name);
+                match reading.orient(&mut reader, out) {
+                    Ok(oriented) if self.measured == Some(oriented.checksum()) => {
+                        watch.refuse(&name, Error::Repeated.to_string());
                     }
+                    // Once columns are delivered there is no second file for this stroke.
+                    Ok(oriented) => {
+                        let delivered = deliver(reader, &oriented, out);
+                        return delivered.map(|()| oriented.checksum()).map_err(|error| error.at(&path));
+                    }
+                    Err(error @ Error::Host(_)) => return Err(error.at(&path)),
                     Err(error) => watch.refuse(&name, error.to_string()),
                 }
             }
@@ -117,45 +153,20 @@ impl Folder {
     }
 }
 
-/// Waits `poll` in slices short enough for the host, and gives up while there is time to say why.
+/// Waits `poll` in slices short enough for the host, and ends early enough before the deadline to report the reason.
 pub(crate) fn pause(job: &Job<'_>, poll: Duration, why: String) -> Result<()> {
     const SLICE: Duration = Duration::from_millis(20);
     let mut left = poll;
     while !left.is_zero() {
         job.check()?;
         if job.remaining() < SLICE * 5 {
-            return Err(Error::TooLate { why });
+            return Err(Error::TooLate(why));
         }
         std::thread::sleep(left.min(SLICE));
         left = left.saturating_sub(SLICE);
     }
     job.progress(0.0, &why);
     Ok(())
-}
-
-/// Notes whether anything was delivered.
-struct Once<'a> {
-    out: &'a mut dyn Receiver,
-    begun: bool,
-}
-
-impl Receiver for Once<'_> {
-    fn check(&mut self, fraction: f64, phase: &str) -> Result<()> {
-        self.out.check(fraction, phase)
-    }
-
-    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
-        self.begun = true;
-        self.out.begin(header)
-    }
-
-    fn column(&mut self, column: &Column) -> Result<()> {
-        self.out.column(column)
-    }
-
-    fn end(&mut self, end: &ScanEnd) -> Result<()> {
-        self.out.end(end)
-    }
 }
 
 /// The host as a receiver.
@@ -166,7 +177,7 @@ pub(crate) struct ToHost<'a, 'j, 's> {
 
 impl Receiver for ToHost<'_, '_, '_> {
     fn check(&mut self, fraction: f64, phase: &str) -> Result<()> {
-        self.job.progress(fraction.min(1.0), phase);
+        self.job.progress(fraction, phase);
         Ok(self.job.check()?)
     }
 

@@ -38,22 +38,13 @@
 //! | `cut_azimuth_deg` | where a full circle is cut open, so that the plate is not |
 
 mod device;
-mod e57;
 mod error;
-mod open;
-mod ptx;
-mod regrid;
-mod source;
-mod text;
 mod watch;
-mod window;
-mod xyb;
-mod xyz;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-use platen_scan::orient::{Expected, Mirror, Turn};
+use platen_formats::orient::{Expected, Mirror, Turn};
 use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
 
 use device::{Folder, Reading, ToHost, config};

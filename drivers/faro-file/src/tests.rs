@@ -1,10 +1,3 @@
-//! Files written by others, the same lattice in every way of writing it, and files that are not sound.
+//! Tests of the driver without a host.
 
-mod collect;
-mod damage;
-mod faults;
-mod formats;
-mod samples;
-mod speed;
 mod watching;
-mod write;

@@ -4,14 +4,87 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-use platen_scan::orient::Expected;
+use platen_formats::orient::Expected;
+use platen_formats::{ScanFile, ScanReader};
+use platen_scan::{Column, ScanEnd, ScanHeader, State};
 
-use super::collect::Collected;
-use super::write::*;
-use crate::device::{Folder, Reading};
-use crate::error::Error;
-use crate::open;
+use crate::device::{Folder, Reading, Receiver};
+use crate::error::{Error, Result};
 use crate::watch::{Entry, Listing, Watch, list};
+
+const ROWS: u32 = 24;
+const COLUMNS: u32 = 32;
+const STEP: f64 = 0.012;
+
+/// A small lattice with gaps, its ranges multiplied by `scale`, as a file of the format with this extension.
+fn file(extension: &str, scale: f64) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(format!("scan.{extension}"));
+    let header = ScanHeader {
+        n_rows: ROWS,
+        n_columns: COLUMNS,
+        azimuth_start: 3.0,
+        azimuth_step: STEP,
+        elevation_start: 0.1,
+        elevation_step: STEP,
+        intensity_range: (0, 2047),
+        ..ScanHeader::default()
+    };
+    let mut file = ScanFile::create(&path).unwrap();
+    let mut writer = file.writer(&header).unwrap();
+    for index in 0..COLUMNS {
+        let rows = || (0..ROWS).map(f64::from);
+        let state = |row: u32| match (3 * row + index).is_multiple_of(11) {
+            true => State::NoReturn,
+            false => State::Valid,
+        };
+        let column = Column {
+            index,
+            range_m: rows().map(|row| scale * (5.0 + 0.03 * row + 0.02 * f64::from(index))).collect(),
+            azimuth: vec![3.0 + STEP * f64::from(index); ROWS as usize],
+            elevation: rows().map(|row| 0.1 - STEP * row).collect(),
+            intensity: (0..ROWS as u16).collect(),
+            state: (0..ROWS).map(state).collect(),
+            ..Column::default()
+        };
+        writer.push(&column).unwrap();
+    }
+    let written = writer.finish(&ScanEnd::default()).unwrap();
+    file.persist(written).unwrap();
+    std::fs::read(&path).unwrap()
+}
+
+/// The end of what was delivered, after header and columns in their order.
+#[derive(Debug, Default)]
+struct Collected {
+    header: Option<ScanHeader>,
+    columns: u32,
+    end: Option<ScanEnd>,
+}
+
+impl Receiver for Collected {
+    fn check(&mut self, fraction: f64, _: &str) -> Result<()> {
+        assert!((0.0..=1.0).contains(&fraction), "progress {fraction}");
+        Ok(())
+    }
+
+    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
+        assert!(self.header.replace(header.clone()).is_none());
+        Ok(())
+    }
+
+    fn column(&mut self, column: &Column) -> Result<()> {
+        column.check(self.header.as_ref().unwrap().n_rows).unwrap();
+        self.columns += 1;
+        Ok(())
+    }
+
+    fn end(&mut self, end: &ScanEnd) -> Result<()> {
+        assert_eq!(self.columns, end.columns);
+        assert!(self.end.replace(*end).is_none());
+        Ok(())
+    }
+}
 
 const STABLE: u32 = 3;
 
@@ -136,7 +209,7 @@ fn a_scan_that_comes_too_late_is_not_the_next_one() {
     let mut watched = folder(temporary.path());
     let late = &mut |pause: u32, folder: &Path| {
         if pause == 199 {
-            std::fs::write(folder.join("late.e57"), e57(PLAIN, 1)).unwrap();
+            std::fs::write(folder.join("late.e57"), file("e57", 1.0)).unwrap();
         }
     };
     let missed = follow(&mut watched, "*", late).unwrap_err().to_string();
@@ -158,7 +231,7 @@ fn look(watch: &mut Watch, folder: &Path) -> Vec<String> {
     let due = watch.poll(list(folder));
     let (mut sound, mut refused) = (Vec::new(), Vec::new());
     for name in due {
-        match open::open(&folder.join(&name), None, &|| true) {
+        match ScanReader::open(&folder.join(&name), None, &|| true) {
             Ok(_) => sound.push(name),
             Err(error) => refused.push((name, error.to_string())),
         }
@@ -170,7 +243,7 @@ fn look(watch: &mut Watch, folder: &Path) -> Vec<String> {
 #[test]
 fn preallocated_full_size_is_refused_until_the_bytes_are_there() {
     let folder = tempfile::tempdir().unwrap();
-    let whole = e57(PLAIN, 1);
+    let whole = file("e57", 1.0);
     let mut watch = watch("*.e57", list(folder.path()).unwrap());
     let path = folder.path().join("scan.e57");
     for arrived in [48, 3000, whole.len() - 1] {
@@ -196,7 +269,7 @@ fn fls_is_folder_gets_its_sentence_while_the_export_is_awaited() {
         assert!(look(&mut watch, folder.path()).is_empty());
     }
     assert!(watch.why().contains("FARO scan as a folder"), "{}", watch.why());
-    std::fs::write(folder.path().join("Scan_001.e57"), e57(PLAIN, 1)).unwrap();
+    std::fs::write(folder.path().join("Scan_001.e57"), file("e57", 1.0)).unwrap();
     let taken = (0..10).find_map(|_| look(&mut watch, folder.path()).pop());
     assert_eq!(taken.as_deref(), Some("Scan_001.e57"));
 }
@@ -206,14 +279,14 @@ fn follow(
     folder: &mut Folder,
     pattern: &str,
     act: &mut dyn FnMut(u32, &Path),
-) -> Result<Collected, platen_sdk::Error> {
+) -> std::result::Result<Collected, platen_sdk::Error> {
     let reading = Reading { cloud: None, known: Expected::default() };
     let path = folder.path.clone();
     let (mut collected, mut pauses) = (Collected::default(), 0);
     let mut pause = |why| {
         act(pauses, &path);
         pauses += 1;
-        if pauses == 200 { Err(Error::TooLate { why }) } else { Ok(()) }
+        if pauses == 200 { Err(Error::TooLate(why)) } else { Ok(()) }
     };
     folder.follow(&reading, glob::Pattern::new(pattern).unwrap(), &mut collected, &mut pause, &|| true)?;
     Ok(collected)
@@ -234,9 +307,11 @@ fn folder(path: &Path) -> Folder {
 #[test]
 fn a_scan_that_grows_in_the_folder_is_measured_once_whole() {
     let temporary = tempfile::tempdir().unwrap();
-    for (name, file) in
-        [("a.e57", e57(PLAIN, 1)), ("a.ptx", ptx(PTX, COLUMNS)), ("a.xyz", xyz("698\n", "", false, "\n"))]
-    {
+    for (name, file) in [
+        ("a.e57", file("e57", 1.0)),
+        ("a.ptx", file("ptx", 1.0)),
+        ("a.xyz", [b"698\n".to_vec(), file("xyz", 1.0)].concat()),
+    ] {
         let path = temporary.path().join(name);
         let mut watched = folder(temporary.path());
         let mut write = |pause: u32, _: &Path| {
@@ -262,13 +337,13 @@ fn repeated_scan_under_a_new_name_is_no_new_scan() {
             }
         }
     };
-    follow(&mut watched, "*", &mut write("first.e57", e57(PLAIN, 1))).unwrap();
-    let copied = follow(&mut watched, "*", &mut write("copy.e57", e57(PLAIN, 1))).unwrap_err().to_string();
+    follow(&mut watched, "*", &mut write("first.e57", file("e57", 1.0))).unwrap();
+    let copied = follow(&mut watched, "*", &mut write("copy.e57", file("e57", 1.0))).unwrap_err().to_string();
     assert!(
         copied.contains("no scan in time: copy.e57: the same points as the scan measured before"),
         "{copied}"
     );
-    let other = e57(E57Style { scale: 1.001, ..PLAIN }, 1);
+    let other = file("e57", 1.001);
     follow(&mut watched, "*", &mut write("second.e57", other)).unwrap();
 }
 
@@ -278,8 +353,8 @@ fn two_scans_at_once_are_not_chosen_between() {
     let mut watched = folder(temporary.path());
     let both = &mut |pause: u32, folder: &Path| {
         if pause == 0 {
-            std::fs::write(folder.join("a.e57"), e57(PLAIN, 1)).unwrap();
-            std::fs::write(folder.join("b.ptx"), ptx(PTX, COLUMNS)).unwrap();
+            std::fs::write(folder.join("a.e57"), file("e57", 1.0)).unwrap();
+            std::fs::write(folder.join("b.ptx"), file("ptx", 1.0)).unwrap();
         }
     };
     let refused = follow(&mut watched, "*", both).unwrap_err().to_string();
@@ -290,11 +365,11 @@ fn two_scans_at_once_are_not_chosen_between() {
 fn appended_scan_in_an_old_file_is_not_taken_for_one() {
     let temporary = tempfile::tempdir().unwrap();
     let path = temporary.path().join("a.ptx");
-    std::fs::write(&path, ptx(PTX, COLUMNS)).unwrap();
+    std::fs::write(&path, file("ptx", 1.0)).unwrap();
     let mut watched = folder(temporary.path());
     let append = &mut |pause: u32, _: &Path| {
         if pause == 0 {
-            std::fs::write(&path, [ptx(PTX, COLUMNS), ptx(PTX, COLUMNS)].concat()).unwrap();
+            std::fs::write(&path, [file("ptx", 1.0), file("ptx", 1.0)].concat()).unwrap();
         }
     };
     let refused = follow(&mut watched, "*", append).unwrap_err().to_string();
@@ -305,18 +380,18 @@ fn appended_scan_in_an_old_file_is_not_taken_for_one() {
 fn nothing_in_the_folder_is_written_or_removed() {
     let temporary = tempfile::tempdir().unwrap();
     let mut watched = folder(temporary.path());
-    let file = e57(PLAIN, 1);
+    let scan = file("e57", 1.0);
     let mut write = |pause: u32, folder: &Path| {
         if pause == 0 {
             let path = folder.join("a.e57");
-            std::fs::write(&path, &file).unwrap();
+            std::fs::write(&path, &scan).unwrap();
             let mut read_only = std::fs::metadata(&path).unwrap().permissions();
             read_only.set_readonly(true);
             std::fs::set_permissions(&path, read_only).unwrap();
         }
     };
     follow(&mut watched, "*", &mut write).unwrap();
-    assert_eq!(std::fs::read(temporary.path().join("a.e57")).unwrap(), file);
+    assert_eq!(std::fs::read(temporary.path().join("a.e57")).unwrap(), scan);
     assert_eq!(list(temporary.path()).unwrap().len(), 1);
 }
 

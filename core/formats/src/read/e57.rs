@@ -8,17 +8,18 @@
 use std::io::{Read, Seek, SeekFrom};
 
 use e57::{E57Reader, IndexBounds, PointCloud, RawValues, Record, RecordDataType, RecordName};
-use platen_scan::orient::RawCell;
-use platen_scan::{Direction, ScanHeader, State};
+use platen_scan::{Direction, State};
 
-use crate::error::{Error, Result};
-use crate::source::{About, Source, Visit};
+use super::error::{ReadError, Result};
+use super::{About, Cells, Source};
+use crate::header_text;
+use crate::orient::RawCell;
 
 const FORMAT: &str = "E57";
 const PAGE: u64 = 1024;
 
 /// Seconds from the Unix epoch to that of GPS, less the 18 leap seconds by which UTC lags since 2017.
-const GPS_EPOCH_UNIX_S: f64 = 315_964_800.0 - 18.0;
+pub(crate) const GPS_EPOCH_UNIX_S: f64 = 315_964_800.0 - 18.0;
 
 /// One scan of an E57 file.
 pub(crate) struct E57<R: Read + Seek> {
@@ -51,26 +52,22 @@ impl<R: Read + Seek> Source for E57<R> {
         &self.about
     }
 
-    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
+    fn cells(&mut self) -> Result<Cells<'_>> {
         let points = self.reader.pointcloud_raw(&self.cloud).map_err(|e| unsound(chain(&e)))?;
-        for (number, values) in points.enumerate() {
-            let values = values.map_err(|e| unsound(format!("point {number}: {}", chain(&e))))?;
-            let cell =
-                self.fields.cell(&values).map_err(|what| unsound(format!("point {number}: {what}")))?;
-            if let Some(cell) = cell {
-                visit(&cell)?;
-            }
-        }
-        Ok(())
+        let fields = &self.fields;
+        Ok(Box::new(points.enumerate().filter_map(move |(number, values)| {
+            let cell = values.map_err(|e| chain(&e)).and_then(|values| fields.cell(&values));
+            cell.map_err(|what| unsound(format!("point {number}: {what}"))).transpose()
+        })))
     }
 }
 
-fn unsound(what: String) -> Error {
-    Error::Unsound { format: FORMAT, what }
+fn unsound(what: String) -> ReadError {
+    ReadError::Unsound { format: FORMAT, what }
 }
 
 /// The crate's message with those of its causes that it does not repeat, in one line.
-fn chain(error: &dyn std::error::Error) -> String {
+pub(crate) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(inner) = cause {
@@ -86,15 +83,15 @@ fn chain(error: &dyn std::error::Error) -> String {
 
 /// Compares the header's figures with the file; a sentence when they differ harmlessly.
 fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
-    let incomplete = |what| Err(Error::Incomplete { format: FORMAT, what });
-    let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
-    file.rewind().map_err(Error::io("going back to the start"))?;
+    let incomplete = |what| Err(ReadError::Incomplete { format: FORMAT, what });
+    let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
+    file.rewind().map_err(ReadError::io("going back to the start"))?;
     if length < PAGE {
         return incomplete(format!("{length} bytes, at least {PAGE} needed"));
     }
     let mut header = [0; 48];
-    file.read_exact(&mut header).map_err(Error::io("reading the header"))?;
-    file.rewind().map_err(Error::io("going back to the start"))?;
+    file.read_exact(&mut header).map_err(ReadError::io("reading the header"))?;
+    file.rewind().map_err(ReadError::io("going back to the start"))?;
     let field = |at: usize| header[at..at + 8].iter().rev().fold(0, |n, b| n << 8 | u64::from(*b));
     let (declared, xml_offset, xml_length, page) = (field(16), field(24), field(32), field(40));
     if page != PAGE {
@@ -126,24 +123,24 @@ fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
         match file.read_exact(&mut page) {
             Ok(()) => number += 1,
             Err(end) if end.kind() == std::io::ErrorKind::UnexpectedEof => break,
-            Err(error) => return Err(Error::Io { doing: "reading pages", source: error }),
+            Err(error) => return Err(ReadError::Io { doing: "reading pages", source: error }),
         }
         let (content, checksum) = page.split_at(page.len() - 4);
         if crc32c::crc32c(content).to_be_bytes() != checksum {
-            return Err(Error::Damaged {
+            return Err(ReadError::Damaged {
                 format: FORMAT,
                 what: format!("the checksum of page {number} is wrong"),
             });
         }
     }
-    file.rewind().map_err(Error::io("going back to the start"))
+    file.rewind().map_err(ReadError::io("going back to the start"))
 }
 
 /// The one scan that holds points, or the one asked for.
 fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> {
     let held = clouds.len();
     if let Some(chosen) = chosen {
-        let missing = Error::NoSuchCloud { format: FORMAT, held, chosen };
+        let missing = ReadError::NoSuchCloud { format: FORMAT, held, chosen };
         return chosen.checked_sub(1).and_then(|i| clouds.into_iter().nth(i)).ok_or(missing);
     }
     let name = |(i, cloud): (usize, &PointCloud)| {
@@ -153,7 +150,7 @@ fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> 
     let mut filled = clouds.into_iter().filter(|cloud| cloud.records > 0);
     match (filled.next(), filled.next()) {
         (Some(cloud), None) => Ok(cloud),
-        (Some(_), Some(_)) => Err(Error::Several { format: FORMAT, scans }),
+        (Some(_), Some(_)) => Err(ReadError::Several { format: FORMAT, scans }),
         (None, _) => Err(unsound("it holds no points".to_owned())),
     }
 }
@@ -191,7 +188,7 @@ fn describe(cloud: &PointCloud) -> About {
         intensity: declared_intensity(cloud),
         instrument: instrument.join(" "),
         acquired_unix_s: cloud.acquisition_start.as_ref().map(|time| time.gps_time + GPS_EPOCH_UNIX_S),
-        own: cloud.description.as_deref().and_then(ScanHeader::from_text),
+        written: cloud.description.as_deref().and_then(header_text::from_text),
         notes,
         ..About::default()
     }
@@ -200,8 +197,8 @@ fn describe(cloud: &PointCloud) -> About {
 /// `intensityLimits`, which are in the unit of the values but may be written as raw scaled integers.
 fn declared_intensity(cloud: &PointCloud) -> Option<(f64, f64)> {
     let limits = cloud.intensity_limits.as_ref()?;
-    let own = cloud.prototype.iter().find(|record| record.name == RecordName::Intensity)?;
-    let value = |limit: &e57::RecordValue| limit.to_f64(&own.data_type).ok();
+    let record = cloud.prototype.iter().find(|record| record.name == RecordName::Intensity)?;
+    let value = |limit: &e57::RecordValue| limit.to_f64(&record.data_type).ok();
     Some((value(limits.intensity_min.as_ref()?)?, value(limits.intensity_max.as_ref()?)?))
 }
 
@@ -249,7 +246,7 @@ impl Fields {
         let state =
             if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
         let (Some(row), Some(column)) = (find(RecordName::RowIndex), find(RecordName::ColumnIndex)) else {
-            return Err(Error::Refused {
+            return Err(ReadError::Refused {
                 format: format!("unorganised E57 ({} points without row and column)", cloud.records),
                 instead: "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
             });

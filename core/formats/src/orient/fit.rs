@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::wrap_azimuth;
+use platen_scan::wrap_azimuth;
 
 /// Sums over the valid cells of one row or one column.
 #[derive(Debug, Clone, Copy, Default)]
@@ -138,7 +138,7 @@ fn fit(means: &[Mean]) -> Option<Fit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Direction;
+    use platen_scan::Direction;
 
     fn line(cells: &[Direction]) -> Line {
         let mut line = Line::default();

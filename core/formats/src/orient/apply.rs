@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
-use crate::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
+use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
 /// One normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +66,7 @@ impl<'a> Assembler<'a> {
     ///
     /// # Errors
     /// [`OrientError::Changed`] when cells of the first pass did not come.
-    pub fn finish(self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
+    pub fn finish(&self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
         if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
             return Err(self.changed());
         }

@@ -7,11 +7,10 @@ use platen_scan::Lattice;
 
 use super::collect::read;
 use super::write::*;
-use crate::e57::E57;
-use crate::error::Error;
+use crate::{Format, ReadError, ScanReader};
 
 /// Reads bytes as a file of this name.
-fn read_bytes(bytes: &[u8], name: &str, chosen: Option<usize>) -> Result<Lattice, Error> {
+fn read_bytes(bytes: &[u8], name: &str, chosen: Option<usize>) -> Result<Lattice, ReadError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
@@ -105,7 +104,7 @@ fn one_of_several_scans_must_be_chosen() {
     let two = e57(PLAIN, 2);
     check_refused(&two, "scan.e57", "holds 2 scans (1: 768 points without name, 2: 768 points without name)");
     check_lattice(&read_bytes(&two, "scan.e57", Some(2)).unwrap(), EXACT);
-    assert!(matches!(read_bytes(&two, "scan.e57", Some(3)), Err(Error::NoSuchCloud { held: 2, .. })));
+    assert!(matches!(read_bytes(&two, "scan.e57", Some(3)), Err(ReadError::NoSuchCloud { held: 2, .. })));
 
     let several = [ptx(PTX, COLUMNS), ptx(PtxStyle { colour: true, ..PTX }, 20), b"\n".to_vec()].concat();
     check_refused(&several, "scan.ptx", "holds 2 scans (24 x 32 cells, 24 x 20 cells)");
@@ -197,8 +196,8 @@ fn a_cut_text_file_is_incomplete() {
     for lines in [0, 1, 2, 5, 9, 10, 11, 400, 777] {
         let cut: String = text.lines().take(lines).map(|line| format!("{line}\n")).collect();
         let error = read_bytes(cut.as_bytes(), "scan.ptx", None).unwrap_err();
-        assert!(matches!(error, Error::Incomplete { .. }), "{lines} lines: {error}");
-        assert!(error.may_pass());
+        assert!(matches!(error, ReadError::Incomplete { .. }), "{lines} lines: {error}");
+        assert!(error.is_transient());
     }
     check_refused(
         text.lines().take(700).collect::<Vec<_>>().join("\n").as_bytes(),
@@ -278,7 +277,7 @@ fn a_prototype_of_no_bits_is_refused_before_memory_runs_out() {
     ];
     let file = e57(E57Style { coordinates: scaled, ..PLAIN }, 1);
     let file = edits.iter().fold(file, |file, (from, to)| edited(&file, from, to));
-    let refused = E57::open(Cursor::new(file), None).err().expect("refused");
+    let refused = ScanReader::new(Cursor::new(file), Format::E57, None).err().expect("refused");
     assert!(refused.to_string().contains("no field of a point takes any space"), "{refused}");
 }
 
@@ -305,5 +304,5 @@ fn formats_that_hold_no_lattice_are_named() {
     std::fs::create_dir(&scan).unwrap();
     let refused = read(&scan, None).unwrap_err().to_string();
     assert!(refused.contains("FARO scan as a folder") && refused.contains("structured E57"), "{refused}");
-    assert!(matches!(read(Path::new("/nowhere/scan.e57"), None), Err(Error::Io { .. })));
+    assert!(matches!(read(Path::new("/nowhere/scan.e57"), None), Err(ReadError::Io { .. })));
 }

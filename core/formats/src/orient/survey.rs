@@ -2,7 +2,7 @@
 
 use super::occupancy::{Inserted, Occupancy};
 use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
-use crate::State;
+use platen_scan::State;
 
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
 pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;

@@ -9,7 +9,7 @@ const WINDOW: usize = 1 << 18;
 ///
 /// Readers of pages seek before every page; `BufReader` would throw its buffer away each time. Before every refill
 /// `alive` is asked: on a slow share that is the only place where a cancelled job can be noticed.
-pub(crate) struct Window<'a, R> {
+pub(super) struct Window<'a, R> {
     file: R,
     alive: &'a dyn Fn() -> bool,
     held: Vec<u8>,
@@ -21,7 +21,7 @@ pub(crate) struct Window<'a, R> {
 
 impl<'a, R: Read + Seek> Window<'a, R> {
     /// At the start of `file`.
-    pub(crate) fn new(file: R, alive: &'a dyn Fn() -> bool) -> Self {
+    pub(super) fn new(file: R, alive: &'a dyn Fn() -> bool) -> Self {
         Self { file, alive, held: Vec::new(), start: 0, position: 0 }
     }
 

@@ -1,4 +1,4 @@
-//! Points per second, printed: `cargo test --release -p faro-file speed -- --nocapture`.
+//! Points per second, printed: `cargo test --release -p platen-formats speed -- --nocapture`.
 
 use std::time::Instant;
 

@@ -2,7 +2,7 @@
 
 use super::survey::{MAX_INDEX, MIN_FILL};
 use super::{Mirror, Plan, Unit};
-use crate::{ScanHeader, wrap_azimuth};
+use platen_scan::{ScanHeader, wrap_azimuth};
 
 /// Largest relative difference between a lattice's nominal step and the one fitted to its cells.
 const SAME_STEP: f64 = 0.01;
@@ -10,7 +10,7 @@ const SAME_STEP: f64 = 0.01;
 impl Plan {
     /// Takes over the header of the scan that the file was written from, so that nominal angles, empty edges and notes
     /// are again what they were; `false`, and nothing changed, when the cells say otherwise.
-    pub fn take_over(&mut self, own: &ScanHeader, warm_up_columns: u32) -> bool {
+    pub fn restore(&mut self, own: &ScanHeader, warm_up_columns: u32) -> bool {
         if !self.agrees(own) {
             return false;
         }

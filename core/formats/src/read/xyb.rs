@@ -7,12 +7,12 @@
 
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
-use platen_scan::orient::{Expected, RawCell, Survey};
 use platen_scan::{Direction, State};
 
-use crate::error::{Error, Result};
-use crate::regrid::{self, Placer, Steps};
-use crate::source::{About, Source, Visit};
+use super::error::{ReadError, Result};
+use super::sweeps::{self, Placed, Placer, Steps};
+use super::{About, Cells, Source};
+use crate::orient::{Expected, RawCell, Survey};
 
 const FORMAT: &str = "XYB";
 /// First line, without its version.
@@ -21,7 +21,7 @@ pub(crate) const SIGNATURE: &[u8] = b"# SCENE XYZ binary";
 const MAX_HEADER: u64 = 512;
 const RECORD: usize = 26;
 /// Full scale of the scanner's reflectance.
-const REFLECTANCE: (f64, f64) = (0.0, 2047.0);
+pub(crate) const REFLECTANCE: (f64, f64) = (0.0, 2047.0);
 const BUFFER: usize = RECORD << 13;
 
 /// One scan of an XYB file.
@@ -52,12 +52,12 @@ struct Header {
 impl<R: Read + Seek> Xyb<R> {
     /// Reads the header, checks the length and finds out how records become cells.
     pub(crate) fn open(mut file: R) -> Result<Self> {
-        let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
+        let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
         let header = header(&mut file)?;
         let bytes = length - header.length;
         if bytes == 0 || !bytes.is_multiple_of(RECORD as u64) {
             let what = format!("{bytes} bytes of points, a multiple of {RECORD} needed");
-            return Err(Error::Incomplete { format: FORMAT, what });
+            return Err(ReadError::Incomplete { format: FORMAT, what });
         }
         let cells = bytes / RECORD as u64;
         let about =
@@ -70,10 +70,9 @@ impl<R: Read + Seek> Xyb<R> {
             let steps = xyb.steps()?;
             xyb.order = Order::Hits(steps.clone(), 0);
             let mut lowest = u32::MAX;
-            xyb.cells(&mut |cell| {
-                lowest = lowest.min(cell.row);
-                Ok(())
-            })?;
+            for cell in xyb.cells()? {
+                lowest = lowest.min(cell?.row);
+            }
             xyb.order = Order::Hits(steps, lowest);
             let note = "the file holds hits without row and column: placed by the order of their angles";
             xyb.about.notes.push(note.to_owned());
@@ -87,7 +86,9 @@ impl<R: Read + Seek> Xyb<R> {
         for in_a_line in [rows, columns] {
             self.order = Order::Lines(in_a_line);
             let mut survey = Survey::default();
-            self.cells(&mut |cell| Ok(survey.add(cell)?))?;
+            for cell in self.cells()? {
+                survey.add(&cell?)?;
+            }
             match survey.decide(&Expected::default()) {
                 Ok(_) => return Ok(()),
                 Err(error) => first_error.get_or_insert(error),
@@ -100,7 +101,7 @@ impl<R: Read + Seek> Xyb<R> {
         let mut reader = self.records()?;
         let mut hits = Vec::new();
         while let Some((xyz, _)) = next(&mut reader)?
-            && hits.len() < regrid::SAMPLE
+            && hits.len() < sweeps::SAMPLE
         {
             if is_hit(xyz) {
                 hits.push(Direction::of(xyz));
@@ -110,7 +111,7 @@ impl<R: Read + Seek> Xyb<R> {
     }
 
     fn records(&mut self) -> Result<BufReader<&mut R>> {
-        self.file.seek(SeekFrom::Start(self.offset)).map_err(Error::io("going to the points"))?;
+        self.file.seek(SeekFrom::Start(self.offset)).map_err(ReadError::io("going to the points"))?;
         Ok(BufReader::with_capacity(BUFFER, &mut self.file))
     }
 }
@@ -120,39 +121,47 @@ impl<R: Read + Seek> Source for Xyb<R> {
         &self.about
     }
 
-    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
+    fn cells(&mut self) -> Result<Cells<'_>> {
         let order = self.order.clone();
         let mut reader = self.records()?;
         match order {
             Order::Lines(in_a_line) => {
-                let (mut row, mut column) = (0, 0);
-                while let Some((xyz, intensity)) = next(&mut reader)? {
-                    visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })?;
-                    row += 1;
-                    if row == in_a_line {
-                        (row, column) = (0, column + 1);
-                    }
-                }
-                Ok(())
+                let places = (0..).flat_map(move |column| (0..in_a_line).map(move |row| (row, column)));
+                Ok(Box::new(places.map_while(move |place| {
+                    let record = next(&mut reader).transpose()?;
+                    Some(record.map(|record| cell(place, record)))
+                })))
             }
             Order::Hits(steps, lowest) => {
-                let mut placer = Placer::new(steps);
-                let mut give = |placed: Vec<regrid::Placed<([f64; 3], f64)>>| {
-                    placed.into_iter().try_for_each(|place| {
-                        let (row, column, (xyz, intensity)) =
-                            (place.row.saturating_sub(lowest), place.column, place.record);
-                        visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
-                    })
-                };
-                while let Some((xyz, intensity)) = next(&mut reader)? {
-                    if is_hit(xyz) {
-                        give(placer.push(Direction::of(xyz), (xyz, intensity))?)?;
+                let mut placer = Some(Placer::new(steps));
+                let mut placed = Vec::new().into_iter();
+                Ok(Box::new(std::iter::from_fn(move || {
+                    loop {
+                        if let Some(Placed { row, column, record }) = placed.next() {
+                            return Some(Ok(cell((row.saturating_sub(lowest), column), record)));
+                        }
+                        let column = match next(&mut reader) {
+                            Ok(Some((xyz, _))) if !is_hit(xyz) => continue,
+                            Ok(Some(record)) => placer.as_mut()?.push(Direction::of(record.0), record),
+                            Ok(None) => placer.take()?.finish(),
+                            Err(error) => return Some(Err(error)),
+                        };
+                        match column {
+                            Ok(column) => placed = column.into_iter(),
+                            Err(why) => return Some(Err(why.into())),
+                        }
                     }
-                }
-                give(placer.finish()?)
+                })))
             }
         }
     }
+}
+
+/// Position and reflectance.
+type Point = ([f64; 3], f64);
+
+fn cell((row, column): (u32, u32), (xyz, intensity): Point) -> RawCell {
+    RawCell { row, column, xyz, beam: None, intensity, state: State::Valid }
 }
 
 fn is_hit(xyz: [f64; 3]) -> bool {
@@ -160,7 +169,7 @@ fn is_hit(xyz: [f64; 3]) -> bool {
 }
 
 /// A reason of the placing is one to refuse the file.
-impl From<String> for Error {
+impl From<String> for ReadError {
     fn from(why: String) -> Self {
         Self::Refused {
             format: format!("XYB file of hits alone ({why})"),
@@ -170,13 +179,13 @@ impl From<String> for Error {
 }
 
 /// The next record, `None` behind the last.
-fn next<R: Read>(reader: &mut R) -> Result<Option<([f64; 3], f64)>> {
+fn next<R: Read>(reader: &mut R) -> Result<Option<Point>> {
     let mut record = [0; RECORD];
     let mut filled = 0;
     while filled < RECORD {
-        match reader.read(&mut record[filled..]).map_err(Error::io("reading points"))? {
+        match reader.read(&mut record[filled..]).map_err(ReadError::io("reading points"))? {
             0 if filled == 0 => return Ok(None),
-            0 => return Err(Error::Incomplete { format: FORMAT, what: "a record is cut".to_owned() }),
+            0 => return Err(ReadError::Incomplete { format: FORMAT, what: "a record is cut".to_owned() }),
             n => filled += n,
         }
     }
@@ -190,19 +199,21 @@ fn next<R: Read>(reader: &mut R) -> Result<Option<([f64; 3], f64)>> {
 }
 
 fn header<R: Read + Seek>(file: &mut R) -> Result<Header> {
-    file.rewind().map_err(Error::io("going back to the start"))?;
+    file.rewind().map_err(ReadError::io("going back to the start"))?;
     let mut head = Vec::new();
-    file.by_ref().take(MAX_HEADER).read_to_end(&mut head).map_err(Error::io("reading the header"))?;
+    file.by_ref().take(MAX_HEADER).read_to_end(&mut head).map_err(ReadError::io("reading the header"))?;
     let end = head.windows(4).position(|four| four == [0; 4]);
     let Some(end) = end else {
         let what = format!("no end of the header in {} bytes", head.len());
-        return Err(Error::Incomplete { format: FORMAT, what });
+        return Err(ReadError::Incomplete { format: FORMAT, what });
     };
     let text = String::from_utf8_lossy(&head[..end]);
     let size = |name: &str| {
         let line = text.lines().find_map(|line| line.strip_prefix(name));
-        line.and_then(|number| number.trim().parse().ok())
-            .ok_or_else(|| Error::Unsound { format: FORMAT, what: format!("its header does not say {name}") })
+        line.and_then(|number| number.trim().parse().ok()).ok_or_else(|| ReadError::Unsound {
+            format: FORMAT,
+            what: format!("its header does not say {name}"),
+        })
     };
     Ok(Header { length: end as u64 + 4, rows: size("Rows")?, columns: size("Cols")? })
 }

@@ -7,11 +7,11 @@
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::State;
-use platen_scan::orient::{Mirror, RawCell};
 
-use crate::error::{Error, Result};
-use crate::source::{About, Source, Visit};
-use crate::text::{self, Lines};
+use super::error::{ReadError, Result};
+use super::lines::{self, Lines};
+use super::{About, Cells, Source};
+use crate::orient::{Mirror, RawCell};
 
 const FORMAT: &str = "PTX";
 const HEADER_LINES: u64 = 10;
@@ -44,18 +44,18 @@ struct Part {
 impl<R: Read + Seek> Ptx<R> {
     /// Counts the lines of the whole file and finds the scan; `chosen` counts from 1.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
-        let length = file.seek(SeekFrom::End(0)).map_err(Error::io("finding the length"))?;
-        file.rewind().map_err(Error::io("going back to the start"))?;
+        let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
+        file.rewind().map_err(ReadError::io("going back to the start"))?;
         let mut parts = parts(BufReader::with_capacity(BUFFER, &mut file), length)?;
         let held = parts.len();
         let part = match chosen {
             None if held == 1 => parts.swap_remove(0),
             None => {
                 let size = |p: &Part| format!("{} x {} cells", p.per_column, p.columns);
-                return Err(Error::Several { format: FORMAT, scans: parts.iter().map(size).collect() });
+                return Err(ReadError::Several { format: FORMAT, scans: parts.iter().map(size).collect() });
             }
             Some(chosen) if (1..=held).contains(&chosen) => parts.swap_remove(chosen - 1),
-            Some(chosen) => return Err(Error::NoSuchCloud { format: FORMAT, held, chosen }),
+            Some(chosen) => return Err(ReadError::NoSuchCloud { format: FORMAT, held, chosen }),
         };
         let about = part.describe();
         Ok(Self { file, part, about })
@@ -67,28 +67,26 @@ impl<R: Read + Seek> Source for Ptx<R> {
         &self.about
     }
 
-    fn cells(&mut self, visit: &mut Visit<'_>) -> Result<()> {
-        self.file.seek(SeekFrom::Start(self.part.offset)).map_err(Error::io("going to the scan"))?;
+    fn cells(&mut self) -> Result<Cells<'_>> {
+        let Part { offset, line, columns, per_column, .. } = self.part;
+        self.file.seek(SeekFrom::Start(offset)).map_err(ReadError::io("going to the scan"))?;
         let mut lines = Lines::new(BufReader::with_capacity(BUFFER, &mut self.file));
-        lines.number = self.part.line - 1;
-        for column in 0..self.part.columns {
-            for row in 0..self.part.per_column {
-                let cell = cell(next(&mut lines)?);
-                let (xyz, intensity) =
-                    cell.ok_or_else(|| unsound(lines.number, "4, 7 or 10 numbers of a cell"))?;
-                visit(&RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })?;
-            }
-        }
-        Ok(())
+        lines.number = line - 1;
+        let places = (0..columns).flat_map(move |column| (0..per_column).map(move |row| (row, column)));
+        Ok(Box::new(places.map(move |(row, column)| {
+            let (xyz, intensity) = cell(next(&mut lines)?)
+                .ok_or_else(|| unsound(lines.number, "4, 7 or 10 numbers of a cell"))?;
+            Ok(RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
+        })))
     }
 }
 
 fn cell(line: &[u8]) -> Option<([f64; 3], f64)> {
-    let (fields, n) = text::fields(line);
+    let (fields, n) = lines::fields(line);
     if !matches!(n, 4 | 7 | 10) {
         return None;
     }
-    let [x, y, z, i] = [0, 1, 2, 3].map(|k| text::number(fields[k]));
+    let [x, y, z, i] = [0, 1, 2, 3].map(|k| lines::number(fields[k]));
     Some(([x?, y?, z?], i?))
 }
 
@@ -100,7 +98,7 @@ fn parts<R: BufRead>(reader: R, length: u64) -> Result<Vec<Part>> {
         if !parts.is_empty() && first.iter().all(u8::is_ascii_whitespace) {
             continue; // Blank lines may follow a scan.
         }
-        let columns = text::only_whole(first);
+        let columns = lines::only_whole(first);
         let columns = columns.ok_or_else(|| unsound(lines.number, "the number of columns"))?;
         let part = header(columns, &mut lines)?;
         let cells = u64::from(part.columns) * u64::from(part.per_column);
@@ -120,17 +118,17 @@ fn parts<R: BufRead>(reader: R, length: u64) -> Result<Vec<Part>> {
 
 /// The nine lines behind the number of columns.
 fn header<R: BufRead>(columns: u32, lines: &mut Lines<R>) -> Result<Part> {
-    let per_column = text::only_whole(next(lines)?);
+    let per_column = lines::only_whole(next(lines)?);
     let per_column = per_column.ok_or_else(|| unsound(lines.number, "the cells per column"))?;
     let mut axes = [[0.0; 3]; 4];
     for axis in &mut axes {
-        let numbers = text::numbers(next(lines)?);
+        let numbers = lines::numbers(next(lines)?);
         *axis = numbers
             .ok_or_else(|| unsound(lines.number, "three numbers of the scanner's position or axes"))?;
     }
     let mut matrix = [[0.0; 4]; 4];
     for row in &mut matrix {
-        let numbers = text::numbers(next(lines)?);
+        let numbers = lines::numbers(next(lines)?);
         *row = numbers.ok_or_else(|| unsound(lines.number, "four numbers of the matrix"))?;
     }
     let position = axes[0];
@@ -142,12 +140,12 @@ fn next<R: BufRead>(lines: &mut Lines<R>) -> Result<&[u8]> {
     lines.next()?.ok_or_else(|| incomplete(HEADER_LINES, format_args!("found {number}")))
 }
 
-fn unsound(line: u64, needed: &str) -> Error {
-    Error::Unsound { format: FORMAT, what: format!("line {line} does not hold {needed}") }
+fn unsound(line: u64, needed: &str) -> ReadError {
+    ReadError::Unsound { format: FORMAT, what: format!("line {line} does not hold {needed}") }
 }
 
-fn incomplete(needed: u64, found: std::fmt::Arguments<'_>) -> Error {
-    Error::Incomplete { format: FORMAT, what: format!("{needed} lines needed, {found}") }
+fn incomplete(needed: u64, found: std::fmt::Arguments<'_>) -> ReadError {
+    ReadError::Incomplete { format: FORMAT, what: format!("{needed} lines needed, {found}") }
 }
 
 impl Part {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{Direction, Lattice};
+use platen_scan::{Direction, Lattice};
 
 const ROWS: u32 = 30;
 const COLUMNS: u32 = 40;
@@ -212,7 +212,7 @@ fn a_full_circle_is_cut_where_asked() {
     let lattice = assemble(&plan, &circle).unwrap();
     for column in 0..n as usize {
         let seen = lattice.direction(lattice.cell(column, 4)).unwrap().azimuth;
-        let off = crate::wrap_azimuth(seen - start - step * column as f64);
+        let off = platen_scan::wrap_azimuth(seen - start - step * column as f64);
         assert!(off.abs() < 1e-6, "column {column} at {seen}");
     }
 }

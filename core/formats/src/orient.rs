@@ -24,7 +24,7 @@ pub use apply::Assembler;
 pub use decide::{Plan, Unit};
 pub use survey::Survey;
 
-use crate::{Direction, State};
+use platen_scan::{Direction, State};
 
 /// One cell as a file stores it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use super::fit::{self, Fit, Line};
 use super::intensity::Scale;
 use super::survey::{FAR, MIN_FILL, NEAR, stored_range};
 use super::{Expected, Mirror, OrientError, Survey, Turn};
-use crate::{ScanHeader, wrap_azimuth};
+use platen_scan::{ScanHeader, wrap_azimuth};
 
 /// Correlation from which rows and columns count as following the angles.
 const MIN_CORRELATION: f64 = 0.99;

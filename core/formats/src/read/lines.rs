@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Read};
 
-use crate::error::{Error, Result};
+use super::error::{ReadError, Result};
 
 /// Longest line that is read; scan files stay below 300 bytes.
 const MAX_LINE: u64 = 4096;
@@ -32,7 +32,7 @@ impl<R: BufRead> Lines<R> {
     pub(crate) fn next(&mut self) -> Result<Option<&[u8]>> {
         self.line.clear();
         let mut bounded = self.reader.by_ref().take(MAX_LINE);
-        let n = bounded.read_until(b'\n', &mut self.line).map_err(Error::io("reading a line"))?;
+        let n = bounded.read_until(b'\n', &mut self.line).map_err(ReadError::io("reading a line"))?;
         if n == 0 {
             return Ok(None);
         }
@@ -41,7 +41,7 @@ impl<R: BufRead> Lines<R> {
         self.ended = self.line.last() == Some(&b'\n');
         if !self.ended && n as u64 == MAX_LINE {
             let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
-            return Err(Error::Unsound { format: "text", what });
+            return Err(ReadError::Unsound { format: "text", what });
         }
         let mark: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
         Ok(Some(self.line.strip_prefix(mark).unwrap_or(&self.line)))
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_file_without_line_ends_takes_no_memory() {
         let mut lines = Lines::new(std::io::BufReader::new(std::io::repeat(b'1').take(1 << 20)));
-        assert!(matches!(lines.next(), Err(Error::Unsound { .. })));
+        assert!(matches!(lines.next(), Err(ReadError::Unsound { .. })));
         assert!(lines.line.capacity() <= 2 * MAX_LINE as usize);
     }
 }

@@ -2,22 +2,19 @@
 
 use std::io::Write as _;
 
-use platen_scan::orient::{Expected, Mirror, Turn};
 use platen_scan::{Direction, Lattice};
 
-use super::collect::{Collected, read};
+use super::collect::{self, read};
 use super::write::*;
-use crate::device::Reading;
-use crate::error::Error;
+use crate::orient::{Expected, Mirror, Turn};
+use crate::{ReadError, header_text};
 
 /// Reads bytes under a name, with what the plant says of the scanner.
-fn read_with(bytes: &[u8], name: &str, known: Expected) -> Result<Lattice, Error> {
+fn read_with(bytes: &[u8], name: &str, known: Expected) -> Result<Lattice, ReadError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    let mut collected = Collected::default();
-    Reading { cloud: None, known }.file(&path, &mut collected, &|| true)?;
-    Ok(collected.lattice.unwrap())
+    collect::read_with(&path, None, &known)
 }
 
 #[track_caller]
@@ -138,12 +135,12 @@ fn a_header_that_does_not_fit_its_cells_is_not_believed() {
         ("start", platen_scan::ScanHeader { azimuth_start: 1.0, ..found.clone() }),
         ("step", platen_scan::ScanHeader { elevation_step: f64::NAN, ..found.clone() }),
     ] {
-        std::fs::write(&path, described(PLAIN, &wrong.to_text(3))).unwrap();
+        std::fs::write(&path, described(PLAIN, &header_text::to_text(&wrong, 3))).unwrap();
         assert_eq!(read(&path, None).unwrap().header(), &found, "{name}");
     }
     let own =
         platen_scan::ScanHeader { n_columns: COLUMNS + 2, notes: vec!["as it was".to_owned()], ..found };
-    std::fs::write(&path, described(PLAIN, &own.to_text(3))).unwrap();
+    std::fs::write(&path, described(PLAIN, &header_text::to_text(&own, 3))).unwrap();
     let lattice = read(&path, None).unwrap();
     let mut header = lattice.header().clone();
     assert!(header.notes.remove(0).starts_with("read from E57"));

@@ -1,0 +1,255 @@
+//! Two passes over the cells of a scan file, of any format.
+//!
+//! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
+//! the CRC-32C of all cells. The second ([`ScanReader::columns`]) delivers every column once, as soon as the file has
+//! completed it. Up to 2.6 million cells (210 MB) are kept from the first pass; a larger file is decoded twice, so that
+//! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
+
+mod detect;
+pub(crate) mod e57;
+mod error;
+mod lines;
+mod ptx;
+mod sweeps;
+mod window;
+pub(crate) mod xyb;
+mod xyz;
+
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use platen_scan::{Column, ScanEnd, ScanHeader};
+
+use crate::Format;
+use crate::orient::{Assembler, Expected, Mirror, Plan, RawCell, Survey};
+
+pub use error::ReadError;
+use error::Result;
+
+#[cfg(test)]
+pub(crate) use detect::format;
+
+/// Properties of a scan that its file declares beside the cells.
+#[derive(Debug, Clone, Default)]
+struct About {
+    /// Name of the format, with the encoding of the cells.
+    format: String,
+    /// Cells stored; an estimate for XYZ.
+    cells: u64,
+    /// Smallest and largest intensity declared.
+    intensity: Option<(f64, f64)>,
+    /// Set when the declared frame is left-handed.
+    mirror: Mirror,
+    /// Maker, model, serial number.
+    instrument: String,
+    /// Seconds since 1970 UTC.
+    acquired_unix_s: Option<f64>,
+    /// Header and warm-up columns from a file written by [`crate::ScanFile`].
+    written: Option<(ScanHeader, u32)>,
+    /// One sentence per decision made while opening.
+    notes: Vec<String>,
+}
+
+/// Cells in the order of the file. Nothing follows an error.
+type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + 'a>;
+
+/// A lattice in a file; its cells can be read any number of times.
+trait Source {
+    /// Returns the declared properties.
+    fn about(&self) -> &About;
+    /// Starts at the first cell.
+    fn cells(&mut self) -> Result<Cells<'_>>;
+}
+
+/// One scan of a file.
+pub struct ScanReader<'a> {
+    source: Box<dyn Source + 'a>,
+    /// All cells, after a first pass over a small file.
+    kept: Vec<RawCell>,
+}
+
+/// Largest number of cells that are kept, 210 MB.
+const MAX_KEPT: u64 = 5 << 19;
+/// Cells between two reports of progress.
+const PROGRESS_EVERY: u64 = 1 << 16;
+
+impl<'a> ScanReader<'a> {
+    /// Opens the scan in the file at `path` and checks that the file is complete: lengths, checksums, line counts.
+    ///
+    /// `cloud` counts from 1 and is required where a file holds several scans. Reading stops with an error as soon as
+    /// `alive` returns false. The file is never locked or changed.
+    ///
+    /// # Errors
+    /// Every variant of [`ReadError`] but [`ReadError::Orient`].
+    pub fn open(path: &Path, cloud: Option<usize>, alive: &'a dyn Fn() -> bool) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let data = std::fs::metadata(path).map_err(ReadError::io("looking for the scan"))?;
+        if data.is_dir() {
+            return Err(detect::folder(&extension));
+        }
+        let file = File::open(path).map_err(ReadError::io("opening the scan"))?;
+        let mut file = window::Window::new(file, alive);
+        let mut head = Vec::new();
+        let read = file.by_ref().take(detect::HEAD).read_to_end(&mut head);
+        read.map_err(ReadError::io("reading the scan"))?;
+        file.rewind().map_err(ReadError::io("going back to the start"))?;
+        Self::new(file, detect::format(&head, &extension)?, cloud)
+    }
+
+    /// Opens a scan of known format; as [`ScanReader::open`].
+    ///
+    /// # Errors
+    /// As [`ScanReader::open`].
+    pub fn new(file: impl Read + Seek + 'a, format: Format, cloud: Option<usize>) -> Result<Self> {
+        let source: Box<dyn Source> = match format {
+            Format::E57 => Box::new(e57::E57::open(file, cloud)?),
+            Format::Ptx => Box::new(ptx::Ptx::open(file, cloud)?),
+            Format::Xyz => Box::new(xyz::Xyz::open(file)?),
+            Format::Xyb => Box::new(xyb::Xyb::open(file)?),
+        };
+        Ok(Self { source, kept: Vec::new() })
+    }
+
+    /// First pass: decides the orientation of the lattice. `known` is what the plant declares about the scanner;
+    /// `progress` is called every 65,536 cells with the share read, 0 to 1, and an error from it ends the pass.
+    ///
+    /// # Errors
+    /// The error of `progress`, or a [`ReadError`].
+    pub fn orient<E: From<ReadError>>(
+        &mut self,
+        known: &Expected,
+        mut progress: impl FnMut(f64) -> std::result::Result<(), E>,
+    ) -> std::result::Result<Oriented, E> {
+        let about = self.source.about().clone();
+        let (mut survey, mut checksum) = (Survey::default(), 0);
+        // The declared number saves memory; the real one is decisive.
+        let mut fits = about.cells <= MAX_KEPT;
+        self.kept.clear();
+        for cell in self.source.cells()? {
+            let cell = cell?;
+            fits &= (self.kept.len() as u64) < MAX_KEPT;
+            if fits {
+                self.kept.push(cell);
+            }
+            survey.add(&cell).map_err(ReadError::from)?;
+            checksum = add_to_checksum(checksum, &cell);
+            if survey.cells().is_multiple_of(PROGRESS_EVERY) {
+                progress(share(survey.cells(), about.cells))?;
+            }
+        }
+        if !fits {
+            self.kept = Vec::new();
+        }
+        let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
+        let expected = Expected { intensity: about.intensity, mirror, ..*known };
+        let mut plan = survey.decide(&expected).map_err(ReadError::from)?;
+        let written = about.written.as_ref();
+        if !written.is_some_and(|(header, warm_up_columns)| plan.restore(header, *warm_up_columns)) {
+            plan.header.notes.splice(0..0, about.notes);
+            plan.header.instrument = about.instrument;
+            plan.header.acquired_unix_s = about.acquired_unix_s;
+        }
+        plan.header.notes.insert(0, format!("read from {}", about.format));
+        Ok(Oriented { plan, checksum })
+    }
+
+    /// Second pass: the columns of the oriented lattice.
+    ///
+    /// # Errors
+    /// When the file cannot be read from its start again.
+    pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
+        let total = self.source.about().cells;
+        let cells = match self.kept.as_slice() {
+            [] => self.source.cells()?,
+            kept => Box::new(kept.iter().copied().map(Ok)),
+        };
+        let assembler = Assembler::new(&oriented.plan);
+        Ok(Columns { cells, assembler, rest: None, seen: 0, total })
+    }
+}
+
+/// Result of the first pass.
+#[derive(Debug)]
+pub struct Oriented {
+    plan: Plan,
+    checksum: u32,
+}
+
+impl Oriented {
+    /// Size, angles and notes of the lattice.
+    pub fn header(&self) -> &ScanHeader {
+        &self.plan.header
+    }
+
+    /// CRC-32C of the numbers of all cells; equal for copies of one scan, under any name.
+    pub fn checksum(&self) -> u32 {
+        self.checksum
+    }
+}
+
+/// Columns of a lattice, each once, in the order in which the file completes them. Nothing follows an error.
+pub struct Columns<'a> {
+    cells: Cells<'a>,
+    assembler: Assembler<'a>,
+    /// After the last cell: columns without any stored cell, and the trailer.
+    rest: Option<(std::vec::IntoIter<Column>, ScanEnd)>,
+    seen: u64,
+    total: u64,
+}
+
+impl Columns<'_> {
+    /// Returns the share of cells read, 0 to 1.
+    pub fn share(&self) -> f64 {
+        share(self.seen, self.total)
+    }
+
+    /// Ends the scan after its last column.
+    ///
+    /// # Errors
+    /// [`ReadError::Orient`] when cells of the first pass did not come.
+    pub fn finish(self) -> Result<ScanEnd> {
+        match self.rest {
+            Some((_, end)) => Ok(end),
+            None => Ok(self.assembler.finish()?.1),
+        }
+    }
+
+    fn next_column(&mut self) -> Result<Option<Column>> {
+        if self.rest.is_none() {
+            for cell in &mut self.cells {
+                self.seen += 1;
+                if let Some(column) = self.assembler.push(&cell?)? {
+                    return Ok(Some(column));
+                }
+            }
+            let (empty, end) = self.assembler.finish()?;
+            self.rest = Some((empty.into_iter(), end));
+        }
+        Ok(self.rest.as_mut().and_then(|(empty, _)| empty.next()))
+    }
+}
+
+impl Iterator for Columns<'_> {
+    type Item = Result<Column>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_column().transpose()
+    }
+}
+
+fn share(seen: u64, total: u64) -> f64 {
+    (seen as f64 / total.max(1) as f64).min(1.0)
+}
+
+/// Continues a CRC-32C over position, intensity, row and column of a cell.
+fn add_to_checksum(checksum: u32, cell: &RawCell) -> u32 {
+    let mut bytes = [0; 40];
+    let [x, y, z] = cell.xyz;
+    for (slot, number) in bytes.chunks_exact_mut(8).zip([x, y, z, cell.intensity]) {
+        slot.copy_from_slice(&number.to_le_bytes());
+    }
+    bytes[32..36].copy_from_slice(&cell.row.to_le_bytes());
+    bytes[36..].copy_from_slice(&cell.column.to_le_bytes());
+    crc32c::crc32c_append(checksum, &bytes)
+}
