@@ -10,7 +10,7 @@ use crate::nearest;
 use crate::node::{Entry, Node, NodeKind};
 use crate::source::{Place, Source};
 use crate::table::{TomlTable, number};
-use crate::unit::{Dimension, Unit};
+use crate::unit::Unit;
 use crate::{Fault, Faults};
 
 /// Type of an option.
@@ -174,17 +174,6 @@ pub fn check_options(
     }
 }
 
-/// One warning for each option given that its plugin wants to drop.
-pub fn deprecated_options(raw: &RawOptions, declared: &[OptionDecl]) -> Vec<Fault> {
-    let old = |entry: &Entry| {
-        let option = declared.iter().find(|option| option.name == entry.key)?;
-        let instead = option.deprecated.as_ref()?;
-        let place = Place { key: format!("{}.{}", raw.place.key, entry.key), offset: entry.key_span.start };
-        Some(raw.source.fault(&place, format!("will be dropped; use {instead}")))
-    };
-    raw.entries.iter().filter_map(old).collect()
-}
-
 fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String {
     if let Some(option) = declared.iter().find(|option| near == Some(option.name.as_str())) {
         return format!("{plugin} has no such option; did you mean \"{}\" ({option})?", option.name);
@@ -196,41 +185,6 @@ fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String 
 }
 
 impl OptionDecl {
-    /// What is wrong with the declaration itself; nothing for a sound one.
-    pub fn faults(&self) -> Vec<String> {
-        let mut faults = Vec::new();
-        let mut must = |sound: bool, rule: &str| {
-            if !sound {
-                faults.push(format!("option {:?}: {rule}", self.name));
-            }
-        };
-        let mut letters = self.name.chars();
-        let named = letters.next().is_some_and(|c| c.is_ascii_lowercase())
-            && letters.all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
-        must(named, "the name must be a small letter, then small letters, digits and underscores");
-        must(!self.doc.trim().is_empty(), "a sentence of documentation is missing");
-        must(self.unit.as_deref().is_none_or(|unit| Unit::find(unit).is_some()), "the unit is unknown");
-        must(
-            self.kind != OptionType::Duration || self.declared_unit().dimension() == Dimension::Time,
-            "the unit must be one of time",
-        );
-        must(self.min.zip(self.max).is_none_or(|(min, max)| min <= max), "min is above max");
-        must(
-            (self.kind == OptionType::Choice) != self.choices.is_empty(),
-            "choices are for a choice, which needs them",
-        );
-        must(!(self.required && self.default.is_some()), "a required option has no default");
-        must(!self.secret || self.kind == OptionType::String, "only a text can be secret");
-        faults.extend(
-            self.default_value(&format!("default of option {:?}", self.name))
-                .err()
-                .into_iter()
-                .flatten()
-                .map(|fault| fault.to_string()),
-        );
-        faults
-    }
-
     /// The default, checked as a given value is. Relative paths are left as they are.
     fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
         let Some(default) = &self.default else { return Ok(None) };

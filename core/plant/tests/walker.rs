@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 use platen_plant::{
     Document, OptionDecl, OptionType, OptionValue, RawOptions, Reported, Value, check_options,
-    deprecated_options,
 };
 
 /// Faults of `text` read as a table of known keys, without the file's name.
@@ -212,7 +211,6 @@ fn stream_options() -> Vec<OptionDecl> {
         OptionDecl { min: Some(-1.0), max: Some(1.0), ..option("mirror", OptionType::Floats) },
         option("colour", OptionType::Bool),
         OptionDecl { secret: true, ..option("password", OptionType::String) },
-        OptionDecl { deprecated: Some("range_max".to_owned()), ..metres("far") },
     ]
 }
 
@@ -257,7 +255,7 @@ config/plant.toml:6:11: scanner.options.threads: found 2.5, expected a whole num
 config/plant.toml:7:12: scanner.options.deadline: found \"3 m\", which is length, expected time in s, ms, us, min, h, d
 config/plant.toml:8:14: scanner.options.resolution: found \"ful\", allowed full, quarter; did you mean \"full\"?
 config/plant.toml:9:10: scanner.options.mirror: found 2, allowed -1 to 1
-config/plant.toml:10:1: scanner.options.zzz: faro-stream has no such option; allowed here: address, range_max, threads, deadline, resolution, calibration, mirror, colour, password, far
+config/plant.toml:10:1: scanner.options.zzz: faro-stream has no such option; allowed here: address, range_max, threads, deadline, resolution, calibration, mirror, colour, password
 config/plant.toml:11:15: scanner.options.calibration: is empty, must have at least one character";
     assert_eq!(checked(text), Err(expected.to_owned()));
 }
@@ -284,37 +282,5 @@ fn a_secret_is_read_from_its_file_and_never_quoted() {
     assert_eq!(
         check("password = { key = 's3cret' }"),
         Err(":3:12: options.password: expected a text, { env = \"NAME\" } or { file = \"PATH\" }".to_owned())
-    );
-}
-
-#[test]
-fn deprecated_options_warn_with_their_replacement() {
-    let warnings = deprecated_options(&raw("[scanner.options]\nfar = 3\n"), &stream_options());
-    let expected = "config/plant.toml:4:1: scanner.options.far: will be dropped; use range_max";
-    assert_eq!(warnings.iter().map(ToString::to_string).collect::<Vec<_>>(), [expected]);
-}
-
-#[test]
-fn a_declaration_is_checked_too() {
-    for option in stream_options() {
-        assert_eq!(option.faults(), Vec::<String>::new());
-    }
-    let bad = OptionDecl {
-        unit: Some("furlong".to_owned()),
-        min: Some(2.0),
-        max: Some(1.0),
-        default: Some("'far".to_owned()),
-        doc: " ".to_owned(),
-        ..option("Range", OptionType::Float)
-    };
-    assert_eq!(
-        bad.faults(),
-        [
-            "option \"Range\": the name must be a small letter, then small letters, digits and underscores",
-            "option \"Range\": a sentence of documentation is missing",
-            "option \"Range\": the unit is unknown",
-            "option \"Range\": min is above max",
-            "default of option \"Range\":1:13: invalid literal string, expected `'`",
-        ]
     );
 }
