@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use platen_shape::DiskMesh;
-use platen_shape::mesh::Face;
+use platen_shape::mesh::SmoothFace;
 use serde_json::{Value as Json, json};
 
 use crate::accuracy::Accuracy;
@@ -128,7 +128,7 @@ fn meshes(
     command: &Command,
 ) -> Result<Vec<MeshRow>, CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(e.to_string());
-    let face = Face::of(&one.seen.patch, &one.seen.outline, &shot.spec);
+    let face = SmoothFace::of(&one.seen.patch, &one.seen.outline, &shot.spec);
     let mut rows = Vec::new();
     for n in &command.meshes {
         progress::phase(&format!("flattening {n} vertices"));

@@ -19,7 +19,7 @@ use platen_scan::{ColumnError, ScanHeader, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
-use platen_shape::{Blank, BlankError, Measured, Patch, PlateSpec, Scanned, Turned, turned};
+use platen_shape::{Blank, BlankError, Measured, Patch, PlateSpec, Reorientation, Scanned, reorientation};
 
 use crate::pipeline::Pipeline;
 use crate::plugin::{JobSpec, PluginError, ScanEvent, Scanner, Surfaces};
@@ -56,7 +56,7 @@ pub enum NotMeasured {
     #[error(
         "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
     )]
-    Turned(Turned),
+    Turned(Reorientation),
     /// The scan of the blank is that of another plate.
     #[error("baseline: {0}")]
     Blank(#[from] BlankError),
@@ -181,7 +181,7 @@ pub fn measure_scanned(
     let cut = blank.as_ref().unwrap_or(&ordered);
     let measurement =
         measure(&scanned.patch, &outline, spec, cut, &mut pipeline.flattening, &mut || start.elapsed())?;
-    match last.and_then(|last| turned(&measurement.surface, last.surface)) {
+    match last.and_then(|last| reorientation(&measurement.surface, last.surface)) {
         Some(turned) => Err(NotMeasured::Turned(turned)),
         None => Ok(Measured { outline, blank, measurement, outline_time }),
     }

@@ -8,7 +8,7 @@
 //! | bent back | a bend against the target's sense |
 //! | overshoot | the gap under the worst board where its sense is "bent too far", else 0 |
 //! | beyond | share of the seen area whose curvature exceeds the target's by more than the limit of a board means, 8 g / c^2 |
-//! | energy left | [`platen_shape::Forming`]: elastic energy from the measured to the target's curvature, and its share of the first stroke's |
+//! | energy left | [`platen_shape::BendingEnergy`]: elastic energy from the measured to the target's curvature, and its share of the first stroke's |
 //!
 //! Force, ram depth and die set are those that the press told. What is not known is null, never 0.
 
@@ -20,7 +20,7 @@ use serde::Serialize;
 use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
 use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::{PlantFile, PlateFile};
-use platen_shape::{Forming, Surface, TargetSurface};
+use platen_shape::{BendingEnergy, Surface, TargetSurface};
 
 use crate::picture::Yardstick;
 use crate::{history_view, output_folder};
@@ -205,7 +205,7 @@ impl SequenceStroke {
     fn add_forming(&mut self, surface: &Surface, file: &PlateFile) {
         let target = target(file);
         let tolerance = Yardstick::of(file).tolerance_per_m();
-        let forming = target.and_then(|target| Forming::new(surface, &target, tolerance));
+        let forming = target.and_then(|target| BendingEnergy::new(surface, &target, tolerance));
         self.energy_left_j = forming.map(|forming| forming.energy);
         self.beyond_share = forming.map(|forming| forming.beyond_share);
     }

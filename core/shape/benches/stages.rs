@@ -17,7 +17,7 @@ use divan::Bencher;
 use harmonic::Harmonic;
 use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
-use platen_shape::mesh::Face;
+use platen_shape::mesh::SmoothFace;
 use platen_shape::outline::outline;
 use platen_shape::surface::{SplineFit, UniformKnots};
 use platen_shape::{
@@ -102,13 +102,13 @@ fn outline_of_the_face(bencher: Bencher<'_, '_>) {
 #[divan::bench(sample_count = 10)]
 fn smooth_face(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
-    bencher.bench_local(|| Face::of(&s.patch, &s.outline, &s.spec));
+    bencher.bench_local(|| SmoothFace::of(&s.patch, &s.outline, &s.spec));
 }
 
 #[divan::bench(sample_count = 10)]
 fn mesh(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
-    let face = Face::of(&s.patch, &s.outline, &s.spec);
+    let face = SmoothFace::of(&s.patch, &s.outline, &s.spec);
     bencher.bench_local(|| {
         face.mesh(&s.outline, &s.spec, &s.spec.rectangle(), platen_shape::measure::N_VERTICES)
     });

@@ -3,14 +3,14 @@
 #[cfg(any(test, feature = "closed-form"))]
 pub mod closed_form;
 mod domain;
-mod free;
-mod laplace;
+mod fixed_boundary;
+mod free_boundary;
 
 pub use domain::{
     UnfitMesh, check_fit, edges_of_vertices, first_turned, interior, plane_picture, signed_area,
 };
-pub use free::{LaidFlat, lay_flat, plane_stress};
-pub use laplace::{cotangents, fixed_boundary};
+pub use fixed_boundary::{cotangents, fixed_boundary};
+pub use free_boundary::{LaidFlat, lay_flat, plane_stress};
 
 use crate::mesh::DiskMesh;
 

@@ -1,51 +1,52 @@
-//! From the lattice to the plate: the geometry of platen, as pure functions of their arguments.
+//! The geometry of platen, from the lattice of a scan to the fitted surface of the plate: pure functions.
 //!
-//! The modules follow the data: `extract` finds the plate's scanned face among the samples of a scan,
-//! `outline` its boundary loop, four corners and four edge curves, `mesh` the mid-surface mesh, a flattening
-//! (a plugin, seen here only as the trait `Flatten`) gives every vertex its place on the original plate (`Blank`: its outline),
-//! `surface` fits S(u, v), `evaluate` reads lines, markers and grids off it.
+//! The method is that of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks" (in
+//! short "Masuda et al."), with the departures listed in this crate's README. The rooms in the order of the data; none
+//! uses one below it:
 //!
-//! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket.
+//! | room | in -> out | method |
+//! |---|---|---|
+//! | [`plate`] | - -> [`PlateSpec`], [`Blank`] | nominal size, outline of the blank as cut |
+//! | [`extract`] | columns of a scan -> [`Patch`] | connected components, normals of a low-pass copy, region growing |
+//! | [`outline`](mod@outline) | patch -> [`Outline`] | longest boundary loop, RANSAC corners, interval-censored maximum likelihood of the edges |
+//! | [`mesh`] | patch, outline -> [`DiskMesh`] | Coons patch, mid-surface, Delaunay triangulation |
+//! | [`flatten`] | mesh -> [`Chart`] | interface of the flattening plugins; harmonic map and free-boundary development |
+//! | [`surface`] | patch, chart -> [`Surface`] | bicubic spline S(u, v), smoothing by restricted maximum likelihood |
+//! | [`evaluate`] | surface -> places, lines, grid | positions and curvatures with their standard deviations |
+//! | [`measure`](mod@measure) | patch, outline -> [`Measurement`] | the stages from mesh to surface in one call |
+//! | [`target`] | target shape -> [`TargetSurface`] | closed forms; rigid registration (Kabsch) |
+//! | [`correspondence`] | two scans of a plate | outline of the blank by a baseline scan; test for a plate put back turned |
+//! | [`inspection`] | outline, surface -> figures | dimension checks, bending energy, marker detection, calibration |
+//!
+//! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket, and works on one
+//! thread at a time: the same columns give the same result to the last bit.
 
-mod baseline;
-mod blank;
-pub mod calibration;
-mod checks;
-pub mod discs;
+pub mod correspondence;
 pub mod evaluate;
 pub mod extract;
 pub mod flatten;
-mod forming;
+pub mod inspection;
 pub mod measure;
 pub mod mesh;
 pub mod outline;
-mod patch;
-mod plane;
-mod plate;
-mod sheet;
-mod stages;
+pub mod plate;
 pub mod surface;
-mod target;
-mod turned;
+pub mod target;
 
-pub use baseline::BlankError;
-pub use blank::Blank;
-pub use checks::{Check, EdgeCheck, ShapeChecks};
+pub use correspondence::{BlankError, Reorientation, reorientation};
+pub use extract::{Beyond, Crossing, Patch, Sample};
 pub use flatten::{Chart, Flatten, FlattenError};
-pub use forming::Forming;
-pub use measure::{MeasureError, Measurement, measure};
+pub use inspection::{BendingEnergy, Check, EdgeCheck, ShapeChecks};
+pub use measure::{MeasureError, Measured, Measurement, Scanned, measure};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
-pub use outline::{Corner, EdgeCurve, Outline, OutlineError};
-pub use patch::{Beyond, Crossing, Patch, Sample};
-pub use plate::{PlateSpec, RegionOfInterest};
-pub use sheet::Sheet;
-pub use stages::{Measured, Scanned};
+pub use outline::{Corner, EdgeCurve, HeightField, Outline, OutlineError};
+pub use plate::{Blank, PlateSpec, RegionOfInterest};
+
 pub use surface::{Surface, SurfaceParts};
 pub use target::{Placement, TargetError, TargetSurface};
-pub use turned::{Turned, turned};
 
 /// Half width of a 95 % interval in standard deviations: every stated uncertainty and level of detection is expanded by it.
 pub const EXPANDED: f64 = 1.96;
 
-/// A point or vector in space, metres, scanner frame unless said.
+/// A point or vector in space, metres, scanner frame unless stated otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -1,20 +1,22 @@
 //! From the plate's samples and outline to its surface S(u, v): one stroke, in the order of the data.
 //!
 //! ```text
-//! Patch, Outline -> Face (smooth face and mid-surface) -> DiskMesh -> Chart (the flattening) -> Surface
+//! Patch, Outline -> SmoothFace (smooth face and mid-surface) -> DiskMesh -> Chart (the flattening) -> Surface
 //! ```
 
 #[cfg(test)]
 mod scene;
-mod settle;
+mod stages;
 #[cfg(test)]
 mod tests;
+
+pub use stages::{Measured, Scanned};
 
 use std::time::Duration;
 
 use crate::evaluate::Location;
-use crate::mesh::{Face, MeshError};
-use crate::surface::{Surface, Undetermined};
+use crate::mesh::{MeshError, SmoothFace};
+use crate::surface::{FitToSamples, Quality, Surface, Undetermined, fit_surface};
 use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
 
 /// Vertices of the mesh: as many as the paper's.
@@ -39,27 +41,10 @@ pub struct Measurement {
     pub timings: Timings,
 }
 
-/// How good the scan was.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
-    /// Samples on the plate.
-    pub n_samples: usize,
-    /// Samples that count: not thrown out as outliers.
-    pub n_used: usize,
-    /// Share of the plate that was seen.
-    pub coverage: f64,
-    /// Standard deviation of the range as observed about the smooth face, metres.
-    pub noise: f64,
-    /// Root mean square distance of the samples from S, metres, weighted as in the fit.
-    pub rms: f64,
-    /// Mean distance of neighbouring samples on the plate, metres.
-    pub lattice_step: f64,
-}
-
 /// Time spent in each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// Face, mid-surface and mesh.
+    /// SmoothFace, mid-surface and mesh.
     pub mesh: Duration,
     /// Flattening.
     pub flatten: Duration,
@@ -94,22 +79,21 @@ pub fn measure(
     clock: &mut dyn FnMut() -> Duration,
 ) -> Result<Measurement, MeasureError> {
     let start = clock();
-    let face = Face::of(patch, outline, spec);
+    let face = SmoothFace::of(patch, outline, spec);
     let (mesh, places) = face.mesh(outline, spec, blank, N_VERTICES)?;
     let meshed = clock();
     let chart = flatten.flatten(&mesh)?;
     chart.check(&mesh)?;
     let flattened = clock();
-    let settled = settle::settle(patch, &face, &places, &chart, spec)?;
+    let FitToSamples { surface, quality } = fit_surface(patch, &face, &places, &chart, spec)?;
     let fitted = clock();
-    let surface = settled.surface;
     Ok(Measurement {
         corners: blank.corners.map(|[u, v]| surface.face(u, v)),
         location: Location::new(&mesh, &chart),
         surface,
         mesh,
         chart,
-        quality: settled.quality,
+        quality,
         timings: Timings {
             mesh: meshed.saturating_sub(start),
             flatten: flattened.saturating_sub(meshed),

@@ -1,14 +1,14 @@
 //! From samples and outline to the triangle mesh of the plate's mid-surface, on which a flattening works.
 
+mod coons_patch;
 mod disk;
-mod edges;
 mod error;
-mod face;
 mod facets;
+mod smooth_face;
 mod topology;
-mod triangulate;
+mod triangulation;
 
 pub use disk::{DiskMesh, DiskParts};
 pub use error::MeshError;
-pub use face::Face;
 pub(crate) use facets::Facets;
+pub use smooth_face::SmoothFace;

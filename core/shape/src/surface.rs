@@ -5,9 +5,12 @@
 //! deviation here is that of the normal direction; how well a material point is located within the surface is the
 //! flattening's affair.
 
+mod fit_surface;
 mod mask;
 mod parts;
 
+pub use fit_surface::Quality;
+pub(crate) use fit_surface::{FitToSamples, fit_surface};
 pub use mask::Mask;
 pub use parts::{SurfaceError, SurfaceParts};
 pub use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};

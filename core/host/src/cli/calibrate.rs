@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use jiff::Timestamp;
 use platen_plant::{PlantFile, PlateFile, PluginUse};
-use platen_shape::calibration::{ArtefactGap, Pooled, artefact_gaps, covering};
+use platen_shape::inspection::calibration::{ArtefactGap, Pooled, artefact_gaps, covering};
 use platen_shape::{Surface, TargetSurface};
 use serde::Serialize;
 

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use platen_plant::PlateFile;
-use platen_shape::discs::{self, Disc};
+use platen_shape::inspection::marker_detection::{DetectedMarker, NoMarker, detect_marker};
 use serde::Serialize;
 
 use super::setup::Setup;
@@ -110,13 +110,13 @@ fn look(
     plate: &PlateFile,
     scanned: &Scanned,
     measured: &Measured,
-) -> Vec<Result<Disc, discs::NoDisc>> {
+) -> Vec<Result<DetectedMarker, NoMarker>> {
     let reach = metres(command.within_mm);
     let surface = &measured.measurement.surface;
-    plate.markers.iter().map(|marker| discs::find(&scanned.patch, surface, marker.at, reach)).collect()
+    plate.markers.iter().map(|marker| detect_marker(&scanned.patch, surface, marker.at, reach)).collect()
 }
 
-fn record(command: &Command, plate: &PlateFile, discs: &[Result<Disc, discs::NoDisc>]) -> Found {
+fn record(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, NoMarker>]) -> Found {
     let markers: Vec<MarkerRecord> = plate
         .markers
         .iter()

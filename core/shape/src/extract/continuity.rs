@@ -6,7 +6,7 @@ use platen_scan::ScanHeader;
 /// each other than this factor times the sum of their ranges times the angle between them (paper, eq. 1).
 const FACTOR: f64 = 1.618_033_988_749_895;
 
-/// The same at 82 degrees: a strongly bent plate is seen so along the line of sight. Down a column two cells are joined
+/// The same at 82 degrees: a strongly bent plate is seen so along the line of beam. Down a column two cells are joined
 /// up to there if the ranges before and behind them change at nearly the same rate, which they do not at an edge.
 const STEEP_FACTOR: f64 = 3.59;
 const STEEP_RATES: f32 = 2.0;

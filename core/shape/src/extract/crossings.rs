@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::local::LocalFace;
-use super::mixed::Pixel;
-use super::noise::Noise;
+use super::local_quadric::LocalQuadric;
+use super::mixed_pixels::Pixel;
+use super::patch::{Beyond, Crossing};
+use super::range_noise::Noise;
 use super::window::Window;
-use crate::patch::{Beyond, Crossing};
 
 /// How far along a row or a column the face may go on behind a gap, cells.
 const WIDEST_GAP: usize = 48;
@@ -30,7 +30,7 @@ pub(super) fn find(
     pixels: &[Pixel],
     number: impl Fn(usize) -> u32,
 ) -> (Vec<Crossing>, f64) {
-    let mut fits: BTreeMap<(usize, usize), Option<LocalFace>> = BTreeMap::new();
+    let mut fits: BTreeMap<(usize, usize), Option<LocalQuadric>> = BTreeMap::new();
     let mut crossings = Vec::new();
     let mut cut = 0.0;
     let scene = Scene { window, noise, face, pixels };
@@ -52,8 +52,8 @@ pub(super) fn find(
                 continue;
             }
             let Some(end) = scene.end_of_face(index, step) else { continue };
-            let tile = LocalFace::tile(window, index);
-            let fit = fits.entry(tile).or_insert_with(|| LocalFace::fit(window, face, tile));
+            let tile = LocalQuadric::tile(window, index);
+            let fit = fits.entry(tile).or_insert_with(|| LocalQuadric::fit(window, face, tile));
             let crossing = fit.as_ref().and_then(|fit| scene.crossing(fit, index, step, end, number(index)));
             match crossing {
                 Some((crossing, false)) => crossings.push(crossing),
@@ -112,7 +112,7 @@ impl Scene<'_> {
     /// The crossing, and whether the face goes on beyond the region of interest.
     fn crossing(
         &self,
-        fit: &LocalFace,
+        fit: &LocalQuadric,
         index: usize,
         step: (isize, isize),
         end: End,
@@ -155,7 +155,7 @@ impl Scene<'_> {
             normal: inside.normal,
             mixed,
             mixed_excess: mixed_excess as f32,
-            complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Untold),
+            complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
             beyond,
         };
@@ -165,7 +165,7 @@ impl Scene<'_> {
     /// Range of the cell `at` behind the face's continuation `far` steps from `index`.
     fn excess(
         &self,
-        fit: &LocalFace,
+        fit: &LocalQuadric,
         at: usize,
         far: usize,
         index: usize,
@@ -179,7 +179,13 @@ impl Scene<'_> {
 
     /// Where the face meets a side face: its ranges fall behind the face's continuation in proportion to the way
     /// from the common edge. Needs three sound cells in a row that do so.
-    fn crease(&self, fit: &LocalFace, index: usize, step: (isize, isize), far: usize) -> Option<(f64, f64)> {
+    fn crease(
+        &self,
+        fit: &LocalQuadric,
+        index: usize,
+        step: (isize, isize),
+        far: usize,
+    ) -> Option<(f64, f64)> {
         if far != 1 {
             return None;
         }

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use platen_scan::ScanHeader;
 
-use super::columns::{Cell, Columns, MARGIN, union, with_margin};
-use super::regions::{Regions, Run};
-use super::sight::{Sight, Turn};
+use super::beam_directions::{AngleSinCos, BeamDirection};
+use super::column_store::{Cell, ColumnStore, MARGIN, union, with_margin};
+use super::connected_components::{Components, Run};
 
 /// Cells of one or more components with a margin, column after column: index `column * n_rows + row`, both counted from
 /// the window's own corner. Only cells within [`MARGIN`] of the component are filled.
@@ -28,15 +28,20 @@ pub(super) struct Window {
     pub(super) spans: Vec<Range<usize>>,
     pub(super) header: ScanHeader,
     /// Nominal azimuth of each column and elevation of each row.
-    azimuths: Vec<Turn>,
-    elevations: Vec<Turn>,
+    azimuths: Vec<AngleSinCos>,
+    elevations: Vec<AngleSinCos>,
     /// One over the steps of azimuth and elevation.
     per_step: (f64, f64),
 }
 
 impl Window {
     /// The window around components, given by their roots.
-    pub(super) fn of(roots: &[u32], regions: &mut Regions, columns: &Columns, header: &ScanHeader) -> Self {
+    pub(super) fn of(
+        roots: &[u32],
+        regions: &mut Components,
+        columns: &ColumnStore,
+        header: &ScanHeader,
+    ) -> Self {
         let extent = regions.extent_of_all(roots);
         let first_column = extent.columns.0.saturating_sub(MARGIN);
         let first_row = extent.rows.0.saturating_sub(MARGIN);
@@ -57,10 +62,10 @@ impl Window {
             header: header.clone(),
             per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
             azimuths: (first_column..end_column)
-                .map(|i| Turn::of(header.azimuth_start + header.azimuth_step * f64::from(i)))
+                .map(|i| AngleSinCos::of(header.azimuth_start + header.azimuth_step * f64::from(i)))
                 .collect(),
             elevations: (first_row..end_row)
-                .map(|i| Turn::of(header.elevation_start - header.elevation_step * f64::from(i)))
+                .map(|i| AngleSinCos::of(header.elevation_start - header.elevation_step * f64::from(i)))
                 .collect(),
         };
         let own: Vec<Vec<Run>> = (first_column..end_column)
@@ -95,7 +100,7 @@ impl Window {
         }
     }
 
-    fn fill(&mut self, i: usize, wanted: &[Range<u32>], columns: &Columns) {
+    fn fill(&mut self, i: usize, wanted: &[Range<u32>], columns: &ColumnStore) {
         let Some(column) = columns.get(self.first_column + i as u32) else { return };
         let azimuth = self.azimuths[i];
         for segment in &column.segments {
@@ -113,18 +118,18 @@ impl Window {
                 let places = self.inverse[at.clone()].iter_mut().zip(&mut self.points[at]);
                 let cells = cells.iter().zip(&self.elevations[row..]).zip(places);
                 for ((cell, elevation), (inverse, point)) in cells.filter(|((cell, _), _)| cell.valid) {
-                    let sight = Sight {
+                    let beam = BeamDirection {
                         azimuth: azimuth.by(f64::from(cell.azimuth_off)),
                         elevation: elevation.by(f64::from(cell.elevation_off)),
                     };
                     *inverse = 1.0 / cell.range_m;
-                    *point = (sight.unit() * f64::from(cell.range_m)).into();
+                    *point = (beam.unit() * f64::from(cell.range_m)).into();
                 }
             }
         }
     }
 
-    /// Columns and the rows of each where cells are filled, without the `margin` outermost ones of the window.
+    /// ColumnStore and the rows of each where cells are filled, without the `margin` outermost ones of the window.
     pub(super) fn inner_spans(&self, margin: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
         let columns = margin..self.n_columns.saturating_sub(margin).max(margin);
         let last = self.n_rows.saturating_sub(margin);
@@ -134,15 +139,15 @@ impl Window {
 
     /// Nominal direction of a cell.
     #[inline]
-    pub(super) fn nominal(&self, column: usize, row: usize) -> Sight {
-        Sight { azimuth: self.azimuths[column], elevation: self.elevations[row] }
+    pub(super) fn nominal(&self, column: usize, row: usize) -> BeamDirection {
+        BeamDirection { azimuth: self.azimuths[column], elevation: self.elevations[row] }
     }
 
     /// Direction of a place in or near the window, in cells and parts of cells, on the nominal lattice.
-    pub(super) fn sight(&self, column: f64, row: f64) -> Sight {
+    pub(super) fn beam_at(&self, column: f64, row: f64) -> BeamDirection {
         let nearest = |x: f64, n: usize| ((x + 0.5).max(0.0) as usize).min(n - 1);
         let (i, k) = (nearest(column, self.n_columns), nearest(row, self.n_rows));
-        Sight {
+        BeamDirection {
             azimuth: self.azimuths[i].by((column - i as f64) * self.header.azimuth_step),
             elevation: self.elevations[k].by((k as f64 - row) * self.header.elevation_step),
         }

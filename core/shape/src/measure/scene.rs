@@ -6,7 +6,8 @@ use super::{Measurement, measure};
 use crate::flatten::{cotangents, fixed_boundary};
 use crate::surface::Derivatives;
 use crate::{
-    Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, Outline, Patch, PlateSpec, Sample, Sheet, Vec3,
+    Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, HeightField, Outline, Patch, PlateSpec,
+    Sample, Vec3,
 };
 use platen_numerics::random::Random;
 
@@ -141,8 +142,9 @@ impl Scene {
             }
             EdgeCurve { points, seen, sigma: 0.1 * self.sigma }
         });
-        let sheet = Sheet::between(corners.map(|c| c.point), &self.patch()).expect("a sheet");
-        Outline { corners, edges, sheet }
+        let height_field =
+            HeightField::between(corners.map(|c| c.point), &self.patch()).expect("a height_field");
+        Outline { corners, edges, height_field }
     }
 
     pub(super) fn measure(&self) -> Measurement {

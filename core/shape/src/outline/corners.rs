@@ -28,7 +28,7 @@ const LEVELLED: usize = 4;
 /// by a few degrees only.
 const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
 
-/// Seen along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
+/// Coverage along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
 const BULGE: f64 = 0.03;
 
 /// A corner in the plane, and the place on the loop where its two edges part.

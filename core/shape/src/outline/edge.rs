@@ -6,11 +6,11 @@
 
 use nalgebra::{Cholesky, Dyn, Vector2};
 
-use super::bracket::{self, Beam, Bracket, Line};
-use super::posterior::Posterior;
-use super::seen::Seen;
-use super::settled::Settled;
-use super::strip::Strip;
+use super::coverage::Coverage;
+use super::developed_strip::DevelopedStrip;
+use super::edge_likelihood::{self, BeamModel, EdgeLikelihood, Line};
+use super::edge_posterior::Posterior;
+use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
@@ -41,7 +41,7 @@ const FOOTPRINT_ROUNDS: usize = 3;
 /// The crossings of an edge in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeData {
-    strip: Strip,
+    strip: DevelopedStrip,
     lines: Vec<Line>,
     dithered: bool,
     from: Vec3,
@@ -54,12 +54,12 @@ impl EdgeData {
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
     pub(super) fn new(
-        crossings: &[Settled],
+        crossings: &[ProjectedCrossing],
         [from, to]: [Vec3; 2],
         thickness: f64,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
-        let strip = Strip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
+        let strip = DevelopedStrip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
         let line = |crossing| Line::new(&strip, crossing, thickness, sampling.angle);
         let lines: Vec<Line> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
@@ -72,7 +72,7 @@ impl EdgeData {
 pub(super) fn footprint(edges: &[EdgeData], sampling: Sampling) -> f64 {
     let any = edges.iter().any(|edge| edge.dithered);
     let telling = edges.iter().filter(|edge| edge.dithered || !any);
-    bracket::footprint(telling.flat_map(|edge| &edge.lines), sampling.angle)
+    edge_likelihood::footprint(telling.flat_map(|edge| &edge.lines), sampling.angle)
 }
 
 /// True when the edge, about at `base`, crosses so many columns and rows of the lattice that where it lies between them
@@ -88,10 +88,10 @@ fn is_dithered(lines: &[Line], base: impl Fn(f64) -> f64, step: f64) -> bool {
 /// An edge as a curve in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
-    strip: Strip,
+    strip: DevelopedStrip,
     posterior: Posterior,
     /// Where crossings agree with it.
-    pub(super) seen: Seen,
+    pub(super) seen: Coverage,
     pub(super) from: f64,
     pub(super) to: f64,
 }
@@ -108,14 +108,14 @@ impl Edge {
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
-        let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(Beam::of(footprint), noise));
-        let mut used: Vec<Bracket> = brackets(footprint).collect();
+        let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(BeamModel::of(footprint), noise));
+        let mut used: Vec<EdgeLikelihood> = brackets(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         let mut own = footprint;
         for _ in 0..FOOTPRINT_ROUNDS {
             let last = own;
             if footprint > 0.0 {
-                own = bracket::footprint_at(&lines, |along| curve.at(along), footprint);
+                own = edge_likelihood::footprint_at(&lines, |along| curve.at(along), footprint);
             }
             // The same footprint gives the same curve, and that one the same footprint.
             if own == last {
@@ -131,7 +131,7 @@ impl Edge {
             Posterior::sampled(&curve, &prior, &lines, [from, to], footprint, sampling).ok_or_else(too_few)?
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
-        let seen = Seen::new(agreeing.map(|b| b.along), step);
+        let seen = Coverage::new(agreeing.map(|b| b.along), step);
         Ok(Self { strip, posterior, seen, from, to })
     }
 
@@ -166,7 +166,7 @@ impl Edge {
 /// lesser maximum of the likelihood, 1 mm off, and the footprint that it tells would keep it there.
 fn most_likely(
     prior: &CurveFit,
-    brackets: &[Bracket],
+    brackets: &[EdgeLikelihood],
     step: f64,
 ) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
@@ -192,7 +192,7 @@ fn most_likely(
 /// One Newton step of a curve.
 fn pulled(
     prior: &CurveFit,
-    brackets: &[Bracket],
+    brackets: &[EdgeLikelihood],
     curve: &SplineCurve,
     least_soft: f64,
 ) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {

@@ -1,6 +1,6 @@
 //! Gaps of scans with a systematic error, once the scanner is calibrated on an artefact.
 
-use platen_shape::calibration::{artefact_gaps, covering};
+use platen_shape::inspection::calibration::{artefact_gaps, covering};
 
 use super::*;
 

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use platen_plant::PlateFile;
-use platen_shape::discs::{Disc, NoDisc};
 use platen_shape::evaluate;
+use platen_shape::inspection::marker_detection::{DetectedMarker, NoMarker};
 use platen_shape::{Measurement, Patch, Vec3};
 
 /// Largest width of the picture, pixels.
@@ -108,7 +108,7 @@ pub(super) fn draw(
     patch: &Patch,
     measurement: &Measurement,
     plate: &PlateFile,
-    discs: &[Result<Disc, NoDisc>],
+    discs: &[Result<DetectedMarker, NoMarker>],
 ) -> Result<String, png::EncodingError> {
     let Some(view) = View::of(patch) else { return Ok(String::new()) };
     let [width, height] = view.size();

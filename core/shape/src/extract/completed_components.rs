@@ -1,0 +1,100 @@
+//! Which components may be the plate, and the work on those that have ended while columns still arrive.
+
+use std::collections::BTreeSet;
+
+use super::column_store::MARGIN;
+use super::connected_components::Extent;
+use super::extent::WidthBound;
+use super::segmented_component::SegmentedComponent;
+use super::{Extractor, LEAST_PART, OUTGROWN, Refusal, plate_selection};
+use crate::Patch;
+
+/// A component of at most this area and width, in parts of the plate's area and diagonal, holds little besides
+/// the plate. Larger ones are looked at only when no plate is found among these.
+const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
+
+/// A component of at least this part of the plate's area is looked at as soon as it has ended. Smaller ones wait: looked
+/// at, every piece of furniture in a dome would hold memory until the end.
+const CLOSED_PART: f64 = 0.3;
+
+/// What is known of a component before the last column has come.
+#[derive(Debug, Clone)]
+pub(super) struct Completed {
+    pub(super) surface: SegmentedComponent,
+    /// Label and outcome of the face that has the plate's size all by itself.
+    pub(super) plate: Option<(u32, Result<Patch, Refusal>)>,
+}
+
+impl Extractor {
+    /// Looks at the components that ended so many columns before `newest` that nothing more joins them: most of the
+    /// work on the plate is done before the last column comes, as long as columns come in order.
+    pub(super) fn look_at_closed(&mut self, newest: u32) {
+        if newest != self.in_order || self.check().is_err() {
+            return;
+        }
+        self.in_order += 1;
+        let Some(last) = newest.checked_sub(MARGIN + 1) else { return };
+        let runs = self.columns.get(last).map_or(0..0, |column| column.runs.clone());
+        let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
+        for root in roots {
+            let extent = self.regions.extent(root);
+            let large = extent.area_mm2 >= self.plate_mm2(CLOSED_PART);
+            if extent.columns.1 == last && large && self.is_near_size(root) {
+                let surface = self.surface(&[root]);
+                let plate = self.plate_of(&surface);
+                self.closed.insert(root, Completed { surface, plate });
+            }
+        }
+    }
+
+    /// The face of a surface that has the plate's size by itself, worked out as if it were chosen.
+    fn plate_of(&self, surface: &SegmentedComponent) -> Option<(u32, Result<Patch, Refusal>)> {
+        let pieces = self.pieces(std::slice::from_ref(surface), 0);
+        let candidates = plate_selection::candidates(&pieces);
+        let fitting = candidates.iter().find(|c| c.pieces.len() == 1 && c.fits(&self.spec))?;
+        let label = pieces[fitting.pieces[0]].label;
+        Some((label, self.patch(surface, &[surface.region(label, &surface.window)])))
+    }
+
+    /// True when a component may hold a piece of the plate.
+    fn may_be_plate(&self, extent: Extent) -> bool {
+        (self.plate_mm2(LEAST_PART)..=self.plate_mm2(OUTGROWN)).contains(&extent.area_mm2)
+    }
+
+    /// True when a component holds little besides the plate.
+    fn is_near_size(&mut self, root: u32) -> bool {
+        let extent = self.regions.extent(root);
+        if extent.area_mm2 > self.plate_mm2(NEAR_SIZE.0) {
+            return false;
+        }
+        let mut spread = WidthBound::default();
+        for index in extent.columns.0..=extent.columns.1 {
+            let Some(column) = self.columns.get(index) else { continue };
+            let azimuth = self.header.azimuth_start + self.header.azimuth_step * f64::from(index);
+            let (sin_az, cos_az) = azimuth.sin_cos();
+            for run in self.regions.runs_of(&[root], column.runs.clone()) {
+                for row in [run.first_row, run.end_row - 1] {
+                    let (sin_el, cos_el) = self.elevation[row as usize];
+                    let range = f64::from(column.range(row));
+                    spread.add([cos_el * cos_az, cos_el * sin_az, sin_el].map(|c| c * range));
+                }
+            }
+        }
+        spread.width() <= NEAR_SIZE.1 * self.spec.width.hypot(self.spec.height)
+    }
+
+    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
+    pub(super) fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
+        let mut roots = Vec::new();
+        for index in 0..self.columns.len() {
+            let runs = self.columns.get(index).map_or(0..0, |column| column.runs.clone());
+            for number in runs {
+                let root = self.regions.root(number);
+                if self.may_be_plate(self.regions.extent(root)) && !roots.contains(&root) {
+                    roots.push(root);
+                }
+            }
+        }
+        roots.into_iter().partition(|root| self.closed.contains_key(root) || self.is_near_size(*root))
+    }
+}

@@ -1,0 +1,290 @@
+//! The face around a few cells as a quadratic function over its tangent plane.
+//!
+//! In space, not over the lattice: a bent plate is a quadratic there however obliquely it is seen and however far apart
+//! its samples are, while the range along a row grows without bound towards the horizon of a bend. Noise along the
+//! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit.
+
+use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+
+use super::window::Window;
+use crate::Vec3;
+use platen_numerics::simd::dispatch_simd;
+
+/// Cells on a side of the square that shares one fit.
+pub(super) const TILE: usize = 4;
+
+/// Cells beyond the square on each side that enter the fit: 16 x 16 at most.
+const REACH: usize = 6;
+
+/// Fewest cells that carry a fit of six coefficients.
+const LEAST_CELLS: usize = 16;
+
+/// Newton steps to where a beam meets the face, at most; each squares an error of a few parts in a hundred, and one of less
+/// than this, metres, is the last.
+const STEPS: usize = 4;
+const STILL: f64 = 1e-8;
+
+/// Height over the tangent plane: c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2, all in metres, x and y in units of the
+/// cells' own spacing along two axes of the plane.
+#[derive(Debug, Clone)]
+pub(super) struct LocalQuadric {
+    centre: Vec3,
+    /// Axes of the plane, each over its unit.
+    along: [Vec3; 2],
+    /// Unit normal of the plane, towards the scanner.
+    up: Vec3,
+    coefficients: SVector<f64, 6>,
+    normal_matrix: Cholesky<f64, nalgebra::Const<6>>,
+}
+
+/// A place on the face or on its continuation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OnFace {
+    pub(super) range: f64,
+    pub(super) point: Vec3,
+    /// Unit normal towards the scanner.
+    pub(super) normal: Vec3,
+    /// Place in the fit's own coordinates.
+    at: [f64; 2],
+}
+
+fn basis([x, y]: [f64; 2]) -> SVector<f64, 6> {
+    SVector::from([1.0, x, y, x * x, x * y, y * y])
+}
+
+/// Which monomial is the product of two functions of the basis, of 1, x, y, x^2, x y, y^2, x^3, x^2 y, x y^2, y^3, x^4, x^3 y,
+/// x^2 y^2, x y^3, y^4.
+const PRODUCTS: [[usize; 6]; 6] = [
+    [0, 1, 2, 3, 4, 5],
+    [1, 3, 4, 6, 7, 8],
+    [2, 4, 5, 7, 8, 9],
+    [3, 6, 7, 10, 11, 12],
+    [4, 7, 8, 11, 12, 13],
+    [5, 8, 9, 12, 13, 14],
+];
+
+/// Points of a fit at most.
+const MOST: usize = (TILE + 2 * REACH) * (TILE + 2 * REACH);
+
+/// Lanes of a sum, to fill vector registers.
+const LANES: usize = 16;
+
+/// Sum of terms over whole lanes of two lists.
+#[inline(always)]
+fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for lane in 0..LANES {
+            lanes[lane] += term(a[lane], b[lane]);
+        }
+    }
+    let mut half = LANES / 2;
+    while half > 0 {
+        (0..half).for_each(|lane| lanes[lane] += lanes[lane + half]);
+        half /= 2;
+    }
+    lanes[0]
+}
+
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    sum(a, b, |a, b| a * b)
+}
+
+/// The points of a fit, by coordinate, with zeros up to whole lanes.
+struct Points {
+    n: usize,
+    by_axis: [[f64; MOST]; 3],
+}
+
+impl Points {
+    fn new() -> Self {
+        Self { n: 0, by_axis: [[0.0; MOST]; 3] }
+    }
+
+    /// Adds those points that are `wanted`: all are written, and the next one goes over one that is not.
+    #[inline(always)]
+    fn extend<'p>(&mut self, points: impl Iterator<Item = (&'p [f64; 3], bool)>) {
+        for (point, wanted) in points {
+            (0..3).for_each(|d| self.by_axis[d][self.n] = point[d]);
+            self.n += usize::from(wanted);
+        }
+        if self.n < MOST {
+            (0..3).for_each(|d| self.by_axis[d][self.n] = 0.0);
+        }
+    }
+
+    #[inline(always)]
+    fn axes(&self) -> [&[f64]; 3] {
+        let len = self.n.next_multiple_of(LANES).min(MOST);
+        self.by_axis.each_ref().map(|numbers| &numbers[..len])
+    }
+
+    /// Moves the origin into the middle of the points, and returns where that was.
+    #[inline(always)]
+    fn centre(&mut self) -> Vec3 {
+        let n = self.n;
+        let centre = Vec3::from(self.axes().map(|x| sum(x, x, |x, _| x) / n as f64));
+        for (numbers, centre) in self.by_axis.iter_mut().zip(centre.iter()) {
+            numbers[..n].iter_mut().for_each(|x| *x -= centre);
+        }
+        centre
+    }
+
+    /// Coordinate of each point along an axis.
+    #[inline(always)]
+    fn along(&self, axis: &Vec3) -> [f64; MOST] {
+        let mut along = [0.0; MOST];
+        let [x, y, z] = self.axes();
+        for (((along, x), y), z) in along.iter_mut().zip(x).zip(y).zip(z) {
+            *along = axis.x * x + axis.y * y + axis.z * z;
+        }
+        along
+    }
+}
+
+/// Products of two lists.
+#[inline(always)]
+fn times(a: &[f64], b: &[f64]) -> [f64; MOST] {
+    let mut product = [0.0; MOST];
+    product.iter_mut().zip(a).zip(b).for_each(|((product, a), b)| *product = a * b);
+    product
+}
+
+impl LocalQuadric {
+    /// The square of cells that shares a fit with `index`.
+    pub(super) fn tile(window: &Window, index: usize) -> (usize, usize) {
+        (index / window.n_rows / TILE, index % window.n_rows / TILE)
+    }
+
+    /// Fits the cells of `face` in and around a tile. `None` when they are too few or all on a line.
+    pub(super) fn fit(window: &Window, face: &[bool], tile: (usize, usize)) -> Option<Self> {
+        let span =
+            |tile: usize, n: usize| (tile * TILE).saturating_sub(REACH)..(tile * TILE + TILE + REACH).min(n);
+        let rows = span(tile.1, window.n_rows);
+        let mut points = Points::new();
+        for column in span(tile.0, window.n_columns) {
+            let cells = column * window.n_rows + rows.start..column * window.n_rows + rows.end;
+            points.extend(window.points[cells.clone()].iter().zip(face[cells].iter().copied()));
+        }
+        if points.n < LEAST_CELLS {
+            return None;
+        }
+        dispatch_simd(
+            #[inline(always)]
+            || Self::through(&mut points),
+        )
+    }
+
+    #[inline(always)]
+    fn through(points: &mut Points) -> Option<Self> {
+        let centre = points.centre();
+        let (along, up) = plane(points, centre)?;
+        let len = points.axes()[0].len();
+        let [x, y, z] = [along[0], along[1], up].map(|axis| points.along(&axis));
+        let [x, y, z] = [&x[..len], &y[..len], &z[..len]];
+        let [xx, xy, yy] = [times(x, x), times(x, y), times(y, y)];
+        let [xx, xy, yy] = [&xx[..len], &xy[..len], &yy[..len]];
+        // Of the first order nothing is left: the origin is the middle.
+        let second = [dot(x, x), dot(x, y), dot(y, y)];
+        let third = [dot(xx, x), dot(xx, y), dot(xy, y), dot(yy, y)];
+        let fourth = [dot(xx, xx), dot(xx, xy), dot(xy, xy), dot(xy, yy), dot(yy, yy)];
+        let mut moments = [0.0; 15];
+        moments[0] = points.n as f64;
+        moments[3..6].copy_from_slice(&second);
+        moments[6..10].copy_from_slice(&third);
+        moments[10..].copy_from_slice(&fourth);
+        let b = SVector::from([0.0, dot(z, x), dot(z, y), dot(z, xx), dot(z, xy), dot(z, yy)]);
+        let mut a = SMatrix::from_fn(|i, k| moments[PRODUCTS[i][k]]);
+        // A trace of ridge on the second order alone lets a narrow strip fall back to a plane.
+        for k in 3..6 {
+            a[(k, k)] += 1.0;
+        }
+        let normal_matrix = Cholesky::new(a)?;
+        let coefficients = normal_matrix.solve(&b);
+        Some(Self { centre, along, up, coefficients, normal_matrix })
+    }
+
+    /// The face, or its continuation, in the direction (`column`, `row`) in lattice coordinates of the window.
+    ///
+    /// `None` where the continuation does not meet the beam.
+    pub(super) fn at(&self, window: &Window, column: f64, row: f64) -> Option<OnFace> {
+        let beam = window.beam_at(column, row).unit();
+        let c = &self.coefficients;
+        let slopes = |[x, y]: [f64; 2]| [c[1] + 2.0 * c[3] * x + c[4] * y, c[2] + c[4] * x + 2.0 * c[5] * y];
+        let mut range = self.up.dot(&self.centre) / self.up.dot(&beam);
+        let mut at = [0.0; 2];
+        for _ in 0..STEPS {
+            let off = beam * range - self.centre;
+            at = self.along.map(|axis| axis.dot(&off));
+            let [by_x, by_y] = slopes(at);
+            let above = self.up.dot(&off) - basis(at).dot(c);
+            let approach =
+                self.up.dot(&beam) - by_x * self.along[0].dot(&beam) - by_y * self.along[1].dot(&beam);
+            let step = above / approach;
+            range -= step;
+            // Behind the horizon of a bend the beam passes above the face or meets it from below.
+            if approach.is_nan() || approach >= 0.0 || range.is_nan() || range <= 0.0 {
+                return None;
+            }
+            if step.abs() < STILL {
+                break;
+            }
+        }
+        let [by_x, by_y] = slopes(at);
+        let normal = self.up - self.along[0] * by_x - self.along[1] * by_y;
+        Some(OnFace { range, point: beam * range, normal: normal.normalize(), at })
+    }
+
+    /// Variance of the range there, in units of that of a sample.
+    pub(super) fn leverage(&self, place: &OnFace) -> f64 {
+        let f = basis(place.at);
+        f.dot(&self.normal_matrix.solve(&f))
+    }
+}
+
+/// The plane through points about their centre, which is their origin: two axes at right angles, each over the mean spacing of points
+/// along it, and the unit normal towards the scanner. `None` when the points lie on a line.
+#[inline(always)]
+fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
+    let [x, y, z] = points.axes();
+    let (xy, xz, yz) = (dot(x, y), dot(x, z), dot(y, z));
+    let eigen = Matrix3::new(dot(x, x), xy, xz, xy, dot(y, y), yz, xz, yz, dot(z, z)).symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let up = eigen.eigenvectors.column(least).into_owned();
+    let up = if up.dot(&centre) > 0.0 { -up } else { up };
+    let axis = |k: usize| {
+        let k = (least + k) % 3;
+        // k even steps have a mean square of k^2 / 12; as many along one axis as along the other.
+        let spacing = (12.0 * eigen.eigenvalues[k]).sqrt() / points.n as f64;
+        (spacing > 0.0).then(|| eigen.eigenvectors.column(k) / spacing)
+    };
+    Some(([axis(1)?, axis(2)?], up))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bent plate's points as far apart as a coarse lattice has them at a grazing beam.
+    #[test]
+    fn a_bend_is_continued_beyond_its_points() {
+        let radius = 5.0;
+        let point = |s: f64, y: f64| {
+            let (sin, cos) = (s / radius).sin_cos();
+            Vec3::new(6.0 + radius * sin, y, -3.6 - radius * (1.0 - cos))
+        };
+        let mut points = Points::new();
+        let bend: Vec<[f64; 3]> = (0..160)
+            .map(|i| point(0.8 + 0.04 * f64::from(i % 10), 0.02 * f64::from(i / 10)).into())
+            .collect();
+        points.extend(bend.iter().map(|point| (point, true)));
+        let face = LocalQuadric::through(&mut points).expect("a face");
+        let beyond = point(1.24, 0.1);
+        let off = beyond - face.centre;
+        let at = face.along.map(|axis| axis.dot(&off));
+        let height = face.up.dot(&off) - basis(at).dot(&face.coefficients);
+        // Of 0.5 mm of noise one part in six is noise across the face here.
+        assert!(height.abs() < 1e-4, "{height}");
+    }
+}

@@ -1,0 +1,161 @@
+//! Pieces of faces, joined across what hides a strip of the plate.
+//!
+//! A chain or the ram in front of the plate can cut its face into components. Two pieces are one face when, on most rows
+//! or columns that hold both, the surface leaves the one and enters the other as one smooth curve, and what stands
+//! between them is nearer than both or was not measured. So are the parts of a face on both sides of the seam of the
+//! scanner's faces, where warm-up columns are left out.
+
+use super::faces::Face;
+use super::smoothed_normals::Normal;
+use super::window::Window;
+use crate::Vec3;
+
+/// Cells from a piece's end to where its normal is taken.
+const INSET: usize = 3;
+
+/// Lines (rows or columns) that must hold both pieces, and the part of them that must agree.
+const LEAST_LINES: usize = 8;
+const AGREEING: f64 = 0.6;
+
+/// Smallest radius of curvature across a hidden strip, metres, and what noise may add to an angle, radians.
+const LEAST_RADIUS: f64 = 2.0;
+const ANGLE_NOISE: f64 = 0.06;
+
+/// How far beside the curve an end may lie, metres: the scanner's two faces disagree by millimetres, and where the
+/// columns left out at their seam are few, this and the noise of a single sample turn the chord far more than
+/// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far above.
+const STEP: f64 = 3e-3;
+
+/// Widest hidden strip, metres.
+const WIDEST_STRIP: f64 = 1.5;
+
+/// One end of a piece on a line of the lattice.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    /// Column on a row, row on a column.
+    place: u32,
+    point: Vec3,
+    normal: Vec3,
+    /// What lies next to it is nearer, or was not measured.
+    hidden: bool,
+    /// Cells next to it that were not measured, up to [`INSET`].
+    unmeasured: u32,
+}
+
+/// A face of a component, with its ends on all rows and columns.
+#[derive(Debug, Clone)]
+pub(super) struct FacePiece {
+    /// Number of the surface that it is a face of.
+    pub(super) surface: usize,
+    pub(super) label: u32,
+    pub(super) area: f64,
+    pub(super) n_cells: usize,
+    /// Points on it for its extent: about one in 256 cells.
+    pub(super) outline: Vec<Vec3>,
+    rows: Ends,
+    columns: Ends,
+}
+
+/// First and last end on the lines from `first` on.
+#[derive(Debug, Clone)]
+struct Ends {
+    first: u32,
+    ends: Vec<Option<[End; 2]>>,
+}
+
+impl FacePiece {
+    pub(super) fn new(
+        surface: usize,
+        window: &Window,
+        labels: &[u32],
+        face: &Face,
+        normals: &[Normal],
+    ) -> Self {
+        let lines = |rows: bool| lines(window, labels, face.label, normals, rows);
+        let (rows, columns) = (lines(true), lines(false));
+        let outline = [&rows, &columns]
+            .into_iter()
+            .flat_map(|lines| lines.ends.iter().step_by(4).flatten().flat_map(|[a, b]| [a.point, b.point]));
+        let outline = outline.collect();
+        Self { surface, label: face.label, area: face.area, n_cells: face.n_cells, outline, rows, columns }
+    }
+
+    /// True when `other` continues this piece behind something nearer.
+    pub(super) fn continues_in(&self, other: &Self) -> bool {
+        agree(&self.rows, &other.rows) || agree(&self.columns, &other.columns)
+    }
+}
+
+fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: bool) -> Ends {
+    let n_rows = window.n_rows;
+    let (n_lines, n_places, first, offset) = if rows {
+        (n_rows, window.n_columns, window.first_row, window.first_column)
+    } else {
+        (window.n_columns, n_rows, window.first_column, window.first_row)
+    };
+    let index = |line: usize, place: usize| if rows { place * n_rows + line } else { line * n_rows + place };
+    // First and last place of each line, from one pass through the cells as they lie.
+    let mut spans: Vec<Option<[usize; 2]>> = vec![None; n_lines];
+    for (column, labels) in labels.chunks_exact(n_rows.max(1)).enumerate() {
+        for (row, _) in labels.iter().enumerate().filter(|(_, of_cell)| **of_cell == label) {
+            let (line, place) = if rows { (row, column) } else { (column, row) };
+            spans[line].get_or_insert([place; 2])[1] = place;
+        }
+    }
+    let ends = spans.into_iter().enumerate().map(|(line, span)| {
+        let [low, high] = span?;
+        let end = |place: usize, outward: isize| {
+            let inner = place.saturating_add_signed(-outward * INSET as isize).clamp(low, high);
+            let at = index(line, place);
+            // Something nearer, or nothing at all: columns that were left out, a patch without echo.
+            let beside = (1..=INSET).filter_map(|far| place.checked_add_signed(outward * far as isize));
+            let beside = beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
+            let near = window.cells[at].range_m - IN_FRONT;
+            let hidden = beside.clone().all(|cell| !cell.valid)
+                || beside.clone().any(|cell| cell.valid && cell.range_m < near);
+            let unmeasured = beside.take_while(|cell| !cell.valid).count() as u32;
+            let normal = Vec3::from(normals[index(line, inner)].map(f64::from));
+            End { place: offset + place as u32, point: window.points[at].into(), normal, hidden, unmeasured }
+        };
+        Some([end(low, -1), end(high, 1)])
+    });
+    Ends { first, ends: ends.collect() }
+}
+
+/// What hides the plate stands at least so far in front of it, metres.
+const IN_FRONT: f32 = 0.03;
+
+fn agree(a: &Ends, b: &Ends) -> bool {
+    let (mut together, mut agreeing) = (0, 0);
+    for (line, ends) in (a.first..).zip(&a.ends) {
+        let other = line.checked_sub(b.first).and_then(|i| b.ends.get(i as usize));
+        if let (Some([a_low, a_high]), Some(Some([b_low, b_high]))) = (ends, other) {
+            let facing = if a_high.place < b_low.place {
+                (a_high, b_low)
+            } else if b_high.place < a_low.place {
+                (b_high, a_low)
+            } else {
+                continue;
+            };
+            together += 1;
+            agreeing += usize::from(one_curve(facing.0, facing.1));
+        }
+    }
+    together >= LEAST_LINES && agreeing as f64 >= AGREEING * together as f64
+}
+
+/// True when a curve of nearly constant curvature leads from one end to the other, which lies farther on their line:
+/// the chord makes equal and opposite angles with the surface at both, as far as a small step between them lets it.
+fn one_curve(a: &End, b: &End) -> bool {
+    let chord = b.point - a.point;
+    let length = chord.norm();
+    let (sin_a, sin_b) = (a.normal.dot(&chord) / length, b.normal.dot(&chord) / length);
+    let turn = a.normal.angle(&b.normal);
+    let step = STEP / length;
+    let nothing_between = b.place - a.place == a.unmeasured + 1;
+    (a.hidden && b.hidden || nothing_between)
+        && length < WIDEST_STRIP
+        && (sin_a + sin_b).abs() < ANGLE_NOISE + 2.0 * step
+        && sin_a.abs().max(sin_b.abs()) < length / LEAST_RADIUS + ANGLE_NOISE + step
+        && turn < length / LEAST_RADIUS + ANGLE_NOISE
+}

@@ -1,0 +1,146 @@
+//! The plane shape that a curved plate was cut as: least membrane energy with free edges.
+//!
+//! The unknowns are the plane places x of the vertices; with G a triangle's metric in space and M = [x1 - x0, x2 - x0],
+//! E = (M^-T G M^-1 - I) / 2 is its Green strain. Moving the places by d changes E by -(grad d + grad d') / 2 as long
+//! as E is small, so that each step is one of linear elasticity (plane stress), and the stiffness of the start serves for all:
+//!
+//! ```text
+//! sum over triangles of A e(d) : D : e(h) = sum of A E : D : e(h)   for all h,   e(d) = (grad d + grad d') / 2
+//! ```
+//!
+//! A developable plate has a place without any strain, and that is found, whatever the law: to second order of the mesh's
+//! sides, 10 um on 5 m at R 5 m. On double curvature the law matters: what another one does to the outline is of the order of the
+//! strain that is left, times the plate's size.
+
+use super::domain::{first_turned, plane_picture, signed_area};
+use super::fixed_boundary::{cotangents, fixed_boundary};
+use crate::mesh::DiskMesh;
+use platen_numerics::sparse::{Graph, SparseError, Spd};
+
+/// Poisson's ratio of steel.
+const POISSON: f64 = 0.3;
+/// The last step is shorter than this, metres.
+const TOLERANCE: f64 = 1e-7;
+/// Steps allowed; three or four are usual, each shorter by the strain or the turn that is left.
+const MAX_STEPS: usize = 20;
+/// Stiffness that holds the plate in its place; no force acts there, so that any does.
+const HELD: f64 = 1.0;
+
+/// The plate laid flat.
+#[derive(Debug, Clone)]
+pub struct LaidFlat {
+    /// Per vertex: place in the plane, metres; corner (0,0) in the origin, corner (W,0) on the u axis.
+    pub uv: Vec<[f64; 2]>,
+    /// Root mean square of the strain that is left, over the plate.
+    pub strain: f64,
+}
+
+/// Lays the mesh flat, its edges free; `None` when it folds over on the way.
+///
+/// Cost: two sparse Cholesky factorisations.
+///
+/// # Errors
+/// [`SparseError`] when the mesh is too rough to be solved for.
+pub fn lay_flat(mesh: &DiskMesh) -> Result<Option<LaidFlat>, SparseError> {
+    let mut uv = fixed_boundary(mesh, &cotangents(mesh))?;
+    if first_turned(&mesh.triangles, &uv).is_some() {
+        return Ok(None);
+    }
+    let metrics: Vec<[f64; 3]> = mesh.triangles.iter().map(|t| metric(mesh, t)).collect();
+    let [origin, on_axis] = [0, 1].map(|k| mesh.boundary[mesh.corners[k] as usize]);
+    let spd = stiffness(mesh, &uv, [origin, on_axis])?;
+    for _ in 0..MAX_STEPS {
+        let mut load = vec![[0.0; 2]; uv.len()];
+        for (t, metric) in mesh.triangles.iter().zip(&metrics) {
+            let (area, hats) = hats(t.map(|v| uv[v as usize]));
+            let [e11, e22, e12] = strain(&hats, metric);
+            let lateral = POISSON * (e11 + e22);
+            let stress =
+                [(1.0 - POISSON) * e11 + lateral, (1.0 - POISSON) * e22 + lateral, (1.0 - POISSON) * e12]
+                    .map(|s| area * s / (1.0 - POISSON * POISSON));
+            for (v, hat) in t.iter().zip(hats) {
+                let slot = &mut load[*v as usize];
+                slot[0] += stress[0] * hat[0] + stress[2] * hat[1];
+                slot[1] += stress[2] * hat[0] + stress[1] * hat[1];
+            }
+        }
+        (0..2).for_each(|c| load[origin as usize][c] -= HELD * uv[origin as usize][c]);
+        load[on_axis as usize][1] -= HELD * uv[on_axis as usize][1];
+        let mut columns = [load];
+        spd.solve(&mut columns)?;
+        let [step] = columns;
+        let mut longest = 0.0_f64;
+        for (x, d) in uv.iter_mut().zip(&step) {
+            longest = longest.max(d[0].hypot(d[1]));
+            (0..2).for_each(|c| x[c] += d[c]);
+        }
+        if longest.is_nan() || first_turned(&mesh.triangles, &uv).is_some() {
+            return Ok(None);
+        }
+        if longest < TOLERANCE {
+            let strain = rms_strain(mesh, &metrics, &uv);
+            return Ok(Some(LaidFlat { uv, strain }));
+        }
+    }
+    Ok(None)
+}
+
+/// The stiffness of the flat plate at the places `uv`, held in its place at two corners.
+fn stiffness(mesh: &DiskMesh, uv: &[[f64; 2]], [origin, on_axis]: [u32; 2]) -> Result<Spd<2>, SparseError> {
+    let nodes: Vec<_> = (0..uv.len() as u32).map(Some).collect();
+    let graph = Graph::of_elements(&mesh.triangles, &nodes, uv.len());
+    let mut spd = Spd::<2>::analyse(&graph, &plane_picture(mesh))?;
+    for t in &mesh.triangles {
+        let (area, hats) = hats(t.map(|v| uv[v as usize]));
+        for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)] {
+            spd.add(t[i], t[j], plane_stress(hats[i], hats[j], POISSON).map(|row| row.map(|x| area * x)));
+        }
+    }
+    spd.add(origin, origin, [[HELD, 0.0], [0.0, HELD]]);
+    spd.add(on_axis, on_axis, [[0.0, 0.0], [0.0, HELD]]);
+    spd.factor()?;
+    Ok(spd)
+}
+
+/// The block of two hat gradients in linear plane stress, per area, Young's modulus 1.
+#[must_use]
+pub fn plane_stress(a: [f64; 2], b: [f64; 2], poisson: f64) -> [[f64; 2]; 2] {
+    let young = 1.0 / (1.0 - poisson * poisson);
+    let shear = 0.5 * (1.0 - poisson) * young;
+    [
+        [young * a[0] * b[0] + shear * a[1] * b[1], young * poisson * a[0] * b[1] + shear * a[1] * b[0]],
+        [young * poisson * a[1] * b[0] + shear * a[0] * b[1], young * a[1] * b[1] + shear * a[0] * b[0]],
+    ]
+}
+
+/// Metric of a triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
+fn metric(mesh: &DiskMesh, t: &[u32; 3]) -> [f64; 3] {
+    let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+    let (e1, e2) = (b - a, c - a);
+    [e1.dot(&e1), e1.dot(&e2), e2.dot(&e2)]
+}
+
+/// Area of a plane triangle and the gradients of its three hat functions.
+fn hats([a, b, c]: [[f64; 2]; 3]) -> (f64, [[f64; 2]; 3]) {
+    let area = signed_area([a, b, c]);
+    let hat = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / (2.0 * area), (q[0] - p[0]) / (2.0 * area)];
+    (area, [hat(b, c), hat(c, a), hat(a, b)])
+}
+
+/// Green's strain 11, 22, 12: the rows of M^-1 are the gradients of the second and third hat function.
+fn strain([_, p, q]: &[[f64; 2]; 3], [g11, g12, g22]: &[f64; 3]) -> [f64; 3] {
+    let stretch =
+        |i: usize, j: usize| g11 * p[i] * p[j] + g12 * (p[i] * q[j] + q[i] * p[j]) + g22 * q[i] * q[j];
+    [0.5 * (stretch(0, 0) - 1.0), 0.5 * (stretch(1, 1) - 1.0), 0.5 * stretch(0, 1)]
+}
+
+fn rms_strain(mesh: &DiskMesh, metrics: &[[f64; 3]], uv: &[[f64; 2]]) -> f64 {
+    let (mut square, mut total) = (0.0, 0.0);
+    for (t, metric) in mesh.triangles.iter().zip(metrics) {
+        let (area, hats) = hats(t.map(|v| uv[v as usize]));
+        let [a, b, c] = strain(&hats, metric);
+        square += area * (a * a + b * b + 2.0 * c * c);
+        total += area;
+    }
+    (square / total).sqrt()
+}

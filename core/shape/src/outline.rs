@@ -1,0 +1,220 @@
+//! The boundary of the scanned face: four corners and four edge curves.
+//!
+//! As in the paper's 3.2: the mesh of lattice neighbours and its longest boundary loop (`boundary`), corner candidates by
+//! the angle to the k-th neighbours, lines near them by RANSAC and their intersections (`corners`), a spline
+//! along each edge (`edge`). Beyond the paper: the edge is located between the lattice's samples, from the places
+//! where rows and columns leave the face, brought onto the face smoothed as a whole (`settled`), in the strip along it rolled
+//! out into the plane (`strip`). What hides a part of an edge or a corner's neighbourhood takes its crossings out (`rim`);
+//! the curve goes through what is left.
+
+mod boundary_loop;
+mod corners;
+mod coverage;
+mod developed_strip;
+mod edge;
+mod edge_likelihood;
+mod edge_posterior;
+mod error;
+mod height_field;
+mod plane;
+mod projected_crossing;
+mod visible_boundary;
+
+pub use error::OutlineError;
+pub use height_field::HeightField;
+pub(crate) use height_field::{SPAN, biweight, per_sigma_across, thinned};
+
+use crate::extract::Patch;
+use crate::{PlateSpec, Vec3};
+use edge::{Edge, EdgeData};
+use plane::Plane;
+use projected_crossing::ProjectedCrossing;
+use visible_boundary::VisibleBoundary;
+
+/// A corner of the scanned face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Position on the scanned face, metres, scanner frame.
+    pub point: Vec3,
+    /// Standard deviation along the edge that leaves the corner and along the one that arrives, metres.
+    pub sigma: [f64; 2],
+    /// False when the corner's neighbourhood was hidden and its place was extrapolated from its edges.
+    pub seen: bool,
+}
+
+/// One edge of the scanned face from its first to its last corner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeCurve {
+    /// Points on the edge at equal steps of arc length (at most 10 mm), first and last are the corners.
+    pub points: Vec<Vec3>,
+    /// Per point: whether the edge was seen there, or bridged.
+    pub seen: Vec<bool>,
+    /// Standard deviation across the edge, in the surface, metres.
+    pub sigma: f64,
+}
+
+/// The boundary in the order (0,0), (W,0), (W,H), (0,H): edge k runs from corner k to corner k + 1.
+///
+/// Coverage from the scanner the loop runs counter-clockwise: (u, v, towards the scanner) is right-handed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outline {
+    /// Corners.
+    pub corners: [Corner; 4],
+    /// Edges v = 0, u = W, v = H, u = 0.
+    pub edges: [EdgeCurve; 4],
+    /// The scanned face smoothed as a whole, on which they lie.
+    pub height_field: HeightField,
+}
+
+/// How the beams sample the plate.
+#[derive(Debug, Clone, Copy)]
+struct Sampling {
+    /// Spacing of the samples, metres.
+    step: f64,
+    /// Angle between beams, radians.
+    angle: f64,
+    /// Noise of the range, metres.
+    noise: f64,
+}
+
+/// Crossings nearer to a corner than this many lattice steps may belong to either edge.
+const CORNER_STEPS: f64 = 2.5;
+
+/// Seed of all random numbers: the same scan gives the same outline.
+const SEED: u64 = 0x706c_6174_656e;
+
+/// Spacing of the points of an edge curve, metres.
+const POINT_SPACING: f64 = 0.01;
+
+/// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not tell corners apart.
+const LARGEST_HINT_ANGLE: f64 = 35.0;
+
+/// An edge that differs by more than this part from the plate file is that of another plate. Cut blanks differ by
+/// millimetres, bending changes edges of the mid-surface by up to 11 mm.
+const SIZE_TOLERANCE: f64 = 0.01;
+
+/// A wrong size is believed where at least this part of the edges that make it was seen.
+const TELLING_PART: f64 = 0.75;
+
+/// The outline of a plate's face.
+///
+/// Corners and edges are those of the scanned face as it is seen, not of the rectangle; the known size is used to
+/// refuse another plate, never to move an edge.
+///
+/// # Errors
+/// Which corner, edge or side cannot be told, and why.
+pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError> {
+    let visible = VisibleBoundary::of(patch, spec)?;
+    let corners = corners::find(&visible.flat, visible.step, spec.width.min(spec.height))?;
+    let near = corners.map(|corner| visible.lift(&corner));
+    let height_field = HeightField::fit(patch, visible.plane.along(corners[1].point - corners[0].point))?;
+    let sampling = Sampling {
+        step: visible.step,
+        angle: (patch.azimuth_step * patch.elevation_step).sqrt(),
+        noise: patch.noise,
+    };
+    let side = |k: usize| {
+        let (from, to) = (near[k], near[(k + 1) % 4]);
+        let margin = CORNER_STEPS * visible.step;
+        let crossings: Vec<ProjectedCrossing> = visible
+            .between(corners[k].at, corners[(k + 1) % 4].at)
+            .filter_map(|crossing| ProjectedCrossing::of(crossing, patch, &height_field))
+            .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
+            .collect();
+        EdgeData::new(&crossings, [from, to], spec.thickness, sampling)
+    };
+    let data = [side(0)?, side(1)?, side(2)?, side(3)?];
+    let footprint = edge::footprint(&data, sampling);
+    let [a, b, c, d] = data.map(|data| Edge::fit(data, footprint, sampling));
+    let mut edges = [a?, b?, c?, d?];
+    let mut points = near;
+    for k in 0..4 {
+        let arriving = (k + 3) % 4;
+        let (point, to, from) = meet(&edges[arriving], &edges[k], near[k]);
+        points[k] = point;
+        edges[arriving].to = to;
+        edges[k].from = from;
+    }
+    let first = first_corner(&points, &visible.plane, spec.u_axis)?;
+    edges.rotate_left(first);
+    points.rotate_left(first);
+    check_size(&edges, spec)?;
+    let corner = |k: usize| {
+        let (arriving, leaving) = (&edges[(k + 3) % 4], &edges[k]);
+        Corner {
+            point: points[k],
+            sigma: [arriving.sigma(arriving.to), leaving.sigma(leaving.from)],
+            seen: arriving.seen.at(arriving.to) && leaving.seen.at(leaving.from),
+        }
+    };
+    let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]]);
+    Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), height_field })
+}
+
+/// Where two edges meet, and where that is along each.
+fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
+    /// Newton's method on two nearly straight curves: the third step no longer moves.
+    const STEPS: usize = 5;
+    const DIFFERENCE: f64 = 0.02;
+    let (mut a, mut b) = (arriving.along(near), leaving.along(near));
+    for _ in 0..STEPS {
+        let apart = leaving.point(b) - arriving.point(a);
+        let tangent = |edge: &Edge, at: f64| {
+            (edge.point(at + DIFFERENCE) - edge.point(at - DIFFERENCE)) / (2.0 * DIFFERENCE)
+        };
+        let (t_a, t_b) = (tangent(arriving, a), tangent(leaving, b));
+        // Least squares of a t_a - b t_b = apart.
+        let (aa, bb, ab) = (t_a.norm_squared(), t_b.norm_squared(), t_a.dot(&t_b));
+        let (ra, rb) = (t_a.dot(&apart), t_b.dot(&apart));
+        let determinant = aa * bb - ab * ab;
+        a += (ra * bb - ab * rb) / determinant;
+        b += (ab * ra - aa * rb) / determinant;
+    }
+    (0.5 * (arriving.point(a) + leaving.point(b)), a, b)
+}
+
+/// The corner that is (0, 0): the one from which the edge leaves that runs most along the hint. Without a hint, u runs
+/// to the right as the scanner sees it.
+fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result<usize, OutlineError> {
+    let hint = hint.map_or_else(nalgebra::Vector2::x, |hint| plane.direction(hint));
+    let angle = |k: usize| plane.direction(points[(k + 1) % 4] - points[k]).angle(&hint).to_degrees();
+    let first = (0..4).min_by(|&a, &b| angle(a).total_cmp(&angle(b))).unwrap_or(0);
+    let angle_deg = angle(first);
+    if angle_deg > LARGEST_HINT_ANGLE || angle_deg.is_nan() {
+        return Err(OutlineError::Hint { angle_deg });
+    }
+    Ok(first)
+}
+
+/// Compares the edges of the mid-surface with the plate file.
+fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
+    for (k, (side, size)) in
+        [("width", spec.width), ("height", spec.height)].into_iter().cycle().take(4).enumerate()
+    {
+        let expected = size - 2.0 * spec.face_inset;
+        let found = edges[k].length_below(0.5 * spec.thickness);
+        if (found - expected).abs() > SIZE_TOLERANCE * expected {
+            let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);
+            // An edge ends where those beside it cross it.
+            let beside = [&edges[(k + 3) % 4], &edges[k], &edges[(k + 1) % 4]];
+            let seen = beside.map(|edge| edge.seen.share(edge.from, edge.to)).into_iter().fold(1.0, f64::min);
+            return Err(if seen < TELLING_PART {
+                OutlineError::Hidden { seen_percent: 100.0 * seen, side, found_mm, expected_mm }
+            } else {
+                OutlineError::WrongSize { side, found_mm, expected_mm }
+            });
+        }
+    }
+    Ok(())
+}
+
+fn curve(edge: &Edge, ends: [Vec3; 2]) -> EdgeCurve {
+    let length = edge.to - edge.from;
+    let n = (length / POINT_SPACING).ceil().max(1.0) as usize;
+    let places: Vec<f64> = (0..=n).map(|i| edge.from + length * i as f64 / n as f64).collect();
+    let mut points: Vec<Vec3> = places.iter().map(|&at| edge.point(at)).collect();
+    (points[0], points[n]) = (ends[0], ends[1]);
+    let mean_variance = places.iter().map(|&at| edge.sigma(at).powi(2)).sum::<f64>() / places.len() as f64;
+    let seen = places.iter().map(|&at| edge.seen.at(at)).collect();
+    EdgeCurve { points, seen, sigma: mean_variance.sqrt() }
+}

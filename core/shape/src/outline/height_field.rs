@@ -1,0 +1,185 @@
+//! The scanned face smoothed as a whole: a height over the plate's mean plane.
+//!
+//! Both what the outline and what the mesh need of the face follows from it. An edge is known by directions: between two beams,
+//! across a mixed one. Where it is in space follows from the range of the face there. That of the few cells about a crossing has half
+//! of a single beam's noise, and a beam that meets the face at 60 degrees from its normal carries it into the edge nearly twofold;
+//! that of the whole face has a thirtieth. One noisy sample moves nothing, and holes are bridged.
+
+use nalgebra::Vector2;
+
+use super::plane::Plane;
+use crate::surface::{FittedSpline, SplineFit, TensorSpline, Undetermined, UniformKnots};
+use crate::{Patch, Sample, Vec3};
+use platen_numerics::simd::dispatch_simd;
+
+/// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
+/// all samples.
+pub(crate) const SPAN: f64 = 0.1;
+
+/// Samples used, at least, where there are as many: every n-th of every n-th column.
+const ENOUGH: usize = 30_000;
+
+/// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
+const CUT_OFF: f64 = 5.0;
+
+/// The cosine of the incidence never counts below this one: beyond 87 degrees a sample tells nothing.
+const LEAST_COSINE: f64 = 0.05;
+
+/// Newton steps from a point near the face, at most; each squares an error of a few parts in a hundred, and one of less than
+/// this, metres, is the last.
+const STEPS: usize = 4;
+const STILL: f64 = 1e-8;
+
+/// A point that would move by more than this, metres, is none of the face.
+const REACH: f64 = 0.5;
+
+/// The smooth scanned face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightField {
+    plane: Plane,
+    /// Height over the plane, metres.
+    height: TensorSpline<1>,
+    /// Observed over stated standard deviation of the samples.
+    pub(crate) noise_scale: f64,
+}
+
+/// The samples of a height_field over its plane.
+#[derive(Debug, Default)]
+struct Heights {
+    places: Vec<[f64; 2]>,
+    heights: Vec<f64>,
+    /// One over their standard deviations.
+    per_sigmas: Vec<f64>,
+}
+
+impl HeightField {
+    /// Fits the samples over `plane`, whose axes run along the plate's edges.
+    ///
+    /// # Errors
+    /// [`Undetermined`] when they are too few.
+    pub(crate) fn fit(patch: &Patch, plane: Plane) -> Result<Self, Undetermined> {
+        let mut heights = Heights::default();
+        let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+        for sample in thinned(patch) {
+            let place = plane.project(sample.point);
+            (low, high) = (low.inf(&place), high.sup(&place));
+            heights.places.push(place.into());
+            heights.heights.push(plane.height(sample.point));
+            heights.per_sigmas.push(per_sigma_across(sample, &plane.normal()));
+        }
+        if !low.iter().zip(&high).all(|(low, high)| low < high) {
+            return Err(Undetermined { n_points: patch.samples.len() });
+        }
+        let axis = |k: usize| {
+            let n_spans = UniformKnots::of_length(high[k] - low[k], SPAN).n_spans();
+            UniformKnots::new(low[k], high[k], n_spans)
+        };
+        let (fitted, noise_scale) = heights.smooth([axis(0), axis(1)])?;
+        Ok(Self { plane, height: fitted.spline, noise_scale })
+    }
+
+    /// The height_field of a plate by its corners.
+    #[cfg(test)]
+    pub(crate) fn between(corners: [Vec3; 4], patch: &Patch) -> Result<Self, Undetermined> {
+        let (along, across) = (corners[1] - corners[0], corners[3] - corners[0]);
+        let plane = Plane::new(corners.iter().sum::<Vec3>() / 4.0, along.cross(&across));
+        Self::fit(patch, plane.along(plane.direction(along)))
+    }
+
+    /// Where the beam through `point` meets the height_field, and the unit normal there, towards the scanner. `None` where it
+    /// does not.
+    pub(crate) fn meet(&self, point: Vec3) -> Option<(Vec3, Vec3)> {
+        self.along(point, point.normalize())
+    }
+
+    /// Where the line through `point` along a unit direction away from the scanner meets the height_field, and the unit normal there.
+    /// `None` where it does not.
+    pub(crate) fn along(&self, point: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
+        let mut at = point;
+        let mut normal = self.plane.normal();
+        for _ in 0..STEPS {
+            let place = self.plane.project(at);
+            let [[height], [by_x], [by_y]] = self.height.frame(place.x, place.y);
+            normal = self.plane.normal() - self.plane.lift_direction(Vector2::new(by_x, by_y));
+            // Towards the height_field the line falls, against its normal.
+            let approach = normal.dot(&direction);
+            if approach.is_nan() || approach >= 0.0 {
+                return None;
+            }
+            let step = (height - self.plane.height(at)) / approach;
+            at += direction * step;
+            if step.abs() < STILL {
+                break;
+            }
+        }
+        ((at - point).norm() < REACH).then(|| (at, normal.normalize()))
+    }
+}
+
+impl Heights {
+    /// The spline through the heights, and how much larger than stated their noise is.
+    fn smooth(&self, axes: [UniformKnots; 2]) -> Result<(FittedSpline<1>, f64), Undetermined> {
+        let all = self.weighted(axes, |i| self.per_sigmas[i].powi(2));
+        let penalty = all.select_penalty([1.0]).penalty;
+        let first = all.solve_with(penalty)?;
+        let residuals: Vec<f64> = (0..self.places.len())
+            .map(|i| {
+                (self.heights[i] - first.spline.point(self.places[i][0], self.places[i][1])[0])
+                    * self.per_sigmas[i]
+            })
+            .collect();
+        let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
+        // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
+        let robust = self.weighted(axes, |i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2));
+        Ok((robust.solve_with(penalty)?, scale))
+    }
+
+    /// The heights as points of a fit, each with its weight.
+    fn weighted(&self, axes: [UniformKnots; 2], weight: impl Fn(usize) -> f64) -> SplineFit<1> {
+        let mut fit = SplineFit::new(axes[0], axes[1]);
+        dispatch_simd(
+            #[inline(always)]
+            || {
+                for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
+                    fit.add(*a, *b, [*height], weight(i));
+                }
+            },
+        );
+        fit
+    }
+}
+
+/// One over the standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
+#[inline(always)]
+pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
+    let range = sample.point.norm();
+    let towards = sample.point.dot(normal).abs().max(LEAST_COSINE * range);
+    range / (f64::from(sample.sigma) * towards)
+}
+
+/// Tukey's biweight of a residual, in standard deviations.
+#[inline(always)]
+pub(crate) fn biweight(residual: f64) -> f64 {
+    let x = residual * (1.0 / CUT_OFF);
+    (1.0 - x * x).max(0.0).powi(2)
+}
+
+/// Standard deviation of normally spread residuals with outliers, from the median of their sizes.
+fn robust_scale(mut sizes: Vec<f64>) -> f64 {
+    /// The median of |x| of the standard normal distribution.
+    const MEDIAN: f64 = 0.674_489_750_196_081_7;
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (*median / MEDIAN).max(1e-6)
+}
+
+/// The samples that suffice for a smooth face.
+pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
+    let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
+    let columns = patch.samples.chunk_by(|a, b| a.column == b.column);
+    let columns = columns.filter(move |samples| samples[0].column.is_multiple_of(every));
+    columns.flatten().filter(move |sample| sample.row.is_multiple_of(every))
+}

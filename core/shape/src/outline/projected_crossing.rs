@@ -1,0 +1,48 @@
+//! Crossings on the height_field.
+
+use super::height_field::HeightField;
+use crate::Vec3;
+use crate::extract::{Beyond, Crossing, Patch};
+
+/// A crossing with its places on the height_field.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ProjectedCrossing {
+    pub(super) crossing: Crossing,
+    /// The last cell of the face, on the height_field, ...
+    pub(super) cell: Vec3,
+    /// ... and its own range behind it, metres.
+    pub(super) residual: f64,
+    /// Its column and row.
+    pub(super) place: [u32; 2],
+}
+
+impl ProjectedCrossing {
+    /// A crossing of `patch` on the height_field. `None` where a beam does not meet it.
+    pub(super) fn of(crossing: &Crossing, patch: &Patch, height_field: &HeightField) -> Option<Self> {
+        let sample = &patch.samples[crossing.sample as usize];
+        let (cell, _) = height_field.meet(sample.point)?;
+        let (mut inside, normal) = height_field.meet(crossing.inside)?;
+        let (mut outside, _) = height_field.meet(crossing.outside)?;
+        // What lies beyond falls behind the height_field by so much more than behind the face's continuation.
+        let (mut mixed, mut mixed_excess) = (None, crossing.mixed_excess);
+        if let Some([near, far]) = crossing.mixed {
+            let (nearest, farthest) = (height_field.meet(near)?.0, height_field.meet(far)?.0);
+            mixed = Some([nearest, farthest]);
+            mixed_excess += (near.norm() - nearest.norm()) as f32;
+        }
+        let more = crossing.outside.norm() - outside.norm();
+        if crossing.beyond == Beyond::SideFace {
+            // From outside to inside are four standard deviations of a range on the side face.
+            let shift = (inside - outside) * (more / (4.0 * f64::from(sample.sigma)));
+            (inside, outside) = (inside + shift, outside + shift);
+        }
+        let excess = crossing.excess + more as f32;
+        let residual = sample.point.norm() - cell.norm();
+        Some(Self {
+            crossing: Crossing { inside, outside, normal, mixed, mixed_excess, excess, ..*crossing },
+            cell,
+            residual,
+            place: [sample.column, sample.row],
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! What is known of the plate before it is scanned.
+
+use crate::{Blank, Vec3};
+
+/// The plate as ordered, and what tells its corners apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlateSpec {
+    /// Extent along u, metres.
+    pub width: f64,
+    /// Extent along v, metres.
+    pub height: f64,
+    /// Thickness, metres.
+    pub thickness: f64,
+    /// How far inside the mid-surface's edge the scanned face ends (bevelled edges), metres.
+    pub face_inset: f64,
+    /// Rough direction of growing u, scanner frame, any length. Decides which corner is (0, 0).
+    pub u_axis: Option<Vec3>,
+    /// Where the plate can be, scanner frame.
+    pub region: Option<RegionOfInterest>,
+}
+
+impl PlateSpec {
+    /// The outline as ordered.
+    #[must_use]
+    pub fn rectangle(&self) -> Blank {
+        Blank::rectangle(self.width, self.height)
+    }
+}
+
+/// Axis-parallel box in the scanner frame, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegionOfInterest {
+    /// Smallest x, y, z.
+    pub min: Vec3,
+    /// Largest x, y, z.
+    pub max: Vec3,
+}
