@@ -43,8 +43,9 @@ fn a_flat_plate_keeps_its_places() {
 
 #[test]
 fn developable_plates_are_exact_to_second_order_of_the_mesh() {
-    check_order(&cylinder(8.0, 0.5), [3.0, 2.5], 2e-5);
-    check_order(&cone([-7.0, 1.0], 0.6), [3.0, 2.0], 5e-5);
+    // Found: 0.03 and 0.08 um.
+    check_order(&cylinder(8.0, 0.5), [3.0, 2.5], 7e-8);
+    check_order(&cone([-7.0, 1.0], 0.6), [3.0, 2.0], 1.6e-7);
 }
 
 #[test]
@@ -95,7 +96,10 @@ fn no_plane_angles_are_nearer() {
 fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     let size = [2.5, 5.0];
     let [mean, max] = errors(&ClosedForm::new(sphere_of_fibres(10.0, size), size, [70, 140], 0.3, 2));
-    assert!((0.5e-3..1.4e-3).contains(&mean) && max < 2.5e-3, "mean {mean:e}, max {max:e}");
+    assert!(
+        (0.6e-3..0.75e-3).contains(&mean) && (1.1e-3..1.4e-3).contains(&max),
+        "mean {mean:e}, max {max:e}"
+    );
 }
 
 /// Small meshes of every kind: noise up to the size of the cells. No panic, no hang, every coordinate finite.
@@ -124,5 +128,6 @@ fn random_small_meshes_give_finite_charts_or_are_refused() {
             }
         }
     }
-    assert!(refused < 1500, "{refused} refused");
+    // Found: 249 of 3000.
+    assert!(refused < 500, "{refused} refused");
 }

@@ -93,8 +93,9 @@ fn a_circles_curvature_is_found_away_from_the_edges() {
     let errors: Vec<f64> = (0..PlateGrid::NODES).filter(inside).map(|i| u.values[i] - 0.125).collect();
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     println!("rms error of the curvature {rms:.1e} 1/m");
+    // Found: 1.5e-4 1/m, and 7e-7 1/m2 in the middle.
     assert!(rms < 3e-4, "{rms}");
-    assert!(field(&report, "gaussian").values[5100].abs() < 1e-4);
+    assert!(field(&report, "gaussian").values[5100].abs() < 1.5e-6);
     assert_eq!(report.findings.says, ["no before scan: nothing is known of a change"]);
 }
 
@@ -110,14 +111,15 @@ fn a_new_band_is_found_with_its_angle_and_place() {
         worst = worst.max(error.abs());
         assert!(error.abs() < angle.uncertainty.expect("known").to_degrees().max(0.02), "{angle:?}");
         let at = angle.at.expect("placed");
-        assert!((at[0] - 1.9).abs() < 0.02 && (at[1] - 1.0).abs() < 0.05, "{at:?}");
+        // Found: 3 and 6 mm, 0.0012 rad; no second band.
+        assert!((at[0] - 1.9).abs() < 0.006 && (at[1] - 1.0).abs() < 0.011, "{at:?}");
         let direction = found(&report, "bend.1.direction").expect("known").value;
-        assert!((direction - std::f64::consts::FRAC_PI_2).abs() < 0.02, "{direction}");
+        assert!((direction - std::f64::consts::FRAC_PI_2).abs() < 0.0025, "{direction}");
         assert!(report.findings.says[0].starts_with("bent by 1."), "{:?}", report.findings.says);
-        let second = found(&report, "bend.2.angle").map_or(0.0, |f| f.value.abs());
-        assert!(second < 2e-3, "{:?}", report.findings);
+        assert!(found(&report, "bend.2.angle").is_none(), "{:?}", report.findings);
     }
     println!("worst error of a bend angle {worst:.3} deg");
+    // Found: 0.016 deg.
     assert!(worst < 0.02, "{worst}");
 }
 
@@ -159,9 +161,10 @@ fn the_deficit_says_bend_more_or_too_far_on_either_face() {
         let deficit = field(&report, "curvature_deficit");
         let at =
             |u: usize| (deficit.values[50 * PlateGrid::SIDE + u], deficit.state[50 * PlateGrid::SIDE + u]);
+        // Found: 0.0033, 0.0027 and 0.0007 1/m.
         assert!((at(17).0 - 0.125).abs() < 6e-3 && at(17).1 == NodeState::Seen, "{:?}", at(17));
         assert!((at(84).0 - (0.125 - 1.0 / 6.0)).abs() < 6e-3 && at(84).1 == NodeState::Seen, "{:?}", at(84));
-        assert!(at(50).0.abs() < 6e-3);
+        assert!(at(50).0.abs() < 1.5e-3);
         assert!(report.fields.iter().all(|f| f.name != "gaussian_missing"), "a cylinder needs no stretching");
         let says = &report.findings.says;
         assert!(
@@ -178,11 +181,12 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
     let target = TargetShape::Sphere { radius: 8.0 };
     let report = run(&inputs(plate(SIGMA, 5, |_| 1.0 / 8.0), None, Some((target, Facing::Inside))));
     let middle = field(&report, "curvature_deficit").values[PlateGrid::NODES / 2];
-    assert!((middle - 1.0 / 8.0).abs() < 2e-3, "{middle}");
+    // Found: 2e-5 1/m; 2.4e-6 1/m2; a share of 4e-5; 0.0019 sr, of the nodes on the edges, which count as full cells.
+    assert!((middle - 1.0 / 8.0).abs() < 4e-5, "{middle}");
     // Bending alone has none of the sphere's Gaussian curvature.
     let missing = field(&report, "gaussian_missing").values[PlateGrid::NODES / 2];
-    assert!((missing - 1.0 / 64.0).abs() < 5e-4, "{missing}");
-    assert!((found(&report, "gaussian.missing_share").expect("known").value - 1.0).abs() < 0.02);
+    assert!((missing - 1.0 / 64.0).abs() < 5e-6, "{missing}");
+    assert!((found(&report, "gaussian.missing_share").expect("known").value - 1.0).abs() < 8e-5);
     let wanted = found(&report, "gaussian.wanted").expect("known").value;
     assert!((wanted - WIDTH * HEIGHT / 64.0).abs() < 0.03 * wanted, "{wanted}");
     assert!(
@@ -193,6 +197,7 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
     // A plate that only bent has no membrane strain.
     for name in ["strain.max", "strain.min"] {
         let strain = found(&report, name).expect("known").value;
+        // Found: 4.8e-4 and 0.6e-4.
         assert!(strain.abs() < 5e-4, "{name} {strain}");
     }
 }
@@ -209,10 +214,11 @@ fn the_strain_is_that_of_the_material_map() {
     let report = run(&inputs(stretched, None, Some((TargetShape::Sphere { radius: 8.0 }, Facing::Inside))));
     for (name, truth) in [("strain_u", 2.002e-3), ("strain_v", -0.995e-3), ("strain_uv", 1.503e-3)] {
         let middle = field(&report, name).values[PlateGrid::NODES / 2];
-        assert!((middle - truth).abs() < 1e-5, "{name} {middle}");
+        // Found: 8e-12, of the fit.
+        assert!((middle - truth).abs() < 2e-11, "{name} {middle}");
     }
     let most = found(&report, "strain.max").expect("known").value;
-    assert!((most - (0.5035e-3 + (1.4985e-3_f64).hypot(1.503e-3))).abs() < 2e-5, "{most}");
+    assert!((most - (0.5035e-3 + (1.4985e-3_f64).hypot(1.503e-3))).abs() < 6e-11, "{most}");
 }
 
 #[test]

@@ -113,10 +113,12 @@ fn a_plate_on_its_supports_is_aligned_by_them() {
     let normal = &report.fields[1].values;
     for [u, v] in places {
         let node = (50.0 * v).round() as usize * PlateGrid::SIDE + (u * 100.0 / 3.0).round() as usize;
-        assert!(normal[node].abs() < 0.1e-3, "{u} {v}: {}", normal[node]);
+        // Found: 0.012 mm, the noise of the fits.
+        assert!(normal[node].abs() < 0.025e-3, "{u} {v}: {}", normal[node]);
     }
     // 0.02 rad round u = 2, held at 0.3 and 2.7: it sinks by 0.02 * 1.7 * 0.7 / 2.4 there.
     let bend = normal[50 * PlateGrid::SIDE + 67];
+    // Found: 0.44 mm off, by the roundness of the bend.
     assert!((bend + 0.02 * 1.7 * 0.7 / 2.4).abs() < 0.5e-3, "{bend}");
     assert!(report.findings.says[0].contains("aligned by supports"), "{:?}", report.findings.says);
     let error = compare(&options, &task(&places[..2]), &|| Ok(())).expect_err("refused");
@@ -143,13 +145,15 @@ fn a_plate_that_only_moved_did_not_change_and_its_movement_is_reported() {
     let now = moved(&plate(SIGMA, 2, 0.0, none), turn, away);
     for alignment in ["unchanged", "corners"] {
         let report = run(now.clone(), before.clone(), alignment, 0.0, 0.02);
-        assert!((value(&report, "displacement.plate_rotation") - turn.angle()).abs() < 2e-4, "{alignment}");
+        // Found: 0.014 mrad, and below 0.0023 mm, with the corners; less with the whole plate.
+        assert!((value(&report, "displacement.plate_rotation") - turn.angle()).abs() < 3e-5, "{alignment}");
         let middle = before.face(WIDTH / 2.0, HEIGHT / 2.0);
         let way = (turn * middle + away - middle).norm();
-        assert!((value(&report, "displacement.plate_translation") - way).abs() < 2e-4, "{alignment}");
+        assert!((value(&report, "displacement.plate_translation") - way).abs() < 5e-6, "{alignment}");
         let size = report.fields[1].values.iter().map(|d| d * d).sum::<f64>() / 10_201.0;
         println!("{alignment}: {:.3} mm rms along the normal", size.sqrt() * 1e3);
-        assert!(size.sqrt() < 0.05e-3, "{alignment} {size}");
+        // Found: 0.007 and 0.010 mm, the noise of both fits.
+        assert!(size.sqrt() < 0.02e-3, "{alignment} {size}");
     }
 }
 
@@ -177,8 +181,9 @@ fn a_new_bend_lifts_one_side_and_leaves_the_other() {
     }
     let rms = |square: f64| (square / PlateGrid::NODES as f64).sqrt();
     println!("normal {:.3} mm rms, vector {:.3} mm rms", rms(square) * 1e3, rms(square_vector) * 1e3);
-    assert!(rms(square) < 0.05e-3 && rms(square_vector) < 0.5e-3);
-    assert!(still as f64 > 0.9 * 57.0 * 101.0 && changed as f64 > 0.95 * 24.0 * 101.0, "{still} {changed}");
+    // Found: 0.011 and 0.014 mm, the noise of both fits; all nodes in the right state.
+    assert!(rms(square) < 0.023e-3 && rms(square_vector) < 0.028e-3);
+    assert!(still as f64 > 0.98 * 57.0 * 101.0 && changed as f64 > 0.98 * 24.0 * 101.0, "{still} {changed}");
     assert!(report.findings.says[0].contains("aligned by unchanged"), "{:?}", report.findings.says);
 }
 
@@ -278,6 +283,7 @@ fn a_change_of_three_times_the_level_of_detection_is_found() {
     }
     let share = found as f64 / (pairs as usize * plateau.len()) as f64;
     println!("a change of {:.3} mm is found in {share:.3} of its area", 3e3 * lod);
+    // Found: 0.970.
     assert!(share > 0.95, "{share}");
 }
 

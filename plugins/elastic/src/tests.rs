@@ -47,7 +47,8 @@ fn a_plate_cut_off_its_rectangle_keeps_its_places() {
     let n = plate.parts.boundary.len();
     plate.parts.places.copy_from_slice(&plate.uv[..n]);
     let [mean, max] = plate.errors(&chart(&plate).uv);
-    assert!(mean < 1e-5 && max < 2e-5, "mean {mean:e}, max {max:e}");
+    // Found: 2.8 and 7.9 um, of the mesh.
+    assert!(mean < 6e-6 && max < 1.6e-5, "mean {mean:e}, max {max:e}");
     // On the rectangle the corner (W, H) alone is 7 mm off.
     plate.parts.places = platen_shape::Blank::rectangle(size[0], size[1]).places(
         plate.parts.corners.map(|at| at as usize),
@@ -73,7 +74,8 @@ fn developable_plates_are_exact_to_second_order_of_the_mesh() {
             plate.errors(&chart(&plate).uv)[1]
         };
         let [coarse, fine] = [error(8), error(32)];
-        assert!(fine < 2e-5, "{fine:e} m");
+        // Found: 1.6 to 5.7 um.
+        assert!(fine < 1.2e-5, "{fine:e} m");
         assert!(coarse / fine > 12.0, "order {}", (coarse / fine).log2() / 2.0);
     };
     check(&cylinder(8.0, 0.5), [3.0, 2.5]);
@@ -81,7 +83,7 @@ fn developable_plates_are_exact_to_second_order_of_the_mesh() {
     check(&half_bent(5.0, 2.5), [5.0, 2.5]);
 }
 
-/// Shape, section 2.2: 0.23 mm in the mean, 0.39 mm at most, when the fibres keep their length. So is the stated uncertainty.
+/// 0.24 mm in the mean, 0.38 mm at most, when the fibres keep their length. So is the stated uncertainty.
 #[test]
 fn on_a_sphere_of_stiff_fibres_the_error_is_the_uncertainty() {
     let size = [2.5, 5.0];
@@ -90,12 +92,13 @@ fn on_a_sphere_of_stiff_fibres_the_error_is_the_uncertainty() {
     let ([mean, max], [said_mean, said_max]) = (plate.errors(&chart.uv), uncertainty(&chart));
     assert!((0.22e-3..0.25e-3).contains(&mean) && (0.36e-3..0.41e-3).contains(&max), "{mean:e} {max:e}");
     assert!(
-        (said_mean / mean - 1.0).abs() < 0.05 && (said_max / max - 1.0).abs() < 0.05,
+        // Found: 0.7 % and 0.02 % apart, by the grid of the bound.
+        (said_mean / mean - 1.0).abs() < 0.015 && (said_max / max - 1.0).abs() < 0.015,
         "{said_mean:e} {said_max:e}"
     );
 }
 
-/// Shape, section 2.2: 0.01 mm from the minimum found another way, where the harmonic map is a millimetre wrong.
+/// Against a minimum found without a mesh. The harmonic map is wrong by a millimetre there.
 #[test]
 fn on_a_sphere_of_least_energy_it_is_right() {
     for (radius, size) in [(10.0, [2.5, 5.0]), (8.0, [3.0, 2.5]), (15.0, [5.0, 2.5])] {
@@ -103,15 +106,16 @@ fn on_a_sphere_of_least_energy_it_is_right() {
         let plate = with_sigma(ClosedForm::new(truth, size, [60, 60], 0.3, 2), 1e-5);
         let [mean, max] = plate.errors(&chart(&plate).uv);
         let [harmonic, _] = harmonic_errors(&plate);
-        assert!(mean < 1e-5 && max < 5e-5, "R {radius} {size:?}: mean {mean:e}, max {max:e}");
+        // Found: at most 3.9 and 20 um.
+        assert!(mean < 8e-6 && max < 4e-5, "R {radius} {size:?}: mean {mean:e}, max {max:e}");
         assert!(harmonic > 30.0 * mean, "harmonic {harmonic:e}");
     }
 }
 
 /// The strain of a sphere of stiff fibres is known: none along the fibres, shrunk across them. The reported strain differs by
-/// the law, but its curl does not: Gauss's curvature is owed by any law.
+/// the law, but its incompatibility does not: any law has the sphere's Gaussian curvature.
 #[test]
-fn the_strain_owes_the_curvature_of_the_sphere() {
+fn the_strain_is_compatible_with_the_curvature_of_the_sphere() {
     let (radius, size, n) = (10.0, [2.5, 2.5], 40);
     let plate = ClosedForm::new(sphere_of_least_energy(radius, size, 0.3), size, [n; 2], 0.0, 0);
     let strain = chart(&plate).strain.unwrap();
@@ -128,7 +132,8 @@ fn the_strain_owes_the_curvature_of_the_sphere() {
     };
     let mixed = at(c + d, c + d)[2] - at(c + d, c - d)[2] - at(c - d, c + d)[2] + at(c - d, c - d)[2];
     let owed = second(0, (0, d)) + second(1, (d, 0)) - 2.0 * mixed / (4.0 * step * step);
-    assert!((owed * radius * radius + 1.0).abs() < 0.03, "{} of -K", owed * radius * radius);
+    // Found: 1.1 %, of the differences over 4 cells.
+    assert!((owed * radius * radius + 1.0).abs() < 0.023, "{} of -K", owed * radius * radius);
 }
 
 /// The outline lies 0.2 mm too far inside on all sides: on a rolled plate its own measures set that right.
@@ -204,5 +209,6 @@ fn random_small_meshes_give_charts_or_are_refused() {
             }
         }
     }
-    assert!(refused < 1000, "{refused} refused");
+    // Found: 184 of 2000.
+    assert!(refused < 370, "{refused} refused");
 }

@@ -30,14 +30,16 @@ fn a_flat_plate_keeps_its_places() {
 
 #[test]
 fn developable_plates_are_exact_to_second_order_of_the_mesh() {
-    check_order(&cylinder(8.0, 0.5), [3.0, 2.5], 2e-5);
-    check_order(&cone([-7.0, 1.0], 0.6), [3.0, 2.0], 5e-5);
+    // Found: 0.03 and 0.08 um.
+    check_order(&cylinder(8.0, 0.5), [3.0, 2.5], 7e-8);
+    check_order(&cone([-7.0, 1.0], 0.6), [3.0, 2.0], 1.6e-7);
 }
 
 #[test]
 fn a_half_bent_plate_is_exact() {
     let plate = ClosedForm::new(half_bent(5.0, 2.5), [5.0, 2.5], [120, 60], 0.3, 5);
-    assert!(errors(&plate)[1] < 3e-5, "{:?}", errors(&plate));
+    // Found: 1.8 um, of the mesh.
+    assert!(errors(&plate)[1] < 4e-6, "{:?}", errors(&plate));
 }
 
 /// The known systematic error on R 10 m, 2.5 x 5 m: 0.65 to 1.3 mm in the mean, after the material's law. With fibres
@@ -47,7 +49,7 @@ fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     let size = [2.5, 5.0];
     let [mean, max] = errors(&ClosedForm::new(sphere_of_fibres(10.0, size), size, [70, 140], 0.3, 2));
     assert!(
-        (0.6e-3..0.8e-3).contains(&mean) && (1.0e-3..1.5e-3).contains(&max),
+        (0.6e-3..0.75e-3).contains(&mean) && (1.1e-3..1.4e-3).contains(&max),
         "mean {mean:e}, max {max:e}"
     );
 }
@@ -91,5 +93,6 @@ fn random_small_meshes_give_finite_charts_or_are_refused() {
             assert_eq!(first_turned(&mesh.triangles, &uv), None, "seed {seed}");
         }
     }
-    assert!(refused < 2000, "{refused} refused");
+    // Found: 314 of 4000.
+    assert!(refused < 630, "{refused} refused");
 }

@@ -19,8 +19,9 @@ fn errors(sigma: f64, seeds: std::ops::Range<u64>) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_balanced_gap_is_right_to_a_tenth_of_a_millimetre() {
-    for (sigma, bound) in [(0.5e-3, 0.1e-3), (2e-3, 0.2e-3)] {
+fn the_error_of_a_balanced_gap_is_a_hundredth_of_the_noise() {
+    // Found: 0.0026 and 0.021 mm rms over 8 scans.
+    for (sigma, bound) in [(0.5e-3, 0.005e-3), (2e-3, 0.042e-3)] {
         let errors = errors(sigma, 1..9);
         let rms = (errors.iter().map(|(e, _)| e * e).sum::<f64>() / errors.len() as f64).sqrt();
         println!("sigma {:.1} mm: rms error of the gap {:.3} mm", sigma * 1e3, rms * 1e3);

@@ -32,13 +32,15 @@ fn a_sphere_on_a_flatter_one_touches_in_the_middle() {
     let corner = [r * angle.sin(), r * (1.0 - angle.cos())];
     let away = t - corner[0].hypot(t - corner[1]);
     let gap = figure(&report, "deviation.gap");
-    assert!((gap + away).abs() < 1e-4, "{gap} {away}");
+    // Found: 2.4 um.
+    assert!((gap + away).abs() < 5e-6, "{gap} {away}");
     // In the best fit both signs are there, and together they are about what is open in the seat.
     let [max, min] = ["deviation.max", "deviation.min"].map(|name| figure(&report, name));
     assert!(max > 0.2 * gap && min < -0.2 * gap, "{max} {min}");
-    assert!((max - min - gap).abs() < 1e-3, "{max} {min} {gap}");
+    // Found: 0.19 mm; the two poses have different normals.
+    assert!((max - min - gap).abs() < 0.4e-3, "{max} {min} {gap}");
     assert!(figure(&report, "deviation.rms") < 0.5 * gap);
-    assert!((figure(&report, "curvature.deviation") - (8.0 / 9.0 - 1.0)).abs() < 1e-3);
+    assert!((figure(&report, "curvature.deviation") - (8.0 / 9.0 - 1.0)).abs() < 5e-5);
     let corner = [figure(&report, "deviation.min_u"), figure(&report, "deviation.min_v")];
     assert!([0.0, WIDTH].contains(&corner[0]) && [0.0, HEIGHT].contains(&corner[1]), "{corner:?}");
 }
@@ -51,7 +53,8 @@ fn a_sphere_on_a_rounder_one_lies_on_its_corners() {
     assert_eq!(figure(&report, "deviation.rocks"), 0.0);
     let deepest = report.findings.figures.iter().find(|f| f.name == "deviation.gap").expect("there");
     let at = deepest.at.expect("a place");
-    assert!((at[0] - 1.5).abs() < 0.1 && (at[1] - 1.0).abs() < 0.1, "{at:?}");
+    // Found: the node in the middle; the next ones are 30 and 20 mm away.
+    assert!((at[0] - 1.5).abs() < 0.01 && (at[1] - 1.0).abs() < 0.01, "{at:?}");
     let value = &report.fields[0].values;
     let corners = [0, NODES - 1, NODES * (NODES - 1), NODES * NODES - 1].map(|i| value[i]);
     assert!(corners.iter().filter(|d| d.abs() < 1e-9).count() >= 3, "{corners:?}");
@@ -69,10 +72,11 @@ fn stations_say_deviation_gap_and_missing_curvature() {
     let report = run(&plate_of(cylinder(9.0), Facing::Outside), &task).expect("sound");
     let node = report.fields[0].values[20 * NODES + 20];
     assert!((figure(&report, "station.D") - node).abs() < 1e-12);
-    assert!((figure(&report, "station.G") - report.findings.templates[0].max_gap).abs() < 1e-6);
+    assert!((figure(&report, "station.G") - report.findings.templates[0].max_gap).abs() < 1e-12);
     // Positive: bend more.
     let deficit = figure(&report, "station.K");
-    assert!((deficit - (1.0 / 8.0 - 1.0 / 9.0)).abs() < 3e-4, "{deficit}");
+    // Found: 5e-5 1/m.
+    assert!((deficit - (1.0 / 8.0 - 1.0 / 9.0)).abs() < 1e-4, "{deficit}");
 }
 
 #[test]
@@ -98,7 +102,8 @@ fn the_search_finds_a_gap_that_no_template_covers() {
     // Across the straight lines, at the far end of the cone, where its radius is 12 m.
     let worst = report.findings.figures.iter().find(|f| f.name == "gap.worst_along_v").expect("searched");
     let gap = 0.5 * (1.0 / 8.0 - 1.0 / 12.0);
-    assert!((worst.value - gap).abs() < 1e-3 && worst.at.expect("a place")[0] == WIDTH, "{worst:?}");
+    // Found: 0.17 mm; the formula is for small angles and the mid-surface.
+    assert!((worst.value - gap).abs() < 0.35e-3 && worst.at.expect("a place")[0] == WIDTH, "{worst:?}");
     assert!(
         report.findings.says.iter().any(|s| s.starts_with("largest gap anywhere: 2")),
         "{:?}",
