@@ -1,4 +1,5 @@
-//! What is known of a scanner beyond its noise: the file that `platen calibrate` writes, and whether it holds.
+//! Calibration of a scanner: its correlated and systematic errors, the file that `platen calibrate` writes, and the
+//! conditions under which it is valid (age, warm-up).
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,19 +11,19 @@ use platen_plant::{Document, Error as PlantError, PlateFile, Reported, TomlTable
 
 use platen_model::units::{metres, mm};
 
-/// Standard deviations above this are no scanner's: a plate was bent, or the scanner moved. Millimetres.
+/// Largest plausible standard deviation, millimetres: above it a plate was bent or the scanner moved.
 const LARGEST_SIGMA_MM: f64 = 20.0;
 
-/// What is known of a scanner at its place.
+/// Errors of one scanner at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// When it was found out.
+    /// Time of the calibration.
     pub made: Timestamp,
-    /// Scanner that it belongs to: maker, model, serial number.
+    /// Its scanner: maker, model, serial number.
     pub instrument: String,
     /// Plate or artefact that was scanned.
     pub plate: String,
-    /// Scans that were taken.
+    /// Number of scans.
     pub scans: usize,
     /// Correlated error of a pair of scans, one sigma, metres.
     pub sigma_correlated: f64,
@@ -30,13 +31,13 @@ pub struct Calibration {
     pub sigma_true: Option<f64>,
 }
 
-/// Why a plant's calibration does not hold.
+/// Reason why a plant's calibration is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum Invalid {
-    /// There is none, or it cannot be read.
+    /// No file, or a faulty one.
     #[error("calibration: {0}; run platen calibrate")]
     Absent(#[from] PlantError),
-    /// It is too old.
+    /// Older than allowed.
     #[error("calibration: {} is {age_d:.0} days old, {limit_d:.0} are allowed; run platen calibrate", .file.display())]
     TooOld {
         /// The file.
@@ -46,7 +47,7 @@ pub enum Invalid {
         /// Largest age, days.
         limit_d: f64,
     },
-    /// The scanner is cold.
+    /// The scanner is warming up.
     #[error("calibration: the scanner is still warming up, {left_min:.0} minutes are left")]
     Cold {
         /// Minutes until it is warm.
@@ -102,7 +103,7 @@ impl Calibration {
         })
     }
 
-    /// The calibration file as text.
+    /// Returns the calibration file as text.
     pub fn to_toml(&self) -> String {
         // A text of JSON is one of TOML.
         let text = |text: &str| serde_json::Value::from(text).to_string();
@@ -122,10 +123,10 @@ impl Calibration {
     }
 }
 
-/// The plant's calibration, if it holds `now`, the scanner having been in reach for `in_reach`.
+/// Returns the plant's calibration if it is valid at `now`, the scanner having been connected for `in_reach`.
 ///
 /// # Errors
-/// Why it does not hold.
+/// The reason why it is invalid.
 pub fn in_force(wanted: &CalibrationUse, now: Timestamp, in_reach: Duration) -> Result<Calibration, Invalid> {
     let calibration = Calibration::load(&wanted.file)?;
     let age = now.duration_since(calibration.made).as_secs_f64();

@@ -1,4 +1,4 @@
-//! What a plant measures with: its plugins, loaded and configured, and where it stands.
+//! The pipeline of a plant: its plugins, loaded and configured, and the frames of scanner and press.
 
 use std::time::Duration;
 
@@ -9,27 +9,27 @@ use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 
 use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
 
-/// Time that a flattening or a comparison may take; the press waits at most 10 s for both.
+/// Deadline of a flattening or a comparison.
 pub(crate) const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
 
-/// The plugins of a plant, ready to measure.
+/// Configured plugins of a plant, ready to measure.
 #[derive(Debug)]
 pub struct Pipeline {
-    /// Turns the mesh into (u, v).
+    /// Maps the mid-surface mesh to (u, v).
     pub flattening: Flattening,
-    /// What is compared, in this order.
+    /// Comparisons, in the order of the plant file.
     pub comparisons: Vec<Comparison>,
     /// Rough direction of growing u at a plate's first scan, scanner frame.
     pub u_axis: Option<Vec3>,
-    /// Where the press stands, scanner frame, when the plant file says so.
+    /// Origin of the press, scanner frame, where the plant file has `press_from_scanner`.
     pub press: Option<Vec3>,
     /// The axis about which the press turns a plate, scanner frame.
     pub press_z: Vec3,
-    /// Where the plate can be, scanner frame.
+    /// Region of interest, scanner frame.
     pub region: Option<RegionOfInterest>,
 }
 
-/// Why a plant cannot measure.
+/// Reason why a plant cannot measure.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// The plant or plate file is wrong.
@@ -43,7 +43,7 @@ pub enum PipelineError {
     Plugin(#[from] PluginError),
 }
 
-/// The library that a plant file names, with its options checked.
+/// Loads the library that a plant file names and checks its options.
 ///
 /// # Errors
 /// The library cannot be used, or every fault of its options.
@@ -53,7 +53,7 @@ pub fn load(catalogue: &Catalogue, wanted: &PluginUse) -> Result<(Library, Vec<O
     Ok((library, values))
 }
 
-/// A library with its defaults but for these options.
+/// Loads a library with its default options except these.
 ///
 /// # Errors
 /// The library cannot be used.
@@ -70,7 +70,7 @@ pub fn load_with<'a>(
     Ok((library, values))
 }
 
-/// A comparison that may take as long as one of a stroke.
+/// Creates a comparison with the deadline of a stroke.
 ///
 /// # Errors
 /// The library cannot be used, or every fault of its options.
@@ -80,7 +80,7 @@ pub fn comparison(catalogue: &Catalogue, wanted: &PluginUse) -> Result<Compariso
 }
 
 impl Pipeline {
-    /// Loads what the plant file names.
+    /// Loads the plugins that the plant file names.
     ///
     /// # Errors
     /// The first plugin that cannot be used.
@@ -94,7 +94,7 @@ impl Pipeline {
             comparisons,
             u_axis: plant.frame.u_axis.map(Vec3::from),
             press: press_origin(&plant.frame.press_from_scanner),
-            // The rotation's last row: what the press frame's z is in the scanner frame.
+            // The rotation's last row is the press frame's z axis in the scanner frame.
             press_z: plant.frame.press_from_scanner.rotation[2].into(),
             region: plant
                 .frame
@@ -103,7 +103,7 @@ impl Pipeline {
         })
     }
 
-    /// The plate as the geometry wants it.
+    /// Returns the plate for the geometry: size, inset, direction of u, region of interest.
     pub fn spec(&self, plate: &PlateFile) -> PlateSpec {
         PlateSpec {
             width: plate.plate.width,
@@ -116,14 +116,14 @@ impl Pipeline {
     }
 }
 
-/// The press's origin in the scanner frame; none where the plant file leaves the scanner in the press's frame.
+/// Returns the press's origin in the scanner frame; `None` for the identity, where the two frames are one.
 fn press_origin(press_from_scanner: &RigidTransform) -> Option<Vec3> {
     let RigidTransform { rotation, translation } = *press_from_scanner;
     let back = |axis: usize| -(0..3).map(|row| rotation[row][axis] * translation[row]).sum::<f64>();
     (*press_from_scanner != RigidTransform::default()).then(|| Vec3::new(back(0), back(1), back(2)))
 }
 
-/// The driver that a plant file names, or `faro-file` where it names none.
+/// Loads the driver that the plant file names; `faro-file` without one.
 ///
 /// # Errors
 /// The library cannot be used, or every fault of its options.

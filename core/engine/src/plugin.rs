@@ -1,7 +1,14 @@
-//! Plugins: found by name, checked before anything of theirs runs, loaded once, never unloaded.
+//! Plugin libraries: found by name, checked as data before any of their code runs, loaded once, never unloaded.
 //!
-//! All `unsafe` of the host is in this module. The rest sees [`Scanner`], [`Flattening`] and [`Comparison`], which
-//! could as well be served from another process.
+//! | module | contents |
+//! |---|---|
+//! | `catalogue` | the plugin folders, and the libraries in them |
+//! | `library`, `descriptor` | a loaded library, and a copy of its static description |
+//! | `instance`, `job`, `host_table`, `values` | one configured plugin on a thread of its own; calls through the tables of `platen.h` |
+//! | `scanner`, `flattening`, `comparison` | the three kinds behind safe types |
+//! | `error` | reasons why a plugin cannot be used or has failed |
+//!
+//! All `unsafe` of the host is in this module.
 
 mod catalogue;
 mod comparison;

@@ -1,9 +1,15 @@
 //! `platen run`: the press triggers, the plate is measured, the result goes back.
 //!
-//! Three parties, each with one task: the press side (link, handshake, registers) of `platen-press`; the bench, a
-//! thread that scans and measures one stroke at a time; and this dispatcher between them. Strokes are remembered in
-//! the history before anything is promised to the press; the stroke before and the baseline are asked from there, so
-//! that a restart changes nothing.
+//! | part | task |
+//! |---|---|
+//! | press side ([`platen_press::run_press`]) | link, handshake, registers |
+//! | `measurement_worker` | scans and measures one stroke at a time, on a thread of its own |
+//! | dispatcher (this module) | passes messages between the two, stops both |
+//! | `journal` | steps of a stroke in the history, before each promise to the press |
+//! | `previous_scans`, `region` | the stroke before and the baseline, from the history; the window of the next scan |
+//! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
+//! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
+//! | `figures` | findings to figures of the press's registers |
 
 mod disk;
 mod measurement_worker;
@@ -34,10 +40,10 @@ use measurement_worker::{MeasurementWorker, Task};
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue};
 
-/// Time for the last scan to reach its file when the host stops.
+/// Time for the last scan to be written when the host stops.
 const LAST_SCAN: Duration = Duration::from_secs(20);
 
-/// Why a host cannot run.
+/// Reason why a host cannot run.
 #[derive(Debug, thiserror::Error)]
 pub enum HostError {
     /// A plugin or a file is wrong.
@@ -49,18 +55,18 @@ pub enum HostError {
     /// The press side could not start.
     #[error(transparent)]
     Press(#[from] RunError<HistoryError>),
-    /// The system has no thread for the bench.
+    /// The system has no thread for the measurement worker.
     #[error("no thread for measuring: {0}")]
     Thread(std::io::Error),
-    /// The bench ended on its own.
+    /// The measurement worker ended on its own.
     #[error("measuring has ended: {0}; restart platen")]
-    Bench(String),
+    Worker(String),
 }
 
-/// What a running host tells those who watch it.
+/// Channels of a running host to its observer.
 #[derive(Debug)]
 pub struct Watcher {
-    /// One for each stroke that was measured or could not be.
+    /// Receives one report per stroke, measured or not.
     pub strokes: tokio::sync::mpsc::UnboundedSender<StrokeReport>,
 }
 
@@ -81,10 +87,11 @@ pub async fn run(
     let (mut host, side) = channels();
     let (tasks, inbox) = std::sync::mpsc::channel();
     let lost = Arc::default();
-    let ends = measurement_worker::Ends { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
-    let bench = MeasurementWorker::new(plant, catalogue, rig, &press, Arc::clone(&history), ends);
-    let bench = std::thread::Builder::new().name("bench".into()).spawn(move || bench.serve(&inbox));
-    let bench = bench.map_err(HostError::Thread)?;
+    let receivers =
+        measurement_worker::Receivers { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
+    let worker = MeasurementWorker::new(plant, catalogue, rig, &press, Arc::clone(&history), receivers);
+    let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
+    let worker = worker.map_err(HostError::Thread)?;
 
     let link = PressLink::new(&press);
     let alarm = status::NewestAlarm::default();
@@ -112,8 +119,8 @@ pub async fn run(
                 }
             }
             Some(order) = host.orders.recv() => {
-                if bench.is_finished() && hung.is_none() {
-                    hung = Some(HostError::Bench("a plugin hangs or the bench failed".into()));
+                if worker.is_finished() && hung.is_none() {
+                    hung = Some(HostError::Worker("a plugin hangs or the measurement failed".into()));
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
                 dispatch(order, &tasks, &mut scanning, &history, &alarm);
@@ -127,17 +134,17 @@ pub async fn run(
     status.abort();
     // A scan that is still being written is finished; a plugin that hangs is not waited for.
     let end = tokio::time::Instant::now() + LAST_SCAN;
-    while hung.is_none() && !bench.is_finished() && tokio::time::Instant::now() < end {
+    while hung.is_none() && !worker.is_finished() && tokio::time::Instant::now() < end {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     match ended {
         Ok(result) => result?,
-        Err(panic) => return Err(HostError::Bench(panic.to_string())),
+        Err(panic) => return Err(HostError::Worker(panic.to_string())),
     }
     hung.map_or(Ok(()), Err)
 }
 
-/// Hands an order on; what the bench must hear while it works goes beside its queue.
+/// Passes an order on; a cancellation bypasses the worker's queue.
 fn dispatch(
     order: Order,
     tasks: &std::sync::mpsc::Sender<Task>,
@@ -149,7 +156,7 @@ fn dispatch(
         Order::StartScan { key, run_id, data } => {
             let token = CancelToken::default();
             *scanning = Some((key, token.clone()));
-            // A bench that ended is noticed by the dispatcher.
+            // The dispatcher notices a worker that has ended.
             let _ = tasks.send(Task::Scan { key, run_id, data, token });
         }
         Order::Evaluate(key) => drop(tasks.send(Task::Evaluate(key))),

@@ -1,11 +1,11 @@
-//! Where plugins are looked for.
+//! The folders of the plugins, and the libraries in them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::{Descriptor, Library, PluginError};
 
-/// The folders in which plugins are looked for, in order.
+/// Plugin folders, in the order of the search.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     folders: Vec<PathBuf>,
@@ -16,12 +16,12 @@ pub struct Catalogue {
 pub struct Listed {
     /// File.
     pub path: PathBuf,
-    /// What it is, or why it cannot be used.
+    /// Its description, or the reason why it cannot be used.
     pub plugin: Result<Descriptor, PluginError>,
 }
 
 impl Catalogue {
-    /// `given` first, then `../lib/platen/plugins` beside the program, then the program's own folder.
+    /// Returns the search order: `given` first, then `../lib/platen/plugins` beside the program, then the program's own folder.
     pub fn new(given: Option<&Path>) -> Self {
         let program = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
         let installed = program.as_ref().map(|folder| folder.join("../lib/platen/plugins"));
@@ -29,10 +29,10 @@ impl Catalogue {
         Self { folders: folders.into_iter().flatten().filter(|folder| folder.is_dir()).collect() }
     }
 
-    /// Loads the plugin that plant files call `name`.
+    /// Loads the plugin named `name` in plant files.
     ///
     /// # Errors
-    /// [`PluginError::NotFound`], or why the library found cannot be used.
+    /// [`PluginError::NotFound`], or the reason why the library found cannot be used.
     pub fn load(&self, name: &str) -> Result<Library, PluginError> {
         let file = format!(
             "{}{}{}",
@@ -51,13 +51,13 @@ impl Catalogue {
         }
     }
 
-    /// The installed plugin whose name is most like `name`, if one is alike at all.
+    /// Returns the installed plugin with the name nearest to `name`, if one is near.
     fn nearest(&self, name: &str) -> Option<String> {
         let names: Vec<String> = self.files().into_keys().map(|stem| stem.replace('_', "-")).collect();
         platen_plant::nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
     }
 
-    /// Library files by the middle of their name, the first folder's before later ones.
+    /// Returns the library files by plugin name; a file of an earlier folder hides one of a later folder.
     fn files(&self) -> BTreeMap<String, PathBuf> {
         let mut files = BTreeMap::new();
         for folder in &self.folders {
@@ -73,14 +73,14 @@ impl Catalogue {
         files
     }
 
-    /// Every library file of the folders with what it is.
+    /// Lists every library file of the folders with its description.
     pub fn list(&self) -> Vec<Listed> {
         let describe =
             |path: PathBuf| Listed { plugin: Library::load(&path).map(|l| l.descriptor().clone()), path };
         self.files().into_values().map(describe).collect()
     }
 
-    /// The folders looked in.
+    /// Returns the folders searched.
     pub fn folders(&self) -> &[PathBuf] {
         &self.folders
     }

@@ -1,4 +1,4 @@
-//! Comparisons as the host sees them.
+//! Comparison plugins: from a task and surfaces to a report.
 
 use std::time::Duration;
 
@@ -10,14 +10,14 @@ use platen_shape::Surface;
 use super::instance::InputFrame;
 use super::{Instance, JobSpec, Kind, Library, PluginError};
 
-/// A comparison with its options.
+/// A configured comparison.
 #[derive(Debug)]
 pub struct Comparison {
     instance: Instance,
     limit: Duration,
 }
 
-/// The surfaces of a plate that a comparison may look at.
+/// Surfaces of one plate, the inputs of a comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct Surfaces<'a> {
     /// The plate now.
@@ -29,7 +29,7 @@ pub struct Surfaces<'a> {
 }
 
 impl Comparison {
-    /// Makes a comparison of checked options; `limit` is the time for one plate.
+    /// Creates a comparison from checked options; `limit` is the deadline of one plate.
     ///
     /// # Errors
     /// As [`Instance::create`].
@@ -39,15 +39,15 @@ impl Comparison {
         Ok(Self { instance, limit })
     }
 
-    /// Name in plant files.
+    /// Returns the name in plant files.
     pub fn name(&self) -> &str {
         self.instance.name()
     }
 
-    /// Compares.
+    /// Runs the comparison and checks its output.
     ///
     /// # Errors
-    /// The plugin's reason, its deadline, or what was wrong with what it sent.
+    /// The plugin's reason, the deadline, or the violation in its output.
     pub fn compare(&self, task: &Task, surfaces: Surfaces<'_>) -> Result<Report, PluginError> {
         let misbehaved =
             |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };

@@ -1,4 +1,4 @@
-//! What a plugin says of itself, copied out of its tables.
+//! Description of a plugin: name, kind, options, formats; copied out of its static tables.
 #![allow(unsafe_code, reason = "reads the plugin's static tables")]
 
 use std::ffi::{CStr, c_char};
@@ -6,19 +6,19 @@ use std::ffi::{CStr, c_char};
 use platen_abi::{Desc, OptionDecl as RawOption, option_flag, option_type};
 use platen_plant::{OptionDecl, OptionType};
 
-/// What a plugin does.
+/// Kind of a plugin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A trigger into a lattice.
+    /// Scanner driver: from a trigger to a lattice.
     Scanner,
-    /// A mesh into (u, v).
+    /// Flattening: from the mid-surface mesh to a chart (u, v).
     Flattening,
-    /// Surfaces into findings.
+    /// Comparison: from surfaces to findings.
     Comparison,
 }
 
 impl Kind {
-    /// As in descriptors.
+    /// Returns the name in descriptors.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scanner => "scanner",
@@ -28,12 +28,12 @@ impl Kind {
     }
 }
 
-/// A plugin's descriptor.
+/// Description of a plugin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Descriptor {
     /// Name in plant files.
     pub id: String,
-    /// What it does.
+    /// Kind.
     pub kind: Kind,
     /// Name for people.
     pub name: String,
@@ -41,7 +41,7 @@ pub struct Descriptor {
     pub vendor: String,
     /// Version.
     pub version: String,
-    /// What it does, in sentences.
+    /// Purpose, in sentences.
     pub doc: String,
     /// SPDX expression.
     pub license: String,
@@ -57,7 +57,7 @@ impl Descriptor {
     /// Copies the descriptor.
     ///
     /// # Safety
-    /// `desc` is a plugin's descriptor: its strings end in NUL, its lists in null, and nothing of it changes.
+    /// `desc` is a plugin's descriptor: strings end in NUL, lists in null, and all of it is constant.
     pub(super) unsafe fn read(desc: &Desc) -> Result<Self, String> {
         // SAFETY: as the caller promises.
         unsafe {

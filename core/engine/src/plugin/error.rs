@@ -1,11 +1,11 @@
-//! What can be wrong with a plugin, one message for each.
+//! Errors of plugins, one message each.
 
 use std::path::PathBuf;
 
-/// A plugin that cannot be used, or that failed at work.
+/// Reason why a plugin cannot be used, or why it failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PluginError {
-    /// There is no library of that name.
+    /// No library has that name.
     #[error("plugin {name}: not found; looked for {file} in {}; {}", list(.looked_in), suggestion(.nearest))]
     NotFound {
         /// Name in the plant file.
@@ -17,16 +17,16 @@ pub enum PluginError {
         /// An installed plugin of a similar name.
         nearest: Option<String>,
     },
-    /// The file is a library of something else, or no library at all.
+    /// The file is another kind of library, or no library.
     #[error("plugin file {}: not a plugin: {why}; remove it from the plugin folder", .path.display())]
     NotAPlugin {
         /// File.
         path: PathBuf,
-        /// What it lacks.
+        /// Missing part.
         why: String,
     },
-    /// The library speaks another version of the boundary.
-    #[error("plugin file {}: built for plugin boundary {found}, this platen speaks {ours}; install the plugin's version for this platen", .path.display())]
+    /// The library was built for another version of the boundary.
+    #[error("plugin file {}: built for plugin boundary {found}, this platen has {ours}; install the plugin's version for this platen", .path.display())]
     WrongAbi {
         /// File.
         path: PathBuf,
@@ -40,10 +40,10 @@ pub enum PluginError {
     FailedToLoad {
         /// File.
         path: PathBuf,
-        /// The loader's words, with the symbol or library that is missing.
+        /// The loader's message, with the symbol or library that is missing.
         why: String,
     },
-    /// The plugin is of another kind than the place it is named in.
+    /// The kind of the plugin does not fit the place in the plant file.
     #[error(
         "plugin {name}: is a {found}, a {needed} is needed here; `platen plugins list` names those installed"
     )]
@@ -70,7 +70,7 @@ pub enum PluginError {
         name: String,
         /// Its reason and hint.
         message: String,
-        /// Trying again may help.
+        /// Whether a second attempt can succeed.
         retryable: bool,
     },
     /// The job was cancelled, or its deadline passed.
@@ -78,27 +78,27 @@ pub enum PluginError {
     Stopped {
         /// Name.
         name: String,
-        /// How long it had worked.
+        /// Time since the start of the job.
         elapsed_ms: u64,
-        /// Deadline or cancel.
+        /// Deadline or cancellation.
         why: &'static str,
     },
-    /// The plugin did not return after deadline, cancel and grace. It cannot be contained in this process.
+    /// The plugin did not return after deadline, cancellation and grace period. It cannot be ended within this process.
     #[error(
-        "{name}: hangs: {elapsed_ms} ms after its start it has not returned, though cancelled; restart platen, report the plugin"
+        "{name}: hangs: not returned {elapsed_ms} ms after its start, although cancelled; restart platen and report the plugin"
     )]
     Hangs {
         /// Name.
         name: String,
-        /// How long it had worked.
+        /// Time since the start of the job.
         elapsed_ms: u64,
     },
-    /// The plugin broke the contract of the boundary.
+    /// The plugin violated the contract of the boundary.
     #[error("{name}: misbehaved: {what}; report this to the plugin's author")]
     Misbehaved {
         /// Name.
         name: String,
-        /// What it did.
+        /// The violation.
         what: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Flattenings as the host sees them.
+//! Flattening plugins: from the mid-surface mesh to a chart.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
 use super::instance::InputFrame;
 use super::{Instance, JobSpec, Kind, Library, PluginError};
 
-/// A flattening with its options.
+/// A configured flattening.
 #[derive(Debug)]
 pub struct Flattening {
     instance: Instance,
@@ -16,7 +16,7 @@ pub struct Flattening {
 }
 
 impl Flattening {
-    /// Makes a flattening of checked options; `limit` is the time for one mesh.
+    /// Creates a flattening from checked options; `limit` is the deadline of one mesh.
     ///
     /// # Errors
     /// As [`Instance::create`].
@@ -26,7 +26,7 @@ impl Flattening {
         Ok(Self { instance, limit })
     }
 
-    /// Name in plant files.
+    /// Returns the name in plant files.
     pub fn name(&self) -> &str {
         self.instance.name()
     }

@@ -1,4 +1,4 @@
-//! The table of functions that plugins call. Each is checked: a plugin may be wrong.
+//! The host's functions for plugins (`platen_host` of `platen.h`). Every argument is checked.
 #![allow(unsafe_code, reason = "callbacks from the other side of the boundary")]
 
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -34,12 +34,12 @@ static TABLE: Table = Table(abi::Host {
     now_mono_ns,
 });
 
-/// The table, valid for ever.
+/// Returns the table, valid until the process ends.
 pub(super) fn get() -> *const abi::Host {
     &raw const TABLE.0
 }
 
-/// An error struct to be filled by a plugin.
+/// Returns an empty error, to be filled by a plugin.
 pub(super) fn empty_error() -> abi::Error {
     abi::Error {
         struct_size: size_of::<abi::Error>() as u32,
@@ -51,7 +51,7 @@ pub(super) fn empty_error() -> abi::Error {
     }
 }
 
-/// Message and hint in one line.
+/// Returns message and hint as one line.
 pub(super) fn message(error: &abi::Error) -> String {
     let text = |chars: &[c_char]| {
         let bytes: Vec<u8> = chars.iter().map(|c| *c as u8).take_while(|b| *b != 0).collect();

@@ -1,4 +1,4 @@
-//! One configured plugin at work, on a thread of its own.
+//! One configured plugin, with a thread of its own for all its calls.
 #![allow(unsafe_code, reason = "calls through the plugin's table")]
 
 use std::ffi::{CStr, CString};
@@ -17,17 +17,17 @@ use super::job::{self, CancelToken, EmittedFrame, Event, JobSpec, Listed};
 use super::values::Values;
 use super::{Kind, Library, PluginError, host_table};
 
-/// Time that a plugin has to return once it was cancelled. A plugin that outlasts it ends the host, so that a busy
-/// computer must not look like a hanging plugin.
+/// Grace period: time for a plugin to return after its cancellation. A plugin that exceeds it ends the host, hence long
+/// enough for a busy computer.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// How often a waiting job looks whether it was cancelled.
+/// Period at which a waiting job checks for cancellation.
 const CANCEL_POLL: Duration = Duration::from_millis(20);
 
-/// Frames under way between a plugin and its consumer: enough to keep both busy, few enough to bound memory.
+/// Capacity of the queue between a plugin and its consumer, frames: both stay busy, and memory is bounded.
 const FRAMES_UNDER_WAY: usize = 64;
 
-/// A frame for a plugin.
+/// An input frame of a job.
 #[derive(Debug)]
 pub(super) struct InputFrame {
     pub(super) format: &'static CStr,
@@ -66,10 +66,10 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// Makes an instance of a plugin with checked option values. Touches no hardware.
+    /// Creates an instance of a plugin with checked option values. Accesses no hardware.
     ///
     /// # Errors
-    /// Wrong kind, or the plugin's own reason to refuse the values.
+    /// Wrong kind, or the plugin's reason to refuse the values.
     pub fn create(library: &Library, kind: Kind, values: &[OptionValue]) -> Result<Self, PluginError> {
         let descriptor = library.descriptor();
         let name = descriptor.id.clone();
@@ -96,7 +96,7 @@ impl Instance {
         Ok(Self { name, commands: Some(commands), raw, thread: Some(thread) })
     }
 
-    /// Name in plant files.
+    /// Returns the name in plant files.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -122,18 +122,18 @@ impl Instance {
         PluginError::Misbehaved { name: self.name.clone(), what: "its thread ended".into() }
     }
 
-    /// Connects to what the plugin needs.
+    /// Opens the instance: the plugin connects to its device.
     ///
     /// # Errors
-    /// The plugin's reason, or that it hangs.
+    /// The plugin's reason, or [`PluginError::Hangs`].
     pub fn open(&self, limit: Duration) -> Result<(), PluginError> {
         self.ask(limit, Command::Open)?
     }
 
-    /// Seconds that a scan of the window takes, when the plugin knows.
+    /// Returns the duration of a scan of the window, seconds, if the plugin can estimate it.
     ///
     /// # Errors
-    /// When the plugin hangs.
+    /// [`PluginError::Hangs`].
     pub fn estimate_s(&self, window: Option<&Window>, limit: Duration) -> Result<Option<f64>, PluginError> {
         let window = window.map(to_raw_window);
         self.ask(limit, |reply| Command::Estimate(window, reply))
@@ -142,7 +142,7 @@ impl Instance {
     /// Prepares for the next trigger.
     ///
     /// # Errors
-    /// The plugin's reason, or that it hangs.
+    /// The plugin's reason, or [`PluginError::Hangs`].
     pub fn arm(&self, spec: JobSpec) -> Result<(), PluginError> {
         let (reports, _receiver) = sync_channel(1);
         let listed = job::begin(Instant::now() + spec.limit, reports);
@@ -183,7 +183,10 @@ impl Drop for Instance {
             if thread.is_finished() {
                 let _ = thread.join();
             } else {
-                tracing::warn!(plugin = self.name, "the plugin does not return from closing; left behind");
+                tracing::warn!(
+                    plugin = self.name,
+                    "the plugin does not return from closing; its thread is abandoned"
+                );
             }
         }
     }
@@ -192,7 +195,7 @@ impl Drop for Instance {
 /// A frame that a plugin emitted.
 #[derive(Debug)]
 pub struct Emitted {
-    /// What the bytes are.
+    /// Name of the format.
     pub format: String,
     /// Bits of `platen_abi::frame_flag`.
     pub flags: u32,
@@ -200,7 +203,7 @@ pub struct Emitted {
 }
 
 impl Emitted {
-    /// The data; nothing of it is to be trusted.
+    /// Returns the data, unchecked.
     pub fn bytes(&self) -> &[u8] {
         self.buffer.as_ref()
     }
@@ -232,7 +235,7 @@ pub struct RunningJob<'a> {
 }
 
 impl RunningJob<'_> {
-    /// The next frame; `None` at the end of the job.
+    /// Returns the next frame; `None` at the end of the job.
     pub fn next_frame(&mut self) -> Option<Emitted> {
         while self.result.is_none() {
             if self.token.is_cancelled() && self.cancelled_at.is_none() {
@@ -255,7 +258,7 @@ impl RunningJob<'_> {
         None
     }
 
-    /// A plugin that was stopped is reported as stopped, whatever it made of it.
+    /// Returns how the job ended: a job that was stopped is reported as stopped, whatever status the plugin returned.
     fn judge(&self, result: Result<(), PluginError>) -> Result<(), PluginError> {
         if self.cancelled_at.is_none() && !(result.is_err() && self.listed.0.is_stopped()) {
             return result;
@@ -268,7 +271,7 @@ impl RunningJob<'_> {
         })
     }
 
-    /// Cancels the job; frames that still come are dropped.
+    /// Cancels the job; later frames are dropped.
     pub fn cancel(&mut self) {
         self.cancelled_at = Some(Instant::now());
         self.listed.0.cancelled.store(true, Ordering::Relaxed);
@@ -277,16 +280,16 @@ impl RunningJob<'_> {
         unsafe { ((*raw).cancel)(raw, self.listed.0.id) };
     }
 
-    /// Waits for the end, dropping frames that still come.
+    /// Waits for the end; later frames are dropped.
     ///
     /// # Errors
-    /// Why the job failed.
+    /// The reason of the failure.
     pub fn finish(mut self) -> Result<(), PluginError> {
         while self.next_frame().is_some() {}
         self.result.take().unwrap_or(Ok(()))
     }
 
-    /// Name of the plugin, for messages.
+    /// Returns the name of the plugin, for messages.
     pub fn name(&self) -> &str {
         &self.instance.name
     }
@@ -332,11 +335,14 @@ fn create(entry: &abi::Entry, name: &str, values: &Values) -> Result<*mut abi::I
     // SAFETY: null, or the instance that the plugin made.
     match unsafe { instance.as_ref() } {
         Some(made) if made.struct_size as usize >= size_of::<abi::Instance>() => Ok(instance),
-        _ => Err(PluginError::Misbehaved { name: name.to_owned(), what: "it made no sound instance".into() }),
+        _ => Err(PluginError::Misbehaved {
+            name: name.to_owned(),
+            what: "it created no valid instance".into(),
+        }),
     }
 }
 
-/// The thread of one instance: works off commands until the host lets go, then closes and destroys.
+/// The thread of one instance: executes commands until the host drops the instance, then closes and destroys it.
 fn serve(raw: *mut abi::Instance, name: &str, inbox: &Receiver<Command>) {
     // SAFETY: of all calls here: `[inst]` calls of a live instance, all from this thread.
     let table = unsafe { &*raw };

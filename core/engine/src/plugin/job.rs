@@ -1,4 +1,4 @@
-//! Jobs in progress, as the callbacks of the host's table see them.
+//! Jobs in progress, for the callbacks of the host's table.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,33 +20,33 @@ impl CancelToken {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// True once cancelled.
+    /// Whether the job was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// What a job belongs to and how long it may take.
+/// Stroke and deadline of a job.
 #[derive(Debug, Clone)]
 pub struct JobSpec {
     /// Stroke, 0 when none.
     pub stroke: u64,
-    /// When the press triggered.
+    /// Time of the press's trigger.
     pub trigger: Instant,
     /// Time allowed from now.
     pub limit: Duration,
-    /// Cancels it.
+    /// Token that cancels it.
     pub cancel: CancelToken,
 }
 
 impl JobSpec {
-    /// Work that belongs to no stroke.
+    /// Returns the specification of a job outside a stroke.
     pub fn untriggered(limit: Duration) -> Self {
         Self { stroke: 0, trigger: Instant::now(), limit, cancel: CancelToken::default() }
     }
 }
 
-/// A frame on its way from a plugin.
+/// A frame from a plugin.
 #[derive(Debug)]
 pub(super) struct EmittedFrame {
     pub(super) format: String,
@@ -54,7 +54,7 @@ pub(super) struct EmittedFrame {
     pub(super) buffer: AlignedBuffer,
 }
 
-/// What happens in a job, as its consumer hears of it.
+/// Events of a job for its consumer.
 #[derive(Debug)]
 pub(super) enum Event {
     Frame(EmittedFrame),
@@ -80,17 +80,17 @@ impl Job {
 static JOBS: Mutex<BTreeMap<u64, Arc<Job>>> = Mutex::new(BTreeMap::new());
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
-/// A number that was not given out before; also used for buffer tokens.
+/// Returns a number that was not issued before; also used for buffer tokens.
 pub(super) fn next_id() -> u64 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// The job of this number, while it is in progress.
+/// Returns the job of this number, while it is in progress.
 pub(super) fn find(id: u64) -> Option<Arc<Job>> {
     JOBS.lock().unwrap_or_else(PoisonError::into_inner).get(&id).cloned()
 }
 
-/// Puts a job on the list until the guard is dropped.
+/// Registers a job until the guard is dropped.
 pub(super) fn begin(deadline: Instant, frames: SyncSender<Event>) -> Listed {
     let job = Arc::new(Job {
         id: next_id(),
@@ -103,7 +103,7 @@ pub(super) fn begin(deadline: Instant, frames: SyncSender<Event>) -> Listed {
     Listed(job)
 }
 
-/// A job on the list. Dropping it takes the job off, with the buffers that were not given back.
+/// A registered job. Dropping it removes the job and the buffers that the plugin did not return.
 #[derive(Debug)]
 pub(super) struct Listed(pub(super) Arc<Job>);
 
@@ -117,7 +117,7 @@ impl Drop for Listed {
     }
 }
 
-/// Nanoseconds of the host's monotonic clock, from the first call on.
+/// Returns nanoseconds of the host's monotonic clock since the first call.
 pub(super) fn mono_ns(at: Instant) -> i64 {
     static START: OnceLock<Instant> = OnceLock::new();
     let start = *START.get_or_init(Instant::now);

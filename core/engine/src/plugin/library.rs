@@ -1,4 +1,4 @@
-//! Opens a library: looks before it opens, binds at once, never unloads.
+//! Loading of a plugin library: inspected as data (ELF) first, symbols bound at once (`RTLD_NOW`), never unloaded.
 #![allow(unsafe_code, reason = "the loader")]
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use platen_abi as abi;
 use super::host_table;
 use super::{Descriptor, PluginError};
 
-/// A loaded library with one plugin. Lives until the program ends.
+/// A loaded library with one plugin; stays loaded until the program ends.
 #[derive(Debug, Clone)]
 pub struct Library(Arc<Loaded>);
 
@@ -26,14 +26,14 @@ struct Loaded {
     descriptor: Descriptor,
 }
 
-/// Libraries by file, so that each is loaded and initialised once.
+/// Loaded libraries by file, so that each is initialised once.
 static LOADED: Mutex<BTreeMap<PathBuf, Library>> = Mutex::new(BTreeMap::new());
 
 impl Library {
-    /// Loads a file, or gives the library already loaded from it.
+    /// Loads a file, or returns the library already loaded from it.
     ///
     /// # Errors
-    /// Not a plugin, wrong ABI, failed to load; nothing of the library runs before the first two are excluded.
+    /// Not a plugin, wrong ABI, failed to load. No code of the library runs before the first two are excluded.
     pub fn load(path: &Path) -> Result<Self, PluginError> {
         let path = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -46,7 +46,7 @@ impl Library {
         Ok(library)
     }
 
-    /// What the plugin says of itself.
+    /// Returns the description of the plugin.
     pub fn descriptor(&self) -> &Descriptor {
         &self.0.descriptor
     }
@@ -61,13 +61,13 @@ impl Library {
     }
 }
 
-/// Reads the file as data: a truncated library would end the process inside the loader, and a library of
-/// something else would run its constructors.
+/// Reads the file as data: a truncated library would end the process inside the loader, and another kind of library
+/// would run its constructors.
 fn look(path: &Path) -> Result<(), PluginError> {
     let not_a_plugin = |why: &str| PluginError::NotAPlugin { path: path.to_path_buf(), why: why.to_owned() };
     let bytes = std::fs::read(path).map_err(|e| not_a_plugin(&format!("it cannot be read ({e})")))?;
     let elf = ElfFile64::<object::Endianness>::parse(bytes.as_slice())
-        .map_err(|_| not_a_plugin("it is no library for this machine, or a damaged one"))?;
+        .map_err(|_| not_a_plugin("no library for this machine, or a damaged one"))?;
     let endian = elf.endian();
     let cut = elf.elf_program_headers().iter().any(|h| {
         let end = h.p_offset(endian).checked_add(h.p_filesz(endian));
@@ -96,7 +96,7 @@ fn look(path: &Path) -> Result<(), PluginError> {
     })
 }
 
-/// The reason of a loading error is in its sources.
+/// Returns a loading error with its sources, which contain the reason.
 fn reasons(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();

@@ -1,4 +1,4 @@
-//! Checked option values as the boundary wants them.
+//! Checked option values as a table of the boundary.
 #![allow(unsafe_code, reason = "builds the table of values")]
 
 use std::ffi::CString;

@@ -1,19 +1,19 @@
-//! How the corners of a plate are told apart after its first scan: u goes on as it ran.
+//! Corner assignment after the first scan of a plate: the direction of u is continued from the previous scan.
 
 use nalgebra::Rotation3;
 use platen_shape::{Surface, Vec3};
 
-/// The plate at its last scan, from which (0, 0) goes on.
+/// Pose of the plate at its previous scan.
 #[derive(Debug, Clone, Copy)]
 pub struct PreviousPose<'a> {
-    /// Its shape and place then.
+    /// Surface at that scan, scanner frame.
     pub surface: &'a Surface,
-    /// How far the press says that it turned the plate since, radians.
+    /// Rotation of the plate since then as reported by the press, radians about the press's z axis.
     pub fed_by: Option<f64>,
 }
 
 impl PreviousPose<'_> {
-    /// Direction of growing u now, scanner frame: as it was, turned by what the press says about its own z.
+    /// Returns the expected direction of growing u, scanner frame: the previous one, rotated about the press's z axis.
     pub(super) fn u_axis(&self, press_z: Vec3) -> Vec3 {
         let (width, middle) = (self.surface.width(), 0.5 * self.surface.height());
         let along_u = self.surface.point(width, middle) - self.surface.point(0.0, middle);

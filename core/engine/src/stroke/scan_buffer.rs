@@ -1,8 +1,8 @@
-//! A whole scan, held until its stroke is judged.
+//! Buffer of a whole scan, until its stroke is judged.
 
 use platen_scan::{Column, ScanEnd, ScanHeader};
 
-/// A whole scan as it came, for the archive.
+/// A whole scan in memory, for the retention of raw scans.
 #[derive(Debug, Default)]
 pub struct ScanBuffer {
     header: Option<ScanHeader>,
@@ -11,8 +11,8 @@ pub struct ScanBuffer {
     end: Option<ScanEnd>,
 }
 
-/// Most cells that are held (`Column::SAMPLE_BYTES` each): a full dome of the finest step that anyone measures plates with.
-const TAPE_CELLS: usize = 50_000_000;
+/// Largest scan held, cells of `Column::SAMPLE_BYTES` each: a full dome at the finest step in use for plates.
+const MAX_CELLS: usize = 50_000_000;
 
 impl ScanBuffer {
     pub(super) fn begin(&mut self, header: ScanHeader) {
@@ -21,7 +21,7 @@ impl ScanBuffer {
 
     pub(super) fn push(&mut self, column: Column) {
         self.cells += column.len();
-        if self.cells > TAPE_CELLS {
+        if self.cells > MAX_CELLS {
             self.columns = Vec::new();
         } else {
             self.columns.push(column);
@@ -32,13 +32,13 @@ impl ScanBuffer {
         self.end = Some(end);
     }
 
-    /// The scan.
+    /// Returns the scan.
     ///
     /// # Errors
-    /// Why it is not whole.
+    /// The reason why it is incomplete.
     pub fn finish(self) -> Result<(ScanHeader, Vec<Column>, ScanEnd), String> {
         match (self.header, self.end) {
-            _ if self.cells > TAPE_CELLS => {
+            _ if self.cells > MAX_CELLS => {
                 Err(format!("{} cells are too many to hold; measure a window", self.cells))
             }
             (Some(header), Some(end)) => Ok((header, self.columns, end)),

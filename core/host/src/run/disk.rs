@@ -1,8 +1,8 @@
-//! The disk that results are written to.
+//! Free space of the disk with the results.
 
 use std::path::Path;
 
-/// Bytes that are free for results in a folder.
+/// Returns the bytes available in a folder.
 pub(super) fn free(folder: &Path) -> std::io::Result<u64> {
     let space = rustix::fs::statvfs(folder)?;
     Ok(space.f_bavail.saturating_mul(space.f_frsize))

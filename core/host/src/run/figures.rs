@@ -1,4 +1,4 @@
-//! From the comparisons' findings to the figures in the press's registers.
+//! Mapping of the comparisons' findings to the figures in the press's registers.
 
 use platen_model::Measure;
 use platen_model::{Code, Figures, Measurement, Timestamp, Verdict};
@@ -8,7 +8,7 @@ use platen_engine::plugin::PluginError;
 use platen_model::Report;
 use platen_shape::Measured;
 
-/// What goes to the press. Figures that no comparison gave stay out and show as invalid.
+/// Returns the result for the press. A figure that no comparison gave is absent, and its register holds the invalid value.
 pub(super) fn measurement(
     measured: &Measured,
     reports: &[Result<Report, PluginError>],

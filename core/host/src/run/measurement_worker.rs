@@ -1,4 +1,7 @@
-//! The bench: scans and measures one stroke at a time, on a thread of its own.
+//! The measurement worker: scans and measures one stroke at a time, on a thread of its own.
+//!
+//! Scan: window of the last stroke, else base window; evaluation: measurement, comparisons, verdict, documents, answer to the
+//! press; then pictures and report. Between strokes it connects to the scanner and reports readiness to the press side.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -29,40 +32,40 @@ use platen_report::result::{Context, ResultRecord};
 use platen_report::{history_view, output_folder, plate_report};
 use platen_shape::Scanned;
 
-/// Longest scan of a driver that gives no estimate: a full dome takes minutes.
+/// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
-/// A scan is given at least this long, whatever its driver estimates: networks stall, computers are busy.
+/// Least estimate passed to the press side: networks stall, computers are busy.
 const LEAST_ESTIMATE: Duration = Duration::from_secs(10);
-/// Time for a scanner to connect.
+/// Deadline for a scanner to connect.
 const OPEN_LIMIT: Duration = Duration::from_secs(60);
-/// Time between two tries to reach a scanner.
+/// Time between two attempts to connect to a scanner.
 const RETRY: Duration = Duration::from_secs(2);
 
-/// What the bench is asked.
+/// A task of the worker.
 #[derive(Debug)]
 pub(super) enum Task {
-    /// Scan this stroke.
+    /// Scan a stroke.
     Scan { key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken },
-    /// Judge the stroke that was scanned last.
+    /// Evaluate the stroke that was scanned last.
     Evaluate(StrokeKey),
 }
 
-/// One stroke as it ended, for those who watch.
+/// Outcome of one stroke, for the observer of a running host.
 #[derive(Debug, Clone)]
 pub struct StrokeReport {
     /// The stroke.
     pub key: StrokeKey,
     /// A scan of the blank.
     pub baseline: bool,
-    /// Its result document, or why there is none.
+    /// Its result document, or the reason why there is none.
     pub result: Result<Box<ResultRecord>, String>,
     /// Folder of its files.
     pub folder: Option<PathBuf>,
-    /// From the order to the verdict.
+    /// Time from the order to the verdict.
     pub elapsed: Duration,
 }
 
-/// A stroke between its scan and its result.
+/// The stroke between its scan and its result.
 #[derive(Debug)]
 struct ActiveStroke {
     key: StrokeKey,
@@ -75,17 +78,17 @@ struct ActiveStroke {
     scanned_at: jiff::Timestamp,
 }
 
-/// A stroke with all that was found out about it.
-struct Judged {
+/// A stroke with its result.
+struct JudgedStroke {
     answer: Measurement,
     record: ResultRecord,
     surface: Surface,
     reports: Vec<Result<Report, PluginError>>,
-    /// Folder of its files, where they could be written.
+    /// Folder of its files; `None` when they could not be written.
     folder: Option<PathBuf>,
 }
 
-/// Scans and measures.
+/// State of the worker.
 #[derive(Debug)]
 pub(super) struct MeasurementWorker {
     plant: PlantFile,
@@ -93,27 +96,27 @@ pub(super) struct MeasurementWorker {
     rig: Pipeline,
     scanner: Option<Scanner>,
     region: Region,
-    /// How long a scan of the base window takes; `None` for a driver that does not plan its scans.
+    /// Duration of a scan of the base window; `None` for a driver without scan planning.
     estimate: Option<Duration>,
-    /// Since when the scanner has been in reach.
+    /// Time since when the scanner has been connected.
     in_reach: Option<Instant>,
-    /// What the press side was told last about being ready to scan.
-    told: Option<Result<(), Code>>,
+    /// Readiness as last reported to the press side.
+    reported: Option<Result<(), Code>>,
     scan_limit: Option<Duration>,
     history: Arc<Mutex<History>>,
     archive: ScanRetention,
-    ends: Ends,
+    receivers: Receivers,
     active: Option<ActiveStroke>,
 }
 
-/// Those who hear of the bench's work.
+/// Receivers of the worker's results.
 #[derive(Debug)]
-pub(super) struct Ends {
+pub(super) struct Receivers {
     /// The press side.
     pub(super) answers: UnboundedSender<Answer>,
-    /// Who watches each stroke.
+    /// Observer of the strokes.
     pub(super) watcher: Option<Watcher>,
-    /// How many strokes' documents could not be written.
+    /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
 }
 
@@ -124,7 +127,7 @@ impl MeasurementWorker {
         rig: Pipeline,
         press: &Press,
         history: Arc<Mutex<History>>,
-        ends: Ends,
+        receivers: Receivers,
     ) -> Self {
         Self {
             plant: plant.clone(),
@@ -134,22 +137,22 @@ impl MeasurementWorker {
             rig,
             scanner: None,
             in_reach: None,
-            told: None,
+            reported: None,
             scan_limit: press.timeouts.scan,
             history,
             archive: ScanRetention::start(&plant.output),
-            ends,
+            receivers,
             active: None,
         }
     }
 
-    /// Works until the dispatcher lets go, or a plugin hangs.
+    /// Executes tasks until the dispatcher closes the channel, or a plugin hangs.
     pub(super) fn serve(mut self, tasks: &Receiver<Task>) {
         loop {
             if self.scanner.is_none() {
                 self.connect();
             }
-            self.tell_ready();
+            self.report_readiness();
             let task = match (&self.scanner, tasks.recv_timeout(RETRY)) {
                 (_, Ok(task)) => task,
                 (_, Err(std::sync::mpsc::RecvTimeoutError::Timeout)) => continue,
@@ -165,9 +168,9 @@ impl MeasurementWorker {
         }
     }
 
-    fn say(&self, answer: Answer) {
-        // A press side that ended needs no answer.
-        let _ = self.ends.answers.send(answer);
+    fn answer(&self, answer: Answer) {
+        // The press side may have ended.
+        let _ = self.receivers.answers.send(answer);
     }
 
     fn connect(&mut self) {
@@ -187,41 +190,41 @@ impl MeasurementWorker {
             Err(why) => {
                 tracing::error!("scanner: {why}");
                 self.in_reach = None;
-                self.told = Some(Err(Code::ScannerNotReady));
-                self.say(Answer::Scanner { ready: Err(Code::ScannerNotReady), estimate: None });
+                self.reported = Some(Err(Code::ScannerNotReady));
+                self.answer(Answer::Scanner { ready: Err(Code::ScannerNotReady), estimate: None });
             }
         }
     }
 
-    /// What is known of the scanner; `None` where the plant names no calibration.
+    /// Returns the valid calibration; `None` where the plant file has none.
     fn calibration(&self) -> Result<Option<Calibration>, calibration::Invalid> {
         let in_reach = self.in_reach.map_or(Duration::ZERO, |since| since.elapsed());
         let wanted = self.plant.calibration.as_ref();
         wanted.map(|wanted| calibration::in_force(wanted, jiff::Timestamp::now(), in_reach)).transpose()
     }
 
-    /// Tells the press side whether strokes can be measured, when that changed: a scanner in reach whose calibration
-    /// does not hold measures nothing that could be judged.
-    fn tell_ready(&mut self) {
+    /// Reports to the press side whether strokes can be measured, when that has changed: without a valid calibration no
+    /// measurement could be judged.
+    fn report_readiness(&mut self) {
         if self.in_reach.is_none() {
             return;
         }
         let found = self.calibration();
         let ready = found.as_ref().map(|_| ()).map_err(|_| Code::CalibrationInvalid);
-        if self.told == Some(ready) {
+        if self.reported == Some(ready) {
             return;
         }
         match found {
             Ok(_) => tracing::info!("scanner ready"),
             Err(why) => tracing::error!("{why}"),
         }
-        self.told = Some(ready);
+        self.reported = Some(ready);
         // A plate that has moved out of its window is scanned twice.
         let estimate = self.estimate.map(|estimate| (2 * estimate).max(LEAST_ESTIMATE));
-        self.say(Answer::Scanner { ready, estimate });
+        self.answer(Answer::Scanner { ready, estimate });
     }
 
-    /// True when a plugin hangs.
+    /// Returns whether a plugin hangs.
     fn scan(&mut self, key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken) -> bool {
         let started = Instant::now();
         self.active = None;
@@ -241,7 +244,7 @@ impl MeasurementWorker {
                 let scanned_at = jiff::Timestamp::now();
                 self.active =
                     Some(ActiveStroke { key, run_id, data, plate, scanned, buffer, started, scanned_at });
-                self.say(Answer::Acquired(key));
+                self.answer(Answer::Acquired(key));
                 false
             }
             Err((code, why, hung)) => {
@@ -256,8 +259,8 @@ impl MeasurementWorker {
         }
     }
 
-    /// Scans in the window where the plate lay at the stroke before, if there is one, else in the base window. A plate
-    /// that has moved out of its window is scanned again in the base window.
+    /// Scans in the window of the last stroke's plate, if there is one, else in the base window. A plate that has moved out of
+    /// its window is scanned again in the base window.
     fn acquire(
         &self,
         scanner: &Scanner,
@@ -281,7 +284,7 @@ impl MeasurementWorker {
             );
             *buffer = self.archive.buffer();
         }
-        // Only a driver that plans its scans is told where to look: one that hands over files has all in them.
+        // Only a driver with scan planning receives a window: a file contains the whole scan.
         let base = self.region.base().filter(|_| self.estimate.is_some());
         let limit = job.limit.saturating_sub(start.elapsed());
         let mut scanned = stroke::scan(scanner, JobSpec { limit, ..job }, base, spec, buffer.as_mut())?;
@@ -289,7 +292,7 @@ impl MeasurementWorker {
         Ok(scanned)
     }
 
-    /// The window round the last stroke's plate, when a scan of it takes less time.
+    /// Returns the window round the last stroke's plate, if its scan takes less time.
     fn quicker(&self, scanner: &Scanner) -> Option<&Window> {
         let window = self.region.plate()?;
         let takes = scanner.estimate(Some(window), OPEN_LIMIT).ok()??;
@@ -298,7 +301,7 @@ impl MeasurementWorker {
 
     fn fail(&self, key: StrokeKey, baseline: bool, code: Code, why: String, started: Instant) {
         tracing::error!(%key, code = code.number(), "not measured: {why}");
-        self.say(Answer::Failed(key, code));
+        self.answer(Answer::Failed(key, code));
         self.report(StrokeReport {
             key,
             baseline,
@@ -309,20 +312,20 @@ impl MeasurementWorker {
     }
 
     fn report(&self, report: StrokeReport) {
-        if let Some(watcher) = &self.ends.watcher {
-            // A watcher that went away needs no report.
+        if let Some(watcher) = &self.receivers.watcher {
+            // The observer may have gone.
             let _ = watcher.strokes.send(report);
         }
     }
 
-    /// The plate file of the stroke's recipe.
+    /// Loads the plate file of the stroke's recipe.
     fn plate(&self, data: &StrokeData) -> Result<PlateFile, (Code, String, bool)> {
         let unknown = |why: String| (Code::RecipeUnknown, why, false);
         let recipe = data.recipe_id.ok_or_else(|| unknown("the press names no recipe".into()))?;
         PlateFile::load(&self.plant.plate_path(recipe)).map_err(|e| unknown(format!("recipe {recipe}: {e}")))
     }
 
-    /// True when a plugin hangs.
+    /// Returns whether a plugin hangs.
     fn evaluate(&mut self, key: StrokeKey) -> bool {
         let Some(mut stroke) = self.active.take().filter(|stroke| stroke.key == key) else {
             self.fail(key, false, Code::Interrupted, "its scan is gone".into(), Instant::now());
@@ -332,8 +335,8 @@ impl MeasurementWorker {
         let (baseline, started) = (stroke.data.baseline, stroke.started);
         let (folder, buffer) = (self.folder(stroke.run_id), stroke.buffer.take());
         let hung = match self.measure(&stroke, start) {
-            Ok(Judged { answer, record, surface, reports, folder }) => {
-                self.say(Answer::Result(key, Box::new(answer)));
+            Ok(JudgedStroke { answer, record, surface, reports, folder }) => {
+                self.answer(Answer::Result(key, Box::new(answer)));
                 let elapsed = started.elapsed();
                 // The press waits for its answer, not for pictures.
                 if let Some(folder) = &folder {
@@ -352,13 +355,13 @@ impl MeasurementWorker {
         hung
     }
 
-    /// Where the files of a stroke go.
+    /// Returns the folder for the files of a stroke.
     fn folder(&self, run_id: u32) -> PathBuf {
         self.plant.output.folder.join(format!("run-{run_id:06}"))
     }
 
-    /// From the plate's face to the result and its files.
-    fn measure(&mut self, stroke: &ActiveStroke, start: Instant) -> Result<Judged, NotMeasured> {
+    /// Measures the scanned plate, compares, judges, and writes the documents.
+    fn measure(&mut self, stroke: &ActiveStroke, start: Instant) -> Result<JudgedStroke, NotMeasured> {
         let spec = self.rig.spec(&stroke.plate);
         let earlier = PreviousScans::of(self.history().archive(), stroke.run_id);
         let last = earlier.last().map(|last| PreviousPose {
@@ -407,16 +410,16 @@ impl MeasurementWorker {
         ];
         let mut answer =
             figures::measurement(&measured, &reports, verdict, &stroke.plate, times, stroke.scanned_at);
-        // A result whose files are lost still goes to the press, and says so.
+        // A result without files still goes to the press, with a warning.
         answer.warning = folder.is_none().then_some(Code::StorageDegraded);
-        Ok(Judged { answer, record, surface: measured.measurement.surface, reports, folder })
+        Ok(JudgedStroke { answer, record, surface: measured.measurement.surface, reports, folder })
     }
 
     fn history(&self) -> MutexGuard<'_, History> {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes the documents and notes where they lie. A full disk costs the record, not the result.
+    /// Writes the documents and records their place. A full disk loses the record, not the result.
     fn keep(&mut self, stroke: &ActiveStroke, record: &ResultRecord, surface: &Surface) -> Option<PathBuf> {
         let folder = self.folder(stroke.run_id);
         let written =
@@ -427,15 +430,15 @@ impl MeasurementWorker {
         match written {
             Ok(()) => Some(folder),
             Err(why) => {
-                self.ends.lost.fetch_add(1, Ordering::Relaxed);
+                self.receivers.lost.fetch_add(1, Ordering::Relaxed);
                 tracing::error!(key = %stroke.key, "the record is lost: {why}");
                 None
             }
         }
     }
 
-    /// Pictures, table and mesh beside the documents, and the plate's report. All can be made again: losing them is no
-    /// fault of the stroke.
+    /// Writes pictures, table and mesh beside the documents, and the plate's report. They can be made again from the
+    /// documents: their loss is no fault of the stroke.
     fn illustrate(
         &self,
         stroke: &ActiveStroke,
@@ -446,7 +449,7 @@ impl MeasurementWorker {
     ) {
         let sound: Vec<&Report> = reports.iter().flatten().collect();
         let draw = || -> Result<(), Box<dyn std::error::Error>> {
-            // A reader of its own: the journal must never wait for a picture.
+            // A reader of its own: the journal never waits for a picture.
             let archive = platen_history::Archive::open(&self.plant.output.history)?;
             let strokes = history_view::strokes_until(&archive, stroke.run_id, record)?;
             output_folder::illustrate(folder, record, surface, &sound, &strokes)?;
@@ -460,7 +463,7 @@ impl MeasurementWorker {
     }
 }
 
-/// Code for the press, sentence for people, and whether a plugin hangs.
+/// Returns the alarm code, the sentence for people, and whether a plugin hangs.
 fn refusal(error: &NotMeasured) -> (Code, String, bool) {
     let hung = matches!(error, NotMeasured::Scanner(PluginError::Hangs { .. }));
     let code = match error {

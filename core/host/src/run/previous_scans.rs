@@ -1,4 +1,4 @@
-//! What is on record of earlier scans of the plate in hand.
+//! Previous scans of the active plate, from the history and the result folders.
 
 use platen_history::{Archive, Error, Stroke};
 use platen_shape::{Blank, Surface};
@@ -9,11 +9,11 @@ use platen_report::{history_view, output_folder};
 #[derive(Debug)]
 pub(super) struct Earlier {
     pub(super) surface: Surface,
-    /// The outline that its (u, v) refer to, where a scan of the blank told it.
+    /// Outline that its (u, v) refer to, where a scan of the blank gave one.
     pub(super) blank: Option<Blank>,
-    /// Where the plate rested.
+    /// Supports of the plate.
     pub(super) supports: Option<String>,
-    /// Feed rotation that the press told, radians.
+    /// Feed rotation as reported by the press, radians.
     pub(super) plate_rot: Option<f64>,
 }
 
@@ -25,12 +25,12 @@ pub(super) struct PreviousScans {
 }
 
 impl PreviousScans {
-    /// Those on record whose files are still there; the log tells of others.
+    /// Reads those on record whose files exist; the log names the others.
     pub(super) fn of(archive: &Archive, run_id: u32) -> Self {
         Self { before: load(archive.before(run_id)), baseline: load(archive.baseline(run_id)) }
     }
 
-    /// The last scan of the plate, whatever it was.
+    /// Returns the last scan of the plate: the stroke before, else the baseline.
     pub(super) fn last(&self) -> Option<&Earlier> {
         self.before.as_ref().or(self.baseline.as_ref())
     }

@@ -1,11 +1,11 @@
-//! The figures of a host as Prometheus reads them: for a textfile collector, so that the host opens no port.
+//! Metrics of a host in the Prometheus text format 0.0.4, for a textfile collector: the host opens no port.
 
 use platen_press::ROUND_TRIP_LIMITS_MS;
 
 use super::StatusRecord;
 
 impl StatusRecord {
-    /// The figures as Prometheus reads them (text format 0.0.4).
+    /// Returns the metrics as text.
     pub fn prometheus(&self, running: bool) -> String {
         let mut text = String::new();
         let label = format!("press=\"{}\"", self.press.replace('\\', "\\\\").replace('"', "\\\""));

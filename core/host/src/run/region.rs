@@ -1,4 +1,4 @@
-//! Which part of the dome is scanned: where the plate can be, not the whole hall. It saves most of a scan's time.
+//! Scan windows: the part of the dome where the plate can be, instead of the whole hall.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -9,17 +9,17 @@ use platen_shape::{RegionOfInterest, Vec3};
 
 use platen_shape::Scanned;
 
-/// Room round the last stroke's plate, metres: its edges rise by some centimetres a stroke, and a press feeds it by a few
-/// decimetres. A plate that went farther is scanned again in the base window.
+/// Margin round the last stroke's plate, metres: its edges rise by some centimetres a stroke, and a press feeds it by a few
+/// decimetres. A plate that moved farther is scanned again in the base window.
 const ROOM: f64 = 0.5;
 
 /// The windows of a plant's scans.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     choice: ScanWindow,
-    /// Where a plate can be at all; everything without.
+    /// Base window: the region of interest; `None` is the whole dome.
     base: Option<Window>,
-    /// Where the last stroke's plate lay, with room round it.
+    /// Window round the last stroke's plate, margin included.
     plate: Option<Window>,
 }
 
@@ -29,17 +29,17 @@ impl Region {
         Self { choice, base, plate: None }
     }
 
-    /// The window of a plate of which nothing is known.
+    /// Returns the window for a plate without a previous scan.
     pub(super) fn base(&self) -> Option<&Window> {
         self.base.as_ref()
     }
 
-    /// The window round the last stroke's plate.
+    /// Returns the window round the last stroke's plate.
     pub(super) fn plate(&self) -> Option<&Window> {
         self.plate.as_ref()
     }
 
-    /// Takes note of where the plate lies.
+    /// Records the place of the plate.
     pub(super) fn saw(&mut self, outline: &Outline) {
         if self.choice == ScanWindow::Plate {
             self.plate = round(outline.edges.iter().flat_map(|edge| &edge.points));
@@ -47,7 +47,7 @@ impl Region {
     }
 }
 
-/// True when the plate reaches the border of what was scanned, so that part of it may lie beyond.
+/// Whether the plate reaches the border of the window, so that a part of it may lie outside.
 pub(super) fn is_cut_off(scanned: &Scanned) -> bool {
     let header = &scanned.header;
     let columns = scanned.warm_up_columns + 1..header.n_columns.saturating_sub(1);
@@ -55,7 +55,7 @@ pub(super) fn is_cut_off(scanned: &Scanned) -> bool {
     scanned.patch.samples.iter().any(|s| !columns.contains(&s.column) || !rows.contains(&s.row))
 }
 
-/// The directions in which a box lies; `None` where the scanner stands in it, above it or below it.
+/// Returns the directions of a box; `None` where the scanner stands in, above or below it.
 fn of_box(region: &RegionOfInterest) -> Option<Window> {
     let (min, max) = (region.min, region.max);
     // The points of its plan nearest to the scanner and farthest from it.
@@ -76,7 +76,7 @@ fn of_box(region: &RegionOfInterest) -> Option<Window> {
     })
 }
 
-/// The directions in which points lie, with room round each; `None` for points all round the scanner.
+/// Returns the directions of points with a margin round each; `None` for points all round the scanner.
 fn round<'a>(points: impl Iterator<Item = &'a Vec3> + Clone) -> Option<Window> {
     let room = |distance: f64| (ROOM / distance.max(ROOM)).asin();
     let azimuth = |p: &Vec3| (p.y.atan2(p.x), room(p.x.hypot(p.y)));
@@ -88,7 +88,7 @@ fn round<'a>(points: impl Iterator<Item = &'a Vec3> + Clone) -> Option<Window> {
     Some(Window { azimuth_start, azimuth_width, elevation_min, elevation_max })
 }
 
-/// Start and width of azimuths with room on both sides of each; they must lie within half a turn.
+/// Returns start and width of azimuths with a margin on both sides of each; they must lie within half a turn.
 fn azimuths(directions: impl Iterator<Item = (f64, f64)> + Clone) -> Option<(f64, f64)> {
     let (sin, cos) = directions.clone().fold((0.0, 0.0), |(s, c), (a, _)| (s + a.sin(), c + a.cos()));
     let middle = f64::atan2(sin, cos);

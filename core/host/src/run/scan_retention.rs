@@ -1,9 +1,9 @@
-//! Raw scans, kept for a while beside the results that were made of them.
+//! Retention of raw scans beside their results.
 //!
 //! A scan stays in memory until its result has gone to the press; then a thread of its own writes it as
 //! `run-NNNNNN/scan.e57`, which `platen measure` reads back to the last bit. Scans older than the plant file says are
-//! removed, and nothing but such scans ever is. Results go first: when the disk runs low, or a scan waits while the one
-//! before the last is still being written, the scan is not kept and the log says so.
+//! removed; no other file is. Results have priority: when the disk runs low, or while the scan before is still being
+//! written, the scan is not kept and the log names the reason.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -19,21 +19,21 @@ use platen_engine::stroke::ScanBuffer;
 
 /// Name of a scan in a result's folder.
 const NAME: &str = "scan.e57";
-/// Bytes of a disk that are left to results and to the history.
+/// Bytes of a disk reserved for results and history.
 const RESERVE: u64 = 1 << 30;
 /// Bytes of a cell in the file: three f64, state, intensity, row and column.
 const CELL_BYTES: u64 = 31;
-/// Scans that wait while one is written.
+/// Length of the queue of scans.
 const WAITING: usize = 1;
 
-/// A scan on its way to its file.
+/// A scan to be written.
 #[derive(Debug)]
 struct Order {
     folder: PathBuf,
     buffer: ScanBuffer,
 }
 
-/// Writes and removes scans on a thread of its own. Dropping it waits until the last one is written.
+/// Writes and removes scans on a thread of its own. Drop waits until the last one is written.
 #[derive(Debug)]
 pub(super) struct ScanRetention {
     orders: Option<SyncSender<Order>>,
@@ -41,7 +41,7 @@ pub(super) struct ScanRetention {
 }
 
 impl ScanRetention {
-    /// Starts, and removes what is too old; keeps nothing when the plant file says so.
+    /// Starts the thread and removes scans that are too old; keeps none where the plant file forbids it.
     pub(super) fn start(output: &Output) -> Self {
         let none = Self { orders: None, thread: None };
         let age = match output.keep_scans {
@@ -63,12 +63,12 @@ impl ScanRetention {
         }
     }
 
-    /// A buffer for the next scan, when scans are kept.
+    /// Returns a buffer for the next scan, if scans are kept.
     pub(super) fn buffer(&self) -> Option<ScanBuffer> {
         self.orders.is_some().then(ScanBuffer::default)
     }
 
-    /// Keeps a scan in the folder of its result, which need not be there.
+    /// Queues a scan for the folder of its result, which need not exist.
     pub(super) fn keep(&self, folder: PathBuf, buffer: Option<ScanBuffer>) {
         let (Some(orders), Some(buffer)) = (&self.orders, buffer) else { return };
         match orders.try_send(Order { folder, buffer }) {
@@ -135,7 +135,7 @@ fn check_room(needed: u64, free: u64) -> Result<(), String> {
     Err(format!("it needs {needed} MB, {free} MB are free and 1 GB is left to results; make room"))
 }
 
-/// Removes scans older than `age` and what an interrupted host left half-written. Touches no other file.
+/// Removes scans older than `age` and partial files of an interrupted host, and no other file.
 fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Result<()> {
     if !results.exists() {
         return Ok(());
@@ -160,7 +160,7 @@ fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Res
     Ok(())
 }
 
-/// True for a scan that is too old, and for one that another process left half-written.
+/// Whether a file is a scan that is too old, or a partial file of another process.
 fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTime) -> bool {
     let old = |limit| now.duration_since(modified).is_ok_and(|age| age > limit);
     let half = name.strip_prefix(NAME).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));

@@ -1,4 +1,4 @@
-//! What `platen status` shows: a small file that the running host keeps up to date.
+//! State of the host in a small file that the running host updates, for `platen status`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,47 +15,47 @@ use tokio::sync::{mpsc, watch};
 use super::disk;
 use platen_report::output_folder;
 
-/// The newest alarm, as the dispatcher hears it.
+/// The newest alarm, set by the dispatcher.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
 
-/// What the press side does not know.
+/// Facts from outside the press side.
 #[derive(Debug, Default)]
 pub(super) struct Beside {
     pub(super) alarm: NewestAlarm,
-    /// How many strokes' documents could not be written.
+    /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
 }
 
 /// Its name in the output folder.
 const FILE: &str = "status.json";
 
-/// From a reset until the press side has told how it stands after it.
+/// Time from a reset until the press side has reported its state after it.
 const RESET_SHOWS: Duration = Duration::from_millis(400);
 
-/// The file by which `platen press reset` asks the running host for a reset: whoever may write into its output folder
-/// may reset it.
+/// The file by which `platen press reset` requests a reset of the running host: write access to the output folder is the
+/// permission.
 pub fn reset_request(folder: &Path) -> PathBuf {
     folder.join("reset.request")
 }
 
-/// How things stand on one press.
+/// State of the host on one press.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StatusRecord {
     /// Name of the press.
     pub press: String,
-    /// When this was written, UTC.
+    /// Time of writing, UTC.
     pub at: jiff::Timestamp,
     /// Process of the host.
     pub pid: u32,
     /// State of the handshake.
     pub state: String,
-    /// What is wrong with the link, in words.
+    /// Fault of the link, in words.
     pub link_error: Option<String>,
-    /// What stands in the error register, in words.
+    /// Content of the error register, in words.
     pub error: Option<String>,
-    /// What stands in the warning register, in words.
+    /// Content of the warning register, in words.
     pub warning: Option<String>,
-    /// The newest alarm since the start, in words, and when it came.
+    /// The newest alarm since the start, in words, and its time.
     pub alarm: Option<(jiff::Timestamp, String)>,
     /// Strokes accepted since the start.
     pub strokes: u64,
@@ -82,28 +82,28 @@ pub struct StatusRecord {
     /// Seconds that the result in hand has waited for the press; null when none waits. There is never more than one: no
     /// stroke is accepted before it is delivered.
     pub result_waits_s: Option<f64>,
-    /// Bytes that are free where results are written; null where that cannot be told.
+    /// Bytes free where results are written; null where unknown.
     pub disk_free: Option<u64>,
     /// Records of the history and result folders that could not be written.
     pub records_lost: u64,
-    /// Seconds without being in step with the press, the present loss apart.
+    /// Seconds out of synchronisation with the press, without the present loss.
     pub link_down_s: f64,
-    /// What happened on the link.
+    /// Counters of the link.
     pub link: LinkRecord,
-    /// When faults were reset by hand last.
+    /// Time of the last manual reset.
     pub reset_at: Option<jiff::Timestamp>,
 }
 
-/// What happened on the link since the start.
+/// Counters of the link since the start.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LinkRecord {
     /// Requests sent.
     pub requests: u64,
     /// Write requests sent.
     pub writes: u64,
-    /// Writes that were never sent because they are not allowed.
+    /// Writes not sent because they are not allowed.
     pub writes_refused: u64,
-    /// Connections built.
+    /// Connections established.
     pub connections: u64,
     /// Connections dropped because of an error, a timeout or a wrong answer.
     pub poisoned: u64,
