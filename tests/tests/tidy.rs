@@ -7,21 +7,49 @@ use std::process::Command;
 /// Workspace crates that each kind of crate may use in its library or program (not in its tests).
 fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
     Some(match (folder, name) {
-        (
-            _,
-            "platen-abi" | "platen-numerics" | "platen-scan" | "platen-plant" | "platen-history"
-            | "platen-sim-plate",
-        ) => &[],
+        (_, "platen-abi" | "platen-model" | "platen-numerics" | "platen-scan" | "platen-sim-plate") => &[],
         (_, "platen-formats") => &["platen-scan"],
-        (_, "platen-shape") => &["platen-numerics", "platen-scan"],
-        (_, "platen-sdk") => &["platen-abi", "platen-scan", "platen-shape"],
-        (_, "platen-press") => &["platen-plant"],
-        (_, "platen") => {
-            &["platen-abi", "platen-scan", "platen-shape", "platen-plant", "platen-press", "platen-history"]
+        (_, "platen-plant" | "platen-history") => &["platen-model"],
+        (_, "platen-shape") => &["platen-model", "platen-numerics", "platen-scan"],
+        (_, "platen-sdk") => &["platen-abi", "platen-model", "platen-scan", "platen-shape"],
+        (_, "platen-press") => &["platen-model", "platen-plant"],
+        (_, "platen-engine") => &[
+            "platen-abi",
+            "platen-formats",
+            "platen-model",
+            "platen-plant",
+            "platen-scan",
+            "platen-sdk",
+            "platen-shape",
+        ],
+        // Documents and pictures: no press, no plugin.
+        (_, "platen-report") => {
+            &["platen-history", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
         }
+        (_, "platen") => &[
+            "platen-abi",
+            "platen-engine",
+            "platen-formats",
+            "platen-history",
+            "platen-model",
+            "platen-plant",
+            "platen-press",
+            "platen-report",
+            "platen-scan",
+            "platen-shape",
+        ],
+        (_, "platen-bench") => &[
+            "platen",
+            "platen-engine",
+            "platen-model",
+            "platen-plant",
+            "platen-press",
+            "platen-scan",
+            "platen-shape",
+        ],
         (_, "simulated") => &["platen-sdk", "platen-scan", "platen-sim-plate", "platen-sim-scanner"],
         ("drivers", _) => &["platen-sdk", "platen-scan", "platen-formats"],
-        ("plugins", _) => &["platen-numerics", "platen-sdk", "platen-shape"],
+        ("plugins", _) => &["platen-model", "platen-numerics", "platen-sdk", "platen-shape"],
         (_, "platen-sim-scanner" | "platen-sim-press") => &["platen-sim-plate"],
         (_, "platen-sim") => &["platen-sim-plate", "platen-sim-scanner", "platen-sim-press"],
         ("tests", _) => return None,

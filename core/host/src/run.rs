@@ -83,13 +83,13 @@ pub async fn run(
 ) -> Result<(), HostError> {
     let history = History::open(&plant.output.history, press.press_id, Timestamp::now())?;
     let history = Arc::new(Mutex::new(history));
-    let rig = Pipeline::of(plant, catalogue)?;
+    let pipeline = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (tasks, inbox) = std::sync::mpsc::channel();
     let lost = Arc::default();
     let receivers =
         measurement_worker::Receivers { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
-    let worker = MeasurementWorker::new(plant, catalogue, rig, &press, Arc::clone(&history), receivers);
+    let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
     let worker = worker.map_err(HostError::Thread)?;
 

@@ -93,7 +93,7 @@ struct JudgedStroke {
 pub(super) struct MeasurementWorker {
     plant: PlantFile,
     catalogue: Catalogue,
-    rig: Pipeline,
+    pipeline: Pipeline,
     scanner: Option<Scanner>,
     region: Region,
     /// Duration of a scan of the base window; `None` for a driver without scan planning.
@@ -124,7 +124,7 @@ impl MeasurementWorker {
     pub(super) fn new(
         plant: &PlantFile,
         catalogue: &Catalogue,
-        rig: Pipeline,
+        pipeline: Pipeline,
         press: &Press,
         history: Arc<Mutex<History>>,
         receivers: Receivers,
@@ -132,9 +132,9 @@ impl MeasurementWorker {
         Self {
             plant: plant.clone(),
             catalogue: catalogue.clone(),
-            region: Region::new(plant.scan_window, rig.region.as_ref()),
+            region: Region::new(plant.scan_window, pipeline.region.as_ref()),
             estimate: None,
-            rig,
+            pipeline,
             scanner: None,
             in_reach: None,
             reported: None,
@@ -230,7 +230,7 @@ impl MeasurementWorker {
         self.active = None;
         let mut buffer = self.archive.buffer();
         let scanned = self.plate(&data).and_then(|plate| {
-            let spec = self.rig.spec(&plate);
+            let spec = self.pipeline.spec(&plate);
             let scanner =
                 self.scanner.as_ref().ok_or((Code::ScannerNotReady, "not connected".to_owned(), false))?;
             let limit = self.scan_limit.unwrap_or(SCAN_LIMIT);
@@ -362,7 +362,7 @@ impl MeasurementWorker {
 
     /// Measures the scanned plate, compares, judges, and writes the documents.
     fn measure(&mut self, stroke: &ActiveStroke, start: Instant) -> Result<JudgedStroke, NotMeasured> {
-        let spec = self.rig.spec(&stroke.plate);
+        let spec = self.pipeline.spec(&stroke.plate);
         let earlier = PreviousScans::of(self.history().archive(), stroke.run_id);
         let last = earlier.last().map(|last| PreviousPose {
             surface: &last.surface,
@@ -374,7 +374,7 @@ impl MeasurementWorker {
             Some(blank) => Baseline::Earlier(blank),
             None => Baseline::None,
         };
-        let measured = stroke::measure_scanned(&mut self.rig, &stroke.scanned, &spec, last, baseline)?;
+        let measured = stroke::measure_scanned(&mut self.pipeline, &stroke.scanned, &spec, last, baseline)?;
         self.region.saw(&measured.outline);
         let surfaces = Surfaces {
             now: &measured.measurement.surface,
@@ -389,13 +389,13 @@ impl MeasurementWorker {
             &stroke.plate,
             history_view::moved(supports, &stroke.plate),
         );
-        let reports = stroke::compare(&self.rig, &task, surfaces);
+        let reports = stroke::compare(&self.pipeline, &task, surfaces);
         let compare = comparing.elapsed();
         let verdict = stroke::verdict(&reports);
         let context = Context {
             plate: &stroke.plate,
             task: &task,
-            press: self.rig.press,
+            press: self.pipeline.press,
             stroke: Some(u64::from(stroke.key.stroke)),
             verdict,
             reports: &reports,
