@@ -82,7 +82,7 @@ platen_sdk::options! {
     pub struct Options {
         /// Earlier scan to compare with.
         against: String = "before", choices ["before", "baseline"];
-        /// How the plate's movement as a whole is removed.
+        /// Alignment of the earlier plate, which removes the movement of the plate as a whole.
         alignment: String = "unchanged", choices ["unchanged", "corners", "supports", "none"];
         /// Smallest connected area that counts as changed, square metres.
         min_patch: f64 = 0.1, unit "m2", min 0.0, max 10.0;

@@ -1,4 +1,4 @@
-//! What cannot be judged, and what is refused.
+//! Tasks and scans that cannot be judged, and refusals.
 
 use super::*;
 
