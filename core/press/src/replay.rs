@@ -157,8 +157,7 @@ impl Player {
 
 fn stand_in() -> Measurement {
     Measurement {
-        verdict: Verdict::CannotTell,
-        reason: None,
+        judgement: Verdict::CannotTell.into(),
         figures: Figures::default(),
         scanned_at: None,
         warning: None,

@@ -246,7 +246,7 @@ fn measurement(strokes: u32) -> Measurement {
         (Measure::Sense, -1.0),
     ]);
     let figures = Figures { values, stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
+    Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
 /// What must hold of every run, whatever was done to it.

@@ -51,7 +51,7 @@ pub struct HostImage {
 
 impl HostImage {
     fn verdict(&self) -> Option<Verdict> {
-        self.result.as_ref().filter(|_| self.valid).map(|result| result.measurement.verdict)
+        self.result.as_ref().filter(|_| self.valid).map(|result| result.measurement.verdict())
     }
 
     fn switch(&self, output: Output) -> Option<bool> {
@@ -240,8 +240,7 @@ mod tests {
             seq: 7,
             recipe_id: Some(17),
             measurement: Measurement {
-                verdict: Verdict::Fail,
-                reason: None,
+                judgement: Verdict::Fail.into(),
                 figures: Figures { values: values.into(), stations: vec![Some(0.001), None, Some(-0.002)] },
                 scanned_at: Some(Timestamp { unix_s: 1_700_000_000, ms: 250 }),
                 warning: None,
@@ -300,10 +299,10 @@ mod tests {
 
     #[test]
     fn no_verdict_bit_without_a_valid_result() {
-        let bits = |verdict, valid| {
+        let bits = |verdict: Verdict, valid| {
             let mut image = HostImage { valid, ..image() };
             if let Some(result) = &mut image.result {
-                result.measurement.verdict = verdict;
+                result.measurement.judgement = verdict.into();
             }
             image.encode(&RegisterMap::pph1(), 0)[2] & 0b11_0000_0001_1100
         };

@@ -416,12 +416,12 @@ impl<L: Link> Runner<L> {
         let stroke_to_result = self.clock.triggered.elapsed();
         self.clock.delivered = Instant::now();
         self.metrics.stroke_to_result.add(stroke_to_result);
-        match result.measurement.verdict {
+        match result.measurement.verdict() {
             Verdict::NotMeasured => self.metrics.not_measured += 1,
             Verdict::Pass | Verdict::Fail | Verdict::CannotTell => self.metrics.measured += 1,
         }
         tracing::info!(
-            stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict,
+            stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict(),
             trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_millis()),
             stroke_to_result_ms = stroke_to_result.as_millis(),
             waited_ms = self.clock.result_since.map(|since| since.elapsed().as_millis()),

@@ -28,7 +28,7 @@ pub fn stand_in(key: StrokeKey) -> Measurement {
         (Measure::Sense, -1.0),
     ];
     let figures = Figures { values: values.into(), stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
+    Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
 /// What the stand-in of scanner and evaluation saw.

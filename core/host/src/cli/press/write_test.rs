@@ -83,7 +83,7 @@ fn image(press: &Press, field: Output, step: usize) -> HostImage {
         },
     };
     let measurement =
-        Measurement { verdict: Verdict::CannotTell, reason: None, figures, scanned_at: None, warning: None };
+        Measurement { judgement: Verdict::CannotTell.into(), figures, scanned_at: None, warning: None };
     let key = StrokeKey { press: press.press_id, session: 0, stroke: 0, attempt: 0 };
     let result = Publication { key, run_id: 0, seq: 0, recipe_id: None, measurement };
     HostImage { result: Some(result), ..HostImage::default() }
