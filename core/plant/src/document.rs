@@ -48,8 +48,6 @@ pub struct Document {
     source: Arc<Source>,
     path: String,
     root: Node,
-    /// Bytes of the errors of syntax.
-    syntax_errors: Vec<Range<usize>>,
     faults: RefCell<Vec<Fault>>,
 }
 
@@ -59,7 +57,7 @@ impl Document {
     /// The parser recovers from an error and goes on, so one slip may have several errors and may hide keys. Of the errors
     /// in one value or one line only the first is reported, the value is skipped, and no key is reported as missing.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
-        let source = Source { file: file.into(), text: text.into() };
+        let mut source = Source { file: file.into(), text: text.into(), syntax_errors: Vec::new() };
         let (table, mut errors) = DeTable::parse_recoverable(&source.text);
         errors.sort_by_key(|error| span(error).start);
         let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
@@ -77,8 +75,8 @@ impl Document {
             let line_end = at.start + line.len();
             end = Some(root.broken_at(at).map_or(line_end, |value| value.end.max(line_end)));
         }
-        let faults = RefCell::new(faults);
-        Self { source: Arc::new(source), path: String::new(), root, syntax_errors: spans, faults }
+        source.syntax_errors = spans;
+        Self { source: Arc::new(source), path: String::new(), root, faults: RefCell::new(faults) }
     }
 
     /// Reads and parses a file.
@@ -92,7 +90,7 @@ impl Document {
         let text = String::from_utf8(bytes).map_err(|error| {
             let offset = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            let source = Source { file: file.clone(), text };
+            let source = Source { file: file.clone(), text, syntax_errors: Vec::new() };
             let message = "this byte is not UTF-8; save the file as UTF-8".to_owned();
             Faults::one(source.fault(&Place { key: String::new(), offset }, message))
         })?;
@@ -101,7 +99,7 @@ impl Document {
 
     /// A part of a file that was read before, to be read on its own.
     pub(crate) fn part(source: Arc<Source>, path: String, root: Node) -> Self {
-        Self { source, path, root, syntax_errors: Vec::new(), faults: RefCell::default() }
+        Self { source, path, root, faults: RefCell::default() }
     }
 
     /// The cursor over the whole file.
@@ -111,7 +109,7 @@ impl Document {
 
     /// Records a fault at `place`.
     pub fn fault(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if !self.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
+        if !self.source.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
             self.faults.borrow_mut().push(self.source.fault(place, message.into()));
         }
         Reported(())
@@ -119,7 +117,7 @@ impl Document {
 
     /// Records that something is not there, unless broken syntax may have swallowed it.
     pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if self.syntax_errors.is_empty() {
+        if self.source.syntax_errors.is_empty() {
             return self.fault(place, message);
         }
         Reported(())

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::Faults;
+use crate::{Fault, Faults};
 
 /// Why a file could not be taken.
 #[derive(Debug, thiserror::Error)]
@@ -18,4 +18,20 @@ pub enum Error {
     /// The file says something that cannot be.
     #[error(transparent)]
     Faulty(#[from] Faults),
+}
+
+impl Error {
+    /// Returns the faults; a file that cannot be read is one at line 0.
+    pub fn into_faults(self) -> Vec<Fault> {
+        match self {
+            Self::Faulty(faults) => faults.into_iter().collect(),
+            Self::Unreadable { path, source } => vec![Fault {
+                file: path.display().to_string(),
+                line: 0,
+                column: 0,
+                key: String::new(),
+                message: source.to_string(),
+            }],
+        }
+    }
 }

@@ -9,9 +9,9 @@ use std::fmt;
 pub struct Fault {
     /// The file as the user named it.
     pub file: String,
-    /// Line, from 1.
+    /// Line, from 1; 0 for a file that cannot be read.
     pub line: usize,
-    /// Column in characters, from 1.
+    /// Column in characters, from 1; 0 for a file that cannot be read.
     pub column: usize,
     /// Dotted path of the key; elements of arrays are counted from 1: `template[2].chord_mm`. Empty for the whole file.
     pub key: String,
@@ -21,7 +21,10 @@ pub struct Fault {
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: ", self.file, self.line, self.column)?;
+        match self.line {
+            0 => write!(f, "{}: ", self.file)?,
+            line => write!(f, "{}:{line}:{}: ", self.file, self.column)?,
+        }
         if !self.key.is_empty() {
             write!(f, "{}: ", self.key)?;
         }

@@ -13,6 +13,8 @@ pub struct TomlKey<'d, T> {
     document: &'d Document,
     place: Place,
     state: Result<Option<T>, Reported>,
+    /// The fault because of which a missing value is no fault.
+    excuse: Option<Reported>,
 }
 
 /// A value with its place, for checks against other keys.
@@ -25,17 +27,22 @@ pub struct Located<T> {
 }
 
 impl<'d, T> TomlKey<'d, T> {
-    pub(crate) fn new(document: &'d Document, place: Place, state: Result<Option<T>, Reported>) -> Self {
-        Self { document, place, state }
+    pub(crate) fn new(
+        document: &'d Document,
+        place: Place,
+        state: Result<Option<T>, Reported>,
+        excuse: Option<Reported>,
+    ) -> Self {
+        Self { document, place, state, excuse }
     }
 
     /// Converts the value; the text of a refusal becomes the fault.
     pub fn try_map<U>(self, convert: impl FnOnce(T) -> Result<U, String>) -> TomlKey<'d, U> {
-        let Self { document, place, state } = self;
+        let Self { document, place, state, excuse } = self;
         let state = state.and_then(|value| {
             value.map(convert).transpose().map_err(|message| document.fault(&place, message))
         });
-        TomlKey { document, place, state }
+        TomlKey { document, place, state, excuse }
     }
 
     /// Converts the value.
@@ -59,8 +66,8 @@ impl<'d, T> TomlKey<'d, T> {
     /// # Errors
     /// [`Reported`] when it is missing or was refused.
     pub fn required(self) -> Result<T, Reported> {
-        let Self { document, place, state } = self;
-        state?.ok_or_else(|| document.absent(&place, "missing"))
+        let Self { document, place, state, excuse } = self;
+        state?.ok_or_else(|| excuse.unwrap_or_else(|| document.absent(&place, "missing")))
     }
 
     /// The value if it is there.

@@ -98,18 +98,19 @@ pub struct OptionValue {
 pub struct RawOptions {
     source: Arc<Source>,
     place: Place,
-    entries: Vec<Entry>,
+    /// The proof of a fault when the file has something else than a table.
+    entries: Result<Vec<Entry>, Reported>,
 }
 
 impl RawOptions {
-    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Vec<Entry>) -> Self {
+    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Result<Vec<Entry>, Reported>) -> Self {
         Self { source, place, entries }
     }
 
     /// No options at all, for a plugin that no plant file names; `owner` stands for the file in messages.
     pub fn none(owner: &str) -> Self {
-        let source = Source { file: owner.to_owned(), text: String::new() };
-        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Vec::new())
+        let source = Source { file: owner.to_owned(), text: String::new(), syntax_errors: Vec::new() };
+        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Ok(Vec::new()))
     }
 
     /// A fault of the options as a whole.
@@ -117,9 +118,9 @@ impl RawOptions {
         self.source.fault(&self.place, message)
     }
 
-    fn document(&self) -> Document {
+    fn document(&self, entries: &[Entry]) -> Document {
         let span = self.place.offset..self.place.offset;
-        let root = Node { span, kind: NodeKind::Table(self.entries.clone()) };
+        let root = Node { span, kind: NodeKind::Table(entries.to_vec()) };
         Document::part(self.source.clone(), self.place.key.clone(), root)
     }
 
@@ -140,7 +141,9 @@ pub fn check_options(
     raw: &RawOptions,
     declared: &[OptionDecl],
 ) -> Result<Vec<OptionValue>, Faults> {
-    let document = raw.document();
+    // Options that are no table were reported with the file.
+    let Ok(entries) = &raw.entries else { return Ok(Vec::new()) };
+    let document = raw.document(entries);
     let mut table = document.root();
     let mut faults = Vec::new();
     let mut values = Vec::new();
@@ -158,7 +161,7 @@ pub fn check_options(
             Err(Reported { .. }) => {}
         }
         if option.required && !table.has(&option.name) {
-            document.fault(
+            document.absent(
                 &Place { key: format!("{}.{}", raw.place.key, option.name), offset: raw.place.offset },
                 format!("missing; {plugin} needs it: {} ({option})", option.doc),
             );

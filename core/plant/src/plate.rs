@@ -81,7 +81,16 @@ impl PlateFile {
         }
     }
 
-    fn take(document: Document) -> Result<Self, Faults> {
+    /// Whether a document is a plate file: it has a table `[plate]`.
+    pub fn recognises(document: &Document) -> bool {
+        document.root().has("plate")
+    }
+
+    /// Checks a parsed document.
+    ///
+    /// # Errors
+    /// Every fault of the document.
+    pub fn take(document: Document) -> Result<Self, Faults> {
         let file = Self::read(document.root());
         document.finish(file)
     }
@@ -136,29 +145,29 @@ fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Re
     let document = table.document();
     table.finish();
 
-    let (width, height) = (width?, height?);
-    *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
-    let thickness = thickness?;
-    let shorter = width.min(height);
-    if thickness.value > shorter / 4.0 {
+    if let (Ok(width), Ok(height)) = (width, height) {
+        *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
+    }
+    let inset = match (face_inset, &thickness) {
+        (Ok(Some(inset)), Ok(thickness)) if inset.value > thickness.value => {
+            let message =
+                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
+            Err(document.fault(&inset.place, message))
+        }
+        (inset, _) => inset.map(|inset| inset.map_or(0.0, |inset| inset.value)),
+    };
+    let (width, height, thickness) = (width?, height?, thickness?);
+    if thickness.value > width.min(height) / 4.0 {
         let message = format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
         return Err(document.fault(&thickness.place, message));
     }
-    let face_inset = match face_inset? {
-        Some(inset) if inset.value > thickness.value => {
-            let message =
-                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
-            return Err(document.fault(&inset.place, message));
-        }
-        inset => inset.map_or(0.0, |inset| inset.value),
-    };
     Ok(Plate {
         id: id?,
         width: metres(width),
         height: metres(height),
         thickness: metres(thickness.value),
         supports: supports?,
-        face_inset: metres(face_inset),
+        face_inset: metres(inset?),
     })
 }
 
@@ -185,13 +194,14 @@ fn read_line(mut table: TomlTable<'_>, names: &mut Names, plate: Option<Rectangl
     let to = place::point(&mut table, "to_mm", plate);
     let (document, place) = (table.document(), table.place().clone());
     table.finish();
-    let line = name.clone().and_then(|name| {
-        let line = ReferenceLine { name, from: from?, to: to? };
-        if line.from == line.to {
+    let ends = from.and_then(|from| {
+        let to = to?;
+        if from == to {
             return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
         }
-        Ok(line)
+        Ok((from, to))
     });
+    let line = ends.and_then(|(from, to)| Ok(ReferenceLine { name: name.clone()?, from, to }));
     NamedLine { name, line }
 }
 

@@ -1,5 +1,7 @@
 //! The text of a file and the places in it.
 
+use std::ops::Range;
+
 use crate::Fault;
 
 /// The text of one file, with its name as the user gave it.
@@ -7,6 +9,8 @@ use crate::Fault;
 pub(crate) struct Source {
     pub(crate) file: String,
     pub(crate) text: String,
+    /// Bytes of the errors of syntax.
+    pub(crate) syntax_errors: Vec<Range<usize>>,
 }
 
 /// A key and the place in the file that a message about it points at.

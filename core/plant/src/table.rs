@@ -18,11 +18,17 @@ pub struct TomlTable<'d> {
     place: Place,
     entries: &'d [Entry],
     asked: Vec<String>,
+    excuse: Option<Reported>,
 }
 
 impl<'d> TomlTable<'d> {
     pub(crate) fn new(document: &'d Document, place: Place, entries: &'d [Entry]) -> Self {
-        Self { document, place, entries, asked: Vec::new() }
+        Self { document, place, entries, asked: Vec::new(), excuse: None }
+    }
+
+    /// Lets missing keys pass from here on, because the fault `excuse` leaves open which keys are required.
+    pub(crate) fn excuse_missing(&mut self, excuse: Reported) {
+        self.excuse = Some(excuse);
     }
 
     /// The document, to record faults between several keys.
@@ -164,27 +170,26 @@ impl<'d> TomlTable<'d> {
         Ok(field.optional()?.unwrap_or_default())
     }
 
-    /// A table of options that only a plugin can check, kept with its places; a missing one is empty.
-    ///
-    /// # Errors
-    /// [`Reported`] when the key is there and is no table.
-    pub fn options(&mut self, key: &str) -> Result<RawOptions, Reported> {
-        let table = self.section(key)?;
-        Ok(RawOptions::new(self.document.source().clone(), table.place, table.entries.to_vec()))
+    /// Table of options that only a plugin can check, kept with its places; a missing one is empty.
+    pub fn options(&mut self, key: &str) -> RawOptions {
+        let table = self.section(key);
+        let place = table.as_ref().map_or_else(|_| self.missing_place(key), |table| table.place.clone());
+        let entries = table.map(|table| table.entries.to_vec());
+        RawOptions::new(self.document.source().clone(), place, entries)
     }
 
     /// The raw value, for keys that accept several types.
     pub(crate) fn node(&mut self, key: &str) -> TomlKey<'d, &'d Node> {
         self.asked.push(key.to_owned());
         let Some(entry) = self.entries.iter().find(|entry| entry.key == key) else {
-            return TomlKey::new(self.document, self.missing_place(key), Ok(None));
+            return TomlKey::new(self.document, self.missing_place(key), Ok(None), self.excuse);
         };
         let place = Place { key: self.place_of(key), offset: entry.value.span.start };
         let state = match entry.value.kind {
             NodeKind::Broken => Err(self.document.broken()),
             _ => Ok(Some(&entry.value)),
         };
-        TomlKey::new(self.document, place, state)
+        TomlKey::new(self.document, place, state, self.excuse)
     }
 
     /// Reports every key that was never asked for, with the nearest one that could have been meant.

@@ -65,11 +65,15 @@ impl RegionOfInterest {
         let document = table.document();
         table.finish();
         let (min, max) = (min?, max?);
-        if let Some(axis) = (0..3).find(|&axis| min[axis] >= max.value[axis]) {
-            let name = ["x", "y", "z"][axis];
-            let message = format!("{name} is {}, must be above the {} of min_mm", max.value[axis], min[axis]);
-            return Err(document.fault(&max.place, message));
+        let mut ordered = Ok(());
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let (min, above) = (min[axis], max.value[axis]);
+            if min >= above {
+                let message = format!("{name} is {above}, must be above the {min} of min_mm");
+                ordered = Err(document.fault(&max.place, message));
+            }
         }
+        ordered?;
         Ok(Self { min: min.map(metres), max: max.value.map(metres) })
     }
 }

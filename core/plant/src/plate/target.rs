@@ -28,13 +28,19 @@ const SHAPES: &[(&str, Word)] = &[
 ];
 
 pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Target, Reported> {
-    // Without the shape nobody knows which keys belong here: only this one is reported.
-    let word = table.choice("shape", SHAPES).required()?;
-    let shape = shape_of(word, &mut table, plate);
+    let word = table.choice("shape", SHAPES).required();
+    let shape = word.and_then(|word| shape_of(word, &mut table, plate));
+    if let Err(reported) = word {
+        // A target of unknown shape may have the keys of every shape.
+        table.excuse_missing(reported);
+        for (_, word) in SHAPES {
+            let _ = shape_of(*word, &mut table, plate);
+        }
+    }
     let mut target =
         Target { shape: TargetShape::Flat, radius_of: RadiusOf::Inside, scanned_face: Facing::Inside };
     let mut faces = Ok(());
-    if !matches!(word, Word::Flat) {
+    if !matches!(word, Ok(Word::Flat)) {
         let radius_of = table.choice(
             "radius_of",
             &[("inside", RadiusOf::Inside), ("outside", RadiusOf::Outside), ("mid", RadiusOf::Mid)],
@@ -48,6 +54,7 @@ pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result
     faces?;
     Ok(Target { shape: shape?, ..target })
 }
+
 fn shape_of(
     word: Word,
     table: &mut TomlTable<'_>,

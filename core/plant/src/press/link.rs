@@ -89,30 +89,26 @@ pub struct Quiet(pub Duration);
 impl Link {
     /// Modbus TCP to `host:port` with default time limits.
     pub fn tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
-        let socket = Socket { host: host.into(), port, peers: Vec::new() };
-        Self::with_defaults(
-            Transport::Tcp(socket),
-            unit,
-            Duration::from_millis(300),
-            Duration::from_millis(20),
-        )
+        Self::new(Transport::Tcp(Socket::new(host, port)), unit)
     }
 
     /// Modbus RTU on a serial port; the response time follows from the line's speed.
     pub fn rtu(serial: Serial, unit: u8) -> Self {
-        let response = serial.response_timeout();
-        let quiet = Quiet(response.mul_f64(1.5));
-        Self::with_defaults(Transport::Rtu(serial, quiet), unit, response, Duration::from_millis(100))
+        Self::new(Transport::rtu(serial), unit)
     }
 
     /// Modbus RTU frames over TCP to a gateway.
     pub fn rtu_over_tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
-        let socket = Socket { host: host.into(), port, peers: Vec::new() };
-        let transport = Transport::RtuOverTcp(socket, Quiet(Duration::from_millis(750)));
-        Self::with_defaults(transport, unit, Duration::from_millis(500), Duration::from_millis(100))
+        Self::new(Transport::rtu_over_tcp(Socket::new(host, port)), unit)
     }
 
-    fn with_defaults(transport: Transport, unit: u8, response_timeout: Duration, poll: Duration) -> Self {
+    /// The default time limits of a transport.
+    pub(super) fn new(transport: Transport, unit: u8) -> Self {
+        let (response_timeout, poll_ms) = match &transport {
+            Transport::Tcp(_) => (Duration::from_millis(300), 20),
+            Transport::Rtu(serial, _) => (serial.response_timeout(), 100),
+            Transport::RtuOverTcp(..) => (Duration::from_millis(500), 100),
+        };
         Self {
             transport,
             unit,
@@ -120,7 +116,7 @@ impl Link {
             response_timeout,
             pause_after_connect: Duration::ZERO,
             pause_between_requests: Duration::ZERO,
-            poll,
+            poll: Duration::from_millis(poll_ms),
             backoff_min: Duration::from_millis(100),
             backoff_max: Duration::from_secs(1),
         }
@@ -137,6 +133,24 @@ impl Link {
             Transport::Tcp(_) => None,
             Transport::Rtu(_, Quiet(quiet)) | Transport::RtuOverTcp(_, Quiet(quiet)) => Some(*quiet),
         }
+    }
+}
+
+impl Transport {
+    pub(super) fn rtu(serial: Serial) -> Self {
+        let quiet = Quiet(serial.response_timeout().mul_f64(1.5));
+        Self::Rtu(serial, quiet)
+    }
+
+    pub(super) fn rtu_over_tcp(socket: Socket) -> Self {
+        Self::RtuOverTcp(socket, Quiet(Duration::from_millis(750)))
+    }
+}
+
+impl Socket {
+    /// An address that only loopback may connect to.
+    pub(super) fn new(host: impl Into<String>, port: u16) -> Self {
+        Self { host: host.into(), port, peers: Vec::new() }
     }
 }
 

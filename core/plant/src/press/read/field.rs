@@ -49,8 +49,8 @@ pub(super) struct Given<N> {
 /// What fields have in common, and what they say about more than themselves.
 pub(super) struct FieldReader {
     pub(super) order: WordOrder,
-    pub(super) address_base: AddressBase,
-    pub(super) block: Block,
+    /// Block of the fields and base of its addresses; `None` where they are faulty.
+    pub(super) block: Option<(Block, AddressBase)>,
     pub(super) counter: Counter,
     pub(super) heartbeat_in: Option<Duration>,
 }
@@ -218,14 +218,16 @@ impl FieldReader {
     }
 
     fn offset(&self, offset: i64) -> Result<u16, String> {
-        let last = self.block.count - 1;
+        let Some((block, _)) = self.block else { return Ok(0) };
+        let last = block.count - 1;
         let inside = u16::try_from(offset).ok().filter(|&offset| offset <= last);
         inside.ok_or_else(|| format!("found register {offset} of its block, which has 0 to {last}"))
     }
 
     fn offset_of(&self, address: i64) -> Result<u16, String> {
-        let first = i64::from(self.address_base.first(self.block.table)) + i64::from(self.block.start);
-        let last = first + i64::from(self.block.count) - 1;
+        let Some((block, base)) = self.block else { return Ok(0) };
+        let first = i64::from(base.first(block.table)) + i64::from(block.start);
+        let last = first + i64::from(block.count) - 1;
         let inside = (first..=last).contains(&address);
         if inside {
             Ok((address - first) as u16)
