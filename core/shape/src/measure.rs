@@ -14,9 +14,11 @@ pub use stages::{Measured, Scanned};
 
 use std::time::Duration;
 
+use platen_numerics::spline_fit::Undetermined;
+
 use crate::evaluate::Location;
 use crate::mesh::{MeshError, SmoothFace};
-use crate::surface::{FitToSamples, Quality, Surface, Undetermined, fit_surface};
+use crate::surface::{FitToSamples, Quality, Surface, fit_surface};
 use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
 
 /// Vertices of the mesh: as many as the paper's.

@@ -5,10 +5,10 @@
 //! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+use platen_numerics::simd::dispatch_simd;
 
 use super::window::Window;
 use crate::Vec3;
-use platen_numerics::simd::dispatch_simd;
 
 /// Cells on a side of the square that shares one fit.
 pub(super) const TILE: usize = 4;

@@ -7,9 +7,10 @@
 
 use std::ops::Range;
 
+use platen_numerics::simd::dispatch_simd;
+
 use super::continuity::Continuity;
 use super::window::Window;
-use platen_numerics::simd::dispatch_simd;
 
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];

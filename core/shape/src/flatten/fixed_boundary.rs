@@ -1,8 +1,9 @@
 //! Maps with the boundary fixed: minimise sum k_ij |p_i - p_j|^2 over the interior vertices.
 
+use platen_numerics::sparse::{Graph, SparseError, Spd};
+
 use super::domain::{interior, plane_picture};
 use crate::mesh::DiskMesh;
-use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 /// Cotangents of the three angles of every triangle of the mesh, at its corners in their order.
 pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {

@@ -12,10 +12,11 @@
 //! sides, 10 um on 5 m at R 5 m. On double curvature the law matters: what another one does to the outline is of the order of the
 //! strain that is left, times the plate's size.
 
+use platen_numerics::sparse::{Graph, SparseError, Spd};
+
 use super::domain::{first_turned, plane_picture, signed_area};
 use super::fixed_boundary::{cotangents, fixed_boundary};
 use crate::mesh::DiskMesh;
-use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 /// Poisson's ratio of steel.
 const POISSON: f64 = 0.3;

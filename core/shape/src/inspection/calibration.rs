@@ -5,7 +5,7 @@
 //! and over pairs, is the correlated part of the level of detection. What repeats in every scan cancels in such pairs; it shows
 //! on an artefact of known shape only, as gaps under boards that ought to fit.
 
-use crate::target::Placement;
+use crate::target_surface::Placement;
 use crate::{EXPANDED, Surface, TargetSurface};
 
 /// Differences that ought to be zero, with what was stated of them.

@@ -1,6 +1,7 @@
 //! Exact plates before the scanner: samples and outline with noise, and what a measurement got wrong.
 
 use nalgebra::{Matrix3, Rotation3};
+use platen_numerics::random::Random;
 
 use super::{Measurement, measure};
 use crate::flatten::{cotangents, fixed_boundary};
@@ -9,7 +10,6 @@ use crate::{
     Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, HeightField, Outline, Patch, PlateSpec,
     Sample, Vec3,
 };
-use platen_numerics::random::Random;
 
 /// The paper's harmonic map.
 pub(super) struct Harmonic;

@@ -1,10 +1,10 @@
 //! The surface spanned by the four edge curves: the first picture of the plate's face, and its coordinates.
 
 use nalgebra::{DMatrix, DVector};
-
-use crate::{EdgeCurve, Outline, Vec3};
 use platen_numerics::tensor_spline::{TensorSpline, approximate_curve};
 use platen_numerics::uniform_knots::UniformKnots;
+
+use crate::{EdgeCurve, Outline, Vec3};
 
 /// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
 /// surface. Detail across the surface (narrow bends) is added later, from the samples inside.

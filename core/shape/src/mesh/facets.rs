@@ -13,10 +13,11 @@
 //! What is left out is of third order: on the flank of a narrow bend, where the curvature changes by 1.5 1/m per metre, the
 //! height is wrong by 0.5 um and the normal by 2e-4 rad where two facets meet, 12 mm from either's middle.
 
-use crate::Vec3;
 use platen_numerics::simd::dispatch_simd;
 use platen_numerics::tensor_spline::{Jet, TensorSpline};
 use platen_numerics::uniform_knots::UniformKnots;
+
+use crate::Vec3;
 
 /// A facet serves points up to this share of its size from its middle; beyond, the next one does.
 const REACH: f64 = 0.6;

@@ -4,10 +4,12 @@
 //! it the sheet is met along the patch's normal: the edges' own noise across the surface drops out. Half the thickness
 //! below the face, along its normal, lies the mid-surface, right up to its edges: cuts are square to it.
 
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
+
 use super::coons_patch::coons_patch;
 use super::facets::Facets;
 use crate::outline::{SPAN, thinned};
-use crate::surface::{TensorSpline, UniformKnots};
 use crate::{Outline, Patch, PlateSpec, Vec3};
 
 /// Facets along a span of the first picture: 50 mm; it has no finer detail than its edges.

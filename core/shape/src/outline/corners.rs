@@ -2,9 +2,9 @@
 //! their intersections (paper, 3.2).
 
 use nalgebra::Vector2;
+use platen_numerics::random::Random;
 
 use super::{OutlineError, SEED};
-use platen_numerics::random::Random;
 
 type Vec2 = Vector2<f64>;
 

@@ -6,13 +6,13 @@
 //! stiff curve can be fitted there to what the lattice says of the edge.
 
 use nalgebra::Vector2;
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coverage::Coverage;
 use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
-use platen_numerics::uniform_knots::UniformKnots;
 
 /// Spacing of the base curve's points, metres.
 const SPACING: f64 = 0.005;

@@ -5,6 +5,8 @@
 //! changes rows, and those few locate it. Where it changes none, it says so (`posterior`).
 
 use nalgebra::{Cholesky, Dyn, Vector2};
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
@@ -13,8 +15,6 @@ use super::edge_posterior::Posterior;
 use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
-use platen_numerics::uniform_knots::UniformKnots;
 
 /// Span of the curve, metres.
 const SPAN: f64 = 0.25;

@@ -8,10 +8,11 @@
 //! be such a beam too, of which noise hides how far it falls behind: both ranges count, the one that was taken and the one
 //! that was not, or the choice between them would move the edge outwards.
 
+use platen_numerics::normal_distribution::{CERTAIN, cdf, log_cdf};
+
 use super::developed_strip::DevelopedStrip;
 use super::projected_crossing::ProjectedCrossing;
 use crate::extract::Beyond;
-use platen_numerics::normal_distribution::{CERTAIN, cdf, log_cdf};
 
 /// Softness of a bracket in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;

@@ -1,11 +1,11 @@
 //! What the lines of an edge say of it together: its expected curve, and how well that is known.
 
 use nalgebra::{Cholesky, DMatrix, Dyn, SMatrix, SVector};
+use platen_numerics::adaptive_metropolis::mean_and_covariance;
+use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
 use super::edge_likelihood::{BeamModel, FOOTPRINT_SPREAD, Line, SOFTNESS};
 use super::{SEED, Sampling};
-use platen_numerics::adaptive_metropolis::mean_and_covariance;
-use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
 /// Places of the edge that are free where its posterior is not normal: ends and thirds. Between them a stiff curve leaves
 /// two tenths of a millimetre open.

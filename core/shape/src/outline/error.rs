@@ -1,6 +1,6 @@
 //! Why a face has no outline.
 
-use crate::surface::Undetermined;
+use platen_numerics::spline_fit::Undetermined;
 
 /// Why the outline of a plate's face could not be told.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -6,11 +6,13 @@
 //! that of the whole face has a thirtieth. One noisy sample moves nothing, and holes are bridged.
 
 use nalgebra::Vector2;
+use platen_numerics::simd::dispatch_simd;
+use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::plane::Plane;
-use crate::surface::{FittedSpline, SplineFit, TensorSpline, Undetermined, UniformKnots};
 use crate::{Patch, Sample, Vec3};
-use platen_numerics::simd::dispatch_simd;
 
 /// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
 /// all samples.

@@ -9,7 +9,7 @@ const PER_METRE: f64 = (1_u64 << 30) as f64;
 /// Where the material of the four edges lies in (u, v).
 ///
 /// Edges v = 0, u = W, v = H, u = 0, each from corner to corner counter-clockwise as the boundary of a
-/// [`DiskMesh`](crate::DiskMesh).
+/// mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Corners (0,0), (W,0), (W,H), (0,H), metres.

@@ -4,11 +4,15 @@
 //! sample then has its (u, v), its own mid-surface point (half the thickness below it along the face's normal) and its
 //! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
 
+use platen_numerics::reml::Penalty;
+use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
+
 use crate::mesh::{Facets, SmoothFace};
 use crate::outline::{biweight, per_sigma_across};
-use crate::surface::{FittedSpline, Mask, SplineFit, Surface, TensorSpline, Undetermined, UniformKnots};
+use crate::surface::{Mask, Surface};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
-use platen_numerics::reml::Penalty;
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without one gets spans of twice the length.
 const SPAN: f64 = 0.06;

@@ -1,10 +1,11 @@
 //! A surface as plain numbers, to be stored or sent across a library boundary.
 
-use super::Surface;
-use super::mask::Mask;
 use platen_numerics::block_banded_cholesky::BlockBandedFactor;
 use platen_numerics::tensor_spline::TensorSpline;
 use platen_numerics::uniform_knots::UniformKnots;
+
+use super::Surface;
+use super::mask::Mask;
 
 /// Everything a [`Surface`] is made of. Control values lie v outer, u inner.
 #[derive(Debug, Clone, PartialEq, Default)]

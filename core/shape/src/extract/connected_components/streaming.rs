@@ -6,8 +6,9 @@
 
 use std::ops::Range;
 
-use crate::extract::continuity::Link;
 use platen_numerics::union_find::UnionFind;
+
+use crate::extract::continuity::Link;
 
 /// Cells `rows` of one column, each continuous with the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
