@@ -46,7 +46,7 @@ pub struct Measurement {
 /// Time spent in each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// SmoothFace, mid-surface and mesh.
+    /// Smooth face, mid-surface and mesh.
     pub mesh: Duration,
     /// Flattening.
     pub flatten: Duration,

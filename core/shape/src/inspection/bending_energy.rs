@@ -15,7 +15,7 @@ pub struct BendingEnergy {
     /// Energy that would bend the plate elastically from the measured to the target's curvature, joules:
     /// U = D/2 int (dku + dkv)^2 - 2 (1 - nu) (dku dkv - dkuv^2) dA, D = E t^3 / 12 (1 - nu^2)
     /// (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, strain energy in pure bending of plates).
-    /// BendingEnergy is plastic: as a measure of what is left, this counts missing and surplus curvature alike, by their squares.
+    /// Forming is plastic: as a measure of what is left, this counts missing and surplus curvature alike, by their squares.
     pub energy: f64,
     /// Share of the seen area that is bent beyond the target by more than the tolerance given.
     pub beyond_share: f64,

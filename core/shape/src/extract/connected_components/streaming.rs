@@ -1,4 +1,4 @@
-//! Connected components of the lattice, grown while columns arrive.
+//! Connected components of the lattice under the continuity criterion, joined while columns arrive (Masuda et al., 3.1).
 //!
 //! A column falls into *runs* of cells that are continuous downwards; runs of neighbouring columns are joined
 //! when any of their cells are continuous across. Components are sets of runs. What is summed over
@@ -19,7 +19,7 @@ pub(in crate::extract) struct Run {
     pub(in crate::extract) end_row: u32,
 }
 
-/// What is known of a component.
+/// Size and bounds of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::extract) struct Extent {
     /// Area across the beams, a lower bound of the surface's area, square millimetres.
@@ -38,7 +38,7 @@ impl Extent {
     }
 }
 
-/// Runs and the sets that they form.
+/// Runs of cells and the components that they form.
 #[derive(Debug, Clone, Default)]
 pub(in crate::extract) struct Components {
     runs: Vec<Run>,
