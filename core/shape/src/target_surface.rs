@@ -1,9 +1,10 @@
-//! The target as a surface: where every material point of the plate is to come to lie.
+//! Target surface: closed-form position, normal and curvature of every material point on the target shape, and the rigid
+//! registration of a measured plate to it (`placement`). Not in Masuda et al.
 //!
 //! Frame: origin in the middle of the plate's mid-surface, x along u and y along v there, z towards the scanner.
 //! Flat, cylinder and cone are isometric images of the rectangle. A sphere carries (u, v) along its great circles
-//! from the middle; a torus is a circle along the axis direction swept along a circle across it. What a real plate
-//! stretches differs from these by millimetres within the surface, which the deviation along the normal does not see.
+//! from the middle; a torus is a circle along the axis direction swept along a circle across it. The stretching of a
+//! real plate differs from these by millimetres within the surface, which does not change the deviation along the normal.
 
 mod cone;
 mod placement;
@@ -93,7 +94,7 @@ impl TargetSurface {
     /// The target of a plate of `width` x `height` x `thickness` metres.
     ///
     /// Radii become those of the mid-surface: half a thickness more than inside, less than outside. A cone's radii are
-    /// those of normal curvature, as a board shows them that stands upright on the plate.
+    /// those of normal curvature, as a template shows them that stands upright on the plate.
     ///
     /// # Errors
     /// [`TargetError`] when a radius is none, would roll the plate up, or a cone is too steep.

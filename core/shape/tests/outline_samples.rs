@@ -31,7 +31,7 @@ fn corners_are_where_the_truth_has_them() {
         let (n, sum) = (ratios.len() as f64, ratios.iter().sum::<f64>());
         let scatter = (ratios.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
         println!("errors over stated deviations: mean {:.2}, rms {scatter:.2}", sum / n);
-        // What is left is what the lattice leaves open: no part of it is common to all edges, none is left out.
+        // The errors scatter as stated, and no part of them is common to all edges.
         assert!((0.6..1.6).contains(&scatter) && (sum / n).abs() < 0.5);
     }
 }

@@ -1,4 +1,4 @@
-//! What happens in a shop, on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
+//! Situations of a workshop on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test code")]
 

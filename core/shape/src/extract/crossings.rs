@@ -11,14 +11,14 @@ use super::patch::{Beyond, Crossing};
 use super::range_noise::Noise;
 use super::window::Window;
 
-/// How far along a row or a column the face may go on behind a gap, cells.
+/// Widest gap along a row or a column behind which the face may go on, cells.
 const WIDEST_GAP: usize = 48;
 
-/// How far beyond the face the local fit places cells. A row that runs along an edge meets many mixed pixels
+/// Cells beyond the face at which the local fit is evaluated. A row that runs along an edge meets many mixed pixels
 /// before it is off the plate; the first of them suffice.
 const FAR: usize = 12;
 
-/// How far beyond the face a range is compared with its continuation, cells.
+/// Cells beyond the face up to which a range is compared with its continuation, cells.
 const FIT_FAR: usize = 3;
 
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.

@@ -21,7 +21,7 @@ const AGREEING: f64 = 0.6;
 const LEAST_RADIUS: f64 = 2.0;
 const ANGLE_NOISE: f64 = 0.06;
 
-/// How far beside the curve an end may lie, metres: the scanner's two faces disagree by millimetres, and where the
+/// Largest distance of an end from the curve, metres: the scanner's two faces disagree by millimetres, and where the
 /// columns left out at their seam are few, this and the noise of a single sample turn the chord far more than
 /// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far above.
 const STEP: f64 = 3e-3;
@@ -107,7 +107,7 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: 
         let end = |place: usize, outward: isize| {
             let inner = place.saturating_add_signed(-outward * INSET as isize).clamp(low, high);
             let at = index(line, place);
-            // Something nearer, or nothing at all: columns that were left out, a patch without echo.
+            // A nearer object, or no return: columns that were left out, a patch without echo.
             let beside = (1..=INSET).filter_map(|far| place.checked_add_signed(outward * far as isize));
             let beside = beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
             let near = window.cells[at].range_m - IN_FRONT;

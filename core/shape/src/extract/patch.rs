@@ -20,11 +20,11 @@ pub struct Sample {
 /// Kind of object next to a cell of the face along its row or column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beyond {
-    /// Something farther away than the face would be if it went on: the plate ends here.
+    /// An object farther away than the face would be if it went on: the plate ends here.
     Behind,
     /// The plate's side face: it ends here too.
     SideFace,
-    /// Something nearer: it hides what lies behind it, the plate may go on.
+    /// A nearer object: it hides what lies behind it, the plate may go on.
     InFront,
     /// No return: the plate ends in front of nothing, or it is a patch without echo.
     Nothing,

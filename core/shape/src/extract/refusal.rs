@@ -61,7 +61,7 @@ pub enum Refusal {
         .first.x, .first.y, .first.z, .second.x, .second.y, .second.z
     )]
     SeveralPlates {
-        /// How many.
+        /// Number of them.
         count: usize,
         /// Middle of one, metres.
         first: Vec3,

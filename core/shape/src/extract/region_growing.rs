@@ -24,7 +24,7 @@ const UNTRUSTED_RINGS: usize = 1;
 /// Cosine of 72 degrees: a normal of the low-pass copy that differs by more is that of a side face, whatever the range.
 const COS_OTHER_FACE: f32 = 0.3;
 
-/// A fit that knows a place worse than this, as a variance in that of a sample, is no excuse for a residual.
+/// Upper bound of the leverage (variance of a prediction in that of a sample) counted in the bound of a residual.
 const MOST_LEVERAGE: f64 = 0.5;
 
 /// Erodes `region` and keeps its largest connected component: the core of the face. `slope_reach` is that of the normals that
@@ -85,7 +85,7 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
 /// A cell is judged when it first touches the face, by a quadratic fit to the face around it, and again when it touches
-/// it elsewhere if the fit did not know its place and yet refused it. The last rings have no part in the fit: a side
+/// it elsewhere if it was rejected by a fit of high leverage. The last rings have no part in the fit: a side
 /// face whose first cells lie within the noise must not bend it. And no cell may have the normal of another face than
 /// the cell of the core from which it was reached.
 pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {

@@ -8,7 +8,7 @@ const STEPS: f64 = 6.0;
 pub(super) struct Coverage {
     /// Sorted.
     places: Vec<f64>,
-    /// How far around a place the edge counts as seen, metres.
+    /// Distance around a place within which the edge counts as seen, metres.
     reach: f64,
 }
 

@@ -44,7 +44,7 @@ impl Posterior {
     }
 
     /// Samples the posterior by adaptive Metropolis: for an edge along a line of the lattice, which lies anywhere between two of
-    /// them. Its likelihood is flat between steep sides; the place of its maximum and the curvature there say nothing about its
+    /// them. Its likelihood is flat between steep sides; the place of its maximum and the curvature there do not give its
     /// width, and where mixed pixels begin depends on the footprint as much as on the edge.
     ///
     /// `curve` is a likely one, its ends the places of the edge's corners along it, `footprint` that of all edges,

@@ -1,4 +1,4 @@
-//! Where a plate lies against its target.
+//! Rigid registration of a plate to its target (Kabsch, Acta Cryst. A32 (1976)).
 
 use nalgebra::{Matrix3, Rotation3};
 
@@ -13,13 +13,13 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The motion that brings the material points of the places (u, v) closest to the target's, on the scanned face.
+    /// Finds the motion that brings the material points of the places (u, v) closest to the target's, on the scanned face.
     #[must_use]
     pub fn best(now: &Surface, target: &TargetSurface, places: impl Iterator<Item = [f64; 2]>) -> Self {
         Self::of_pairs(places.map(|[u, v]| (now.face(u, v), target.face(u, v))))
     }
 
-    /// The motion that brings the first points of the pairs closest to the second ones (Kabsch, by the singular vectors of
+    /// Finds the motion that brings the first points of the pairs closest to the second ones (Kabsch, by the singular vectors of
     /// the covariance).
     #[must_use]
     pub fn of_pairs(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
@@ -40,13 +40,13 @@ impl Placement {
         Self { rotation, translation: to - rotation * from }
     }
 
-    /// Where the motion takes a point.
+    /// Returns the moved point.
     #[must_use]
     pub fn moved(&self, p: &Vec3) -> Vec3 {
         self.rotation * p + self.translation
     }
 
-    /// Measured minus target along the target's normal at a place (u, v), metres, positive towards the scanner.
+    /// Returns measured minus target along the target's normal at a place (u, v), metres, positive towards the scanner.
     #[must_use]
     pub fn deviation(&self, now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> f64 {
         let here = self.moved(&now.face(u, v));

@@ -67,7 +67,7 @@ impl Components {
         self.runs.len() as u32
     }
 
-    /// Those of `runs` that belong to a component given by its root.
+    /// Returns those of `runs` that belong to a component given by its root.
     pub(in crate::extract) fn runs_of(&mut self, roots: &[u32], runs: Range<u32>) -> Vec<Run> {
         let mut own = Vec::new();
         for number in runs {
@@ -103,7 +103,7 @@ impl Components {
         }
     }
 
-    /// Joins the runs of a column and of the next one where `across` says that their cells are continuous.
+    /// Joins the runs of a column and of the next one where their cells are continuous by `across`.
     ///
     /// `range_a(row)` and `range_b(row)` give ranges inside the runs. Overlapping runs are joined at the first row
     /// that links them; the rest of the overlap need not be looked at.
