@@ -4,13 +4,12 @@
 //! `platen measure`. What `platen convert` writes must give the same cells again.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
 use platen_plant::Value;
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
@@ -197,16 +196,11 @@ fn read(path: &Path) -> Lattice {
     let options = [("file", Value::Path(path.into()))];
     let (library, values) = pipeline::load_with(&catalogue, "faro-file", options).unwrap();
     let scanner = Scanner::create(&library, &values).unwrap();
-    let mut lattice = None;
-    let end = scanner.scan(JobSpec::untriggered(Duration::from_secs(100)), None, &mut |event| {
-        match event {
-            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
-            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
-        }
-        ControlFlow::Continue(())
-    });
-    let lattice = lattice.unwrap_or_else(|| panic!("{}: {end:?}", path.display()));
-    assert_eq!(lattice.n_valid() as u64, end.unwrap().points, "{}", path.display());
+    let scan = scanner.start(JobSpec::untriggered(Duration::from_secs(100)), None);
+    let mut scan = scan.unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let mut lattice = Lattice::new(scan.header().clone());
+    scan.by_ref().for_each(|column| lattice.push(&column.unwrap()).unwrap());
+    assert_eq!(lattice.n_valid() as u64, scan.finish().unwrap().points, "{}", path.display());
     lattice
 }
 

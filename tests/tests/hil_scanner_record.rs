@@ -7,11 +7,10 @@ mod stream;
 use std::f64::consts::PI;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
-use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use platen_engine::plugin::{JobSpec, ScanEvent};
+use platen_engine::plugin::JobSpec;
 use platen_scan::{Face, Lattice, Window};
 use platen_sim_scanner::stream::{
     Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Shop, Values, Wanted, column_payload,
@@ -192,13 +191,9 @@ fn take_dome(address: &str) {
     let (before, started) = (most_memory_kb(), Instant::now());
     let mut points = 0;
     let spec = JobSpec::untriggered(10 * LIMIT);
-    let end = scanner.scan(spec, None, &mut |event| {
-        if let ScanEvent::Column(column) = event {
-            points += column.range_m.len() as u64;
-        }
-        ControlFlow::Continue(())
-    });
-    assert_eq!(end.unwrap().points, points);
+    let mut scan = scanner.start(spec, None).unwrap();
+    scan.by_ref().for_each(|column| points += column.unwrap().range_m.len() as u64);
+    assert_eq!(scan.finish().unwrap().points, points);
     let (taken, seconds) = (most_memory_kb() - before, started.elapsed().as_secs_f64());
     println!("\ndome {points} cells in {taken} kB beyond the {before} kB before, {seconds:.1} s");
 }

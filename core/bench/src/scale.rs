@@ -4,7 +4,6 @@
 //! the same process included.
 
 use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
@@ -17,10 +16,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value as Json, json};
 
 use crate::bench::Command;
-use crate::scene::Setting;
+use crate::scene::{SCAN_LIMIT, Setting};
 use crate::stages::ms;
 use crate::{bench, machine, tables};
-use platen_engine::plugin::Catalogue;
+use platen_engine::plugin::{Catalogue, JobSpec};
 use platen_host::cli::{CliError, Common, output};
 use platen_host::progress;
 
@@ -130,25 +129,20 @@ fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -
         return Err(CliError::Usage("give at least one --flattening".into()));
     };
     let window = cells.window();
+    let (spec, (scanner, _)) = (scene.spec(), scene.scanner(catalogue, folder, setting)?);
+    let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), window.as_ref())?;
+    let header = scan.header().clone();
+    let mut extractor = Extractor::new(&header, &spec);
     let mut on_columns = Duration::ZERO;
-    let mut wrong = None;
-    let push = |extractor: &mut Extractor, column: &Column| {
+    for column in &mut scan {
+        let column = column?;
         let start = machine::thread_time();
-        let pushed = extractor.push(column);
+        extractor.push(&column).map_err(|e| failed(&e))?;
         on_columns += machine::thread_time().saturating_sub(start);
-        match pushed {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                wrong = Some(error);
-                ControlFlow::Break(())
-            }
-        }
-    };
-    let streamed = scene.stream(catalogue, folder, setting, window.as_ref(), push);
-    if let Some(error) = wrong {
-        return Err(failed(&error));
     }
-    let (header, spec, extractor) = streamed?;
+    scan.finish()?;
+    // Its memory is not that of measuring.
+    drop(scanner);
     let start = machine::cpu_time();
     let patch = extractor.finish().map_err(|e| failed(&e))?;
     let extracted = machine::cpu_time();

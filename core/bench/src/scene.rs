@@ -4,24 +4,23 @@
 //! `truth_file`. Every seed has errors of its own and moves and turns the plate a little, so that the lattice falls
 //! differently on its edges each time.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use platen_plant::Value;
-use platen_scan::{Column, ScanHeader, Window};
+use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
 use platen_shape::{Patch, PlateSpec, Vec3};
 
 use crate::accuracy::Truth;
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
 use platen_engine::stroke::NotMeasured;
 use platen_host::cli::CliError;
 use platen_model::units::metres;
 
 /// Casting the rays of a full dome takes minutes on a slow machine.
-const SCAN_LIMIT: Duration = Duration::from_secs(3600);
+pub(super) const SCAN_LIMIT: Duration = Duration::from_secs(3600);
 /// Angle between cells of the scans of `accuracy`: 6 mm at 7 m.
 const STEP_DEG: f64 = 0.05;
 /// Enough round their plates to see where they end.
@@ -90,7 +89,7 @@ impl Scene {
     }
 
     /// What is known of the plate before it is scanned.
-    fn spec(&self) -> PlateSpec {
+    pub(super) fn spec(&self) -> PlateSpec {
         let [width, height, thickness] = self.size_mm.map(metres);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
         PlateSpec {
@@ -126,53 +125,16 @@ impl Scene {
         setting: Setting,
     ) -> Result<Shot, CliError> {
         let (scanner, truth) = self.scanner(catalogue, folder, setting)?;
-        let mut header = None;
-        let mut columns = Vec::new();
-        let job = JobSpec::untriggered(SCAN_LIMIT);
-        scanner.scan(job, None, &mut |event| {
-            match event {
-                ScanEvent::Begin(begun) => header = Some(begun),
-                ScanEvent::Column(column) => columns.push(column),
-            }
-            ControlFlow::Continue(())
-        })?;
-        let header = header.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
+        let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), None)?;
+        let header = scan.header().clone();
+        let columns = scan.by_ref().collect::<Result<_, _>>()?;
+        scan.finish()?;
         let truth = Truth::read(&truth).map_err(|e| CliError::Failed(e.to_string()))?;
         Ok(Shot { header, columns, truth, spec: self.spec() })
     }
 
-    /// Scans and extracts at once, each column with `push`: nothing of the scan is kept but what the extractor keeps.
-    pub(super) fn stream(
-        &self,
-        catalogue: &Catalogue,
-        folder: &Path,
-        setting: Setting,
-        window: Option<&Window>,
-        mut push: impl FnMut(&mut Extractor, &Column) -> ControlFlow<()>,
-    ) -> Result<(ScanHeader, PlateSpec, Extractor), CliError> {
-        let (scanner, _) = self.scanner(catalogue, folder, setting)?;
-        let spec = self.spec();
-        let mut extractor = None;
-        scanner.scan(
-            JobSpec::untriggered(SCAN_LIMIT),
-            window,
-            &mut |event| match (event, &mut extractor) {
-                (ScanEvent::Begin(header), _) => {
-                    let empty = Extractor::new(&header, &spec);
-                    extractor = Some((header, empty));
-                    ControlFlow::Continue(())
-                }
-                (ScanEvent::Column(column), Some((_, extractor))) => push(extractor, &column),
-                (ScanEvent::Column(_), None) => ControlFlow::Break(()),
-            },
-        )?;
-        let (header, extractor) =
-            extractor.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
-        Ok((header, spec, extractor))
-    }
-
     /// The driver set to this scene, and where its truth will lie.
-    fn scanner(
+    pub(super) fn scanner(
         &self,
         catalogue: &Catalogue,
         folder: &Path,

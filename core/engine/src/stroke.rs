@@ -11,18 +11,17 @@ mod scan_buffer;
 pub use previous_pose::PreviousPose;
 pub use scan_buffer::ScanBuffer;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use platen_model::{Task, Verdict};
-use platen_scan::{ColumnError, ScanHeader, Window};
+use platen_scan::{ColumnError, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
 use platen_shape::{Blank, BlankError, Measured, Patch, PlateSpec, Reorientation, Scanned, reorientation};
 
 use crate::pipeline::Pipeline;
-use crate::plugin::{JobSpec, PluginError, ScanEvent, Scanner, Surfaces};
+use crate::plugin::{JobSpec, PluginError, Scanner, Surfaces};
 use platen_model::Report;
 
 /// Why a stroke was not measured, by who must act.
@@ -34,9 +33,6 @@ pub enum NotMeasured {
     /// The scanner's driver sent what is no lattice.
     #[error("scan: {0}; report this to the driver's author")]
     Column(#[from] ColumnError),
-    /// The driver sent columns before it said what they are.
-    #[error("scan: columns without a header; report this to the driver's author")]
-    NoHeader,
     /// The plate was not found in the scan.
     #[error("scan: {0}")]
     Plate(#[from] Refusal),
@@ -77,40 +73,23 @@ pub fn scan(
     mut buffer: Option<&mut ScanBuffer>,
 ) -> Result<Scanned, NotMeasured> {
     let start = Instant::now();
-    let mut extractor: Option<(ScanHeader, Extractor)> = None;
-    let mut wrong: Option<NotMeasured> = None;
-    let mut take = |event| match (event, &mut extractor) {
-        (ScanEvent::Begin(header), _) => {
-            if let Some(buffer) = buffer.as_deref_mut() {
-                buffer.begin(header.clone());
-            }
-            extractor = Some((header.clone(), Extractor::new(&header, spec)));
-            Ok(())
-        }
-        (ScanEvent::Column(column), Some((_, extractor))) => {
-            extractor.push(&column)?;
-            if let Some(buffer) = buffer.as_deref_mut() {
-                buffer.push(column);
-            }
-            Ok(())
-        }
-        (ScanEvent::Column(_), None) => Err(NotMeasured::NoHeader),
-    };
-    let end = scanner.scan(job, window, &mut |event| match take(event) {
-        Ok(()) => ControlFlow::Continue(()),
-        Err(error) => {
-            wrong = Some(error);
-            ControlFlow::Break(())
-        }
-    });
-    if let Some(error) = wrong {
-        return Err(error);
+    let mut scan = scanner.start(job, window)?;
+    let header = scan.header().clone();
+    let mut extractor = Extractor::new(&header, spec);
+    if let Some(buffer) = buffer.as_deref_mut() {
+        buffer.begin(header.clone());
     }
-    let end = end?;
+    for column in &mut scan {
+        let column = column?;
+        extractor.push(&column)?;
+        if let Some(buffer) = buffer.as_deref_mut() {
+            buffer.push(column);
+        }
+    }
+    let end = scan.finish()?;
     if let Some(buffer) = buffer {
         buffer.end(end);
     }
-    let (header, mut extractor) = extractor.ok_or(NotMeasured::NoHeader)?;
     let acquired = Instant::now();
     extractor.leave_out_warm_up(end.warm_up_columns);
     let patch = extractor.finish()?;

@@ -24,9 +24,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::scan_file::ScanFileError;
 use platen_engine::pipeline::PipelineError;
 use platen_engine::plugin::{Catalogue, PluginError};
+use platen_formats::WriteError;
 use platen_report::output_folder::FilesError;
 
 /// Measures plates on a press, stroke by stroke.
@@ -127,10 +127,10 @@ impl From<PipelineError> for CliError {
     }
 }
 
-impl From<ScanFileError> for CliError {
-    fn from(error: ScanFileError) -> Self {
+impl From<WriteError> for CliError {
+    fn from(error: WriteError) -> Self {
         match error {
-            ScanFileError::Format(_) | ScanFileError::Exists(_) => Self::Usage(error.to_string()),
+            WriteError::Format(_) | WriteError::Exists(_) => Self::Usage(error.to_string()),
             failed => Self::Failed(failed.to_string()),
         }
     }

@@ -12,7 +12,6 @@ mod angle;
 mod column;
 mod lattice;
 mod scan;
-mod text;
 
 pub use angle::{Direction, Window, wrap_azimuth};
 pub use column::{Column, ColumnError, Face, State};

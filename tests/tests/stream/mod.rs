@@ -2,11 +2,10 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::net::SocketAddr;
-use std::ops::ControlFlow;
 use std::time::Duration;
 
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, PluginError, Scanner};
 use platen_plant::PlantFile;
 use platen_scan::{Lattice, ScanEnd, Window};
 use platen_sim_plate::{PlateState, Shape};
@@ -60,15 +59,12 @@ pub(crate) fn scan(
     window: Option<&Window>,
     limit: Duration,
 ) -> Result<(Lattice, ScanEnd), PluginError> {
-    let mut lattice: Option<Lattice> = None;
-    let end = scanner.scan(JobSpec::untriggered(limit), window, &mut |event| {
-        match event {
-            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
-            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
-        }
-        ControlFlow::Continue(())
-    })?;
-    Ok((lattice.unwrap(), end))
+    let mut scan = scanner.start(JobSpec::untriggered(limit), window)?;
+    let mut lattice = Lattice::new(scan.header().clone());
+    for column in &mut scan {
+        lattice.push(&column?).unwrap();
+    }
+    Ok((lattice, scan.finish()?))
 }
 
 /// Everything that a scan says, so that two can be compared to the last bit.

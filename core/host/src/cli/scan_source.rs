@@ -3,14 +3,14 @@
 use std::path::Path;
 use std::time::Duration;
 
+use platen_formats::{ScanFile, Written};
 use platen_plant::Value;
-use platen_scan::{ScanEnd, Window};
+use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
 use super::CliError;
 use crate::progress;
-use crate::scan_file::Sink;
 use platen_engine::pipeline;
-use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, RunningScan, Scanner};
 
 /// A file of the finest full dome takes minutes to read.
 pub(super) const READ_LIMIT: Duration = Duration::from_secs(1800);
@@ -27,29 +27,83 @@ pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Re
     Ok(scanner)
 }
 
-/// Scans, shows how far it is, and stops on Ctrl-C.
-pub(super) fn follow(
-    scanner: &Scanner,
+/// A scan in progress, shown on the terminal; its errors begin with the file that is read, if it is one.
+pub(super) struct ShownScan<'a> {
+    scan: RunningScan<'a>,
+    line: Line<'a>,
+    columns: u32,
+}
+
+/// The progress line, taken away at the end. Must be dropped after the scan.
+struct Line<'a> {
+    what: &'a str,
+    file: Option<&'a Path>,
+}
+
+/// Starts a scan that shows its progress as `what` and stops on Ctrl-C.
+pub(super) fn follow<'a>(
+    scanner: &'a Scanner,
     limit: Duration,
     window: Option<&Window>,
-    what: &str,
-    sink: &mut Sink<'_>,
-) -> Result<ScanEnd, PluginError> {
+    what: &'a str,
+    file: Option<&'a Path>,
+) -> Result<ShownScan<'a>, CliError> {
     let job = JobSpec { cancel: interrupt(), ..JobSpec::untriggered(limit) };
-    let (mut columns, mut expected) = (0_u32, 0);
     progress::phase(what);
-    let end = scanner.scan(job, window, &mut |event| {
-        match &event {
-            ScanEvent::Begin(header) => expected = header.n_columns,
-            ScanEvent::Column(_) => columns += 1,
+    let line = Line { what, file };
+    let scan = scanner.start(job, window).map_err(|e| line.failed(e))?;
+    Ok(ShownScan { scan, line, columns: 0 })
+}
+
+impl ShownScan<'_> {
+    /// Size, angles and notes of the lattice.
+    pub(super) fn header(&self) -> &ScanHeader {
+        self.scan.header()
+    }
+
+    /// Ends the scan.
+    pub(super) fn finish(self) -> Result<ScanEnd, CliError> {
+        self.scan.finish().map_err(|e| self.line.failed(e))
+    }
+
+    /// Writes the scan to a new file.
+    pub(super) fn write(mut self, mut file: ScanFile) -> Result<Written, CliError> {
+        let mut writer = file.writer(self.header())?;
+        for column in &mut self {
+            writer.push(&column?)?;
         }
-        if columns % SHOW_EVERY == 1 {
-            progress::share(what, f64::from(columns) / f64::from(expected.max(1)));
+        let written = writer.finish(&self.finish()?)?;
+        Ok(file.persist(written)?)
+    }
+}
+
+impl Iterator for ShownScan<'_> {
+    type Item = Result<Column, CliError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let column = self.scan.next()?.map_err(|e| self.line.failed(e));
+        self.columns += 1;
+        if self.columns % SHOW_EVERY == 1 {
+            let expected = self.header().n_columns.max(1);
+            progress::share(self.line.what, f64::from(self.columns) / f64::from(expected));
         }
-        sink(event)
-    });
-    progress::done();
-    end
+        Some(column)
+    }
+}
+
+impl Line<'_> {
+    fn failed(&self, error: PluginError) -> CliError {
+        CliError::Failed(match self.file {
+            Some(file) => format!("{}: {error}", file.display()),
+            None => error.to_string(),
+        })
+    }
+}
+
+impl Drop for Line<'_> {
+    fn drop(&mut self) {
+        progress::done();
+    }
 }
 
 /// A token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread for

@@ -468,7 +468,7 @@ fn refusal(error: &NotMeasured) -> (Code, String, bool) {
     let hung = matches!(error, NotMeasured::Scanner(PluginError::Hangs { .. }));
     let code = match error {
         NotMeasured::Scanner(PluginError::Stopped { .. }) => Code::ScanTimeout,
-        NotMeasured::Scanner(_) | NotMeasured::Column(_) | NotMeasured::NoHeader => Code::ScanFailed,
+        NotMeasured::Scanner(_) | NotMeasured::Column(_) => Code::ScanFailed,
         NotMeasured::Plate(_) => Code::PlateNotFound,
         NotMeasured::Askew { .. } | NotMeasured::Turned(_) => Code::PlateTurned,
         NotMeasured::Outline(_) | NotMeasured::Blank(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
