@@ -14,7 +14,7 @@ use platen_plant::Value;
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::stream::{
-    Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Values, Wanted, column_payload,
+    Bridge, BridgeConfig, Head, Plan, Receiver, ScanLayout, ScanSettings, Values, column_payload,
 };
 use platen_sim_scanner::{
     E57Encoding, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, SimState, Surroundings,
@@ -127,13 +127,13 @@ fn write_all() -> Vec<(PathBuf, f64)> {
 struct Again(SimScan);
 
 impl Head for Again {
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
-        Ok(Plan { wanted: *wanted, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String> {
+        Ok(Plan { settings: *settings, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
     }
 
     fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let lattice = &self.0.lattice;
-        let begin = Begin {
+        let begin = ScanLayout {
             rows: lattice.n_rows,
             columns: lattice.n_columns,
             azimuth_start: lattice.azimuth_start,

@@ -9,7 +9,7 @@ use platen_engine::plugin::{Catalogue, JobSpec, PluginError, Scanner};
 use platen_plant::PlantFile;
 use platen_scan::{Lattice, ScanEnd, Window};
 use platen_sim_plate::{PlateState, Shape};
-use platen_sim_scanner::stream::{Bridge, BridgeConfig, Shop};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
 
 /// Longest scan that a test waits for; nothing here takes so long unless it is broken.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);
@@ -21,8 +21,8 @@ pub(crate) fn plate() -> PlateState {
 }
 
 /// A scanner before that plate.
-pub(crate) fn shop() -> Shop {
-    Shop { threads: 2, ..Shop::new(Box::new(|| Ok(Some(plate())))) }
+pub(crate) fn shop() -> RayCastHead {
+    RayCastHead { threads: 2, ..RayCastHead::new(Box::new(|| Ok(Some(plate())))) }
 }
 
 /// A bridge with these faults, its seed fixed.
@@ -30,7 +30,7 @@ pub(crate) fn bridge(faults: &[&str]) -> Bridge {
     start(faults, BridgeConfig::default(), shop())
 }
 
-pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: Shop) -> Bridge {
+pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: RayCastHead) -> Bridge {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     Bridge::start(BridgeConfig { faults, ..config }, Box::new(shop)).unwrap()
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// What a bridge has done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct BridgeTally {
+pub struct BridgeCounters {
     /// Connections taken.
     pub connections: u32,
     /// Scans that the head began.
@@ -25,9 +25,9 @@ pub struct BridgeTally {
     pub cuts: u32,
 }
 
-/// Counters of [`BridgeTally`].
+/// Counters of [`BridgeCounters`].
 #[derive(Debug, Default)]
-pub(super) struct Counts {
+pub(super) struct AtomicCounters {
     pub(super) connections: AtomicU32,
     pub(super) scans: AtomicU32,
     pub(super) starts: AtomicU32,
@@ -38,11 +38,11 @@ pub(super) struct Counts {
     pub(super) cuts: AtomicU32,
 }
 
-impl Counts {
+impl AtomicCounters {
     /// As they stand now.
-    pub(super) fn read(&self) -> BridgeTally {
+    pub(super) fn read(&self) -> BridgeCounters {
         let read = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
-        BridgeTally {
+        BridgeCounters {
             connections: read(&self.connections),
             scans: read(&self.scans),
             starts: read(&self.starts),
@@ -55,7 +55,7 @@ impl Counts {
     }
 }
 
-/// Counts one up.
-pub(super) fn count(counter: &AtomicU32) {
+/// AtomicCounters one up.
+pub(super) fn increment(counter: &AtomicU32) {
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -11,7 +11,7 @@ use crate::{
 };
 
 use super::head::{Head, Plan, Receiver};
-use super::message::{Begin, Region, Values, Wanted};
+use super::message::{ScanLayout, ScanSettings, Values, Window};
 use super::payload::column_payload;
 
 /// Seeds of consecutive scans lie this far apart, so that no two bridges with neighbouring seeds share a scan.
@@ -27,7 +27,7 @@ const TURNS: u32 = 64;
 pub type PlateSource = Box<dyn Fn() -> Result<Option<PlateState>, String> + Send + Sync>;
 
 /// Scanner and shop.
-pub struct Shop {
+pub struct RayCastHead {
     /// What lies in the press when a scan begins.
     pub plate: PlateSource,
     /// What stands round it.
@@ -49,13 +49,13 @@ pub struct Shop {
     pub threads: usize,
 }
 
-impl std::fmt::Debug for Shop {
+impl std::fmt::Debug for RayCastHead {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Shop").field("instrument", &self.instrument).finish_non_exhaustive()
+        f.debug_struct("RayCastHead").field("instrument", &self.instrument).finish_non_exhaustive()
     }
 }
 
-impl Shop {
+impl RayCastHead {
     /// A scanner with the errors of its device before this plate.
     pub fn new(plate: PlateSource) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Shop {
         }
     }
 
-    fn lattice(&self, device: &Device, window: Option<&Region>, plate: Option<&Plate>) -> SimLattice {
+    fn lattice(&self, device: &Device, window: Option<&Window>, plate: Option<&Plate>) -> SimLattice {
         let step = device.step();
         match (window, self.margin) {
             (Some(w), _) => {
@@ -112,13 +112,13 @@ impl Shop {
     }
 }
 
-fn device(wanted: &Wanted) -> Result<Device, String> {
-    Device::new(wanted.divisor, wanted.rate_kpts, wanted.compression).map_err(|error| error.to_string())
+fn device(settings: &ScanSettings) -> Result<Device, String> {
+    Device::new(settings.divisor, settings.rate_kpts, settings.compression).map_err(|error| error.to_string())
 }
 
 /// Width and height of what is scanned, radians: of the window, or of a plate's surroundings, or all of it.
-fn extent(wanted: &Wanted, margin: Option<f64>) -> (f64, f64) {
-    match (wanted.window, margin) {
+fn extent(settings: &ScanSettings, margin: Option<f64>) -> (f64, f64) {
+    match (settings.window, margin) {
         (Some(window), _) => (window.azimuth_width, window.elevation_max - window.elevation_min),
         // A plate of 5 m at 5 m distance.
         (None, Some(margin)) => (1.0 + 2.0 * margin, 0.6 + 2.0 * margin),
@@ -126,25 +126,25 @@ fn extent(wanted: &Wanted, margin: Option<f64>) -> (f64, f64) {
     }
 }
 
-impl Head for Shop {
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
-        let device = device(wanted)?;
-        if let Some(w) = &wanted.window {
+impl Head for RayCastHead {
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String> {
+        let device = device(settings)?;
+        if let Some(w) = &settings.window {
             let reached = w.elevation_max > LOWEST_DEG.to_radians() && w.elevation_max > w.elevation_min;
             if !(reached && w.azimuth_width > 0.0) {
                 return Err("the window lies outside of what the scanner reaches, -62.5 to 90 degrees".into());
             }
         }
-        let (width, height) = extent(wanted, self.margin);
+        let (width, height) = extent(settings, self.margin);
         let computing_s = width * height / device.step().powi(2) * SECONDS_PER_CELL;
         let duration_s = device.duration_s(width);
-        Ok(Plan { wanted: *wanted, duration_s, computing_s, altered: Vec::new() })
+        Ok(Plan { settings: *settings, duration_s, computing_s, altered: Vec::new() })
     }
 
     fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<(), String> {
-        let device = device(&plan.wanted)?;
+        let device = device(&plan.settings)?;
         let plate = (self.plate)()?.map(|state| Plate::new(&state)).transpose().map_err(|e| e.to_string())?;
-        let lattice = self.lattice(&device, plan.wanted.window.as_ref(), plate.as_ref());
+        let lattice = self.lattice(&device, plan.settings.window.as_ref(), plate.as_ref());
         let instrument = self.instrument(&device, &lattice, number);
         let mut begin = begin(&lattice, &instrument, self.values);
         begin.altered.clone_from(&plan.altered);
@@ -152,16 +152,16 @@ impl Head for Shop {
             mirror(&mut begin);
         }
         let scene = Scene::new(plate, &self.surroundings);
-        let shot = Shot { shop: self, device, scene, lattice, instrument, begin };
+        let shot = PreparedScan { shop: self, device, scene, lattice, instrument, begin };
         // Who broke off knows why.
         let _ = shot.take(out);
         Ok(())
     }
 }
 
-fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> Begin {
+fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> ScanLayout {
     let order = if instrument.faces.is_some() { "time" } else { "azimuth" };
-    Begin {
+    ScanLayout {
         rows: lattice.n_rows,
         columns: lattice.n_columns,
         azimuth_start: lattice.azimuth_start,
@@ -182,7 +182,7 @@ fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> Begin
 }
 
 /// The same lattice counted from the other ends.
-fn mirror(begin: &mut Begin) {
+fn mirror(begin: &mut ScanLayout) {
     let last = |n: u32| f64::from(n - 1);
     begin.azimuth_start += begin.azimuth_step * last(begin.columns);
     begin.azimuth_step = -begin.azimuth_step;
@@ -192,16 +192,16 @@ fn mirror(begin: &mut Begin) {
 }
 
 /// One scan about to be taken.
-struct Shot<'a> {
-    shop: &'a Shop,
+struct PreparedScan<'a> {
+    shop: &'a RayCastHead,
     device: Device,
     scene: Scene,
     lattice: SimLattice,
     instrument: Instrument,
-    begin: Begin,
+    begin: ScanLayout,
 }
 
-impl Shot<'_> {
+impl PreparedScan<'_> {
     fn take(&self, out: &mut dyn Receiver) -> ControlFlow<()> {
         out.begin(self.begin.clone())?;
         let all = self.lattice.n_columns;

@@ -14,14 +14,14 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A connection to the second port.
 #[derive(Debug)]
-pub(crate) struct Line {
+pub(crate) struct ControlClient {
     address: String,
     reader: BufReader<TcpStream>,
 }
 
 /// What is to be scanned: a stroke that the host has accepted and now waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Wanted {
+pub(crate) struct PendingStroke {
     pub(crate) session: u16,
     pub(crate) stroke: u16,
     pub(crate) attempt: u16,
@@ -33,10 +33,11 @@ enum Registers {
     Registers { p: Vec<u16>, h: Vec<u16> },
 }
 
-impl Line {
+impl ControlClient {
     /// Connects.
     pub(crate) fn open(address: &str) -> Result<Self, Error> {
-        let failed = |error: std::io::Error| Error::Line { address: address.into(), what: error.to_string() };
+        let failed =
+            |error: std::io::Error| Error::Control { address: address.into(), what: error.to_string() };
         let stream = TcpStream::connect(address).map_err(failed)?;
         stream.set_read_timeout(Some(TIMEOUT)).and_then(|()| stream.set_nodelay(true)).map_err(failed)?;
         Ok(Self { address: address.into(), reader: BufReader::new(stream) })
@@ -52,7 +53,7 @@ impl Line {
     }
 
     /// The stroke that the host waits for, if it waits for one and the plate lies still.
-    pub(crate) fn wanted(&mut self) -> Result<Option<Wanted>, Error> {
+    pub(crate) fn pending(&mut self) -> Result<Option<PendingStroke>, Error> {
         let Registers::Registers { p: press, h: host } = self.ask(r#"{"get":"registers"}"#)?;
         let word = |block: &[u16], at: usize| block.get(at).copied().unwrap_or(0);
         let (stroke, told) = (word(&press, p::STROKE_ID), word(&host, h::STATUS));
@@ -60,14 +61,14 @@ impl Line {
             && told & (status::BUSY | status::SCAN_DONE) == status::BUSY
             && word(&host, h::ACK_STROKE_ID) == stroke;
         let (session, attempt) = (word(&press, p::SESSION_ID), word(&press, p::ATTEMPT));
-        Ok(waits.then_some(Wanted { session, stroke, attempt }))
+        Ok(waits.then_some(PendingStroke { session, stroke, attempt }))
     }
 
     fn ask<T: DeserializeOwned>(&mut self, request: &str) -> Result<T, Error> {
         let mut line = String::new();
         let said =
             writeln!(self.reader.get_mut(), "{request}").and_then(|()| self.reader.read_line(&mut line));
-        let failed = |what: String| Error::Line { address: self.address.clone(), what };
+        let failed = |what: String| Error::Control { address: self.address.clone(), what };
         match said {
             Ok(0) => Err(failed("it has ended".into())),
             Ok(_) => {

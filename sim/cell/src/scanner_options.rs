@@ -13,7 +13,7 @@ const CYCLIC_PERIOD: f64 = 1.2;
 
 /// What stands before the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Hidden {
+enum Occluder {
     Nothing,
     Person,
     Chain,
@@ -22,7 +22,7 @@ enum Hidden {
 
 /// The scanner and its place.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct Device {
+pub(crate) struct ScannerOptions {
     /// Angle between cells, degrees
     #[arg(long, default_value_t = 0.05)]
     step_deg: f64,
@@ -42,23 +42,23 @@ pub(crate) struct Device {
     #[arg(long, default_value_t = 1)]
     pub(crate) scan_seed: u64,
     /// What stands between scanner and plate
-    #[arg(long, value_enum, default_value_t = Hidden::Nothing)]
-    hidden_by: Hidden,
+    #[arg(long, value_enum, default_value_t = Occluder::Nothing)]
+    hidden_by: Occluder,
 }
 
 /// A scan with all that is known of it.
-pub(crate) struct Shot {
+pub(crate) struct Capture {
     pub(crate) scene: Scene,
     pub(crate) scan: SimScan,
 }
 
-impl Device {
+impl ScannerOptions {
     /// What stands round the plate.
     pub(crate) fn surroundings(&self) -> Surroundings {
-        let hides = |what| self.hidden_by == what || self.hidden_by == Hidden::Both;
+        let hides = |what| self.hidden_by == what || self.hidden_by == Occluder::Both;
         Surroundings {
-            person_in_front: hides(Hidden::Person),
-            chain: hides(Hidden::Chain),
+            person_in_front: hides(Occluder::Person),
+            chain: hides(Occluder::Chain),
             ..Surroundings::default()
         }
     }
@@ -79,7 +79,7 @@ impl Device {
     }
 
     /// Scans; `number` tells the noise of repeated scans apart.
-    pub(crate) fn shot(&self, state: Option<&PlateState>, number: u64) -> Result<Shot, PlateError> {
+    pub(crate) fn capture(&self, state: Option<&PlateState>, number: u64) -> Result<Capture, PlateError> {
         let plate = state.map(Plate::new).transpose()?;
         let lattice =
             SimLattice::of_plate(plate.as_ref(), self.margin_deg.to_radians(), self.step_deg.to_radians());
@@ -88,11 +88,11 @@ impl Device {
         let scene = Scene::new(plate, &self.surroundings());
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let columns = scan_all(&scene, &lattice, &instrument, threads);
-        Ok(Shot { scene, scan: SimScan { lattice, columns } })
+        Ok(Capture { scene, scan: SimScan { lattice, columns } })
     }
 }
 
-impl Shot {
+impl Capture {
     /// Writes the scan in the format of the file's ending.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         let format = FileFormat::of(path).ok_or_else(|| Error::Format { path: path.into() })?;

@@ -9,12 +9,12 @@ use crate::profile::Profile;
 use crate::{Jet, Vec3};
 
 #[derive(Debug, Clone)]
-pub(crate) struct Swept {
+pub(crate) struct SweptSurface {
     pub(crate) profile: Profile,
     pub(crate) section: Profile,
 }
 
-impl Swept {
+impl SweptSurface {
     /// True when the map from (s, r) is isometric.
     pub(crate) fn is_developable(&self) -> bool {
         self.profile.is_straight() || self.section.is_straight()

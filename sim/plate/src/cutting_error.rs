@@ -4,14 +4,14 @@ use crate::Blank;
 
 /// The map from the ordered rectangle to the cut blank: corners moved, edges bowed as parabolas, straight blends between.
 #[derive(Debug, Clone)]
-pub(crate) struct Cut {
+pub(crate) struct CuttingError {
     size: [f64; 2],
     corners: [[f64; 2]; 4],
     /// Outwards, in the middle of the edges v = 0, u = W, v = H, u = 0.
     bows: [f64; 4],
 }
 
-impl Cut {
+impl CuttingError {
     /// `None` for the rectangle itself.
     pub(crate) fn new(blank: &Blank) -> Option<Self> {
         let corners = blank.corners_off_mm.map(|off| off.map(|mm| mm * 1e-3));
@@ -59,10 +59,10 @@ mod tests {
     #[test]
     fn corners_and_bows_are_where_they_were_asked_and_slopes_agree_with_differences() {
         let mut blank = PlateState::flat(4000.0, 3000.0, 36.0).blank;
-        assert!(Cut::new(&blank).is_none());
+        assert!(CuttingError::new(&blank).is_none());
         blank.corners_off_mm = [[0.0, 0.0], [4.0, 0.0], [7.0, -3.0], [3.0, -3.0]];
         blank.bows_mm = [0.0, 2.0, -1.0, 0.5];
-        let cut = Cut::new(&blank).unwrap();
+        let cut = CuttingError::new(&blank).unwrap();
         let near = |a: f64, b: f64, [u, v]: [f64; 2]| {
             let ([x, y], _) = cut.material(a, b);
             assert!((x - u).hypot(y - v) < 1e-12, "({a}, {b}) at ({x}, {y})");

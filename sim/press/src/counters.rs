@@ -1,6 +1,6 @@
 //! What the press itself saw of its host: the side on which tests assert.
 //!
-//! [`Witness`] looks at every write as it arrives, so a result that is published twice or changes under its number
+//! [`WriteMonitor`] looks at every write as it arrives, so a result that is published twice or changes under its number
 //! is seen even between two cycles of the program.
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ const SENTENCES: usize = 20;
 
 /// Counts of one press since its start.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Tally {
+pub struct Counters {
     /// Milliseconds since the start.
     pub now_ms: u64,
     /// The press has made all its strokes, or its plate has passed, and the part has left.
@@ -77,12 +77,12 @@ pub struct Tally {
     pub owners: Vec<u16>,
 
     /// Results taken, in order.
-    pub taken: Vec<Taken>,
+    pub taken: Vec<AcceptedResult>,
 }
 
 /// One result as the press took it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Taken {
+pub struct AcceptedResult {
     /// Why it was asked for.
     pub cause: Cause,
     /// Number of the stroke.
@@ -105,7 +105,7 @@ pub struct Taken {
     pub words: Vec<u16>,
 }
 
-impl Tally {
+impl Counters {
     /// The counts alone, and the number of results taken: what can be asked often in a long run.
     #[must_use]
     pub fn counts(&mut self) -> (Self, usize) {
@@ -130,7 +130,7 @@ impl Tally {
     }
 
     /// Contradictions in a result that is about to be taken.
-    pub fn judge(&mut self, host: &HBlock, recipe_id: u16) {
+    pub fn check_result(&mut self, host: &HBlock, recipe_id: u16) {
         let stroke = host.word(h::RESULT_STROKE_ID);
         if host.crc() != host.word(h::CRC16) {
             let (found, needed) = (host.word(h::CRC16), host.crc());
@@ -168,21 +168,21 @@ type Identity = (u16, u16, u16);
 
 /// Watches the H block from write to write.
 #[derive(Clone, Debug, Default)]
-pub struct Witness {
+pub struct WriteMonitor {
     published: BTreeMap<Identity, (u16, Vec<u16>)>,
     last_seq: Option<u16>,
 }
 
-impl Witness {
+impl WriteMonitor {
     /// Looks at the H block after a write.
-    pub fn observe(&mut self, host: &HBlock, tally: &mut Tally) {
+    pub fn observe(&mut self, host: &HBlock, counters: &mut Counters) {
         let owner = host.word(h::OWNER);
-        if owner != 0 && !tally.owners.contains(&owner) {
-            tally.owners.push(owner);
+        if owner != 0 && !counters.owners.contains(&owner) {
+            counters.owners.push(owner);
         }
-        tally.missed_reported = host.word(h::MISSED_COUNT);
+        counters.missed_reported = host.word(h::MISSED_COUNT);
         if host.status(status::PASS) && host.status(status::FAIL) {
-            tally.wrong(format!("status {:#06x}: pass and fail", host.word(h::STATUS)));
+            counters.wrong(format!("status {:#06x}: pass and fail", host.word(h::STATUS)));
         }
         if !host.status(status::RESULT_VALID) {
             return;
@@ -190,7 +190,7 @@ impl Witness {
         let stroke = host.word(h::RESULT_STROKE_ID);
         if !host.whole() {
             let [head, tail] = [host.word(h::RESULT_SEQ), host.word(h::RESULT_SEQ_TAIL)];
-            tally.wrong(format!("stroke {stroke}: valid, but sequence {head} and its copy {tail} differ"));
+            counters.wrong(format!("stroke {stroke}: valid, but sequence {head} and its copy {tail} differ"));
             return;
         }
         let identity = (host.word(h::SESSION_ECHO), stroke, host.word(h::ATTEMPT_ECHO));
@@ -201,14 +201,14 @@ impl Witness {
                 // Results that the press forgot while it restarted leave gaps; going back would be a lost journal.
                 let step = self.last_seq.map_or(1, |last| seq.wrapping_sub(last));
                 if step == 0 || step > u16::MAX / 2 {
-                    tally.wrong(format!("stroke {stroke}: sequence {seq} after {:?}", self.last_seq));
+                    counters.wrong(format!("stroke {stroke}: sequence {seq} after {:?}", self.last_seq));
                 }
                 self.last_seq = Some(seq);
-                tally.published += 1;
+                counters.published += 1;
                 self.published.insert(identity, (seq, words));
             }
-            Some((first, _)) if *first != seq => tally.duplicates += 1,
-            Some((_, before)) if *before != words => tally.changed += 1,
+            Some((first, _)) if *first != seq => counters.duplicates += 1,
+            Some((_, before)) if *before != words => counters.changed += 1,
             Some(_) => {}
         }
     }

@@ -14,7 +14,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Mutex;
 use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBits};
 
-use crate::damage::{Answer, damage, exception};
+use crate::answer_faults::{Answer, apply_fault, exception};
 use crate::faults::LineFault;
 use crate::frame::{Framing, Message, Split, split_tcp};
 use crate::pty;
@@ -159,12 +159,12 @@ impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
                 exchange(server, &request).await?
             };
             self.shared.thaw().await;
-            let damaged = {
+            let faulty = {
                 let mut line = self.shared.line();
                 let line = &mut *line;
-                damage(answer, fault, self.framing, &line.faults, &mut line.random)
+                apply_fault(answer, fault, self.framing, &line.faults, &mut line.random)
             };
-            match damaged {
+            match faulty {
                 Answer::Reset => return Ok(()),
                 Answer::None => {}
                 Answer::Bytes(bytes) => send(&self.writer, &bytes).await?,

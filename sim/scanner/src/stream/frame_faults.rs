@@ -16,7 +16,7 @@ pub(super) enum Step {
     /// It is sent.
     Send(Frame),
     /// It is sent with this bit of its payload flipped on the way.
-    SendSpoiled(Frame, usize),
+    SendCorrupted(Frame, usize),
     /// A header alone is sent, with this length, and with this bit flipped.
     Header(u32, Option<usize>),
     /// Nothing is said for so long.
@@ -29,7 +29,7 @@ pub(super) enum Step {
 
 /// The faults that touch frames, and which of them have happened.
 #[derive(Debug)]
-pub(super) struct Disturb {
+pub(super) struct FrameFaults {
     faults: Vec<Fault>,
     spent: BTreeSet<usize>,
     /// Columns that were left out once.
@@ -37,14 +37,14 @@ pub(super) struct Disturb {
     random: Pcg64,
 }
 
-impl Disturb {
+impl FrameFaults {
     pub(super) fn new(faults: &[Fault], seed: u64) -> Self {
         let random = Pcg64::new(u128::from(seed), 7);
         Self { faults: faults.to_vec(), spent: BTreeSet::new(), left_out: BTreeSet::new(), random }
     }
 
     /// Number of a fault that lasts.
-    pub(super) fn lasting(&self, kind: FaultKind) -> Option<u32> {
+    pub(super) fn persistent(&self, kind: FaultKind) -> Option<u32> {
         self.faults.iter().find(|fault| fault.kind == kind).map(|fault| fault.number)
     }
 
@@ -55,7 +55,7 @@ impl Disturb {
     }
 
     fn one_in(&mut self, kind: FaultKind) -> bool {
-        match self.lasting(kind) {
+        match self.persistent(kind) {
             Some(share) => self.below(share) == 0,
             None => false,
         }
@@ -67,7 +67,7 @@ impl Disturb {
     }
 
     /// The steps that a frame takes; `sent` columns went out on this connection before.
-    pub(super) fn pass(&mut self, frame: Frame, sent: u32) -> Vec<Step> {
+    pub(super) fn apply(&mut self, frame: Frame, sent: u32) -> Vec<Step> {
         match frame.kind {
             frame::COLUMN => self.column(frame, sent),
             frame::SCAN_END => self.end(frame, sent),
@@ -79,7 +79,7 @@ impl Disturb {
         if self.once(FaultKind::DropMidScan, |at| sent >= at).is_some() {
             return Some(Step::Cut);
         }
-        if self.lasting(FaultKind::DropOften).is_some_and(|at| sent >= at) {
+        if self.persistent(FaultKind::DropOften).is_some_and(|at| sent >= at) {
             return Some(Step::Cut);
         }
         self.once(FaultKind::BridgeKilled, |at| sent >= at).map(|_| Step::Die)
@@ -91,7 +91,7 @@ impl Disturb {
         }
         let number = payload::number(&frame.payload).unwrap_or(0);
         let mut steps = self.before(&frame, sent);
-        if self.lasting(FaultKind::MissingColumn).is_some()
+        if self.persistent(FaultKind::MissingColumn).is_some()
             && self.left_out.insert((frame.scan, number))
             && self.one_in(FaultKind::MissingColumn)
         {
@@ -99,13 +99,13 @@ impl Disturb {
         }
         if self.one_in(FaultKind::CorruptFrame) {
             let bit = self.below(8 * frame.payload.len() as u32) as usize;
-            steps.push(Step::SendSpoiled(frame, bit));
+            steps.push(Step::SendCorrupted(frame, bit));
             return steps;
         }
         if self.one_in(FaultKind::Repeated) {
             steps.push(Step::Send(frame.clone()));
         }
-        let torn = self.once(FaultKind::TornColumn, |at| sent >= at).map(|_| torn(&frame));
+        let torn = self.once(FaultKind::TornColumn, |at| sent >= at).map(|_| altered_copy(&frame));
         steps.push(Step::Send(frame));
         steps.extend(torn.map(Step::Send));
         steps
@@ -124,8 +124,8 @@ impl Disturb {
         once(FaultKind::Oversize, Step::Header(2 << 20, None));
         once(FaultKind::ZeroLength, empty(frame::COLUMN));
         once(FaultKind::UnknownFrame, empty(0x0777));
-        once(FaultKind::UnknownCommand, empty(0x0777 | frame::MUST_KNOW));
-        if let Some(ms) = self.lasting(FaultKind::Slow) {
+        once(FaultKind::UnknownCommand, empty(0x0777 | frame::CRITICAL));
+        if let Some(ms) = self.persistent(FaultKind::Slow) {
             steps.push(Step::Wait(Duration::from_millis(ms.into())));
         }
         if sent == 3
@@ -133,10 +133,10 @@ impl Disturb {
         {
             steps.push(Step::Wait(Duration::from_millis(ms.into())));
         }
-        if self.lasting(FaultKind::LateFrames).is_some() && sent.is_multiple_of(5) {
+        if self.persistent(FaultKind::LateFrames).is_some() && sent.is_multiple_of(5) {
             let scan = frame.scan - 1;
             let end = r#"{"outcome":"aborted","columns":0,"points":0,"digest":0}"#;
-            steps.push(Step::Send(Frame { scan, ..torn(frame) }));
+            steps.push(Step::Send(Frame { scan, ..altered_copy(frame) }));
             steps.push(Step::Send(Frame { kind: frame::SCAN_END, scan, payload: end.into() }));
         }
         steps
@@ -146,18 +146,18 @@ impl Disturb {
         if let Some(cut) = self.cut(sent) {
             return vec![cut];
         }
-        if self.lasting(FaultKind::EventLost).is_some() {
+        if self.persistent(FaultKind::EventLost).is_some() {
             return Vec::new();
         }
         if self.once(FaultKind::CorruptEnd, |_| true).is_some() {
-            return vec![Step::SendSpoiled(frame, 40)];
+            return vec![Step::SendCorrupted(frame, 40)];
         }
         vec![Step::Send(frame)]
     }
 }
 
 /// A column that is sound and says something else.
-fn torn(frame: &Frame) -> Frame {
+fn altered_copy(frame: &Frame) -> Frame {
     let mut payload = frame.payload.clone();
     if let Some(last) = payload.last_mut() {
         *last ^= 1;

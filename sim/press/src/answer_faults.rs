@@ -30,7 +30,7 @@ pub(crate) fn exception(request: &Message, code: u8) -> Message {
 }
 
 /// `answer` as bytes after `fault`.
-pub(crate) fn damage(
+pub(crate) fn apply_fault(
     mut answer: Message,
     fault: Option<LineFault>,
     framing: Framing,
@@ -99,8 +99,14 @@ mod tests {
         Message { transaction: 7, unit: 1, pdu: vec![3, 4, 0, 1, 0, 2] }
     }
 
-    fn damaged(fault: LineFault) -> Answer {
-        damage(answer(), Some(fault), Framing::Tcp, &LineFaults::default(), &mut fastrand::Rng::with_seed(1))
+    fn faulty(fault: LineFault) -> Answer {
+        apply_fault(
+            answer(),
+            Some(fault),
+            Framing::Tcp,
+            &LineFaults::default(),
+            &mut fastrand::Rng::with_seed(1),
+        )
     }
 
     #[test]
@@ -116,15 +122,15 @@ mod tests {
             (LineFault::Twice, whole.repeat(2)),
         ];
         for (fault, bytes) in cases {
-            assert_eq!(damaged(fault), Answer::Bytes(bytes), "{fault:?}");
+            assert_eq!(faulty(fault), Answer::Bytes(bytes), "{fault:?}");
         }
-        assert_eq!(damaged(LineFault::Dribble), Answer::Dribble(whole.clone()));
-        let Answer::Bytes(noisy) = damaged(LineFault::Noise) else { panic!("noise is sent at once") };
+        assert_eq!(faulty(LineFault::Dribble), Answer::Dribble(whole.clone()));
+        let Answer::Bytes(noisy) = faulty(LineFault::Noise) else { panic!("noise is sent at once") };
         assert_eq!(noisy[NOISE..], whole);
-        let Answer::Late(late, delay) = damaged(LineFault::Late) else { panic!("late is late") };
+        let Answer::Late(late, delay) = faulty(LineFault::Late) else { panic!("late is late") };
         assert_eq!(late, whole);
         assert!((200..=900).contains(&delay.as_millis()), "{delay:?}");
-        let Answer::Bytes(flipped) = damaged(LineFault::BitFlip) else { panic!("a flip is sent at once") };
+        let Answer::Bytes(flipped) = faulty(LineFault::BitFlip) else { panic!("a flip is sent at once") };
         let bits: u32 = flipped.iter().zip(&whole).map(|(a, b)| (a ^ b).count_ones()).sum();
         assert_eq!((bits, &flipped[6..]), (1, &whole[6..]));
     }

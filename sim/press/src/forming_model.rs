@@ -78,7 +78,7 @@ pub enum Next {
 
 /// One plate on its way from flat to its target.
 #[derive(Clone, Debug)]
-pub struct Steel {
+pub struct FormingModel {
     config: PlateConfig,
     strategy: Strategy,
     programme: Vec<Stroke>,
@@ -87,7 +87,7 @@ pub struct Steel {
     corrections: usize,
 }
 
-impl Steel {
+impl FormingModel {
     /// A flat plate and a programme toward its target.
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl Steel {
     }
 
     /// Keeps the latest result.
-    pub fn learn(&mut self, result: &HBlock) {
+    pub fn record_result(&mut self, result: &HBlock) {
         self.last = Some(*result);
     }
 
