@@ -134,8 +134,8 @@ impl<'a> Page<'a> {
     }
 
     fn worst_section(&self) -> Option<Markup> {
-        let board = history_view::worst_board(self.document.as_ref().ok()?)?;
-        self.picture(&format!("section-{}", board.name))
+        let template = history_view::worst_template(self.document.as_ref().ok()?)?;
+        self.picture(&format!("section-{}", template.name))
     }
 }
 
@@ -249,9 +249,9 @@ fn gap(point: &StripPoint) -> String {
 }
 
 fn worst_place(record: &ResultRecord) -> String {
-    history_view::worst_board(record).map_or_else(
+    history_view::worst_template(record).map_or_else(
         || "\u{2013}".to_owned(),
-        |board| format!("{:.0}, {:.0}", board.max_gap_at_mm[0], board.max_gap_at_mm[1]),
+        |template| format!("{:.0}, {:.0}", template.max_gap_at_mm[0], template.max_gap_at_mm[1]),
     )
 }
 

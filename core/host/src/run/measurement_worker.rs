@@ -387,7 +387,7 @@ impl MeasurementWorker {
         let task = Calibration::task(
             calibration.as_ref(),
             &stroke.plate,
-            history_view::moved(supports, &stroke.plate),
+            history_view::supports_changed(supports, &stroke.plate),
         );
         let reports = stroke::compare(&self.pipeline, &task, surfaces);
         let compare = comparing.elapsed();

@@ -46,6 +46,6 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
     let surface = output_folder::surface_beside(&document)
         .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
         .ok()?;
-    let kept = history_view::kept(&document);
-    Some(Earlier { surface, blank: kept.blank(), supports: kept.supports, plate_rot: data.plate_rot })
+    let earlier = history_view::read_document(&document);
+    Some(Earlier { surface, blank: earlier.blank(), supports: earlier.supports, plate_rot: data.plate_rot })
 }
