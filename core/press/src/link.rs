@@ -1,29 +1,37 @@
-//! Words to and from the press.
+//! Modbus link to the press (MODBUS Application Protocol Specification V1.1b3; MODBUS over Serial Line V1.02).
 //!
-//! [`Link`] moves one request and one answer; [`Client`] is the only one who uses it. It puts a time limit on every
-//! request, checks quantity and echo itself, refuses writes outside the allow-list, and drops the connection at any
-//! error or timeout: after a late answer a Modbus connection is off by one for ever (TCP), or silently wrong (RTU).
+//! | module | contents |
+//! |---|---|
+//! | `client` | the only user of a [`Link`]: time limits, check of quantity and echo, allow-list, counters |
+//! | `press_link` | the link that the plant file describes |
+//! | `modbus` | host as Modbus client over TCP, RTU or RTU over TCP (tokio-modbus) |
+//! | `server` | host as Modbus TCP server |
+//! | `tcp`, `rtu` | sockets and serial ports with the options that a press needs |
+//! | `error` | errors, and the consequence of each exception code |
+//!
+//! [`Link`] transfers one request and one answer. The client drops the connection at any error or timeout: after a late
+//! answer a Modbus TCP connection would assign every answer to the wrong request, and an RTU line would do so undetected.
 
-mod any;
 mod client;
 mod error;
 mod modbus;
+mod press_link;
 mod rtu;
-mod served;
+mod server;
 mod tcp;
 
-pub use any::PressLink;
 pub use client::{Client, Counts, ROUND_TRIP_LIMITS_MS};
 pub use error::{Consequence, LinkError, consequence};
 pub use modbus::ModbusLink;
-pub use served::ServedLink;
+pub use press_link::PressLink;
+pub use server::ServerLink;
 
 use std::fmt;
 
 use platen_plant::press::RegisterTable;
 use rtu::DRAIN_MAX;
 
-/// One Modbus request. Nothing else is ever sent: functions 3, 4 and 16, and 43 by people's tools.
+/// A Modbus request: functions 3, 4 and 16, and function 43 for the tools. No other function is sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Read consecutive registers.
@@ -32,17 +40,17 @@ pub enum Request {
         table: RegisterTable,
         /// Address of the first.
         start: u16,
-        /// How many.
+        /// Number of registers.
         count: u16,
     },
     /// Write consecutive holding registers.
     Write {
         /// Address of the first.
         start: u16,
-        /// What to write.
+        /// Values.
         words: Vec<u16>,
     },
-    /// Ask the device who made it (function 43, type 14).
+    /// Read device identification (function 43, MEI type 14).
     Identify,
 }
 
@@ -58,54 +66,52 @@ impl fmt::Display for Request {
     }
 }
 
-/// What came back, unchecked.
+/// A Modbus answer, unchecked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Response {
     /// Registers.
     Words(Vec<u16>),
-    /// A write was done, as the peer understood it.
+    /// Echo of a write.
     Written {
         /// Address of the first.
         start: u16,
-        /// How many.
+        /// Number of registers.
         count: u16,
     },
-    /// Who made it, product and revision, as far as they are text.
+    /// Vendor, product and revision, as far as they are text.
     Identity(Vec<String>),
-    /// The peer refused, with a Modbus exception code.
+    /// Exception code.
     Exception(u8),
 }
 
-/// Why no answer came, as the transport tells it.
+/// Error of the transport.
 #[derive(Debug, thiserror::Error)]
 pub enum TransportError {
-    /// There is no connection.
+    /// Not connected.
     #[error("not connected")]
     NotConnected,
     /// The connection failed.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// The peer does not speak the protocol.
+    /// The peer violates the protocol.
     #[error("{0}")]
     Protocol(String),
-    /// The task that owns the connection ended.
+    /// The task that owns the connection has ended.
     #[error("the connection was given up in the middle of a request")]
     Abandoned,
 }
 
-/// Moves one request at a time to the press and brings its answer.
-///
-/// It has no time limits and checks nothing: [`Client`] does.
+/// Transport of one request at a time, without time limits or checks, which [`Client`] adds.
 pub trait Link: Send {
-    /// Where it leads, for messages.
+    /// Returns the address of the peer, for messages.
     fn peer(&self) -> String;
 
-    /// Builds a connection. Late answers to requests of an older one must not reach the new one.
+    /// Connects. A late answer to a request of an earlier connection must not reach the new one.
     fn connect(&mut self) -> impl Future<Output = Result<(), TransportError>> + Send;
 
-    /// Sends a request and waits for its answer, for ever if need be.
+    /// Sends a request and waits for its answer, without a time limit.
     fn call(&mut self, request: &Request) -> impl Future<Output = Result<Response, TransportError>> + Send;
 
-    /// Drops the connection at once, whatever state it is in.
+    /// Drops the connection at once, in any state.
     fn disconnect(&mut self);
 }

@@ -1,24 +1,24 @@
-//! The link that the plant file asks for.
+//! The link that the plant file describes: client or server.
 
 use platen_plant::press::{Press, Role, Transport};
 
-use super::{Link, ModbusLink, Request, Response, ServedLink, TransportError};
+use super::{Link, ModbusLink, Request, Response, ServerLink, TransportError};
 
-/// A link to a press, whoever asks and whoever answers.
+/// Link to a press in either role.
 #[derive(Debug)]
 pub enum PressLink {
-    /// The host asks.
+    /// The host is the Modbus client.
     Asking(ModbusLink),
-    /// The press asks.
-    Served(ServedLink),
+    /// The press is the Modbus client.
+    Served(ServerLink),
 }
 
 impl PressLink {
-    /// The link that the plant file describes; not connected yet. Only Modbus TCP can be served, which the plant file's
-    /// check sees to.
+    /// Returns the link of the plant file, not connected yet. The server role exists for Modbus TCP only, as the check of the
+    /// plant file ensures.
     pub fn new(press: &Press) -> Self {
         match (press.role, &press.link.transport) {
-            (Role::Server, Transport::Tcp(socket)) => Self::Served(ServedLink::new(press, socket)),
+            (Role::Server, Transport::Tcp(socket)) => Self::Served(ServerLink::new(press, socket)),
             (Role::Server | Role::Client, _) => Self::Asking(ModbusLink::new(&press.link)),
         }
     }

@@ -1,4 +1,4 @@
-//! The modes that write nothing: off, and listen.
+//! The modes that write nothing: `off` and `listen`.
 
 use std::time::Duration;
 
@@ -7,12 +7,12 @@ use platen_plant::press::Press;
 use super::{Answer, Order, PressSide};
 use crate::{Client, Link, LinkError, PressImage, Torn};
 
-/// The mode `off`: leaves the press alone.
+/// Runs the mode `off`: no connection.
 pub(super) async fn wait_for_stop(mut side: PressSide) {
     while !matches!(side.answers.recv().await, None | Some(Answer::Stop)) {}
 }
 
-/// The mode `listen`: reads, tells what changed, and never writes.
+/// Runs the mode `listen`: reads, reports changes, never writes.
 pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut side: PressSide) {
     let mut last = None;
     let mut backoff = press.link.backoff_min;
@@ -22,7 +22,7 @@ pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut si
                 backoff = press.link.backoff_min;
                 if last.as_ref() != Some(&image) {
                     last = Some(image.clone());
-                    // Nobody listens any more: the end comes through the other channel.
+                    // The receiver is gone: the stop arrives through the other channel.
                     let _ = side.orders.send(Order::Seen(Box::new(image)));
                 }
                 press.link.poll

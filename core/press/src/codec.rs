@@ -1,4 +1,4 @@
-//! Registers to typed images and back, after the register map. Pure.
+//! Codec between registers and typed images according to the register map; pure functions.
 
 mod host_image;
 mod press_image;

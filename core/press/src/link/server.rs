@@ -1,8 +1,8 @@
-//! The host as Modbus server, for presses that have client blocks only: the press writes its block here and reads the
+//! Host as Modbus TCP server, for presses with client function blocks only: the press writes its block here and reads the
 //! host's.
 //!
-//! For the rest of the host this is a link like any other: reading the press means looking at what it wrote last. A
-//! press that has not asked for anything for a while is not connected.
+//! It implements [`Link`]: a read of the press returns the block that the press wrote last. A press without a request for
+//! a while counts as not connected.
 
 use std::future::{Ready, ready};
 use std::net::{IpAddr, SocketAddr};
@@ -20,32 +20,32 @@ use tokio_modbus::{ExceptionCode, Request as Wire, Response as WireResponse, Sla
 
 use super::{Link, Request, Response, TransportError};
 
-/// Connections at a time: the press, its predecessor whose end was not noticed, and two people's tools.
+/// Concurrent connections: the press, a previous connection whose end was not noticed, and two tools.
 const CONNECTIONS: usize = 4;
-/// A press that is silent this long is gone.
+/// Time without a request after which the press counts as disconnected.
 const SILENCE: Duration = Duration::from_secs(2);
-/// Time between two looks whether the press is there, and before a server that ended is started again.
+/// Period of the check for the press, and pause before the server is started again.
 const LOOK: Duration = Duration::from_millis(10);
-/// Modbus unit ids that mean "whoever answers at this address" on TCP.
+/// Unit ids that any TCP server accepts.
 const ANY_UNIT: [u8; 2] = [0, 255];
 
-/// A link to a press that asks.
+/// Link to a press that is the Modbus client.
 #[derive(Debug)]
-pub struct ServedLink {
+pub struct ServerLink {
     socket: Socket,
     unit: u8,
     registers: Arc<Registers>,
     server: Option<Listening>,
 }
 
-/// The server, and where it is reached.
+/// The server and its address.
 #[derive(Debug)]
 struct Listening {
     address: SocketAddr,
     task: AbortHandle,
 }
 
-/// Both blocks, as the press sees them.
+/// Both blocks as the press sees them.
 #[derive(Debug)]
 struct Registers {
     press: Block,
@@ -57,12 +57,12 @@ struct Registers {
 struct Words {
     press: Vec<u16>,
     host: Vec<u16>,
-    /// When the press last wrote its block.
+    /// Time of the last write of the press.
     heard: Option<Instant>,
 }
 
-impl ServedLink {
-    /// A link as the plant file describes it; `socket` is where to listen.
+impl ServerLink {
+    /// Returns the link of the plant file; `socket` is the address to listen on.
     pub(super) fn new(press: &Press, socket: &Socket) -> Self {
         let (read, write) = (press.map.read, press.map.write);
         let zeros = |block: Block| vec![0; usize::from(block.count)];
@@ -71,10 +71,10 @@ impl ServedLink {
         Self { socket: socket.clone(), unit: press.link.unit, registers, server: None }
     }
 
-    /// Listens from now on, and says where: with port 0 the system chooses. Later calls find it listening.
+    /// Starts to listen and returns the address: with port 0 the system chooses. Later calls return the same address.
     ///
     /// # Errors
-    /// When the address is not this computer's, or the port is taken.
+    /// The address is not one of this computer, or the port is in use.
     pub async fn listen(&mut self) -> Result<SocketAddr, TransportError> {
         if let Some(server) = self.server.as_ref().filter(|server| !server.task.is_finished()) {
             return Ok(server.address);
@@ -88,7 +88,7 @@ impl ServedLink {
     }
 }
 
-impl Drop for ServedLink {
+impl Drop for ServerLink {
     fn drop(&mut self) {
         if let Some(server) = &self.server {
             server.task.abort();
@@ -96,7 +96,7 @@ impl Drop for ServedLink {
     }
 }
 
-impl Link for ServedLink {
+impl Link for ServerLink {
     fn peer(&self) -> String {
         format!("expected at {}:{} unit {}", self.socket.host, self.socket.port, self.unit)
     }
@@ -132,17 +132,17 @@ impl Link for ServedLink {
                     Response::Written { start: *start, count }
                 })
             }
-            // A press that asks cannot be asked.
+            // A client cannot be asked.
             Request::Identify => return Ok(Response::Exception(ExceptionCode::IllegalFunction.into())),
         };
         Ok(response.unwrap_or(Response::Exception(ExceptionCode::IllegalDataAddress.into())))
     }
 
-    /// The server goes on: it is the press that connects.
+    /// The server continues: the press connects.
     fn disconnect(&mut self) {}
 }
 
-/// Where consecutive registers lie in a block, if they do.
+/// Returns the place of consecutive registers in a block, if they lie in it.
 fn part(block: &Block, start: u16, count: u16) -> Option<Range<usize>> {
     let first = start.checked_sub(block.start)?;
     let inside = count > 0 && u32::from(first) + u32::from(count) <= u32::from(block.count);
@@ -150,7 +150,7 @@ fn part(block: &Block, start: u16, count: u16) -> Option<Range<usize>> {
 }
 
 impl Registers {
-    /// Words are plain numbers: a panic elsewhere cannot have left them half done.
+    /// The words are plain numbers: a panic elsewhere cannot leave them inconsistent.
     fn lock(&self) -> MutexGuard<'_, Words> {
         self.words.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -159,7 +159,7 @@ impl Registers {
         self.lock().heard.is_some_and(|heard| heard.elapsed() < SILENCE)
     }
 
-    /// What the press asks: it may read both blocks and write its own, nothing else.
+    /// Answers a request: the press may read both blocks and write its own, nothing else.
     fn serve(&self, request: Wire<'_>) -> Result<WireResponse, ExceptionCode> {
         let mut words = self.lock();
         match request {
@@ -190,12 +190,12 @@ impl Registers {
     }
 }
 
-/// One connection's requests.
+/// Requests of one connection.
 #[derive(Clone)]
 struct Service {
     registers: Arc<Registers>,
     unit: u8,
-    /// Gives the place back when the connection ends.
+    /// Released when the connection ends.
     _place: Arc<tokio::sync::OwnedSemaphorePermit>,
 }
 
@@ -211,7 +211,7 @@ impl tokio_modbus::server::Service for Service {
     }
 }
 
-/// Serves for ever: the library's server ends at the first `accept` that fails, so it is started again.
+/// Serves without end: the library's server ends at the first failing `accept` and is started again.
 async fn serve(listener: TcpListener, registers: Arc<Registers>, unit: u8, peers: Vec<IpAddr>) {
     let places = Arc::new(Semaphore::new(CONNECTIONS));
     let admit = |address: SocketAddr| {

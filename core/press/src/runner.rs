@@ -1,12 +1,13 @@
-//! Runs the handshake: ties link, registers, journal and host together.
+//! I/O task of the press side: connects link, registers, journal and host with the pure handshake.
 //!
-//! One task polls the press, feeds the pure handshake and carries out its effects. The host takes part through two
-//! channels: it receives [`Order`]s and sends [`Answer`]s, in its own time. The journal is written beside the loop.
+//! One task polls the press, feeds the handshake and executes its effects (`cycle`). The host takes part through two channels:
+//! it receives [`Order`]s and sends [`Answer`]s. The journal is written on a thread of its own (`journal`); the modes `off` and
+//! `listen` write nothing (`read_only`); `metrics` counts strokes and durations.
 
 mod cycle;
 mod journal;
-mod listen;
 mod metrics;
+mod read_only;
 
 use std::time::Duration;
 
@@ -21,7 +22,7 @@ use crate::{
     Client, Code, Counts, HostImage, Journal, Link, Measurement, PressImage, State, StrokeData, StrokeKey,
 };
 
-/// What the press side wants from the host.
+/// Order of the press side to the host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
     /// Scan a stroke; answer with [`Answer::Acquired`] or [`Answer::Failed`].
@@ -30,30 +31,30 @@ pub enum Order {
         key: StrokeKey,
         /// Key of its record.
         run_id: u32,
-        /// What the press said about it.
+        /// Data of the press about it.
         data: Box<StrokeData>,
     },
-    /// Judge the scan of a stroke; answer with [`Answer::Result`] or [`Answer::Failed`]. Comes after
+    /// Evaluate the scan of a stroke; answer with [`Answer::Result`] or [`Answer::Failed`]. Comes after
     /// [`Answer::Acquired`], and after a restart for a stroke that was scanned before.
     Evaluate(StrokeKey),
-    /// Give up scan and evaluation of a stroke.
+    /// Abort scan and evaluation of a stroke.
     Cancel(StrokeKey),
-    /// The plate is finished and leaves.
+    /// The plate is finished.
     PartEnd,
-    /// Something for people to know, once per cause.
+    /// An alarm, once per cause.
     Alarm {
-        /// What.
+        /// Alarm.
         code: Code,
-        /// The stroke in hand.
+        /// The active stroke.
         stroke: Option<StrokeKey>,
-        /// Where and why, in one line, where there is more to say than the table of alarms does.
+        /// Place and cause in one line, where they add to the table of alarms.
         detail: Option<String>,
     },
-    /// Modes that never scan: what the press says has changed.
+    /// In modes without scans: the registers of the press have changed.
     Seen(Box<PressImage>),
 }
 
-/// What the host tells the press side.
+/// Answer of the host to the press side.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// The scan of a stroke is complete.
@@ -64,42 +65,42 @@ pub enum Answer {
     Failed(StrokeKey, Code),
     /// Whether the scanner can take a scan, and how long one would take. No stroke is accepted before the first.
     Scanner {
-        /// What is wrong with it.
+        /// Its fault, if any.
         ready: Result<(), Code>,
         /// Its estimate of one scan.
         estimate: Option<Duration>,
     },
     /// The operator resets faults.
     Reset,
-    /// End; the registers are made safe first.
+    /// Stop; the registers are made safe first.
     Stop,
 }
 
-/// How things stand, for `status` and screen.
+/// State of the press side, for `status` and screen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
     /// State of the handshake.
     pub state: State,
-    /// What is wrong with the link; may not stand in the registers.
+    /// Fault of the link; not necessarily in the registers.
     pub link_error: Option<Code>,
-    /// What the press said last.
+    /// Registers of the press at the last read.
     pub press: Option<PressImage>,
-    /// What the registers of the host shall say.
+    /// Desired registers of the host.
     pub host: HostImage,
-    /// What happened on the link.
+    /// Counters of the link.
     pub counts: Counts,
-    /// What happened to strokes.
+    /// Metrics of the strokes.
     pub metrics: Metrics,
 }
 
 /// The host's ends of the channels.
 #[derive(Debug)]
 pub struct HostSide {
-    /// What the press side wants.
+    /// Receives orders.
     pub orders: mpsc::UnboundedReceiver<Order>,
-    /// What the host tells; dropping it means [`Answer::Stop`].
+    /// Sends answers; dropping it means [`Answer::Stop`].
     pub answers: mpsc::UnboundedSender<Answer>,
-    /// How things stand.
+    /// State of the press side.
     pub status: watch::Receiver<Status>,
 }
 
@@ -111,7 +112,7 @@ pub struct PressSide {
     status: watch::Sender<Status>,
 }
 
-/// Channels between the host and one press.
+/// Creates the channels between the host and one press.
 pub fn channels() -> (HostSide, PressSide) {
     let (order, orders) = mpsc::unbounded_channel();
     let (answer, answers) = mpsc::unbounded_channel();
@@ -126,7 +127,7 @@ pub fn channels() -> (HostSide, PressSide) {
     (HostSide { orders, answers: answer, status }, PressSide { orders: order, answers, status: tell_status })
 }
 
-/// Why the press side could not run.
+/// Reason why the press side could not start.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError<E: std::error::Error + 'static> {
     /// The journal could not be read: without it a stroke could be measured twice.
@@ -134,23 +135,23 @@ pub enum RunError<E: std::error::Error + 'static> {
     Journal {
         /// Name of the press.
         press: String,
-        /// Why.
+        /// Error of the journal.
         source: E,
     },
     /// The journal panicked while it was read.
-    #[error("press {press}: the journal gave up while being read")]
+    #[error("press {press}: the journal failed while being read")]
     JournalGone {
         /// Name of the press.
         press: String,
     },
 }
 
-/// Serves one press until the host says [`Answer::Stop`] or drops its end; then makes the registers safe.
+/// Serves one press until the host sends [`Answer::Stop`] or drops its end; then makes the registers safe.
 ///
-/// `link` leads to the press. Errors of the link are not errors of this function: it connects again for ever.
+/// Errors of `link` are no errors of this function: it reconnects without end.
 ///
 /// # Errors
-/// [`RunError`] when the journal cannot be read at the start.
+/// [`RunError`], when the journal cannot be read at the start.
 pub async fn run_press<L: Link, J: Journal>(
     press: Press,
     link: L,
@@ -159,11 +160,11 @@ pub async fn run_press<L: Link, J: Journal>(
 ) -> Result<(), RunError<J::Error>> {
     match press.mode {
         Mode::Off => {
-            listen::wait_for_stop(side).await;
+            read_only::wait_for_stop(side).await;
             Ok(())
         }
         Mode::Listen => {
-            listen::listen(&press, Client::new(link, &press), side).await;
+            read_only::listen(&press, Client::new(link, &press), side).await;
             Ok(())
         }
         Mode::DryRun | Mode::Simulate | Mode::Measure => {

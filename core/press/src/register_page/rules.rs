@@ -1,8 +1,8 @@
-//! What stands beside the tables: how the two find each other, how the tables are read, and what the press must do.
+//! The texts beside the tables: connection, notation of the tables, and rules for the program of the press.
 
 use platen_plant::press::{Input, Mode, Output, Parity, Press, RegisterType, Role, Transport};
 
-/// How the two find each other.
+/// Returns the paragraph about the connection.
 pub(super) fn connection(press: &Press) -> Vec<String> {
     let (link, ms) = (&press.link, |time: std::time::Duration| time.as_millis());
     let mut lines = Vec::new();
@@ -64,7 +64,7 @@ pub(super) fn connection(press: &Press) -> Vec<String> {
     lines
 }
 
-/// What travels in which request, as the press sees it.
+/// Returns the requests as the press sees them.
 fn exchange(press: &Press) -> String {
     let (map, serial) = (&press.map, press.link.is_serial());
     let fast = map.fast_count();
@@ -79,7 +79,7 @@ fn exchange(press: &Press) -> String {
     )
 }
 
-/// Bits, steps, types: only those that the map has.
+/// Returns the notation of bits, steps and types that the map has.
 pub(super) fn notation(press: &Press) -> Vec<String> {
     let map = &press.map;
     let mut lines = vec![
@@ -191,12 +191,12 @@ pub(super) fn rules(press: &Press) -> Vec<String> {
     rules
 }
 
-/// How often trigger must read the same before it counts.
+/// Returns the debouncing of the trigger.
 fn debounce(press: &Press) -> u8 {
     press.map.inputs.get(&Input::Trigger).map_or(1, |field| field.debounce_reads)
 }
 
-/// What a valid result says, by the bits that the map has.
+/// Returns the meaning of the verdict bits that the map has.
 fn verdicts(press: &Press) -> String {
     let has = |output: &Output| press.map.outputs.contains_key(output);
     let bits = [Output::StatusPass, Output::StatusFail, Output::StatusCannotTell, Output::StatusNotMeasured];

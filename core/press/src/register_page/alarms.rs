@@ -2,7 +2,7 @@
 
 use platen_model::{Code, Language};
 
-/// The whole table as CSV for the HMI: code, severity, text and remedy.
+/// Returns the table of alarms as CSV for the HMI: code, severity, text and remedy.
 pub fn alarms_csv(language: Language) -> String {
     let mut csv = String::from("code,severity,text,remedy\n");
     for code in Code::ALL {

@@ -1,4 +1,4 @@
-//! The register map in force as a page for the programmer of the press: Markdown, CSV, and the program to write.
+//! The register map in force for the programmer of the press: Markdown, CSV, JSON, and the reference program.
 
 mod alarms;
 mod rules;
@@ -24,7 +24,7 @@ struct Row {
     name: &'static str,
     field: RegisterField,
     meaning: &'static str,
-    /// The number that the plant file asks for elsewhere than in the field.
+    /// Value that the plant file defines outside the field.
     must_be: Option<u16>,
 }
 
@@ -55,13 +55,13 @@ fn outputs(press: &Press) -> Vec<Row> {
 }
 
 impl Row {
-    /// Zero-based addresses on the wire: `120` or `108..=109`; with the bit, `102.3`.
+    /// Returns the zero-based addresses on the wire: `120` or `108..=109`; with the bit, `102.3`.
     fn address(&self, block: &Block) -> String {
         let Some(offset) = self.offset else { return "-".into() };
         self.numbers(u32::from(block.start) + u32::from(offset))
     }
 
-    /// The same in Modicon notation.
+    /// Returns the addresses in Modicon notation.
     fn modicon(&self, block: &Block) -> String {
         let Some(offset) = self.offset else { return "-".into() };
         let first = if block.table == RegisterTable::Holding { 400_001 } else { 300_001 };
@@ -92,7 +92,7 @@ impl Row {
         format!("{list}{}{text} {order}", field.kind.name()).trim_end().to_owned()
     }
 
-    /// All of it as the page shows it.
+    /// Returns the row of the page.
     fn show(&self, block: &Block) -> MapRow {
         MapRow {
             address: self.address(block),
@@ -105,7 +105,7 @@ impl Row {
         }
     }
 
-    /// What one raw step means.
+    /// Returns the value of one raw step.
     fn step(&self) -> String {
         let field = &self.field;
         match (field.unit, field.scale) {
@@ -115,7 +115,7 @@ impl Row {
         }
     }
 
-    /// Everything else that must be known about the field.
+    /// Returns the notes of the field.
     fn notes(&self) -> String {
         let field = &self.field;
         let mut notes = Vec::new();
@@ -150,7 +150,7 @@ impl Row {
     }
 }
 
-/// The page as Markdown: both blocks, the rules, and the reference program.
+/// Returns the page as Markdown: both blocks, the rules, and the reference program.
 pub fn map_markdown(press: &Press) -> String {
     let map = &press.map;
     let mut page = format!(
@@ -212,7 +212,7 @@ fn section(page: &mut String, title: &str, block: &Block, rows: &[Row]) {
     }
 }
 
-/// The page as CSV: one line per field.
+/// Returns the page as CSV: one line per field.
 pub fn map_csv(press: &Press) -> String {
     let mut csv = String::from("direction,address,six_digit,name,type,step,meaning,notes\n");
     let sides = [
@@ -232,7 +232,7 @@ pub fn map_csv(press: &Press) -> String {
     csv
 }
 
-/// The page for programs.
+/// The page as data.
 #[derive(Debug, Clone, Serialize)]
 pub struct MapPage {
     /// Name of the press.
@@ -241,17 +241,17 @@ pub struct MapPage {
     pub press_id: u16,
     /// The built-in map that the plant file started from.
     pub profile: &'static str,
-    /// What the press tells the host.
+    /// Fields from the press to the host.
     pub press_to_host: Vec<MapRow>,
-    /// What the host tells the press.
+    /// Fields from the host to the press.
     pub host_to_press: Vec<MapRow>,
-    /// The registers that the host may change, zero-based.
+    /// Registers that the host may write, zero-based.
     pub may_write: String,
-    /// How the two find each other.
+    /// Connection of host and press.
     pub connection: Vec<String>,
-    /// How the rows are read.
+    /// Notation of the rows.
     pub notation: Vec<String>,
-    /// What the press must do.
+    /// Rules for the program of the press.
     pub rules: Vec<String>,
     /// The reference program, Structured Text.
     pub program: String,
@@ -269,15 +269,15 @@ pub struct MapRow {
     /// Type, with the order of its words.
     #[serde(rename = "type")]
     pub kind: String,
-    /// What one raw step means; empty for a plain number.
+    /// Value of one raw step; empty for a plain number.
     pub step: String,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
-    /// Everything else that must be known about it.
+    /// Notes.
     pub notes: String,
 }
 
-/// The page as data.
+/// Returns the page as data.
 pub fn map_page(press: &Press) -> MapPage {
     let show = |rows: Vec<Row>, block| rows.iter().map(|row| row.show(block)).collect();
     MapPage {
