@@ -10,7 +10,7 @@ pub(crate) mod e57;
 mod error;
 mod lines;
 mod ptx;
-mod sweeps;
+mod scan_order;
 mod window;
 pub(crate) mod xyb;
 mod xyz;

@@ -62,7 +62,7 @@ fn deliver(mut reader: ScanReader<'_>, oriented: &Oriented, out: &mut dyn Receiv
 /// Columns between two reports of progress.
 const CHECK_EVERY: u32 = 64;
 
-/// Where scans arrive.
+/// A watched folder.
 #[derive(Debug)]
 pub(crate) struct Folder {
     /// The folder.
@@ -71,20 +71,20 @@ pub(crate) struct Folder {
     pub(crate) pattern: String,
     /// Polls for which a file must stay the same.
     pub(crate) stable_polls: u32,
-    /// What lay there before the trigger; nothing until it could be listed.
+    /// Listing before the trigger; none until the folder could be listed.
     pub(crate) before: Option<Listing>,
     /// Checksum of the scan measured before.
     pub(crate) measured: Option<u32>,
 }
 
 impl Folder {
-    /// Notes what lies there now: none of it is the next scan.
+    /// Lists the folder: none of its present files is the next scan.
     pub(crate) fn look(&mut self) -> Result<()> {
         self.before = Some(list(&self.path).map_err(Error::Folder)?);
         Ok(())
     }
 
-    /// The pattern of one stroke.
+    /// Returns the pattern of one stroke.
     pub(crate) fn pattern(
         &self,
         stroke: u64,
@@ -194,7 +194,7 @@ impl Receiver for ToHost<'_, '_, '_> {
     }
 }
 
-/// The options contradict each other.
+/// Returns the error for contradictory options.
 pub(crate) fn config(what: &str, hint: &str) -> platen_sdk::Error {
     platen_sdk::Error::new(ErrorKind::Config, what).hint(hint)
 }

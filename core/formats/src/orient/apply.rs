@@ -1,11 +1,11 @@
-//! Second look at the cells: columns of the normalised lattice.
+//! Second pass: columns of the normalised lattice.
 
 use std::f64::consts::FRAC_PI_2;
 
 use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
-/// One normalised cell that waits for the rest of its column.
+/// A normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     row: u32,
@@ -15,12 +15,11 @@ struct Sample {
     state: State,
 }
 
-/// Collects cells into columns by a [`Plan`] and gives each column out when its last cell came.
+/// Collector of cells into columns by a [`Plan`]; each column is returned with its last cell.
 ///
-/// A file stored column by column needs memory for one column, a file stored row by row for all cells. Columns
-/// come in the order in which the file completes them.
+/// A file stored column by column needs memory for one column, a file stored row by row for all cells.
 #[derive(Debug)]
-pub struct Assembler<'a> {
+pub(crate) struct Assembler<'a> {
     plan: &'a Plan,
     waiting: Vec<Vec<Sample>>,
     seen: u64,
@@ -28,16 +27,16 @@ pub struct Assembler<'a> {
 }
 
 impl<'a> Assembler<'a> {
-    /// Nothing collected yet.
-    pub fn new(plan: &'a Plan) -> Self {
+    /// Returns an empty collector.
+    pub(crate) fn new(plan: &'a Plan) -> Self {
         Self { plan, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0 }
     }
 
-    /// Takes a cell; gives the column that it completes.
+    /// Adds a cell; returns the column that it completes.
     ///
     /// # Errors
     /// [`OrientError::Changed`] when the cell was not there in the first pass.
-    pub fn push(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
+    pub(crate) fn push(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
         self.seen += 1;
         let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
         let samples = &mut self.waiting[column as usize];
@@ -62,11 +61,11 @@ impl<'a> Assembler<'a> {
         Ok(Some(column))
     }
 
-    /// Ends the scan: the columns of which the file stores no cell, and the trailer.
+    /// Returns the columns of which the file stores no cell, and the trailer.
     ///
     /// # Errors
-    /// [`OrientError::Changed`] when cells of the first pass did not come.
-    pub fn finish(&self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
+    /// [`OrientError::Changed`] when cells of the first pass are missing.
+    pub(crate) fn finish(&self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
         if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
             return Err(self.changed());
         }
@@ -91,8 +90,8 @@ impl<'a> Assembler<'a> {
 }
 
 impl Plan {
-    /// Normalised column and row of a stored cell, `None` when it lies outside of the lattice decided.
-    pub fn place(&self, cell: &RawCell) -> Option<(u32, u32)> {
+    /// Returns normalised column and row of a stored cell, `None` outside of the lattice decided.
+    pub(crate) fn place(&self, cell: &RawCell) -> Option<(u32, u32)> {
         let (row, column) = if self.swapped { (cell.column, cell.row) } else { (cell.row, cell.column) };
         let (n_rows, n_columns) = (self.header.n_rows, self.header.n_columns);
         let row = row.checked_sub(self.first_row).filter(|row| *row < n_rows)?;
@@ -102,8 +101,8 @@ impl Plan {
         Some(((column + n_columns - self.cut) % n_columns, row))
     }
 
-    /// Position of a stored cell: right-handed, metres.
-    pub fn position(&self, cell: &RawCell) -> [f64; 3] {
+    /// Returns the position of a stored cell: right-handed, metres.
+    pub(crate) fn position(&self, cell: &RawCell) -> [f64; 3] {
         let metres = match self.unit {
             Unit::Metre => cell.xyz,
             Unit::Millimetre => cell.xyz.map(|c| c / 1000.0),
@@ -116,7 +115,7 @@ impl Plan {
         }
     }
 
-    /// Range in metres and direction of a cell that is stored so; not beyond the zenith, where azimuth means another.
+    /// Returns range and direction of a cell stored so, in metres; not beyond the zenith, where the azimuth is another.
     fn beam(&self, cell: &RawCell) -> Option<(f64, Direction)> {
         let plain = self.mirror == Mirror::None && self.unit == Unit::Metre;
         let (range, direction) = cell.beam.filter(|_| plain)?;
@@ -139,7 +138,7 @@ impl Plan {
     }
 }
 
-/// Spreads samples over the rows between the first and the last of which something is known.
+/// Returns the column from the first to the last row of known direction.
 fn to_column(index: u32, samples: &[Sample]) -> Column {
     let known = || samples.iter().filter(|sample| sample.state != State::NoReturn);
     let first_row = known().map(|sample| sample.row).min().unwrap_or(0);

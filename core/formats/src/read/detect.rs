@@ -31,7 +31,7 @@ fn refused(format: impl Into<String>, instead: &'static str) -> ReadError {
     ReadError::Refused { format: format.into(), instead }
 }
 
-/// First bytes that name a format for certain.
+/// First bytes of formats without a readable lattice.
 const SIGNATURES: [(&[u8], &str); 9] = [
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "FARO .fls scan (compound file)"),
     (b"LASF", "LAS or LAZ point cloud, unorganised"),
@@ -44,7 +44,7 @@ const SIGNATURES: [(&[u8], &str); 9] = [
     (b"7z\xbc\xaf\x27\x1c", "7z archive"),
 ];
 
-/// Extensions of formats that have no signature known in public.
+/// Extensions of formats without a public signature.
 const EXTENSIONS: [(&str, &str); 11] = [
     ("fls", "FARO .fls scan"),
     ("fws", "FARO SCENE workspace, which points to scans and holds none"),
@@ -106,11 +106,11 @@ fn text_format(head: &[u8], extension: &str) -> Result<Format> {
 struct Sampled {
     /// Numbers in it.
     numbers: usize,
-    /// True when they can be row, column and a point.
+    /// Whether they can be row, column and a point.
     cell: bool,
 }
 
-/// The first lines that are no comments; nothing when one holds anything but numbers.
+/// Returns the first lines that are no comments; none when one holds anything but numbers.
 fn sample(head: &[u8]) -> Result<Vec<Sampled>> {
     // The last line is only whole when the file ends with it.
     let whole = if (head.len() as u64) < HEAD {

@@ -186,7 +186,7 @@ fn a_cut_xyb_says_so() {
     check_refused(&whole[..whole.len() - 3], "scan.xyb", "19965 bytes of points, a multiple of 26 needed");
     check_refused(&whole[..60], "scan.xyb", "no end of the header in 60 bytes");
     let nameless = String::from_utf8_lossy(&whole[..80]).replace("Rows", "Raws").into_bytes();
-    check_refused(&[&nameless[..], &[0; 30]].concat(), "scan.xyb", "does not say");
+    check_refused(&[&nameless[..], &[0; 30]].concat(), "scan.xyb", "does not contain Rows");
 }
 
 #[test]

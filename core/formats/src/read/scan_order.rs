@@ -1,36 +1,36 @@
-//! Rows and columns of hits that came without them, from the order in which they were measured.
+//! Recovery of rows and columns of hits stored without them, from the order of measurement.
 //!
-//! A column is measured in one sweep: along it the elevation steps in one direction, at its end it falls back, and
-//! the azimuth moves on by one step. Real angles are no even lattice (on the pump sample they wander by more than a
-//! step over the scan, and by a quarter of a step from column to column), so that rounding to a grid fails; but from
-//! one column to the next they wander little. Every hit is therefore compared with what its row showed in the
-//! column before, and a hit in a row not seen yet with its neighbour in the same column. When more than one hit in
-//! a thousand lies between two rows, or a column between two columns, there is no lattice to be had.
+//! A column is measured in one sweep: the elevation steps in one direction, falls back at the end of the column, and the
+//! azimuth advances by one step. Real angles are no even lattice (on the pump sample they drift by more than a step over
+//! the scan, and by a quarter of a step from column to column), so that rounding to a grid fails; from one column to the
+//! next they drift little. Each hit is therefore compared with the angles of its row in the column before, and a hit in a
+//! new row with its neighbour in the same column. A cloud is refused when more than one hit in a thousand lies between two
+//! rows or columns. Steps are robust: medians and a lower quantile over the first million hits.
 
 use platen_scan::{Direction, wrap_azimuth};
 
-/// Distance from the nearest row, in steps, from which a hit could as well belong to the next.
+/// Distance from the nearest row, in steps, from which a hit is ambiguous.
 const DOUBTFUL: f64 = 0.4;
-/// Share of doubtful hits that is borne.
+/// Largest share of ambiguous hits.
 const MAX_DOUBTFUL: f64 = 1e-3;
-/// Azimuth steps within a column from which it must be another column.
+/// Azimuth steps between two hits of different columns, at least.
 const NEXT_COLUMN: f64 = 0.6;
-/// Rows within which the azimuth of a column does not wander.
+/// Rows within which the azimuth of a column does not drift.
 const NEIGHBOURS: usize = 8;
-/// Columns within which the elevation of a row does not wander.
+/// Columns within which the elevation of a row does not drift.
 const LATELY: i64 = 4;
-/// Rows kept free below the first, for hits that lie lower than the lowest of the sample.
+/// Rows reserved below the first, for hits lower than the lowest of the sample.
 const MARGIN: f64 = 64.0;
-/// Most hits of a column.
+/// Largest number of hits in a column.
 const MAX_COLUMN: usize = 1 << 17;
 /// Rows that share one mean step.
 const STRETCH: f64 = 16.0;
-/// Steps that make a mean of their own.
+/// Least number of steps for a mean of their own.
 const ENOUGH: f64 = 32.0;
 /// Hits from which the steps are estimated.
 pub(crate) const SAMPLE: usize = 1 << 20;
 
-/// Why there is no lattice.
+/// Reason why there is no lattice.
 pub(crate) type Reason = String;
 
 /// Steps of a lattice, signed in the order of measurement.
@@ -48,7 +48,7 @@ pub(crate) struct Steps {
     azimuth: f64,
 }
 
-/// A hit in its place; the record is whatever the caller keeps with it.
+/// A hit with its row and column, and the caller's record of it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placed<T> {
     pub(crate) row: u32,
@@ -119,7 +119,7 @@ impl Steps {
         median(moves).filter(|step| *step != 0.0).ok_or_else(|| "fewer than three columns".to_owned())
     }
 
-    /// Row of an elevation on a lattice whose rows do not wander from column to column.
+    /// Returns the row of an elevation on a lattice whose rows do not drift from column to column.
     fn even(&self, elevation: f64) -> f64 {
         let stretches = (elevation - self.start) / self.elevation / STRETCH;
         let here = (stretches.max(0.0) as usize).min(self.rows.len() - 1);
@@ -128,7 +128,7 @@ impl Steps {
     }
 }
 
-/// What a row showed last.
+/// Latest hit of a row.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     /// Distance of the elevation from the even lattice, rows.
@@ -137,7 +137,7 @@ struct Seen {
     column: i64,
 }
 
-/// A hit whose row is known and whose column is not yet.
+/// A hit of known row whose column is not known yet.
 #[derive(Debug, Clone, Copy)]
 struct Waiting<T> {
     hit: Direction,
@@ -145,13 +145,13 @@ struct Waiting<T> {
     row: usize,
     /// Distance of the elevation from the even lattice, rows.
     off: f64,
-    /// True when it could as well belong to the next row.
+    /// Whether the hit is ambiguous.
     doubtful: bool,
-    /// Column by what the row showed last.
+    /// Column by the latest hit of the row.
     column: Option<f64>,
 }
 
-/// Puts hits into their places, column by column.
+/// Assigns rows and columns to hits, column by column.
 #[derive(Debug)]
 pub(crate) struct Placer<T> {
     steps: Steps,
@@ -168,7 +168,7 @@ impl<T: Copy> Placer<T> {
         Self { steps, rows: Vec::new(), waiting: Vec::new(), before: None, hits: 0, doubtful: 0 }
     }
 
-    /// Takes the next hit; gives the column before when it begins a new one.
+    /// Adds the next hit; returns the column before when the hit begins a new one.
     pub(crate) fn push(&mut self, hit: Direction, record: T) -> Result<Vec<Placed<T>>, Reason> {
         let mut placed = Vec::new();
         let mut here = self.find_row(hit, record, self.waiting.last().map(|last| last.off));
@@ -183,7 +183,7 @@ impl<T: Copy> Placer<T> {
         Ok(placed)
     }
 
-    /// Ends the scan: the last column.
+    /// Ends the scan; returns the last column.
     pub(crate) fn finish(mut self) -> Result<Vec<Placed<T>>, Reason> {
         let placed = self.flush()?;
         if self.doubtful as f64 > MAX_DOUBTFUL * self.hits as f64 {
@@ -192,7 +192,7 @@ impl<T: Copy> Placer<T> {
         Ok(placed)
     }
 
-    /// The elevation falls back, or the azimuth moves on further than it wanders within a column.
+    /// Returns whether the elevation falls back, or the azimuth advances further than it drifts within a column.
     fn begins_column(&self, last: &Waiting<T>, here: &Waiting<T>) -> bool {
         let falls_back = (here.hit.elevation - last.hit.elevation) / self.steps.elevation < -0.5;
         let moves_on = match (last.column, here.column) {
@@ -204,12 +204,12 @@ impl<T: Copy> Placer<T> {
         falls_back || moves_on * here.hit.elevation.cos() > NEXT_COLUMN
     }
 
-    /// Columns between two azimuths.
+    /// Returns the number of columns between two azimuths.
     fn columns(&self, from: f64, to: f64) -> f64 {
         wrap_azimuth(to - from) / self.steps.azimuth
     }
 
-    /// Row of a hit; `off` is how far the hit before it in its column is from the even lattice.
+    /// Finds the row of a hit; `off` is the distance of the hit before it in its column from the even lattice.
     fn find_row(&self, hit: Direction, record: T, off: Option<f64>) -> Waiting<T> {
         let even = self.steps.even(hit.elevation);
         let near = off.or_else(|| self.nearest(even)).unwrap_or(0.0);
@@ -226,14 +226,14 @@ impl<T: Copy> Placer<T> {
         }
     }
 
-    /// What a row showed, unless that is too many columns ago to say anything.
+    /// Returns the latest hit of a row within the last columns.
     fn lately(&self, row: usize) -> Option<Seen> {
         let seen = self.rows.get(row).copied().flatten()?;
         let (before, _) = self.before?;
         (before - seen.column < LATELY).then_some(seen)
     }
 
-    /// How far the nearest row that was seen lately is from the even lattice.
+    /// Returns the distance from the even lattice of the nearest row hit within the last columns.
     fn nearest(&self, even: f64) -> Option<f64> {
         let here = (even.max(0.0) as usize).min(MAX_COLUMN);
         let off = |row: usize| Some(self.lately(row)?.off);
@@ -283,7 +283,7 @@ fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// The value below which this share lies.
+/// Returns the value below which the share lies.
 fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     let rank = (values.len() as f64 * share) as usize;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
