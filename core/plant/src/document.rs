@@ -1,4 +1,4 @@
-//! A TOML file that is being read, and the faults found so far.
+//! Parsed TOML document with the faults found so far.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -11,15 +11,13 @@ use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
 use crate::{Error, Fault, Faults, TomlTable};
 
-/// Proof that a fault has been recorded: only [`Document`] makes it, so a reader that returns it cannot refuse a file
-/// without a word.
+/// Proof that a fault has been recorded. Only [`Document`] makes it, so no reader can refuse a file without a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reported(());
 
-/// A TOML file that is being read: [`Document::root`] gives the cursor, [`Document::finish`] the result or all faults.
+/// Parsed TOML document: [`Document::root`] returns its table, [`Document::finish`] the result or all faults.
 ///
-/// Faults are collected, never returned one by one: a reader goes on after a fault, and takes its values out with `?`
-/// only when everything has been read.
+/// Faults are collected: a reader goes on after a fault and takes its values out with `?` when everything has been read.
 ///
 /// ```
 /// use platen_plant::{Document, Faults, Reported, TomlTable};
@@ -97,17 +95,17 @@ impl Document {
         Ok(Self::parse(file, text))
     }
 
-    /// A part of a file that was read before, to be read on its own.
+    /// Makes a document of a part of another one.
     pub(crate) fn part(source: Arc<Source>, path: String, root: Node) -> Self {
         Self { source, path, root, faults: RefCell::default() }
     }
 
-    /// The cursor over the whole file.
+    /// Returns the root table.
     pub fn root(&self) -> TomlTable<'_> {
         TomlTable::new(self, Place { key: self.path.clone(), offset: self.root.span.start }, self.entries())
     }
 
-    /// Records a fault at `place`.
+    /// Records a fault at `place`, unless an error of syntax lies there.
     pub fn fault(&self, place: &Place, message: impl Into<String>) -> Reported {
         if !self.source.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
             self.faults.borrow_mut().push(self.source.fault(place, message.into()));
@@ -115,7 +113,7 @@ impl Document {
         Reported(())
     }
 
-    /// Records that something is not there, unless broken syntax may have swallowed it.
+    /// Records that something is missing, unless an error of syntax may have hidden it.
     pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
         if self.source.syntax_errors.is_empty() {
             return self.fault(place, message);
@@ -123,18 +121,18 @@ impl Document {
         Reported(())
     }
 
-    /// The proof for a value that a syntax fault has broken.
+    /// Returns the proof for a value that an error of syntax has broken.
     pub(crate) fn broken(&self) -> Reported {
         Reported(())
     }
 
-    /// `file:line:column` of a place, to name it in a message about another one.
+    /// Returns `file:line:column` of a place, for a message about another one.
     pub fn locate(&self, place: &Place) -> String {
         let (line, column) = self.source.line_column(place.offset);
         format!("{}:{line}:{column}", self.source.file)
     }
 
-    /// `result` when nothing at all was wrong, else every fault.
+    /// Returns `result` if there is no fault.
     ///
     /// # Errors
     /// All faults of the file in the order of their places.

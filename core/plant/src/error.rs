@@ -1,10 +1,10 @@
-//! Why a file could not be taken.
+//! Error of reading a file.
 
 use std::path::PathBuf;
 
 use crate::{Fault, Faults};
 
-/// Why a file could not be taken.
+/// Error of reading a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be opened or read.
@@ -12,10 +12,10 @@ pub enum Error {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The file says something that cannot be.
+    /// The file has faults.
     #[error(transparent)]
     Faulty(#[from] Faults),
 }

@@ -1,4 +1,4 @@
-//! One value on its way out of the file: missing, found or already reported.
+//! Value of one key: missing, found or already reported.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use crate::document::{Document, Reported};
 use crate::source::Place;
 
-/// The value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
+/// Value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
 #[derive(Debug)]
 #[must_use = "end the chain with required(), optional() or or()"]
 pub struct TomlKey<'d, T> {
@@ -17,12 +17,12 @@ pub struct TomlKey<'d, T> {
     excuse: Option<Reported>,
 }
 
-/// A value with its place, for checks against other keys.
+/// Value with its place, for checks against other keys.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Located<T> {
-    /// The value.
+    /// Value.
     pub value: T,
-    /// Where it stands.
+    /// Place.
     pub place: Place,
 }
 
@@ -61,7 +61,7 @@ impl<'d, T> TomlKey<'d, T> {
         self.map(|value| Located { value, place })
     }
 
-    /// The value, or the fault that it is missing.
+    /// Returns the value; a missing one is a fault.
     ///
     /// # Errors
     /// [`Reported`] when it is missing or was refused.
@@ -70,7 +70,7 @@ impl<'d, T> TomlKey<'d, T> {
         state?.ok_or_else(|| excuse.unwrap_or_else(|| document.absent(&place, "missing")))
     }
 
-    /// The value if it is there.
+    /// Returns the value if it is there.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.
@@ -78,7 +78,7 @@ impl<'d, T> TomlKey<'d, T> {
         self.state
     }
 
-    /// The value, or its default.
+    /// Returns the value or its default.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.

@@ -1,4 +1,4 @@
-//! The plant file: which scanner, which algorithms, where the plates and the results are.
+//! Plant file: press, scanner, algorithms, and the folders of plate files and results.
 //!
 //! Everything but `[scanner]` and `[press]` has a default, so that a scan can be measured without a plant file.
 //! Relative paths start at the folder of the plant file.
@@ -28,43 +28,43 @@ const COMPARISONS: [&str; 2] = ["displacement", "template"];
 const WINDOWS: [(&str, ScanWindow); 3] =
     [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
 
-/// Which part of the dome is scanned, by a driver that plans its scans (one that estimates their time).
+/// Part of the dome that is scanned, by a driver that plans its scans (one that estimates their time).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ScanWindow {
-    /// Where the last stroke's plate lay and some room round it; the region of interest for a new plate, and once more
-    /// for a plate that has moved out.
+    /// Place of the last stroke's plate with a margin; the region of interest for a new plate, and once more for a plate
+    /// that has moved out.
     #[default]
     Plate,
-    /// Always the region of interest.
+    /// Region of interest.
     Region,
-    /// What the driver scans by itself.
+    /// Choice of the driver.
     Everything,
 }
 
-/// A checked plant file, but for the options of its plugins: those wait for the plugins' own declarations.
+/// Checked plant file. Options of plugins are not checked yet: the plugins declare them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantFile {
     /// Name for people; the file's name where none is given.
     pub name: String,
-    /// From which every random choice is drawn, so that a measurement can be repeated to the last bit.
+    /// Seed of every random choice, so that a measurement can be repeated to the last bit.
     pub seed: u64,
-    /// The press and how it is reached; needed to run, not to measure a file.
+    /// Press; required to run, not to measure a file.
     pub press: Option<Press>,
-    /// Where scans come from; needed to run, not to measure a file.
+    /// Scanner driver; required to run, not to measure a file.
     pub scanner: Option<PluginUse>,
-    /// Which part of the dome it scans.
+    /// Part of the dome that is scanned.
     pub scan_window: ScanWindow,
-    /// How the scanner stands to the press and the plate.
+    /// Position of the scanner relative to press and plate.
     pub frame: Frame,
-    /// What is known of the scanner; without it only its noise is in the uncertainties.
+    /// Calibration of the scanner; without it only its noise is in the uncertainties.
     pub calibration: Option<CalibrationUse>,
     /// Folder of the plate files.
     pub plates: PathBuf,
-    /// Turns the mesh into (u, v).
+    /// Flattening: the map of the mesh to (u, v).
     pub flattening: PluginUse,
-    /// What is compared after each stroke, in this order.
+    /// Comparisons after each stroke, in this order.
     pub comparisons: Vec<PluginUse>,
-    /// Where results go.
+    /// Destination of results.
     pub output: Output,
 }
 
@@ -93,7 +93,7 @@ pub struct Survey {
 }
 
 impl Default for PlantFile {
-    /// What an empty plant file in the current folder would say.
+    /// The values of an empty plant file in the current folder.
     fn default() -> Self {
         Self {
             name: "no plant file".to_owned(),
@@ -128,7 +128,7 @@ impl PlantFile {
         Self::take(Document::parse(file, text), Path::new(file))
     }
 
-    /// The plate file of a recipe number: `plates/plate-017.toml` for 17.
+    /// Returns the plate file of a recipe number: `plates/plate-017.toml` for 17.
     pub fn plate_path(&self, recipe: u16) -> PathBuf {
         plate_path(&self.plates, recipe)
     }

@@ -1,27 +1,27 @@
-//! One plugin as the plant file names it.
+//! Plugin named by the plant file.
 
 use crate::document::{Document, Reported};
 use crate::key::Located;
 use crate::{Fault, Place, RawOptions, TomlTable};
 
-/// One plugin as the plant file names it, its options not yet checked.
+/// Plugin named by the plant file, its options not yet checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PluginUse {
-    /// Name of the plugin, as its library is found.
+    /// Name, from which the library's file name follows.
     pub plugin: String,
-    /// Its options; [`check_options`](crate::check_options) checks them.
+    /// Options; [`check_options`](crate::check_options) checks them.
     pub options: RawOptions,
-    /// The fault to report with another message, at the place of the name.
+    /// Fault at the place of the name, without its message.
     template: Option<Fault>,
 }
 
 impl PluginUse {
-    /// A plugin that no file names, with the default of every option.
+    /// Makes the use of a plugin that no file names, with the default of every option.
     pub fn by_default(plugin: &str) -> Self {
         Self { plugin: plugin.to_owned(), options: RawOptions::none(plugin), template: None }
     }
 
-    /// A plugin that the file implies by leaving `place` out.
+    /// Makes the use of a plugin that the file implies by leaving its table out; its faults are reported at `place`.
     pub(super) fn implied(plugin: &str, document: &Document, place: &Place) -> Self {
         Self { template: Some(document.source().fault(place, String::new())), ..Self::by_default(plugin) }
     }
@@ -35,7 +35,7 @@ impl PluginUse {
         Ok(Self { plugin, options, template })
     }
 
-    /// A fault of this choice of plugin, at its place in the plant file: it is not installed, or refuses.
+    /// Makes a fault of this choice of plugin, at its place in the plant file.
     pub fn fault(&self, message: impl Into<String>) -> Fault {
         let message = message.into();
         match &self.template {

@@ -1,4 +1,4 @@
-//! The target: the shape that the plate is bent toward, each shape with its own keys.
+//! `[target]`: the shape that the plate is bent toward, each shape with its own keys.
 
 use std::f64::consts::TAU;
 
@@ -85,7 +85,7 @@ fn shape_of(
     }
 }
 
-/// Direction of the straight lines. Required: no direction is the usual one.
+/// Reads the direction of the straight lines, which has no default.
 fn axis(table: &mut TomlTable<'_>) -> Result<f64, Reported> {
     table.number("axis_deg").in_range(-180.0..=180.0).map(f64::to_radians).required()
 }
@@ -94,7 +94,7 @@ fn radius(table: &mut TomlTable<'_>, key: &str, plate: Option<Rectangle>) -> Res
     table.number(key).check(|mm| reaches(*mm, *mm, plate)).map(metres).required()
 }
 
-/// A radius is above zero and does not roll the plate's shorter side into more than a full turn.
+/// Refuses a radius of zero or less, or one that rolls the plate's shorter side into more than a full turn.
 fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), String> {
     if radius_mm <= 0.0 {
         let advice = if found == 0.0 { "" } else { "; scanned_face says which way the plate bends" };
@@ -111,7 +111,7 @@ fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), S
     Ok(())
 }
 
-/// A cone's radius cannot change by more than the length of its straight line.
+/// Refuses a cone whose radius changes by more than the length of its straight line.
 fn slopes(
     document: &Document,
     axis: f64,

@@ -9,7 +9,7 @@ use crate::document::Reported;
 use crate::press::{Link, Parity, Quiet, Serial, Socket, Transport};
 use crate::{Located, Place, TomlTable};
 
-/// What the words travel over.
+/// Type of the link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Way {
     Tcp,

@@ -1,4 +1,4 @@
-//! Reads `[press.map]`: the built-in map of the profile, with what the file says otherwise.
+//! Reads `[press.map]`: the built-in map of the profile with the changes of the file.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -15,14 +15,14 @@ use crate::{Place, TomlTable};
 const MOST_READ: i64 = 125;
 const MOST_WRITTEN: i64 = 123;
 
-/// A register map and where the file says what of it.
+/// Register map with the places of its parts in the file.
 #[derive(Debug)]
 pub(super) struct LocatedMap {
     pub(super) map: RegisterMap,
-    /// Where the file speaks of a field; the others are the profile's.
+    /// Places of the fields that the file gives; the others are the profile's.
     pub(super) inputs: BTreeMap<Input, Place>,
     pub(super) outputs: BTreeMap<Output, Place>,
-    /// Where `[press.map]` stands, for what is missing, and its `write`, for what does not fit.
+    /// Places of `[press.map]`, for missing fields, and of its `write`, for conflicts of the block.
     pub(super) place: Place,
     pub(super) write_place: Place,
     pub(super) heartbeat_in: Option<Duration>,
