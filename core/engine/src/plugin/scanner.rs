@@ -1,4 +1,4 @@
-//! Scanner drivers as the host sees them.
+//! Scanner drivers: scans are pulled column by column.
 
 use std::time::Duration;
 
@@ -9,16 +9,16 @@ use platen_sdk::exchange::Decode;
 use super::instance::InputFrame;
 use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError, RunningJob};
 
-/// Largest lattice believed: beyond the finest scanner's 17,351 x 40,960 cells.
+/// Largest lattice accepted: beyond the finest scanner's 17,351 x 40,960 cells.
 const MAX_ROWS: u32 = 1 << 16;
 const MAX_COLUMNS: u32 = 1 << 17;
 
-/// A scanner driver with its options.
+/// A configured scanner driver.
 #[derive(Debug)]
 pub struct Scanner(Instance);
 
 impl Scanner {
-    /// Makes a driver of checked options.
+    /// Creates a driver from checked options.
     ///
     /// # Errors
     /// As [`Instance::create`].
@@ -26,15 +26,15 @@ impl Scanner {
         Instance::create(library, Kind::Scanner, values).map(Self)
     }
 
-    /// The instance: opening, arming, estimating.
+    /// Returns the instance, to open and arm it.
     pub fn instance(&self) -> &Instance {
         &self.0
     }
 
-    /// Seconds that a scan takes, when the driver knows.
+    /// Returns the duration of a scan, if the driver can estimate it.
     ///
     /// # Errors
-    /// When the driver hangs.
+    /// [`PluginError::Hangs`].
     pub fn estimate(
         &self,
         window: Option<&Window>,
@@ -78,7 +78,7 @@ pub struct RunningScan<'a> {
 const NO_END: &str = "the scan has no end";
 
 impl RunningScan<'_> {
-    /// Size, angles and notes of the lattice.
+    /// Returns size, angles and notes of the lattice.
     pub fn header(&self) -> &ScanHeader {
         &self.header
     }

@@ -1,9 +1,8 @@
 //! Previous scans of the active plate, from the history and the result folders.
 
 use platen_history::{Archive, Error, Stroke};
-use platen_shape::{Blank, Surface};
-
 use platen_report::{history_view, output_folder};
+use platen_shape::{Blank, Surface};
 
 /// An earlier scan of the plate.
 #[derive(Debug)]

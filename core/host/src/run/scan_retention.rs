@@ -10,12 +10,12 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
-use platen_plant::plant::{KeepScans, Output};
-
-use super::disk;
 use platen_engine::stroke::ScanBuffer;
 use platen_formats::{ScanFile, WriteError};
+use platen_plant::plant::{KeepScans, Output};
 use platen_scan::{Column, ScanEnd, ScanHeader};
+
+use super::disk;
 
 /// Name of a scan in a result's folder.
 const NAME: &str = "scan.e57";
