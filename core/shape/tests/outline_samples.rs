@@ -14,7 +14,8 @@ fn corners_are_where_the_truth_has_them() {
         let off = |k: usize| (outline.corners[k].point - support::vec3(&sample.truth["corners_m"][k])).norm();
         let rms_mm = ((0..4).map(|k| off(k).powi(2)).sum::<f64>() / 4.0).sqrt() * 1000.0;
         println!("{}: corners {rms_mm:.2} mm rms", folder.display());
-        assert!(rms_mm < 0.9, "{rms_mm}");
+        // Found: 0.21 to 0.41 mm, at a lattice step of 8 mm.
+        assert!(rms_mm < 0.82, "{rms_mm}");
         for k in 0..4 {
             let truth = |k: usize| support::vec3(&sample.truth["corners_m"][k % 4]);
             let corner = &outline.corners[k];
