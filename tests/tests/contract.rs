@@ -106,7 +106,7 @@ fn a_scanner_in_c_scans() {
 
     let spec = JobSpec::untriggered(LIMIT);
     let cancel = spec.cancel.clone();
-    let scan = scanner.start(spec, None).unwrap();
+    let mut scan = scanner.start(spec, None).unwrap();
     cancel.cancel();
     let stopped = scan.finish().unwrap_err();
     assert!(matches!(stopped, PluginError::Stopped { why: "it was cancelled", .. }), "{stopped}");

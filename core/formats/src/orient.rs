@@ -4,7 +4,7 @@
 //! written, and headers are unreliable: names are swapped, counts are wrong. The decision therefore uses the cells alone.
 //! The first pass (`Survey`) keeps sums per row and per column. `Survey::decide` fits elevation to the row number and
 //! unwrapped azimuth to the column number by weighted least squares, the other way round too, requires correlations of
-//! 0.99 and returns a `Plan`. The second pass (`Assembler`) applies it to every cell. The result has row 0 at the top,
+//! 0.99 and returns a `Plan`. The second pass ([`Columns`]) applies it to every cell. The result has row 0 at the top,
 //! columns by increasing azimuth (counter-clockwise seen from above), a right-handed frame, and metres.
 //!
 //! Limits: a mirrored scan equals a real one whose head turns in the opposite direction. It is detected only when the
@@ -19,7 +19,7 @@ mod occupancy;
 mod restore;
 mod survey;
 
-pub(crate) use apply::Assembler;
+pub use apply::Columns;
 pub(crate) use decide::Plan;
 use decide::Unit;
 pub(crate) use survey::Survey;

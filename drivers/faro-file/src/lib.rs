@@ -46,7 +46,7 @@ use std::time::Duration;
 use platen_formats::orient::{Expected, Mirror, Turn};
 use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
 
-use device::{Folder, Reading, ToHost, config};
+use device::{Folder, Reading, config};
 
 options! {
     /// Options of the file driver; the module head is their manual.
@@ -141,11 +141,14 @@ impl Scanner for FaroFile {
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let alive = || job.check().is_ok();
-        let mut host = ToHost { job, out };
+        let mut progress = device::progress(job, "looking at the lattice");
         match &mut self.place {
             Place::File(path) => {
-                let read = self.reading.file(path, &mut host, &alive);
-                // A cancelled job ends reading with an error of its own. The host knows the file's name.
+                let read = self.reading.open(path, &alive).and_then(|mut reader| {
+                    let oriented = self.reading.orient(&mut reader, &mut progress)?;
+                    device::deliver(job, &mut reader, &oriented, out)
+                });
+                // A cancelled job ends reading with an error of its own. The host adds the name of the file.
                 read.map_err(|error| job.check().err().unwrap_or_else(|| error.into_sdk()))
             }
             Place::Folder(folder) => {
@@ -153,7 +156,13 @@ impl Scanner for FaroFile {
                 let pattern = pattern.map_err(|e| config(&format!("pattern: {e}"), "see its description"))?;
                 let poll = self.poll;
                 let mut pause = |why| device::pause(job, poll, why);
-                folder.follow(&self.reading, pattern, &mut host, &mut pause, &alive)
+                let found = folder.wait(&self.reading, pattern, &mut progress, &mut pause, &alive);
+                let delivered = found.and_then(|(path, mut reader, oriented)| {
+                    let sent = device::deliver(job, &mut reader, &oriented, out);
+                    sent.map(|()| oriented.checksum()).map_err(|error| error.at(&path))
+                });
+                folder.close(delivered.as_ref().ok().copied());
+                delivered.map(drop)
             }
         }
     }

@@ -87,7 +87,7 @@ impl RunningScan<'_> {
     ///
     /// # Errors
     /// The driver's reason, the deadline, or the fault in what it sent.
-    pub fn finish(mut self) -> Result<ScanEnd, PluginError> {
+    pub fn finish(&mut self) -> Result<ScanEnd, PluginError> {
         self.by_ref().try_for_each(|column| column.map(drop))?;
         self.end.ok_or_else(|| misbehaved(&self.job, NO_END))
     }

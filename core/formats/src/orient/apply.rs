@@ -2,8 +2,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
+
+use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
+use crate::read::{Cells, ReadError};
 
 /// A normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
@@ -15,28 +17,63 @@ struct Sample {
     state: State,
 }
 
-/// Collector of cells into columns by a [`Plan`]; each column is returned with its last cell.
+/// Columns of an oriented lattice, each once, as soon as the file has completed it. Nothing follows an error.
 ///
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
-#[derive(Debug)]
-pub(crate) struct Assembler<'a> {
+pub struct Columns<'a> {
     plan: &'a Plan,
+    cells: Cells<'a>,
     waiting: Vec<Vec<Sample>>,
     seen: u64,
     points: u64,
+    /// First column not yet examined for having no stored cell.
+    rest: usize,
 }
 
-impl<'a> Assembler<'a> {
-    /// Returns an empty collector.
-    pub(crate) fn new(plan: &'a Plan) -> Self {
-        Self { plan, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0 }
+impl<'a> Columns<'a> {
+    /// Starts the second pass over the cells.
+    pub(crate) fn new(plan: &'a Plan, cells: Cells<'a>) -> Self {
+        Self { plan, cells, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0, rest: 0 }
+    }
+
+    /// Returns the share of cells read, 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.seen as f64 / self.expected() as f64
+    }
+
+    /// Returns the trailer; columns not taken are read and dropped.
+    ///
+    /// # Errors
+    /// As the columns.
+    pub fn finish(&mut self) -> Result<ScanEnd, ReadError> {
+        self.try_for_each(|column| column.map(drop))?;
+        Ok(ScanEnd {
+            columns: self.plan.header.n_columns,
+            points: self.points,
+            warm_up_columns: self.plan.warm_up_columns,
+            outcome: Outcome::Complete,
+        })
+    }
+
+    fn next_column(&mut self) -> Result<Option<Column>, ReadError> {
+        while let Some(cell) = self.cells.next() {
+            if let Some(column) = self.add(&cell?)? {
+                return Ok(Some(column));
+            }
+        }
+        if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
+            return Err(self.changed().into());
+        }
+        let empty = self.plan.cells[self.rest..].iter().position(|cells| *cells == 0);
+        Ok(empty.map(|ahead| {
+            let index = self.rest + ahead;
+            self.rest = index + 1;
+            Column { index: index as u32, ..Column::default() }
+        }))
     }
 
     /// Adds a cell; returns the column that it completes.
-    ///
-    /// # Errors
-    /// [`OrientError::Changed`] when the cell was not there in the first pass.
-    pub(crate) fn push(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
+    fn add(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
         self.seen += 1;
         let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
         let samples = &mut self.waiting[column as usize];
@@ -61,31 +98,20 @@ impl<'a> Assembler<'a> {
         Ok(Some(column))
     }
 
-    /// Returns the columns of which the file stores no cell, and the trailer.
-    ///
-    /// # Errors
-    /// [`OrientError::Changed`] when cells of the first pass are missing.
-    pub(crate) fn finish(&self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
-        if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
-            return Err(self.changed());
-        }
-        let empty = self.plan.cells.iter().enumerate().filter(|(_, cells)| **cells == 0);
-        let empty = empty.map(|(index, _)| Column { index: index as u32, ..Column::default() }).collect();
-        let end = ScanEnd {
-            columns: self.plan.header.n_columns,
-            points: self.points,
-            warm_up_columns: self.plan.warm_up_columns,
-            outcome: Outcome::Complete,
-        };
-        Ok((empty, end))
-    }
-
     fn expected(&self) -> u64 {
         self.plan.cells.iter().map(|cells| u64::from(*cells)).sum()
     }
 
     fn changed(&self) -> OrientError {
         OrientError::Changed { expected: self.expected(), found: self.seen }
+    }
+}
+
+impl Iterator for Columns<'_> {
+    type Item = Result<Column, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_column().transpose()
     }
 }
 

@@ -27,20 +27,15 @@ pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Re
     Ok(scanner)
 }
 
-/// A scan in progress, shown on the terminal; its errors begin with the file that is read, if it is one.
+/// A scan in progress, shown on the terminal until it is dropped.
 pub(super) struct ShownScan<'a> {
     scan: RunningScan<'a>,
-    line: Line<'a>,
+    what: &'a str,
+    file: Option<&'a Path>,
     columns: u32,
 }
 
-/// The progress line, taken away at the end. Must be dropped after the scan.
-struct Line<'a> {
-    what: &'a str,
-    file: Option<&'a Path>,
-}
-
-/// Starts a scan that shows its progress as `what` and stops on Ctrl-C.
+/// Starts a scan that is shown as `what` and stops on Ctrl-C. Its errors begin with `file`.
 pub(super) fn follow<'a>(
     scanner: &'a Scanner,
     limit: Duration,
@@ -50,20 +45,19 @@ pub(super) fn follow<'a>(
 ) -> Result<ShownScan<'a>, CliError> {
     let job = JobSpec { cancel: interrupt(), ..JobSpec::untriggered(limit) };
     progress::phase(what);
-    let line = Line { what, file };
-    let scan = scanner.start(job, window).map_err(|e| line.failed(e))?;
-    Ok(ShownScan { scan, line, columns: 0 })
+    let scan = scanner.start(job, window).inspect_err(|_| progress::done()).map_err(|e| failed(file, e))?;
+    Ok(ShownScan { scan, what, file, columns: 0 })
 }
 
 impl ShownScan<'_> {
-    /// Size, angles and notes of the lattice.
+    /// Returns the header of the scan.
     pub(super) fn header(&self) -> &ScanHeader {
         self.scan.header()
     }
 
     /// Ends the scan.
-    pub(super) fn finish(self) -> Result<ScanEnd, CliError> {
-        self.scan.finish().map_err(|e| self.line.failed(e))
+    pub(super) fn finish(mut self) -> Result<ScanEnd, CliError> {
+        self.scan.finish().map_err(|e| failed(self.file, e))
     }
 
     /// Writes the scan to a new file.
@@ -81,29 +75,26 @@ impl Iterator for ShownScan<'_> {
     type Item = Result<Column, CliError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let column = self.scan.next()?.map_err(|e| self.line.failed(e));
+        let column = self.scan.next()?.map_err(|e| failed(self.file, e));
         self.columns += 1;
         if self.columns % SHOW_EVERY == 1 {
             let expected = self.header().n_columns.max(1);
-            progress::share(self.line.what, f64::from(self.columns) / f64::from(expected));
+            progress::share(self.what, f64::from(self.columns) / f64::from(expected));
         }
         Some(column)
     }
 }
 
-impl Line<'_> {
-    fn failed(&self, error: PluginError) -> CliError {
-        CliError::Failed(match self.file {
-            Some(file) => format!("{}: {error}", file.display()),
-            None => error.to_string(),
-        })
-    }
-}
-
-impl Drop for Line<'_> {
+impl Drop for ShownScan<'_> {
     fn drop(&mut self) {
         progress::done();
     }
+}
+
+fn failed(file: Option<&Path>, error: PluginError) -> CliError {
+    CliError::Failed(
+        file.map(|file| format!("{}: ", file.display())).unwrap_or_default() + &error.to_string(),
+    )
 }
 
 /// A token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread for
