@@ -133,6 +133,7 @@ fn here(
         on_columns += machine::thread_time().saturating_sub(start);
     }
     scan.finish()?;
+    drop(scan);
     // Its memory is not that of measuring.
     drop(scanner);
     let start = machine::cpu_time();
