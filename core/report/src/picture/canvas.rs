@@ -1,4 +1,4 @@
-//! A sheet to draw on, in pixels from its upper left corner.
+//! Drawing area of a picture: shapes and text in pixels from its upper left corner, written as SVG.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -7,27 +7,27 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::colour::{self, INK, PAPER};
 use super::{Caption, PictureError};
 
-/// A place on the sheet.
+/// Position on the canvas, pixels.
 pub(super) type At = (f64, f64);
 
-/// A sheet to draw on.
-pub(super) struct Page<'a> {
+/// Drawing area.
+pub(super) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
     /// Width, pixels.
     pub(super) width: f64,
 }
 
-/// The drawing library knows whole pixels alone: it is given this many to one of ours.
+/// Pixels of the drawing library to one of the picture: the library has whole pixels only.
 const FINE: f64 = 8.0;
 
-/// How a piece of text looks.
+/// Size, colour and alignment of a text.
 #[derive(Clone, Copy)]
 pub(super) struct Text {
     /// Height of its letters with their room, pixels.
     pub(super) size: f64,
     pub(super) colour: RGBColor,
     pub(super) bold: bool,
-    /// Which part of it stands at the place.
+    /// Part of the text at its position.
     pub(super) across: HPos,
     pub(super) upright: VPos,
 }
@@ -54,19 +54,19 @@ impl Text {
     }
 }
 
-/// The SVG of what `paint` draws.
+/// Returns the SVG of the shapes drawn by `paint`.
 pub(super) fn draw(
     size: (u32, u32),
-    paint: impl FnOnce(&Page<'_>) -> Result<(), PictureError>,
+    paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
 ) -> Result<String, PictureError> {
     let mut svg = String::new();
     {
         let fine = [size.0, size.1].map(|pixels| pixels * FINE as u32);
         let area = SVGBackend::with_string(&mut svg, fine.into()).into_drawing_area();
         area.fill(&PAPER).map_err(failed)?;
-        let page = Page { area, width: f64::from(size.0) };
-        paint(&page)?;
-        page.area.present().map_err(failed)?;
+        let canvas = Canvas { area, width: f64::from(size.0) };
+        paint(&canvas)?;
+        canvas.area.present().map_err(failed)?;
     }
     let shown = |pixels: [u32; 2]| format!("width=\"{}\" height=\"{}\"", pixels[0], pixels[1]);
     let size = [size.0, size.1];
@@ -81,12 +81,12 @@ fn pixel((x, y): At) -> (i32, i32) {
     ((x * FINE).round() as i32, (y * FINE).round() as i32)
 }
 
-/// Widths and radii.
+/// Converts widths and radii.
 fn wide(pixels: u32) -> u32 {
     pixels * FINE as u32
 }
 
-impl Page<'_> {
+impl Canvas<'_> {
     pub(super) fn text(&self, text: &str, at: At, look: Text) -> Result<(), PictureError> {
         let weight = if look.bold { FontStyle::Bold } else { FontStyle::Normal };
         let font = FontDesc::new(FontFamily::SansSerif, look.size * FINE, weight);
@@ -99,7 +99,7 @@ impl Page<'_> {
     }
 
     pub(super) fn frame(&self, from: At, to: At, colour: RGBColor, width: u32) -> Result<(), PictureError> {
-        // As a line: the library draws a rectangle's outline one pixel wide, whatever it is told.
+        // As a line: the library draws the outline of a rectangle one pixel wide, whatever its style.
         self.line(&[from, (to.0, from.1), to, (from.0, to.1), from], colour, width)
     }
 
@@ -108,7 +108,7 @@ impl Page<'_> {
         self.area.draw(&PathElement::new(points, colour.stroke_width(wide(width)))).map_err(failed)
     }
 
-    /// A line of dashes as long as their gaps.
+    /// Draws a line of dashes as long as their gaps.
     pub(super) fn dashed(&self, from: At, to: At, colour: RGBColor, width: u32) -> Result<(), PictureError> {
         const DASH: f64 = 12.0;
         let length = (to.0 - from.0).hypot(to.1 - from.1).max(1.0);
@@ -139,10 +139,10 @@ impl Page<'_> {
         self.area.draw(&Circle::new(pixel(at), wide(radius), colour.filled())).map_err(failed)
     }
 
-    /// Plate and stroke, what the picture shows, and the verdict at the right.
-    pub(super) fn head(&self, caption: &Caption<'_>, what: &str) -> Result<(), PictureError> {
+    /// Draws the heading: plate and stroke, title of the picture, verdict at the right.
+    pub(super) fn head(&self, caption: &Caption<'_>, title: &str) -> Result<(), PictureError> {
         self.text(&caption.title(), (24.0, 34.0), Text::new(38.0).bold())?;
-        self.text(what, (24.0, 78.0), Text::new(24.0))?;
+        self.text(title, (24.0, 78.0), Text::new(24.0))?;
         let words = caption.verdict.words().to_uppercase();
         // A capital letter of a bold sans serif is about 0.72 of its height wide.
         let chip = 0.72 * 34.0 * words.len() as f64 + 40.0;
