@@ -18,17 +18,14 @@ const STRUCTURED: &str =
 
 /// Returns the refusal of a folder.
 pub(super) fn folder(extension: &str) -> ReadError {
-    match extension {
-        "fls" => refused(
+    let (format, instead) = match extension {
+        "fls" => (
             "FARO scan as a folder",
             "only the maker's software reads its points; import it into SCENE and export a structured E57",
         ),
-        _ => refused("a folder", "name the scan file itself"),
-    }
-}
-
-fn refused(format: impl Into<String>, instead: &'static str) -> ReadError {
-    ReadError::Refused { format: format.into(), instead }
+        _ => ("a folder", "name the scan file itself"),
+    };
+    ReadError::Refused(format.to_owned(), instead)
 }
 
 /// First bytes of formats without a readable lattice.
@@ -65,7 +62,7 @@ const EXTENSIONS: [(&str, &str); 11] = [
 /// [`ReadError::Refused`] for every other format, [`ReadError::Incomplete`] for no bytes.
 pub(crate) fn format(head: &[u8], extension: &str) -> Result<Format> {
     if head.is_empty() {
-        return Err(ReadError::Incomplete { format: "scan", what: "0 bytes".to_owned() });
+        return Err(ReadError::Incomplete("scan", "0 bytes".to_owned()));
     }
     if head.starts_with(b"ASTM-E57") {
         return Ok(Format::E57);
@@ -75,10 +72,10 @@ pub(crate) fn format(head: &[u8], extension: &str) -> Result<Format> {
     }
     if let Some((_, format)) = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature)) {
         let instead = if format.contains("archive") { "unpack it first" } else { STRUCTURED };
-        return Err(refused(*format, instead));
+        return Err(ReadError::Refused((*format).to_owned(), instead));
     }
     if let Some((_, format)) = EXTENSIONS.iter().find(|(known, _)| *known == extension) {
-        return Err(refused(*format, STRUCTURED));
+        return Err(ReadError::Refused((*format).to_owned(), STRUCTURED));
     }
     text_format(head, extension)
 }
@@ -91,14 +88,14 @@ fn text_format(head: &[u8], extension: &str) -> Result<Format> {
     // A first line that holds one number is a count of points.
     let data = if sizes.first() == Some(&1) { &lines[1..] } else { &lines[..] };
     let unorganised =
-        |what: &str| Err(refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
+        |what: &str| Err(ReadError::Refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
     match sizes.as_slice() {
         [1, 1] | [1, 1, 3, ..] => Ok(Format::Ptx),
         [1] if extension == "ptx" => Ok(Format::Ptx),
         [_, ..] if !data.is_empty() && data.iter().all(|line| line.cell) => Ok(Format::Xyz),
         [.., n] if extension == "pts" && *n >= 3 => unorganised("PTS point cloud"),
         [.., n] if *n >= 3 => unorganised("text point cloud"),
-        _ => Err(refused("a file of unknown format", STRUCTURED)),
+        _ => Err(ReadError::Refused("a file of unknown format".to_owned(), STRUCTURED)),
     }
 }
 

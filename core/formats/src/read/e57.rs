@@ -64,7 +64,7 @@ impl<R: Read + Seek> Source for E57<R> {
 }
 
 fn unsound(what: String) -> ReadError {
-    ReadError::Unsound { format: FORMAT, what }
+    ReadError::Unsound(FORMAT, what)
 }
 
 /// Returns the message of the `e57` crate with the causes that it does not repeat, in one line.
@@ -84,7 +84,7 @@ pub(crate) fn chain(error: &dyn std::error::Error) -> String {
 
 /// Compares the header with the length of the file; returns a note on a harmless difference.
 fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
-    let incomplete = |what| Err(ReadError::Incomplete { format: FORMAT, what });
+    let incomplete = |what| Err(ReadError::Incomplete(FORMAT, what));
     let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
     file.rewind().map_err(ReadError::io("going back to the start"))?;
     if length < PAGE {
@@ -127,10 +127,7 @@ fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
         }
         let (content, checksum) = page.split_at(page.len() - 4);
         if crc32c::crc32c(content).to_be_bytes() != checksum {
-            return Err(ReadError::Damaged {
-                format: FORMAT,
-                what: format!("the checksum of page {number} is wrong"),
-            });
+            return Err(ReadError::Damaged(FORMAT, format!("the checksum of page {number} is wrong")));
         }
     }
     file.rewind().map_err(ReadError::io("going back to the start"))
@@ -140,7 +137,7 @@ fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
 fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> {
     let held = clouds.len();
     if let Some(chosen) = chosen {
-        let missing = ReadError::NoSuchCloud { format: FORMAT, held, chosen };
+        let missing = ReadError::NoSuchCloud(FORMAT, held, chosen);
         return chosen.checked_sub(1).and_then(|i| clouds.into_iter().nth(i)).ok_or(missing);
     }
     let name = |(i, cloud): (usize, &PointCloud)| {
@@ -150,7 +147,7 @@ fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> 
     let mut filled = clouds.into_iter().filter(|cloud| cloud.records > 0);
     match (filled.next(), filled.next()) {
         (Some(cloud), None) => Ok(cloud),
-        (Some(_), Some(_)) => Err(ReadError::Several { format: FORMAT, scans }),
+        (Some(_), Some(_)) => Err(ReadError::Several(FORMAT, scans)),
         (None, _) => Err(unsound("it holds no points".to_owned())),
     }
 }
@@ -246,10 +243,10 @@ impl Fields {
         let state =
             if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
         let (Some(row), Some(column)) = (find(RecordName::RowIndex), find(RecordName::ColumnIndex)) else {
-            return Err(ReadError::Refused {
-                format: format!("unorganised E57 ({} points without row and column)", cloud.records),
-                instead: "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
-            });
+            return Err(ReadError::Refused(
+                format!("unorganised E57 ({} points without row and column)", cloud.records),
+                "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
+            ));
         };
         Ok(Self {
             position,

@@ -41,7 +41,7 @@ impl<R: BufRead> Lines<R> {
         self.ended = self.line.last() == Some(&b'\n');
         if !self.ended && n as u64 == MAX_LINE {
             let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
-            return Err(ReadError::Unsound { format: "text", what });
+            return Err(ReadError::Unsound("text", what));
         }
         let mark: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
         Ok(Some(self.line.strip_prefix(mark).unwrap_or(&self.line)))
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_file_without_line_ends_takes_no_memory() {
         let mut lines = Lines::new(std::io::BufReader::new(std::io::repeat(b'1').take(1 << 20)));
-        assert!(matches!(lines.next(), Err(ReadError::Unsound { .. })));
+        assert!(matches!(lines.next(), Err(ReadError::Unsound(..))));
         assert!(lines.line.capacity() <= 2 * MAX_LINE as usize);
     }
 }

@@ -52,10 +52,10 @@ impl<R: Read + Seek> Ptx<R> {
             None if held == 1 => parts.swap_remove(0),
             None => {
                 let size = |p: &Part| format!("{} x {} cells", p.per_column, p.columns);
-                return Err(ReadError::Several { format: FORMAT, scans: parts.iter().map(size).collect() });
+                return Err(ReadError::Several(FORMAT, parts.iter().map(size).collect()));
             }
             Some(chosen) if (1..=held).contains(&chosen) => parts.swap_remove(chosen - 1),
-            Some(chosen) => return Err(ReadError::NoSuchCloud { format: FORMAT, held, chosen }),
+            Some(chosen) => return Err(ReadError::NoSuchCloud(FORMAT, held, chosen)),
         };
         let about = part.describe();
         Ok(Self { file, part, about })
@@ -141,11 +141,11 @@ fn next<R: BufRead>(lines: &mut Lines<R>) -> Result<&[u8]> {
 }
 
 fn unsound(line: u64, needed: &str) -> ReadError {
-    ReadError::Unsound { format: FORMAT, what: format!("line {line} does not hold {needed}") }
+    ReadError::Unsound(FORMAT, format!("line {line} does not hold {needed}"))
 }
 
 fn incomplete(needed: u64, found: std::fmt::Arguments<'_>) -> ReadError {
-    ReadError::Incomplete { format: FORMAT, what: format!("{needed} lines needed, {found}") }
+    ReadError::Incomplete(FORMAT, format!("{needed} lines needed, {found}"))
 }
 
 impl Part {

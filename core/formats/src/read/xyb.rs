@@ -57,7 +57,7 @@ impl<R: Read + Seek> Xyb<R> {
         let bytes = length - header.length;
         if bytes == 0 || !bytes.is_multiple_of(RECORD as u64) {
             let what = format!("{bytes} bytes of points, a multiple of {RECORD} needed");
-            return Err(ReadError::Incomplete { format: FORMAT, what });
+            return Err(ReadError::Incomplete(FORMAT, what));
         }
         let cells = bytes / RECORD as u64;
         let about =
@@ -171,10 +171,8 @@ fn is_hit(xyz: [f64; 3]) -> bool {
 /// Failure of the recovery of rows and columns: the file is refused.
 impl From<String> for ReadError {
     fn from(why: String) -> Self {
-        Self::Refused {
-            format: format!("XYB file of hits alone ({why})"),
-            instead: "export it again with all cells, or as structured E57",
-        }
+        let format = format!("XYB file of hits alone ({why})");
+        Self::Refused(format, "export it again with all cells, or as structured E57")
     }
 }
 
@@ -185,7 +183,7 @@ fn next<R: Read>(reader: &mut R) -> Result<Option<Point>> {
     while filled < RECORD {
         match reader.read(&mut record[filled..]).map_err(ReadError::io("reading points"))? {
             0 if filled == 0 => return Ok(None),
-            0 => return Err(ReadError::Incomplete { format: FORMAT, what: "a record is cut".to_owned() }),
+            0 => return Err(ReadError::Incomplete(FORMAT, "a record is cut".to_owned())),
             n => filled += n,
         }
     }
@@ -205,15 +203,13 @@ fn header<R: Read + Seek>(file: &mut R) -> Result<Header> {
     let end = head.windows(4).position(|four| four == [0; 4]);
     let Some(end) = end else {
         let what = format!("no end of the header in {} bytes", head.len());
-        return Err(ReadError::Incomplete { format: FORMAT, what });
+        return Err(ReadError::Incomplete(FORMAT, what));
     };
     let text = String::from_utf8_lossy(&head[..end]);
     let size = |name: &str| {
         let line = text.lines().find_map(|line| line.strip_prefix(name));
-        line.and_then(|number| number.trim().parse().ok()).ok_or_else(|| ReadError::Unsound {
-            format: FORMAT,
-            what: format!("its header does not contain {name}"),
-        })
+        line.and_then(|number| number.trim().parse().ok())
+            .ok_or_else(|| ReadError::Unsound(FORMAT, format!("its header does not contain {name}")))
     };
     Ok(Header { length: end as u64 + 4, rows: size("Rows")?, columns: size("Cols")? })
 }

@@ -116,11 +116,11 @@ fn cell(fields: &[&[u8]; lines::MAX_FIELDS], n: usize) -> Option<RawCell> {
 }
 
 fn cut<R>(lines: &Lines<R>, what: &str) -> ReadError {
-    ReadError::Incomplete { format: FORMAT, what: format!("line {}: {what}", lines.number) }
+    ReadError::Incomplete(FORMAT, format!("line {}: {what}", lines.number))
 }
 
 fn unsound<R>(lines: &Lines<R>, width: Option<usize>) -> ReadError {
     let needed = width.map_or_else(|| "5, 6, 8 or 9".to_owned(), |n| n.to_string());
     let what = format!("line {} does not hold row, column and a point in {needed} numbers", lines.number);
-    ReadError::Unsound { format: FORMAT, what }
+    ReadError::Unsound(FORMAT, what)
 }

@@ -1,4 +1,4 @@
-//! Where `measure`, `inspect`, `convert` and `scan` get their scans from.
+//! Scans of `measure`, `inspect`, `convert` and `scan`: from a file by the driver `faro-file`, or from the plant's scanner.
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,12 +12,12 @@ use crate::progress;
 use platen_engine::pipeline;
 use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, RunningScan, Scanner};
 
-/// A file of the finest full dome takes minutes to read.
+/// Longest time to read a file: minutes for the finest full dome.
 pub(super) const READ_LIMIT: Duration = Duration::from_secs(1800);
-/// Columns between two looks at the progress.
+/// Columns between two displays of the progress.
 const SHOW_EVERY: u32 = 32;
 
-/// The file driver, set to one file and, where it holds several scans, to one of them, counted from 1.
+/// Opens the file driver for one file; `cloud` chooses one of several scans, from 1.
 pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Result<Scanner, CliError> {
     let file = ("file", Value::Path(std::path::absolute(scan)?));
     let cloud = cloud.map(|cloud| ("cloud", Value::Int(i64::from(cloud))));
@@ -97,8 +97,8 @@ fn failed(file: Option<&Path>, error: PluginError) -> CliError {
     )
 }
 
-/// A token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread for
-/// that, Ctrl-C ends the program at once.
+/// Returns a token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread
+/// for that, Ctrl-C ends the program at once.
 fn interrupt() -> CancelToken {
     let token = CancelToken::default();
     let cancelled = token.clone();
