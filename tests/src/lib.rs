@@ -1,4 +1,6 @@
-//! Helpers of the tests: builds the workspace once, finds programs, libraries, files and samples.
+//! Helpers of the tests: builds the workspace once, finds programs, libraries and files; unpacks samples.
+
+pub mod samples;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -40,17 +42,4 @@ pub fn library(name: &str) -> PathBuf {
     let file =
         format!("{}{}{}", std::env::consts::DLL_PREFIX, name.replace('-', "_"), std::env::consts::DLL_SUFFIX);
     built().join(file)
-}
-
-/// The scans of other writers, where they are present: `PLATEN_SAMPLES`, else `../shared/samples`.
-///
-/// Says on stderr when they are absent, so that a reader of the log knows what was left out.
-pub fn samples() -> Option<PathBuf> {
-    let folder = std::env::var_os("PLATEN_SAMPLES")
-        .map_or_else(|| repository().join("../shared/samples"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("left out: no samples at {}", folder.display());
-    None
 }

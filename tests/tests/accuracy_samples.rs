@@ -17,17 +17,18 @@ use platen_plant::{PlantFile, Value};
 use platen_shape::Measured;
 use platen_shape::PlateSpec;
 use platen_sim_plate::Pose;
+use platen_tests::samples;
 use serde_json::Value as Json;
 
 type Vec3 = Vector3<f64>;
 
+/// Scans of each scene by our simulator.
 const SEEDS: u64 = 10;
 /// The plate moves by up to this much from seed to seed, millimetres: more than a lattice step.
 const SHIFT_MM: f64 = 15.0;
 const LIMIT: Duration = Duration::from_secs(120);
 
 struct Sample {
-    name: &'static str,
     folder: PathBuf,
     truth: Json,
     /// The simulator's own words for the shape.
@@ -35,10 +36,9 @@ struct Sample {
 }
 
 impl Sample {
-    fn open(name: &'static str, shape: &'static str) -> Option<Self> {
-        let folder = platen_tests::samples()?.join("plates").join(name);
+    fn open(folder: PathBuf, shape: &'static str) -> Self {
         let truth = serde_json::from_slice(&std::fs::read(folder.join("truth.json")).unwrap()).unwrap();
-        Some(Self { name, folder, truth, shape })
+        Self { folder, truth, shape }
     }
 
     fn number(&self, pointer: &str) -> f64 {
@@ -146,26 +146,34 @@ impl Lab {
 
 /// The range is widened by `factor`. Figures of markers up to `no_judge_mm` are the sample's own doubt about its truth
 /// and judge nothing.
-fn check(name: &'static str, shape: &'static str, factor: f64, no_judge_mm: f64) {
-    let Some(sample) = Sample::open(name, shape) else { return };
+fn check(name: &str, shape: &'static str, factor: f64, no_judge_mm: f64) {
+    let samples: Vec<Sample> = samples::each(&format!("plates/{name}"))
+        .into_iter()
+        .map(|folder| Sample::open(folder, shape))
+        .collect();
     let folder = tempfile::tempdir().unwrap();
     let mut lab = Lab::new();
-    let theirs = lab.of_sample(&sample);
-    let ours: Vec<[f64; 2]> = (1..=SEEDS).map(|seed| lab.of_ours(&sample, folder.path(), seed)).collect();
-    for (k, what) in ["corners rms", "markers mean"].into_iter().enumerate() {
-        let figures = || ours.iter().map(|figures| figures[k]);
-        let (least, most) = (figures().fold(f64::INFINITY, f64::min), figures().fold(0.0, f64::max));
-        let mean = figures().sum::<f64>() / ours.len() as f64;
-        println!(
-            "{}: {what} {:.3} mm; ours over {SEEDS} seeds: {least:.3} to {most:.3}, mean {mean:.3} mm",
-            sample.name, theirs[k]
-        );
-        let in_doubt = k == 1 && theirs[k].max(most) <= no_judge_mm;
-        assert!(
-            in_doubt || (least / factor..=most * factor).contains(&theirs[k]),
-            "{name}: {what} of the sample {} mm, ours {least} to {most} mm",
-            theirs[k]
-        );
+    // The scene is the same in every set.
+    let scene = &samples[0];
+    let ours: Vec<[f64; 2]> = (1..=SEEDS).map(|seed| lab.of_ours(scene, folder.path(), seed)).collect();
+    for sample in &samples {
+        let theirs = lab.of_sample(sample);
+        for (k, what) in ["corners rms", "markers mean"].into_iter().enumerate() {
+            let figures = || ours.iter().map(|figures| figures[k]);
+            let (least, most) = (figures().fold(f64::INFINITY, f64::min), figures().fold(0.0, f64::max));
+            let mean = figures().sum::<f64>() / ours.len() as f64;
+            println!(
+                "{}: {what} {:.3} mm; ours over {SEEDS} seeds: {least:.3} to {most:.3}, mean {mean:.3} mm",
+                sample.folder.display(),
+                theirs[k]
+            );
+            let in_doubt = k == 1 && theirs[k].max(most) <= no_judge_mm;
+            assert!(
+                in_doubt || (least / factor..=most * factor).contains(&theirs[k]),
+                "{name}: {what} of the sample {} mm, ours {least} to {most} mm",
+                theirs[k]
+            );
+        }
     }
 }
 

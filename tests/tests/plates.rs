@@ -2,35 +2,66 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use platen_tests::samples;
 use serde_json::Value as Json;
 
 type Vec3 = Vector3<f64>;
 
-/// Bounds of the first working version, millimetres: corners rms, markers mean, surface rms inside and near an edge.
+/// Largest errors, millimetres: corners rms, markers mean (elastic, and with the harmonic map's own error), surface rms
+/// inside and within 100 mm of an edge.
 struct Bounds {
     corners: f64,
     markers: f64,
+    markers_harmonic: f64,
     inside: f64,
     near_edge: f64,
 }
 
-const DEVELOPABLE: Bounds = Bounds { corners: 3.0, markers: 1.0, inside: 0.1, near_edge: 0.2 };
-const HALF_BENT: Bounds = Bounds { markers: 3.0, ..DEVELOPABLE };
-const SPHERE: Bounds = Bounds { markers: 2.0, ..DEVELOPABLE };
-
+/// About twice the largest figure found, in the small set or the large one, with either flattening: a scan is one draw of noise
+/// and of where the lattice falls on the edges, which moves corners and markers by half of what is found.
 const PLATES: [(&str, Bounds); 8] = [
-    ("p1_cylinder", DEVELOPABLE),
-    ("p2_sphere", SPHERE),
-    ("p3_half_bent", HALF_BENT),
-    ("p4a_stroke", DEVELOPABLE),
-    ("p4b_stroke", DEVELOPABLE),
-    ("p4c_null_pair_of_p4b", DEVELOPABLE),
-    ("p5_cone_ptx", DEVELOPABLE),
-    ("p6_occluded", DEVELOPABLE),
+    // Found: corners 0.20, markers 0.10 and 0.12, surface 0.0025 and 0.006.
+    (
+        "p1_cylinder",
+        Bounds { corners: 0.4, markers: 0.2, markers_harmonic: 0.24, inside: 0.005, near_edge: 0.012 },
+    ),
+    // Found: corners 0.40, markers 0.19 and 0.61 (what the harmonic map does to a sphere), surface 0.004 and 0.008.
+    (
+        "p2_sphere",
+        Bounds { corners: 0.8, markers: 0.38, markers_harmonic: 1.2, inside: 0.008, near_edge: 0.016 },
+    ),
+    // Found: corners 0.30, markers 0.21 and 0.14, surface 0.006 and 0.010: the end of the bend is narrow.
+    (
+        "p3_half_bent",
+        Bounds { corners: 0.6, markers: 0.42, markers_harmonic: 0.28, inside: 0.012, near_edge: 0.021 },
+    ),
+    // Found on the three: corners 0.46 (one edge runs along a column of the lattice and lies anywhere between two), markers 0.11 and
+    // 0.14, surface 0.005 and 0.011.
+    ("p4a_stroke", BANDS),
+    ("p4b_stroke", BANDS),
+    ("p4c_null_pair_of_p4b", BANDS),
+    // Found: corners 0.26, markers 0.13 and 0.10, surface 0.007 and 0.014: the coarsest lattice, 0.06 degrees.
+    (
+        "p5_cone_ptx",
+        Bounds { corners: 0.52, markers: 0.25, markers_harmonic: 0.2, inside: 0.014, near_edge: 0.028 },
+    ),
+    // Found: corners 0.28, markers 0.09 and 0.11, surface 0.005 and 0.013: range noise 0.8 instead of 0.5 mm, parts hidden.
+    (
+        "p6_occluded",
+        Bounds { corners: 0.57, markers: 0.19, markers_harmonic: 0.22, inside: 0.01, near_edge: 0.025 },
+    ),
 ];
+const BANDS: Bounds =
+    Bounds { corners: 0.92, markers: 0.22, markers_harmonic: 0.27, inside: 0.0106, near_edge: 0.022 };
+
+/// Largest error of a displacement vector, millimetres rms, of the stroke and of the null pair: 0.06 and 0.095 are found.
+const STROKE_MM: f64 = 0.12;
+const NULL_PAIR_MM: f64 = 0.19;
+/// Least number of the 441 places that a stroke changes: 147 are found. A null pair changes none.
+const CHANGED: usize = 74;
 
 fn load(path: &Path) -> Json {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
@@ -38,20 +69,6 @@ fn load(path: &Path) -> Json {
 
 fn vec3(json: &Json) -> Vec3 {
     Vec3::from_fn(|k, _| json[k].as_f64().unwrap())
-}
-
-/// The scan file of a plate, unpacked where it is packed.
-fn scan(plate: &Path, folder: &Path) -> PathBuf {
-    let packed = plate.join("scan.ptx.gz");
-    if !packed.exists() {
-        return plate.join("scan.e57");
-    }
-    let file = folder.join("scan.ptx");
-    if !file.exists() {
-        let mut unpacked = flate2::read::GzDecoder::new(std::fs::File::open(packed).unwrap());
-        std::io::copy(&mut unpacked, &mut std::fs::File::create(&file).unwrap()).unwrap();
-    }
-    file
 }
 
 /// Writes what a user would know as a plate file and gives the u-axis hint.
@@ -87,7 +104,7 @@ fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json
         .unwrap();
     let output = platen_tests::program("platen")
         .arg("measure")
-        .arg(scan(plate, folder))
+        .arg(samples::scan(plate, folder))
         .arg("--plate")
         .arg(&file)
         .arg("--plant")
@@ -214,21 +231,22 @@ fn against_truth(result: &Json, truth: &Json) -> Row {
 
 #[test]
 fn every_plate_is_measured_within_its_bounds() {
-    let Some(samples) = platen_tests::samples() else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut failures = Vec::new();
     println!(
         "| plate | flattening | corners rms mm | markers mean mm | surface inside mm | near edge mm | extract | outline | mesh | flatten | surface | total ms |"
     );
-    for (name, bounds) in &PLATES {
-        let plate = samples.join("plates").join(name);
+    for plate in samples::plates() {
+        let name = plate.file_name().unwrap().to_string_lossy();
+        let bounds = PLATES.iter().find(|(plate, _)| *plate == name).map(|(_, bounds)| bounds);
+        let bounds = bounds.unwrap_or_else(|| panic!("{name} has no bounds"));
         let truth = load(&plate.join("truth.json"));
         for flattening in ["harmonic", "elastic"] {
             let result = measure(&plate, folder.path(), flattening, &[]);
             let row = against_truth(&result, &truth);
             let t = &result["timings_ms"];
             println!(
-                "| {name} | {flattening} | {:.2} | {:.2} | {:.3} | {:.3} | {} | {} | {} | {} | {} | {} |",
+                "| {name} | {flattening} | {:.3} | {:.3} | {:.4} | {:.4} | {} | {} | {} | {} | {} | {} |",
                 row.corners,
                 row.markers,
                 row.inside,
@@ -240,20 +258,20 @@ fn every_plate_is_measured_within_its_bounds() {
                 t["surface"],
                 t["total"],
             );
+            let markers = if flattening == "harmonic" { bounds.markers_harmonic } else { bounds.markers };
             for (what, found, bound) in [
                 ("corners", row.corners, bounds.corners),
-                ("markers", row.markers, bounds.markers),
+                ("markers", row.markers, markers),
                 ("inside", row.inside, bounds.inside),
                 ("near an edge", row.near_edge, bounds.near_edge),
             ] {
                 if found.is_nan() || found > bound {
-                    failures.push(format!("{name} {flattening}: {what} {found:.3} mm, bound {bound}"));
+                    failures.push(format!("{name} {flattening}: {what} {found:.4} mm, bound {bound}"));
                 }
             }
             // Nothing is good by default: there is no target, so nothing is judged.
             assert_eq!(result["verdict"], "cannot_tell");
         }
-        let _ = std::fs::remove_file(folder.path().join("scan.ptx"));
     }
     assert!(failures.is_empty(), "{failures:#?}");
 }
@@ -272,12 +290,10 @@ fn rigid(from: &[Vec3], to: &[Vec3]) -> impl Fn(&Vec3) -> Vec3 {
 
 #[test]
 fn a_stroke_shows_as_displacement_and_a_null_pair_does_not() {
-    let Some(samples) = platen_tests::samples() else { return };
-    let plates = samples.join("plates");
     let folder = tempfile::tempdir().unwrap();
-    for (now, before, changed) in
-        [("p4b_stroke", "p4a_stroke", true), ("p4c_null_pair_of_p4b", "p4b_stroke", false)]
-    {
+    let pairs = [("p4b_stroke", "p4a_stroke", true), ("p4c_null_pair_of_p4b", "p4b_stroke", false)];
+    let sets = samples::each("plates");
+    for (plates, (now, before, changed)) in sets.iter().flat_map(|set| pairs.map(|pair| (set, pair))) {
         let earlier = plates.join(before).join("scan.e57");
         let result =
             measure(&plates.join(now), folder.path(), "elastic", &["--before", earlier.to_str().unwrap()]);
@@ -307,9 +323,9 @@ fn a_stroke_shows_as_displacement_and_a_null_pair_does_not() {
             "{now} against {before}: vector error {error:.3} mm rms, {n_changed} of {} places changed",
             found.len()
         );
-        assert!(error < 1.0, "{now}: {error} mm");
+        assert!(error < if changed { STROKE_MM } else { NULL_PAIR_MM }, "{now}: {error} mm");
         if changed {
-            assert!(n_changed > 40, "{now}: only {n_changed} places changed");
+            assert!(n_changed > CHANGED, "{now}: only {n_changed} places changed");
         } else {
             assert_eq!(n_changed, 0, "{now}: {}", result["says"]);
         }

@@ -1,7 +1,7 @@
-//! Errors of a measurement against the true shape of a simulated plate.
+//! How far a measurement is from a known truth: the figures by which a simulated scan is judged.
 //!
-//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`,
-//! `platen-sim scanner --truth`). Nothing of the measurement enters it, and it never enters a measurement.
+//! The truth comes as the document that the simulated scanner writes beside a scan (driver option `truth_file`,
+//! `platen-sim scanner --truth`). Nothing of the measurement goes into it, and it never goes into a measurement.
 
 use std::path::Path;
 
@@ -12,19 +12,19 @@ use platen_shape::{Surface, Vec3};
 
 use platen_model::units::metres;
 
-/// Width of the strip along the edges whose surface errors are counted apart, metres.
+/// Width of the strip along the edges whose surface is judged apart, metres.
 pub const EDGE_STRIP: f64 = 0.1;
-/// Width of the strip along the edges whose curvature errors are not counted, metres.
+/// Width of the strip along the edges whose curvature is not judged, metres.
 pub const CURVATURE_STRIP: f64 = 0.15;
-/// Newton steps of the projection of a point onto the face, from a start within millimetres.
+/// Newton steps to the foot of a point on the face: the start is within millimetres.
 const FOOT_STEPS: usize = 3;
 
-/// True shape of a plate; metres, scanner frame.
+/// What a measurement should find; metres, scanner frame.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Truth {
     /// Corners (0,0), (W,0), (W,H), (0,H) of the scanned face.
     pub corners_m: [[f64; 3]; 4],
-    /// Markers on the scanned face.
+    /// Marked places on the scanned face.
     pub markers: Vec<TrueMarker>,
     /// Positions and curvatures at a few hundred places.
     pub grid: TrueGrid,
@@ -32,7 +32,7 @@ pub struct Truth {
     pub face: TrueFace,
 }
 
-/// Marker with its true position.
+/// A marked place.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueMarker {
     /// Along u.
@@ -43,7 +43,7 @@ pub struct TrueMarker {
     pub position_m: [f64; 3],
 }
 
-/// Even grid over the plate, edges included, v outer, u inner.
+/// Places on an even grid over the plate, edges included, v outer, u inner.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueGrid {
     /// Places along u.
@@ -58,7 +58,7 @@ pub struct TrueGrid {
     pub kappa_v_per_m: Vec<f64>,
 }
 
-/// Even grid as [`TrueGrid`], positions only.
+/// As [`TrueGrid`], positions only.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueFace {
     /// Places along u.
@@ -69,10 +69,10 @@ pub struct TrueFace {
     pub position_m: Vec<[f64; 3]>,
 }
 
-/// Failure to read a truth file.
+/// Why there is no truth.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// Unreadable file.
+    /// The file cannot be read.
     #[error("{path}: {source}; the simulated scanner writes it when its option truth_file is set")]
     Read {
         /// File.
@@ -80,10 +80,8 @@ pub enum TruthError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// File that is no truth document.
-    #[error(
-        "{path}: not the truth of a scan: {what}; rebuild the simulated driver together with this program"
-    )]
+    /// It is no such document.
+    #[error("{path}: no truth of a scan: {what}; rebuild the simulated driver together with this program")]
     Malformed {
         /// File.
         path: String,
@@ -115,13 +113,13 @@ impl Truth {
 /// Errors of one measurement; metres, radians, 1/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Root mean square of the distances of the corners.
+    /// Corners, root mean square of the distances.
     pub corners: f64,
-    /// Mean distance of the markers.
+    /// Markers, mean distance.
     pub markers_mean: f64,
-    /// Largest distance of a marker.
+    /// Markers, largest distance.
     pub markers_worst: f64,
-    /// Root mean square distance of the true face from the measured one along its normal, beyond [`EDGE_STRIP`].
+    /// Distance of the true face from the measured one along its normal, root mean square, beyond [`EDGE_STRIP`].
     pub surface_inside: f64,
     /// The same within it.
     pub surface_edge: f64,
@@ -137,7 +135,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Compares a measurement with the truth.
+    /// Judges a measurement.
     #[must_use]
     pub fn of(measurement: &Measurement, truth: &Truth) -> Self {
         let surface = &measurement.surface;
@@ -167,13 +165,13 @@ impl Accuracy {
     }
 }
 
-/// Returns the root mean square, 0 for no values.
+/// Root mean square; 0 of nothing.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (n, sum) = values.into_iter().fold((0_usize, 0.0), |(n, sum), x| (n + 1, sum + x * x));
     (sum / n.max(1) as f64).sqrt()
 }
 
-/// Returns (u, v) of the k-th node of an even grid over the plate.
+/// (u, v) of the k-th place of an even grid over the plate.
 fn place(surface: &Surface, k: usize, [nu, nv]: [usize; 2]) -> [f64; 2] {
     [
         surface.width() * (k % nu) as f64 / (nu - 1) as f64,
@@ -185,7 +183,7 @@ fn from_edge(surface: &Surface, [u, v]: [f64; 2]) -> f64 {
     u.min(v).min(surface.width() - u).min(surface.height() - v)
 }
 
-/// Returns the distances of the true face from the measured one, inside and near an edge.
+/// Distances of the true places from the measured face, inside and near an edge.
 fn heights(surface: &Surface, truth: &TrueFace) -> (Vec<f64>, Vec<f64>) {
     let (mut inside, mut edge) = (Vec::new(), Vec::new());
     for (k, at) in truth.position_m.iter().enumerate() {
@@ -196,8 +194,7 @@ fn heights(surface: &Surface, truth: &TrueFace) -> (Vec<f64>, Vec<f64>) {
     (inside, edge)
 }
 
-/// Returns the height of a point over the measured face at its orthogonal projection: the point's own (u, v) contains the
-/// error of the flattening.
+/// Height of a point over the measured face at its foot there: the point's own (u, v) is off by the error of the flattening.
 fn height(surface: &Surface, [mut u, mut v]: [f64; 2], point: Vec3) -> f64 {
     for _ in 0..FOOT_STEPS {
         let at = surface.derivatives(u, v);
@@ -237,7 +234,7 @@ impl Cells {
     }
 }
 
-/// Returns measured minus true curvatures along u and along v.
+/// Measured minus true curvatures along u and along v.
 fn curvature(surface: &Surface, truth: &TrueGrid) -> Vec<f64> {
     let mut errors = Vec::new();
     for k in 0..truth.nu * truth.nv {

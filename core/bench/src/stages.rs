@@ -1,4 +1,4 @@
-//! Measurement of a scan in memory, each stage timed in processor time.
+//! One measurement of a scan in memory, stage by stage, in processor time.
 
 use std::time::Duration;
 
@@ -14,40 +14,40 @@ use platen_engine::stroke::NotMeasured;
 /// Processor time of each stage.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Stages {
-    /// Extraction of the plate's face from the lattice.
+    /// From the lattice to the plate's face.
     pub(super) extract: Duration,
-    /// Boundary loop, corners, edges.
+    /// Loop, corners, edges.
     pub(super) outline: Duration,
     /// Smooth face, mid-surface, mesh.
     pub(super) mesh: Duration,
     /// Flattening.
     pub(super) flatten: Duration,
-    /// Fit of S(u, v) and its covariance.
+    /// S(u, v) and its covariance.
     pub(super) surface: Duration,
 }
 
 impl Stages {
-    /// Returns the sum of all stages.
+    /// All of them.
     pub(super) fn total(&self) -> Duration {
         self.extract + self.outline + self.mesh + self.flatten + self.surface
     }
 }
 
-/// Extracted face and outline, and their times.
+/// The plate as seen, and the time until then.
 pub(super) struct Seen {
     pub(super) patch: Patch,
     pub(super) outline: Outline,
     times: [Duration; 2],
 }
 
-/// Measurement with its intermediate results and times.
+/// What came out, and after how long.
 pub(super) struct Run {
     pub(super) seen: Seen,
     pub(super) measurement: Measurement,
     pub(super) stages: Stages,
 }
 
-/// Extracts the plate's face and outline from a scan.
+/// Finds the plate in a scan.
 pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
     let start = cpu_time();
     let patch = shot.extract()?;
@@ -57,7 +57,7 @@ pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
     Ok(Seen { patch, outline, times })
 }
 
-/// Measures an extracted plate.
+/// Measures a plate that was found.
 pub(super) fn shape(
     shot: &Shot,
     seen: &Seen,
@@ -66,7 +66,7 @@ pub(super) fn shape(
     Ok(measure(&seen.patch, &seen.outline, &shot.spec, &shot.spec.rectangle(), flattening, &mut cpu_time)?)
 }
 
-/// Extracts and measures.
+/// Finds and measures.
 pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMeasured> {
     let seen = see(shot)?;
     let measurement = shape(shot, &seen, flattening)?;
@@ -76,13 +76,13 @@ pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMe
     Ok(Run { seen, measurement, stages })
 }
 
-/// Returns the median; of an even number of times, the smaller of the two in the middle.
+/// The middle of several times; of an even number, the smaller of the two in the middle.
 pub(super) fn median(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
     times.get(times.len().saturating_sub(1) / 2).copied().unwrap_or_default()
 }
 
-/// Returns milliseconds, rounded to microseconds.
+/// Milliseconds with a thousandth.
 pub(super) fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }

@@ -1,75 +1,76 @@
-//! Orientation, handedness and units of a stored lattice by monotone fits of elevation and azimuth to row and column.
+//! Orientation, handedness and units of a stored lattice, decided from its geometry.
 //!
-//! Formats disagree on what a row is, where row 0 lies, in which direction columns run and in which unit coordinates are
-//! written, and headers are unreliable: names are swapped, counts are wrong. The decision therefore uses the cells alone.
-//! The first pass (`Survey`) keeps sums per row and per column. `Survey::decide` fits elevation to the row number and
-//! unwrapped azimuth to the column number by weighted least squares, the other way round too, requires correlations of
-//! 0.99 and returns a `Plan`. The second pass ([`Columns`]) applies it to every cell. The result has row 0 at the top,
-//! columns by increasing azimuth (counter-clockwise seen from above), a right-handed frame, and metres.
+//! File formats disagree on what a row is, where row 0 lies, which way columns run and in which unit they are
+//! written, and their headers are no help: names are swapped, counts lie. So nothing here trusts a name. A
+//! [`Survey`] sees every stored cell once and keeps sums per row and per column; [`Survey::decide`] correlates
+//! rows and columns with elevation and unwrapped azimuth and gives a [`Plan`]; an [`Assembler`] sees the cells
+//! again and applies it, so that a scan larger than memory can be read twice but is never held. The result is
+//! the order of this crate: row 0 at the top, columns by increasing azimuth counter-clockwise seen from above,
+//! right-handed, metres.
 //!
-//! Limits: a mirrored scan equals a real one whose head turns in the opposite direction. It is detected only when the
-//! frame declares it ([`Expected::mirror`]) or the direction of rotation is known ([`Expected::turn`]). The mirror face of
-//! a column is not stored in any lattice file.
+//! What geometry cannot tell: a mirrored scan looks like a real one whose head turned the other way. It is
+//! found only when the frame says so ([`Expected::mirror`]) or the direction of turning is known
+//! ([`Expected::turn`]). Which face of the mirror measured a column is not stored in any lattice file.
 
 mod apply;
 mod decide;
 mod fit;
 mod intensity;
 mod occupancy;
-mod restore;
+mod own;
 mod survey;
 
-pub use apply::Columns;
-pub(crate) use decide::Plan;
-use decide::Unit;
-pub(crate) use survey::Survey;
+pub use apply::Assembler;
+pub use decide::{Plan, Unit};
+pub use survey::Survey;
 
 use platen_scan::{Direction, State};
 
-/// A cell as stored in a file.
+/// One cell as a file stores it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct RawCell {
-    /// Row number in the file.
-    pub(crate) row: u32,
-    /// Column number in the file.
-    pub(crate) column: u32,
+pub struct RawCell {
+    /// What the file calls row.
+    pub row: u32,
+    /// What the file calls column.
+    pub column: u32,
     /// Position in the file's own unit and frame; any point on the beam when only its direction is known.
-    pub(crate) xyz: [f64; 3],
-    /// The same position as range and direction, where the file stores these: they are kept to the last bit.
-    pub(crate) beam: Option<(f64, Direction)>,
-    /// Intensity in the scale of the file.
-    pub(crate) intensity: f64,
-    /// State in the file. A valid cell at the origin or without finite numbers counts as missing.
-    pub(crate) state: State,
+    pub xyz: [f64; 3],
+    /// The same place as range and direction, where the file stores these: they are kept to the last bit.
+    pub beam: Option<(f64, Direction)>,
+    /// In the file's own scale.
+    pub intensity: f64,
+    /// What the file says of the cell. A valid cell at the origin or without finite numbers counts as missing.
+    pub state: State,
 }
 
-/// Direction of columns by increasing index, seen from above.
+/// Which way columns run by growing index, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
-    /// Direction of rotation of most instruments.
+    /// As the head of most instruments turns.
     Clockwise,
-    /// By increasing azimuth.
+    /// By growing azimuth.
     CounterClockwise,
 }
 
-/// Correction of a left-handed frame.
+/// How to make a left-handed frame right-handed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mirror {
     /// The frame is right-handed.
     #[default]
     None,
-    /// x is negated.
+    /// x changes its sign.
     X,
-    /// y is negated.
+    /// y changes its sign.
     Y,
 }
 
-/// Declarations about a scan beside its cells.
+/// What is known of a scan besides its cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Expected {
     /// Smallest and largest intensity that the file declares.
     pub intensity: Option<(f64, f64)>,
-    /// Direction of columns in the files of this instrument, where it is known; the opposite one is a mirrored scan.
+    /// Which way columns run in the files of this instrument, where that is known; the other way is a mirrored
+    /// scan.
     pub turn: Option<Turn>,
     /// Set when the frame of the file is left-handed.
     pub mirror: Mirror,
@@ -77,10 +78,10 @@ pub struct Expected {
     pub cut_azimuth: Option<f64>,
 }
 
-/// Reason why stored cells are no lattice of a scan.
+/// Why stored cells are not a lattice of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OrientError {
-    /// A row or column number beyond any scanner.
+    /// No scanner has so many rows or columns.
     #[error(
         "cell (row {row}, column {column}) lies outside of any scanner's lattice ({max} rows or columns at most)"
     )]
@@ -92,7 +93,7 @@ pub enum OrientError {
         /// Largest number of either.
         max: u32,
     },
-    /// Two cells at one place.
+    /// A cell comes twice.
     #[error(
         "cell (row {row}, column {column}) comes twice: rows and columns were lost; export a structured scan"
     )]
@@ -102,7 +103,7 @@ pub enum OrientError {
         /// Stored column.
         column: u32,
     },
-    /// Fewer cells than 2 % of the places between the first and the last row and column.
+    /// The indices spread over far more cells than there are.
     #[error(
         "{cells} cells spread over {n_rows} x {n_columns} places ({percent:.2} %, at least {needed} % needed): the scan was thinned out; export every point"
     )]
@@ -118,7 +119,7 @@ pub enum OrientError {
         /// Share needed.
         needed: f64,
     },
-    /// Fewer than 3 rows or columns with valid cells.
+    /// Nothing or next to nothing was measured.
     #[error(
         "{valid} valid cells in {n_rows} rows and {n_columns} columns: too few to tell rows from columns (3 x 3 needed)"
     )]
@@ -130,7 +131,7 @@ pub enum OrientError {
         /// Columns with valid cells.
         n_columns: u32,
     },
-    /// Neither assignment of rows and columns follows the angles.
+    /// Neither way of reading rows and columns follows the angles.
     #[error(
         "rows follow elevation by {rows_elevation:+.3} and columns azimuth by {columns_azimuth:+.3} (swapped: {columns_elevation:+.3}, {rows_azimuth:+.3}), 0.99 needed: the points are not seen from the origin of the file; export in the scanner's own frame, structured, without registration applied"
     )]
@@ -144,7 +145,7 @@ pub enum OrientError {
         /// Correlation of row with azimuth.
         rows_azimuth: f64,
     },
-    /// Ranges that are neither metres nor millimetres.
+    /// Neither metres nor millimetres.
     #[error(
         "half of the {valid} ranges are {side} {limit}: neither metres nor millimetres; export in metres"
     )]
@@ -156,7 +157,7 @@ pub enum OrientError {
         /// The limit.
         limit: f64,
     },
-    /// Columns in the direction opposite to the known one.
+    /// Columns run against the known direction.
     #[error(
         "columns run {found}, this scanner's run {expected}: the file is mirrored; export in a right-handed frame, or set mirror"
     )]
@@ -166,7 +167,7 @@ pub enum OrientError {
         /// Direction expected.
         expected: &'static str,
     },
-    /// Other cells in the second pass than in the first.
+    /// The second pass met other cells than the first.
     #[error(
         "the scan changed while it was read ({expected} cells in the first pass, {found} in the second); wait until it is complete"
     )]
@@ -179,7 +180,7 @@ pub enum OrientError {
 }
 
 impl Turn {
-    fn name(self) -> &'static str {
+    fn says(self) -> &'static str {
         match self {
             Self::Clockwise => "clockwise",
             Self::CounterClockwise => "counter-clockwise",
@@ -194,7 +195,7 @@ const NO_RANGE: f64 = 1e-6;
 /// Range above which a number is no measurement in any unit.
 const NO_NUMBER: f64 = 1e12;
 
-/// Returns the state of a cell by its numbers.
+/// State of a cell after a look at its numbers.
 fn true_state(cell: &RawCell) -> State {
     let [x, y, z] = cell.xyz;
     let range2 = x * x + y * y + z * z;

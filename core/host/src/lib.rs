@@ -3,3 +3,4 @@
 pub mod cli;
 pub mod progress;
 pub mod run;
+pub mod scan_file;

@@ -1,18 +1,18 @@
-//! Progress line on stderr; silent where stderr is no terminal.
+//! Progress on a terminal; silent in a pipe.
 
 use std::io::{IsTerminal, Write as _};
 
-/// Replaces the progress line by the name of the work in progress.
+/// Shows what is being done, in place of what was shown before.
 pub fn phase(what: &str) {
     show(&format!("\r\x1b[2K{what} ..."));
 }
 
-/// Replaces the progress line by a name and the share done, 0 to 1.
+/// Shows how much of it is done, 0 to 1.
 pub fn share(what: &str, done: f64) {
     show(&format!("\r\x1b[2K{what} ... {:.0} %", done.min(1.0) * 100.0));
 }
 
-/// Clears the progress line.
+/// Takes the progress line away.
 pub fn done() {
     show("\r\x1b[2K");
 }

@@ -1,10 +1,10 @@
-//! Error of reading a file.
+//! Why a file could not be taken.
 
 use std::path::PathBuf;
 
-use crate::{Fault, Faults};
+use crate::Faults;
 
-/// Error of reading a file.
+/// Why a file could not be taken.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be opened or read.
@@ -12,26 +12,10 @@ pub enum Error {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Error of the system.
+        /// What the system says.
         source: std::io::Error,
     },
-    /// The file has faults.
+    /// The file says something that cannot be.
     #[error(transparent)]
     Faulty(#[from] Faults),
-}
-
-impl Error {
-    /// Returns the faults; a file that cannot be read is one at line 0.
-    pub fn into_faults(self) -> Vec<Fault> {
-        match self {
-            Self::Faulty(faults) => faults.into_iter().collect(),
-            Self::Unreadable { path, source } => vec![Fault {
-                file: path.display().to_string(),
-                line: 0,
-                column: 0,
-                key: String::new(),
-                message: source.to_string(),
-            }],
-        }
-    }
 }

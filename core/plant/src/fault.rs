@@ -1,30 +1,27 @@
-//! Faults of a file: place, key and message.
+//! Faults of a file: where, which key, what was found, what is allowed.
 
 use std::fmt;
 
-/// Fault of a file at one place.
+/// One fault of one file, at one place.
 ///
 /// Displays as `config/plant-north.toml:41:7: press.map.in.stroke_id: message`, in one line.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct Fault {
     /// The file as the user named it.
     pub file: String,
-    /// Line, from 1; 0 for a file that cannot be read.
+    /// Line, from 1.
     pub line: usize,
-    /// Column in characters, from 1; 0 for a file that cannot be read.
+    /// Column in characters, from 1.
     pub column: usize,
     /// Dotted path of the key; elements of arrays are counted from 1: `template[2].chord_mm`. Empty for the whole file.
     pub key: String,
-    /// Value found and values allowed.
+    /// What was found and what is allowed.
     pub message: String,
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            0 => write!(f, "{}: ", self.file)?,
-            line => write!(f, "{}:{line}:{}: ", self.file, self.column)?,
-        }
+        write!(f, "{}:{}:{}: ", self.file, self.line, self.column)?;
         if !self.key.is_empty() {
             write!(f, "{}: ", self.key)?;
         }
@@ -32,7 +29,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Faults of one or several files, sorted by file, line and column. Never empty.
+/// All faults of one or several files, sorted by file, line and column. Never empty.
 ///
 /// Displays as one line per fault; serialises as an array of [`Fault`]s.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -40,19 +37,19 @@ impl fmt::Display for Fault {
 pub struct Faults(Vec<Fault>);
 
 impl Faults {
-    /// Sorts the faults and drops repeats; `None` when there are none.
+    /// Sorts the faults and drops repeats; nothing when there are none.
     pub fn new(mut faults: Vec<Fault>) -> Option<Self> {
         faults.sort();
         faults.dedup();
         (!faults.is_empty()).then_some(Self(faults))
     }
 
-    /// Makes a list of one fault.
+    /// A single fault.
     pub fn one(fault: Fault) -> Self {
         Self(vec![fault])
     }
 
-    /// Returns the faults in the order of their places.
+    /// The faults in the order of their places.
     pub fn as_slice(&self) -> &[Fault] {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! Value of one key: missing, found or already reported.
+//! One value on its way out of the file: missing, found or already reported.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -6,43 +6,36 @@ use std::ops::RangeInclusive;
 use crate::document::{Document, Reported};
 use crate::source::Place;
 
-/// Value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
+/// The value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
 #[derive(Debug)]
 #[must_use = "end the chain with required(), optional() or or()"]
 pub struct TomlKey<'d, T> {
     document: &'d Document,
     place: Place,
     state: Result<Option<T>, Reported>,
-    /// The fault because of which a missing value is no fault.
-    excuse: Option<Reported>,
 }
 
-/// Value with its place, for checks against other keys.
+/// A value with its place, for checks against other keys.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Located<T> {
-    /// Value.
+    /// The value.
     pub value: T,
-    /// Place.
+    /// Where it stands.
     pub place: Place,
 }
 
 impl<'d, T> TomlKey<'d, T> {
-    pub(crate) fn new(
-        document: &'d Document,
-        place: Place,
-        state: Result<Option<T>, Reported>,
-        excuse: Option<Reported>,
-    ) -> Self {
-        Self { document, place, state, excuse }
+    pub(crate) fn new(document: &'d Document, place: Place, state: Result<Option<T>, Reported>) -> Self {
+        Self { document, place, state }
     }
 
     /// Converts the value; the text of a refusal becomes the fault.
     pub fn try_map<U>(self, convert: impl FnOnce(T) -> Result<U, String>) -> TomlKey<'d, U> {
-        let Self { document, place, state, excuse } = self;
+        let Self { document, place, state } = self;
         let state = state.and_then(|value| {
             value.map(convert).transpose().map_err(|message| document.fault(&place, message))
         });
-        TomlKey { document, place, state, excuse }
+        TomlKey { document, place, state }
     }
 
     /// Converts the value.
@@ -61,16 +54,16 @@ impl<'d, T> TomlKey<'d, T> {
         self.map(|value| Located { value, place })
     }
 
-    /// Returns the value; a missing one is a fault.
+    /// The value, or the fault that it is missing.
     ///
     /// # Errors
     /// [`Reported`] when it is missing or was refused.
     pub fn required(self) -> Result<T, Reported> {
-        let Self { document, place, state, excuse } = self;
-        state?.ok_or_else(|| excuse.unwrap_or_else(|| document.absent(&place, "missing")))
+        let Self { document, place, state } = self;
+        state?.ok_or_else(|| document.absent(&place, "missing"))
     }
 
-    /// Returns the value if it is there.
+    /// The value if it is there.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.
@@ -78,7 +71,7 @@ impl<'d, T> TomlKey<'d, T> {
         self.state
     }
 
-    /// Returns the value or its default.
+    /// The value, or its default.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.

@@ -16,7 +16,7 @@ use crate::{Fault, Faults};
 /// Type of an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionType {
-    /// True or false.
+    /// true or false.
     Bool,
     /// A whole number, with or without a unit.
     Int,
@@ -28,42 +28,42 @@ pub enum OptionType {
     Choice,
     /// A file or folder; a relative one starts at the folder of the plant file.
     Path,
-    /// A time, in seconds unless [`OptionDecl::unit`] is another unit of time.
+    /// A time, in seconds unless [`OptionDecl::unit`] says another unit of time.
     Duration,
     /// A list of numbers.
     Floats,
 }
 
-/// Declaration of one option by its plugin.
+/// What a plugin says of one of its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionDecl {
     /// The key: `[a-z][a-z0-9_]*`.
     pub name: String,
-    /// Type.
+    /// Its type.
     pub kind: OptionType,
-    /// Symbol of the unit of a bare number, for [`Unit::find`]; none for pure numbers.
+    /// Symbol of the unit of a bare number, as [`Unit::find`] knows it; none for numbers that measure nothing.
     pub unit: Option<String>,
     /// Smallest number allowed, of each element of a list, in the declared unit.
     pub min: Option<f64>,
     /// Largest number allowed.
     pub max: Option<f64>,
-    /// Words of a choice.
+    /// The words of a choice.
     pub choices: Vec<String>,
-    /// Value where the plant file gives none, as TOML text.
+    /// The value where the plant file gives none, as TOML text.
     pub default: Option<String>,
-    /// Required in the plant file.
+    /// Whether the plant file must give it.
     pub required: bool,
-    /// Purpose, in one sentence.
+    /// One sentence on what it does.
     pub doc: String,
-    /// Value kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
+    /// Whether its value is kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
     pub secret: bool,
-    /// Rarely needed.
+    /// Whether most users never need it.
     pub advanced: bool,
-    /// Replacement of an option that will be removed.
+    /// What to use in its place, for an option that will go.
     pub deprecated: Option<String>,
 }
 
-/// Checked value. Numbers are in the declared unit, durations in seconds.
+/// A checked value. Numbers are in the declared unit, durations in seconds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// Of a [`OptionType::Bool`].
@@ -82,45 +82,44 @@ pub enum Value {
     Floats(Vec<f64>),
 }
 
-/// Value of one option and its origin.
+/// One option's value and where it came from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionValue {
     /// Name of the option.
     pub name: String,
-    /// Value.
+    /// Its value.
     pub value: Value,
-    /// Given in the plant file; else the default.
+    /// Whether the plant file gave it; else it is the default.
     pub given: bool,
 }
 
-/// Unchecked options of one plugin with their places in the plant file.
+/// The options of one plugin as they stand in the plant file, unchecked, with their places.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawOptions {
     source: Arc<Source>,
     place: Place,
-    /// The proof of a fault when the file has something else than a table.
-    entries: Result<Vec<Entry>, Reported>,
+    entries: Vec<Entry>,
 }
 
 impl RawOptions {
-    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Result<Vec<Entry>, Reported>) -> Self {
+    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Vec<Entry>) -> Self {
         Self { source, place, entries }
     }
 
-    /// Makes an empty set, for a plugin that no plant file names; messages have `owner` in place of a file.
+    /// No options at all, for a plugin that no plant file names; `owner` stands for the file in messages.
     pub fn none(owner: &str) -> Self {
-        let source = Source { file: owner.to_owned(), text: String::new(), syntax_errors: Vec::new() };
-        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Ok(Vec::new()))
+        let source = Source { file: owner.to_owned(), text: String::new() };
+        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Vec::new())
     }
 
-    /// Makes a fault of the options as a whole.
+    /// A fault of the options as a whole.
     pub(crate) fn fault(&self, message: String) -> Fault {
         self.source.fault(&self.place, message)
     }
 
-    fn document(&self, entries: &[Entry]) -> Document {
+    fn document(&self) -> Document {
         let span = self.place.offset..self.place.offset;
-        let root = Node { span, kind: NodeKind::Table(entries.to_vec()) };
+        let root = Node { span, kind: NodeKind::Table(self.entries.clone()) };
         Document::part(self.source.clone(), self.place.key.clone(), root)
     }
 
@@ -141,9 +140,7 @@ pub fn check_options(
     raw: &RawOptions,
     declared: &[OptionDecl],
 ) -> Result<Vec<OptionValue>, Faults> {
-    // Options that are no table were reported with the file.
-    let Ok(entries) = &raw.entries else { return Ok(Vec::new()) };
-    let document = raw.document(entries);
+    let document = raw.document();
     let mut table = document.root();
     let mut faults = Vec::new();
     let mut values = Vec::new();
@@ -161,7 +158,7 @@ pub fn check_options(
             Err(Reported { .. }) => {}
         }
         if option.required && !table.has(&option.name) {
-            document.absent(
+            document.fault(
                 &Place { key: format!("{}.{}", raw.place.key, option.name), offset: raw.place.offset },
                 format!("missing; {plugin} needs it: {} ({option})", option.doc),
             );
@@ -188,7 +185,7 @@ fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String 
 }
 
 impl OptionDecl {
-    /// Returns the default, checked as a given value is. Relative paths are left as they are.
+    /// The default, checked as a given value is. Relative paths are left as they are.
     fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
         let Some(default) = &self.default else { return Ok(None) };
         let document = Document::parse(plugin, format!("{} = {default}", self.name));
@@ -259,13 +256,13 @@ impl OptionDecl {
         if inside { Ok(()) } else { Err(format!("found {}, allowed {}", node.describe(), self.range())) }
     }
 
-    /// Returns the declared unit; seconds for a duration without one.
+    /// The declared unit; seconds for a duration without one.
     fn declared_unit(&self) -> Unit {
         let default = if self.kind == OptionType::Duration { Unit::SECOND } else { Unit::ONE };
         self.unit.as_deref().and_then(Unit::find).unwrap_or(default)
     }
 
-    /// Returns `0.6 to 130 m`.
+    /// `0.6 to 130 m`.
     fn range(&self) -> String {
         let range = match (self.min, self.max) {
             (Some(min), Some(max)) => format!("{min} to {max}"),
@@ -281,7 +278,7 @@ impl OptionDecl {
     }
 }
 
-/// Formats as `number in m, 0.6 to 130 m, default 30`.
+/// `float in m, 0.6 to 130 m, default 30`.
 impl fmt::Display for OptionDecl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.kind {
@@ -316,7 +313,7 @@ fn whole(value: f64) -> Option<i64> {
     (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
 }
 
-/// Returns a secret text, given directly or by its variable or file. No message quotes it.
+/// A secret text, or where to find it: never quoted in a message.
 fn secret(node: &Node, folder: &Path) -> Result<String, String> {
     let entries = match &node.kind {
         NodeKind::String(text) => return Ok(text.clone()),

@@ -1,8 +1,10 @@
-//! Plate file: a plate, its target, and the places, lines and templates to be evaluated.
+//! The plate file: one plate, what it is to become, and what is to be measured on it.
 
 mod place;
 mod target;
 mod template;
+
+pub use template::{PRESETS, Preset};
 
 use std::path::Path;
 
@@ -12,31 +14,31 @@ use crate::document::{Document, Reported};
 use crate::{Error, Faults, TomlTable};
 use place::{Names, Rectangle};
 
-/// Range of a plate's sides, millimetres: wide enough for the 2-5 m of the trade, narrow enough to refuse metres.
+/// Smallest and largest side of a plate, millimetres: wide round the 2-5 m of the trade, narrow enough to catch metres.
 const SIDE_MM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
-/// Range of thickness, millimetres.
+/// Thinnest and thickest plate, millimetres.
 const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1.0..=300.0;
 
-/// Checked plate file. Lengths in metres, angles in radians, places as (u, v) on the original rectangle.
+/// A checked plate file. Lengths in metres, angles in radians, places as (u, v) on the original rectangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlateFile {
-    /// Plate as ordered.
+    /// The plate as ordered.
     pub plate: Plate,
-    /// Target shape; without it nothing can be judged.
+    /// What it is to become; without it nothing can be judged.
     pub target: Option<Target>,
-    /// Markers to be reported.
+    /// Places to be reported.
     pub markers: Vec<Marker>,
-    /// Lines to be reported, on which templates lie.
+    /// Lines to be reported, and for templates to lie on.
     pub reference_lines: Vec<ReferenceLine>,
-    /// Places on the supports of the press during a scan.
+    /// Places that rest on the press's supports while the plate is scanned.
     pub supports: Vec<Support>,
-    /// Templates to be laid on the plate.
+    /// Boards to be laid on the plate.
     pub templates: Vec<Template>,
-    /// Stations, in the order of the press's station registers.
+    /// Figures for the press's station registers, in their order.
     pub stations: Vec<Station>,
 }
 
-/// Reference line and its name, which is kept where the line is faulty: a template on it is then no second fault.
+/// A line, and its name even where the rest is faulty, so that a template on it is not called faulty too.
 #[derive(Debug, Clone)]
 struct NamedLine {
     name: Result<String, Reported>,
@@ -79,16 +81,7 @@ impl PlateFile {
         }
     }
 
-    /// Returns whether a document is a plate file: it has a table `[plate]`.
-    pub fn recognises(document: &Document) -> bool {
-        document.root().has("plate")
-    }
-
-    /// Checks a parsed document.
-    ///
-    /// # Errors
-    /// Every fault of the document.
-    pub fn take(document: Document) -> Result<Self, Faults> {
+    fn take(document: Document) -> Result<Self, Faults> {
         let file = Self::read(document.root());
         document.finish(file)
     }
@@ -117,7 +110,7 @@ impl PlateFile {
     }
 }
 
-/// Reads every element of an array of tables with `read`, which also gets the names taken so far.
+/// Reads every element of an array of tables; `read` also gets the names taken so far.
 fn read_all<'d, T>(
     root: &mut TomlTable<'d>,
     key: &str,
@@ -132,7 +125,7 @@ fn read_all<'d, T>(
     Ok(all)
 }
 
-/// Reads `[plate]`; sets `rectangle` if both sides are sound.
+/// Also sets `rectangle`, when both sides are sound, whatever else is not.
 fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
     let id = table.name("id").required();
     let width = table.number("width_mm").in_range(SIDE_MM).required();
@@ -143,29 +136,29 @@ fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Re
     let document = table.document();
     table.finish();
 
-    if let (Ok(width), Ok(height)) = (width, height) {
-        *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
-    }
-    let inset = match (face_inset, &thickness) {
-        (Ok(Some(inset)), Ok(thickness)) if inset.value > thickness.value => {
-            let message =
-                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
-            Err(document.fault(&inset.place, message))
-        }
-        (inset, _) => inset.map(|inset| inset.map_or(0.0, |inset| inset.value)),
-    };
-    let (width, height, thickness) = (width?, height?, thickness?);
-    if thickness.value > width.min(height) / 4.0 {
+    let (width, height) = (width?, height?);
+    *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
+    let thickness = thickness?;
+    let shorter = width.min(height);
+    if thickness.value > shorter / 4.0 {
         let message = format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
         return Err(document.fault(&thickness.place, message));
     }
+    let face_inset = match face_inset? {
+        Some(inset) if inset.value > thickness.value => {
+            let message =
+                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
+            return Err(document.fault(&inset.place, message));
+        }
+        inset => inset.map_or(0.0, |inset| inset.value),
+    };
     Ok(Plate {
         id: id?,
         width: metres(width),
         height: metres(height),
         thickness: metres(thickness.value),
         supports: supports?,
-        face_inset: metres(inset?),
+        face_inset: metres(face_inset),
     })
 }
 
@@ -192,14 +185,13 @@ fn read_line(mut table: TomlTable<'_>, names: &mut Names, plate: Option<Rectangl
     let to = place::point(&mut table, "to_mm", plate);
     let (document, place) = (table.document(), table.place().clone());
     table.finish();
-    let ends = from.and_then(|from| {
-        let to = to?;
-        if from == to {
+    let line = name.clone().and_then(|name| {
+        let line = ReferenceLine { name, from: from?, to: to? };
+        if line.from == line.to {
             return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
         }
-        Ok((from, to))
+        Ok(line)
     });
-    let line = ends.and_then(|(from, to)| Ok(ReferenceLine { name: name.clone()?, from, to }));
     NamedLine { name, line }
 }
 
@@ -223,12 +215,12 @@ fn read_station(
     Ok(Station { name: name?, at: at?, quantity: quantity? })
 }
 
-/// Converts millimetres of the file to metres.
+/// Millimetres of the file to metres.
 fn metres(mm: f64) -> f64 {
     mm / 1000.0
 }
 
-/// Converts metres to millimetres for a message, rounded to a micrometre.
+/// Metres to millimetres for a message, without the dust of the conversion.
 fn millimetres(m: f64) -> f64 {
     (m * 1e6).round() / 1000.0
 }

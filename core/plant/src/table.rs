@@ -1,4 +1,4 @@
-//! Reader of one table: every key is asked for by name and type; a key not asked for is a fault.
+//! The cursor over one table: every key is asked for by name and type, and what was not asked for is a fault.
 
 use crate::RawOptions;
 use crate::document::{Document, Reported};
@@ -7,7 +7,7 @@ use crate::nearest;
 use crate::node::{Entry, Node, NodeKind};
 use crate::source::Place;
 
-/// Reader of one table of a [`Document`].
+/// A cursor over one table of a [`Document`].
 ///
 /// Each getter notes its key as known; [`TomlTable::finish`] reports the others. Read every key, then finish, then take the
 /// values out: see [`Document`].
@@ -18,35 +18,34 @@ pub struct TomlTable<'d> {
     place: Place,
     entries: &'d [Entry],
     asked: Vec<String>,
-    excuse: Option<Reported>,
 }
 
 impl<'d> TomlTable<'d> {
     pub(crate) fn new(document: &'d Document, place: Place, entries: &'d [Entry]) -> Self {
-        Self { document, place, entries, asked: Vec::new(), excuse: None }
+        Self { document, place, entries, asked: Vec::new() }
     }
 
-    /// Lets missing keys pass from here on, because the fault `excuse` leaves open which keys are required.
-    pub(crate) fn excuse_missing(&mut self, excuse: Reported) {
-        self.excuse = Some(excuse);
-    }
-
-    /// Returns the document, to record faults between several keys.
+    /// The document, to record faults between several keys.
     pub fn document(&self) -> &'d Document {
         self.document
     }
 
-    /// Returns the place of the table.
+    /// Where the table stands.
     pub fn place(&self) -> &Place {
         &self.place
     }
 
-    /// Returns whether the key is there, of any type; does not count as asking for it.
+    /// Every key that stands in the table, for tables whose keys are names given by the user.
+    pub fn keys(&self) -> impl Iterator<Item = &'d str> + use<'d> {
+        self.entries.iter().map(|entry| entry.key.as_str())
+    }
+
+    /// Whether the key is there, of whatever type; does not count as asking for it.
     pub fn has(&self, key: &str) -> bool {
         self.entries.iter().any(|entry| entry.key == key)
     }
 
-    /// Reads true or false.
+    /// true or false.
     pub fn bool(&mut self, key: &str) -> TomlKey<'d, bool> {
         self.value(key, "true or false", |node| match node.kind {
             NodeKind::Bool(value) => Some(value),
@@ -54,7 +53,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a whole number.
+    /// A whole number.
     pub fn integer(&mut self, key: &str) -> TomlKey<'d, i64> {
         self.value(key, "a whole number", |node| match node.kind {
             NodeKind::Integer(value) => Some(value),
@@ -62,17 +61,17 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a finite number, with or without decimals.
+    /// A finite number, with or without decimals.
     pub fn number(&mut self, key: &str) -> TomlKey<'d, f64> {
         self.value(key, "a number", number)
     }
 
-    /// Reads a text.
+    /// A text.
     pub fn string(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string)
     }
 
-    /// Reads a text that is not empty.
+    /// A text that is not empty.
     pub fn name(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string).check(|name| match name.trim().is_empty() {
             true => Err("is empty, must have at least one character".to_owned()),
@@ -80,7 +79,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads one of a few words.
+    /// One of a few words.
     pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> TomlKey<'d, T> {
         let words = || choices.iter().map(|(word, _)| *word);
         self.value(key, "a text", string).try_map(|found| {
@@ -91,12 +90,20 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a list of exactly `N` finite numbers: a point, a direction.
+    /// A list of finite numbers.
+    pub fn numbers(&mut self, key: &str) -> TomlKey<'d, Vec<f64>> {
+        self.value(key, "a list of numbers", |node| match &node.kind {
+            NodeKind::Array(values) => values.iter().map(number).collect(),
+            _ => None,
+        })
+    }
+
+    /// A list of exactly `N` finite numbers: a point, a direction.
     pub fn vector<const N: usize>(&mut self, key: &str) -> TomlKey<'d, [f64; N]> {
         self.value(key, &format!("a list of {N} numbers"), vector)
     }
 
-    /// Reads `R` lists of exactly `N` finite numbers: the rows of a matrix.
+    /// `R` lists of exactly `N` finite numbers: the rows of a matrix.
     pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> TomlKey<'d, [[f64; N]; R]> {
         self.value(key, &format!("{R} lists of {N} numbers"), |node| match &node.kind {
             NodeKind::Array(rows) => rows.iter().map(vector).collect::<Option<Vec<_>>>()?.try_into().ok(),
@@ -104,7 +111,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a list of texts, each with its place.
+    /// A list of texts, each with its place.
     pub fn strings(&mut self, key: &str) -> TomlKey<'d, Vec<Located<String>>> {
         let place = self.place_of(key);
         self.value(key, "a list of texts", |node| match &node.kind {
@@ -119,7 +126,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a table below this one.
+    /// A table below this one, missing or not.
     pub fn table(&mut self, key: &str) -> TomlKey<'d, TomlTable<'d>> {
         let (document, path) = (self.document, self.place_of(key));
         self.value(key, "a table", |node| {
@@ -128,7 +135,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// Reads a table below this one in which every key has a default; a missing one is empty.
+    /// A table below this one in which every key has a default: a missing one reads as empty.
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no table.
@@ -137,7 +144,7 @@ impl<'d> TomlTable<'d> {
         Ok(self.table(key).optional()?.unwrap_or(empty))
     }
 
-    /// Reads the elements of an array of tables (`[[key]]`) in their order; a missing one has none.
+    /// The elements of an array of tables (`[[key]]`) in their order; a missing one has none.
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no array of tables.
@@ -157,26 +164,27 @@ impl<'d> TomlTable<'d> {
         Ok(field.optional()?.unwrap_or_default())
     }
 
-    /// Keeps a table of options, which a plugin's declarations check later; a missing one is empty.
-    pub fn options(&mut self, key: &str) -> RawOptions {
-        let table = self.section(key);
-        let place = table.as_ref().map_or_else(|_| self.missing_place(key), |table| table.place.clone());
-        let entries = table.map(|table| table.entries.to_vec());
-        RawOptions::new(self.document.source().clone(), place, entries)
+    /// A table of options that only a plugin can check, kept with its places; a missing one is empty.
+    ///
+    /// # Errors
+    /// [`Reported`] when the key is there and is no table.
+    pub fn options(&mut self, key: &str) -> Result<RawOptions, Reported> {
+        let table = self.section(key)?;
+        Ok(RawOptions::new(self.document.source().clone(), table.place, table.entries.to_vec()))
     }
 
-    /// Reads the raw value, for keys that accept several types.
+    /// The raw value, for keys that accept several types.
     pub(crate) fn node(&mut self, key: &str) -> TomlKey<'d, &'d Node> {
         self.asked.push(key.to_owned());
         let Some(entry) = self.entries.iter().find(|entry| entry.key == key) else {
-            return TomlKey::new(self.document, self.missing_place(key), Ok(None), self.excuse);
+            return TomlKey::new(self.document, self.missing_place(key), Ok(None));
         };
         let place = Place { key: self.place_of(key), offset: entry.value.span.start };
         let state = match entry.value.kind {
             NodeKind::Broken => Err(self.document.broken()),
             _ => Ok(Some(&entry.value)),
         };
-        TomlKey::new(self.document, place, state, self.excuse)
+        TomlKey::new(self.document, place, state)
     }
 
     /// Reports every key that was never asked for, with the nearest one that could have been meant.
@@ -187,7 +195,7 @@ impl<'d> TomlTable<'d> {
         });
     }
 
-    /// As [`TomlTable::finish`], with a message made from the nearest key and all keys that were asked for.
+    /// As [`TomlTable::finish`], with the message made from the nearest key, if any, and all that were asked for.
     pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
         for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
             let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };
@@ -196,7 +204,7 @@ impl<'d> TomlTable<'d> {
         }
     }
 
-    /// Reads the value of `key` with `read`; where that refuses, the fault names what was expected.
+    /// The value of `key` as `read` takes it; where `read` refuses, the fault names what was expected.
     fn value<T>(
         &mut self,
         key: &str,
@@ -220,7 +228,7 @@ impl<'d> TomlTable<'d> {
     }
 }
 
-/// Returns a finite number.
+/// A finite number; NaN and infinities are no measure of anything.
 pub(crate) fn number(node: &Node) -> Option<f64> {
     match node.kind {
         // Whole numbers above 2^53 lose their last digits; no quantity of a plant has so many.

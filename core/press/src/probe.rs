@@ -1,33 +1,33 @@
-//! Search for word order and address of a 32-bit number: every interpretation of the registers round an address.
+//! Which order of words and which address a press means: every reading of the registers round an address.
 
 use platen_plant::press::{RegisterType, WordOrder};
 
 use crate::codec::{bits, raw_number};
 
-/// One interpretation of two registers as a number.
+/// One way to read two registers as a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Offset from the given address, registers: manuals that count from 1 give one too many.
+    /// Registers away from the address asked for: manuals that count from 1 give one too many.
     pub shift: i8,
-    /// Type of the 32 bits.
+    /// How the 32 bits are read.
     pub kind: RegisterType,
     /// Order of the words and bytes.
     pub order: WordOrder,
     /// The two registers.
     pub words: [u16; 2],
-    /// The number.
+    /// What they mean then.
     pub number: f64,
 }
 
 impl Reading {
-    /// Whether it equals the expected number to the precision of the smaller of both types (24 bits).
+    /// Whether it is the number expected, to the precision of the smaller of both types (24 bits).
     pub fn is(&self, expected: f64) -> bool {
         (self.number - expected).abs() <= expected.abs().max(f64::MIN_POSITIVE) * f64::from(f32::EPSILON)
     }
 }
 
-/// Returns every interpretation of 32-bit numbers at an address and one register to either side of it. `around` are the
-/// registers from one before the address on; pairs beyond their end are left out.
+/// Every reading of 32-bit numbers at an address and one register to either side of it. `around` are the registers from
+/// one before the address on; what lies beyond their end is left out.
 pub fn readings(around: &[u16]) -> Vec<Reading> {
     let mut readings = Vec::new();
     for (shift, words) in (-1i8..=1).zip(around.windows(2)) {

@@ -1,8 +1,9 @@
-//! Reconciliation of the host's registers: drives them to their target values. Every write can be repeated safely.
+//! Makes the registers of the host say what they shall say, whatever happens on the way.
 //!
-//! The desired words are compared with the known actual words (echoed or read back); differences are written until they are
-//! echoed. Order: data with the old commit word, the commit word, the status; a result is therefore complete before it is
-//! valid. A result is withdrawn by its status first, also when the next result is present after a loss of the link.
+//! The wanted words are compared with those that the press is known to have (echoed, or read back); what differs is
+//! written until it is echoed. Data come first with the old commit word, then the commit word, then the status, so that
+//! a result is complete before it is valid; a result is withdrawn by its status first, also when the next one is there
+//! already because the link was lost in between. Every write is harmless to repeat.
 
 use std::time::Duration;
 
@@ -11,39 +12,39 @@ use tokio::time::Instant;
 
 use crate::{Client, HostImage, Link, LinkError};
 
-/// Age in beats of the oldest heartbeat that may still be in transit on a slow line.
+/// Heartbeats of this many beats ago may still be under way on a slow line.
 const OLD_BEATS: u16 = 16;
 
-/// Phase in which a register is written.
+/// When a register is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// Diagnostic: written along with data and with each beat.
+    /// For people only: rides along with data, and with each beat.
     Idle,
     Data,
     Commit,
     Status,
 }
 
-/// The block of the host: desired and known actual words.
+/// The block of the host: what it shall be, what it is known to be.
 #[derive(Debug)]
 pub(crate) struct Reconciler {
     map: RegisterMap,
     turns: Vec<Turn>,
-    /// Spans of one write: neighbours inside the same range of the allow-list.
+    /// Registers that one write may span: neighbours inside the same range of the allow-list.
     spans: Vec<std::ops::Range<usize>>,
     pretend: bool,
     known: Option<Vec<u16>>,
-    /// Sequence number of the last result made valid.
+    /// Sequence number of the result that was made valid last.
     shown: Option<u16>,
     heartbeat: u16,
     beat_every: Duration,
     next_beat: Instant,
     budget: Budget,
-    /// Writes that repeated echoed words: the press had lost or changed them.
+    /// Writes that repeated what had been echoed before: the press had lost or changed it.
     pub(crate) rewrites: u64,
 }
 
-/// Writer of the host's own block, from a read-back.
+/// What a read of the host's own block says about who writes there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Witness {
     pub(crate) owner: Option<u16>,
@@ -69,17 +70,17 @@ impl Reconciler {
         }
     }
 
-    /// Marks all actual words as unknown.
+    /// Nothing is known about the registers any more.
     pub(crate) fn forget(&mut self) {
         self.known = None;
     }
 
-    /// Whether actual and desired words differ, or a beat is due.
+    /// Whether the registers are known to say something else than they shall, or a beat is due.
     pub(crate) fn is_due(&self, image: &HostImage) -> bool {
         Instant::now() >= self.next_beat || !self.says(&image.encode(&self.map, self.heartbeat))
     }
 
-    /// Sets the actual words from a read-back. `owner` is this host's number.
+    /// Takes note of the block as read back. `owner` is this host's number.
     pub(crate) fn read_back(&mut self, words: Vec<u16>, owner: u16) -> Witness {
         let field = |output, words: &[u16]| {
             let offset = self.map.output(output).and_then(|field| field.place.offset())?;
@@ -107,8 +108,8 @@ impl Reconciler {
         Witness { owner: found_owner, heartbeat: found_beat, mine }
     }
 
-    /// Writes the differences. Returns true when the actual words equal `image`; false when the limit of writes per second
-    /// defers the rest.
+    /// Writes what differs. True when the registers are known to say all of `image`; false when the limit of writes per
+    /// second puts the rest off.
     pub(crate) async fn write<L: Link>(
         &mut self,
         client: &mut Client<L>,
@@ -146,7 +147,7 @@ impl Reconciler {
         Ok(done)
     }
 
-    /// Whether the valid result in the registers is this one: by its sequence number there, else by the last one made valid.
+    /// Whether the valid result in the registers is this one: by its sequence number there, else by this host's memory.
     fn shows_this(&self, known: &[u16], wanted: &[u16], image: &HostImage) -> bool {
         match self.map.output(Output::ResultSeq).and_then(|field| field.place.offset()) {
             Some(offset) => known.get(usize::from(offset)) == wanted.get(usize::from(offset)),
@@ -154,7 +155,7 @@ impl Reconciler {
         }
     }
 
-    /// Whether the actual words of the writable registers equal these.
+    /// Whether the registers that may be written are known to say this.
     fn says(&self, wanted: &[u16]) -> bool {
         let same = |known: &Vec<u16>| {
             let mut registers = self.spans.iter().cloned().flatten().filter(|&i| self.turns[i] != Turn::Idle);
@@ -174,7 +175,7 @@ impl Reconciler {
         })
     }
 
-    /// Returns the range from the first to the last register of this phase that differs within a span.
+    /// From the first to the last register of this turn that differs within a span.
     fn differing(
         &self,
         turn: Turn,
@@ -188,7 +189,7 @@ impl Reconciler {
         Some(first..last + 1)
     }
 
-    /// Returns the words of a write: registers of other phases in between keep their actual words.
+    /// Registers of other turns that lie between keep the words that the press has.
     async fn write_range<L: Link>(
         &mut self,
         client: &mut Client<L>,
@@ -228,7 +229,7 @@ fn turns(map: &RegisterMap) -> Vec<Turn> {
     turns
 }
 
-/// Returns the parts of the write block inside the allow-list, as register offsets.
+/// The parts of the write block that the allow-list leaves, as register offsets.
 fn spans(press: &Press) -> Vec<std::ops::Range<usize>> {
     let block = press.map.write.addresses();
     let inside = |range: &std::ops::RangeInclusive<u16>| {
@@ -239,7 +240,7 @@ fn spans(press: &Press) -> Vec<std::ops::Range<usize>> {
     press.write.ranges().iter().filter_map(inside).collect()
 }
 
-/// Token bucket: a limit of writes per second with a burst of one second.
+/// A limit of writes per second, with a second's worth to spare.
 #[derive(Debug)]
 struct Budget {
     per_second: f64,

@@ -106,7 +106,7 @@ impl Bench {
         assert!(!(image.busy && image.valid), "busy and valid");
         assert!(!image.valid || image.result.is_some(), "valid without a result");
         if let (true, LinkState::Online, Some(code)) =
-            (image.valid, link, image.result.as_ref().and_then(|result| result.measurement.reason()))
+            (image.valid, link, image.result.as_ref().and_then(|result| result.measurement.reason))
         {
             assert_eq!(
                 image.error,
@@ -187,7 +187,8 @@ impl Bench {
 
 fn measurement() -> Measurement {
     Measurement {
-        judgement: Verdict::Pass.into(),
+        verdict: Verdict::Pass,
+        reason: None,
         figures: Figures { values: [(Measure::GapMax, 0.001)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,

@@ -1,4 +1,4 @@
-//! Strokes on record in the form of pictures and reports: labels, points of the strip, worst template, earlier documents.
+//! What the history holds of a plate's strokes, as pictures and reports want it.
 
 use std::path::Path;
 
@@ -11,11 +11,10 @@ use crate::picture::StripPoint;
 use crate::result::{OutlineRecord, ResultRecord, TemplateRecord};
 use platen_model::units::mm;
 
-/// Returns the strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have
-/// it yet.
+/// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
 ///
 /// # Errors
-/// The history cannot be read.
+/// The history's.
 pub fn strokes_until(
     archive: &Archive,
     run_id: u32,
@@ -27,7 +26,7 @@ pub fn strokes_until(
     Ok(earlier.chain([of_record(&this, record)]).collect())
 }
 
-/// Returns the label of a stroke in the strip and in tables: number or `blank`, attempt, `trial`.
+/// What stands below a stroke in the strip and in tables.
 pub fn label(stroke: &Stroke) -> String {
     let number = if stroke.baseline { "blank".to_owned() } else { stroke.key.stroke.to_string() };
     let again = if stroke.key.attempt > 0 { format!(".{}", stroke.key.attempt) } else { String::new() };
@@ -35,7 +34,7 @@ pub fn label(stroke: &Stroke) -> String {
     format!("{number}{again}{trial}")
 }
 
-/// Returns a stroke as a point of the strip, from its figures on record.
+/// A stroke of the strip, from its figures on record.
 pub fn of_stroke(stroke: &Stroke) -> StripPoint {
     let figure = |name: &str| stroke.figures.get(name).copied();
     StripPoint {
@@ -43,52 +42,63 @@ pub fn of_stroke(stroke: &Stroke) -> StripPoint {
         gap_mm: figure("gap.max").map(mm),
         uncertainty_mm: figure("gap.uncertainty").map(mm),
         sense: figure("sense").map_or(0, |sense| sense.clamp(-1.0, 1.0).round() as i8),
-        verdict: stroke.verdict.unwrap_or(Verdict::NotMeasured),
+        verdict: verdict(stroke),
     }
 }
 
-/// Returns a stroke as a point of the strip, from its document.
+/// The judgement on record; none is no measurement.
+pub fn verdict(stroke: &Stroke) -> Verdict {
+    use platen_model::Verdict as Kept;
+    match stroke.verdict {
+        Some(Kept::Pass) => Verdict::Pass,
+        Some(Kept::Fail) => Verdict::Fail,
+        Some(Kept::CannotTell) => Verdict::CannotTell,
+        Some(Kept::NotMeasured) | None => Verdict::NotMeasured,
+    }
+}
+
+/// A stroke of the strip, from its document.
 pub fn of_record(stroke: &Stroke, record: &ResultRecord) -> StripPoint {
-    let worst = worst_template(record);
+    let worst = worst_board(record);
     StripPoint {
         label: label(stroke),
-        gap_mm: worst.map(|template| template.max_gap_mm),
-        uncertainty_mm: worst.map(|template| template.uncertainty_mm),
-        sense: worst.map_or(0, |template| template.sense),
+        gap_mm: worst.map(|board| board.max_gap_mm),
+        uncertainty_mm: worst.map(|board| board.uncertainty_mm),
+        sense: worst.map_or(0, |board| board.sense),
         verdict: record.verdict,
     }
 }
 
-/// Returns the template with the largest gap per limit, as in the press's registers.
-pub fn worst_template(record: &ResultRecord) -> Option<&TemplateRecord> {
-    let share = |t: &TemplateRecord| t.max_gap_mm.abs() / t.limit_mm.max(f64::MIN_POSITIVE);
-    let templates = record.reference_lines.iter().flat_map(|line| &line.templates);
-    templates.max_by(|a, b| share(a).total_cmp(&share(b)))
+/// The board with the most gap per limit, as in the press's registers.
+pub fn worst_board(record: &ResultRecord) -> Option<&TemplateRecord> {
+    let share = |board: &TemplateRecord| board.max_gap_mm.abs() / board.limit_mm.max(f64::MIN_POSITIVE);
+    let boards = record.reference_lines.iter().flat_map(|line| &line.templates);
+    boards.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
-/// Part of a result document that later strokes of the plate use.
+/// What a result document has of a plate for its later strokes.
 #[derive(Debug, Default, serde::Deserialize)]
-pub struct EarlierDocument {
-    /// Supports of the plate.
+pub struct Kept {
+    /// Where the plate rested.
     pub supports: Option<String>,
     outline: Option<OutlineRecord>,
 }
 
-impl EarlierDocument {
-    /// Returns the outline of the blank to which (u, v) refer, where a scan of the blank gave one.
+impl Kept {
+    /// The outline of the blank that its (u, v) refer to, where a scan of it told one.
     pub fn blank(&self) -> Option<Blank> {
         self.outline.as_ref().and_then(OutlineRecord::blank)
     }
 }
 
-/// Reads an earlier document; an unreadable one gives an empty record.
-pub fn read_document(document: &Path) -> EarlierDocument {
+/// Reads that of a document; nothing is known from one that cannot be read.
+pub fn kept(document: &Path) -> Kept {
     let text = std::fs::read(document).unwrap_or_default();
     serde_json::from_slice(&text).unwrap_or_default()
 }
 
-/// Returns whether the plate rests on other supports than `before`; false where either is unknown.
-pub fn supports_changed(before: Option<&str>, plate: &PlateFile) -> bool {
+/// Whether the plate rests on other supports than it did `before`; what is not known is not called a change.
+pub fn moved(before: Option<&str>, plate: &PlateFile) -> bool {
     before.zip(plate.plate.supports.as_deref()).is_some_and(|(before, now)| before != now)
 }
 
@@ -105,9 +115,9 @@ mod tests {
             PlateFile::parse("plate.toml", &text).unwrap()
         };
         let trestles = plate("supports = \"trestles\"");
-        assert!(supports_changed(Some("bed"), &trestles));
-        assert!(!supports_changed(Some("trestles"), &trestles));
-        assert!(!supports_changed(None, &trestles) && !supports_changed(Some("bed"), &plate("")));
+        assert!(moved(Some("bed"), &trestles));
+        assert!(!moved(Some("trestles"), &trestles));
+        assert!(!moved(None, &trestles) && !moved(Some("bed"), &plate("")));
     }
 
     #[test]
@@ -115,9 +125,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("result.json");
         std::fs::write(&path, r#"{"schema": "platen.result/1", "supports": "bed", "grid": [1, 2]}"#).unwrap();
-        assert_eq!(read_document(&path).supports.as_deref(), Some("bed"));
-        assert!(read_document(&path).blank().is_none());
-        let missing = read_document(&folder.path().join("gone.json"));
-        assert!(missing.supports.is_none() && missing.blank().is_none());
+        assert_eq!(kept(&path).supports.as_deref(), Some("bed"));
+        assert!(kept(&path).blank().is_none());
+        let gone = kept(&folder.path().join("gone.json"));
+        assert!(gone.supports.is_none() && gone.blank().is_none());
     }
 }

@@ -1,9 +1,7 @@
-//! Result document of one measurement, schema `platen.result/1`.
+//! The result of one measurement as people and programs read it: `platen.result/1`.
 //!
-//! Lengths that a person reads are millimetres, named `_mm`; positions are metres in the scanner frame, named `_m`; angles are
-//! degrees, named `_deg`; curvatures 1/m, named `_per_m`; times milliseconds. Grids are row-major, v outer, u inner. Unknown
-//! values are null, never 0. Uncertainties are expanded (95 %) unless named sigma. The program's own units are metres and
-//! radians.
+//! Inside everything is metres and radians; here lengths that a person reads are millimetres, named `_mm`, positions
+//! are metres, named `_m`. Grids are row-major, v outer, u inner. What is not known is null, never 0.
 
 mod checks;
 mod grid;
@@ -44,44 +42,44 @@ pub struct ResultRecord {
     pub plate: String,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
-    /// Verdict on the plate.
+    /// Judgement.
     pub verdict: Verdict,
     /// Sentences for the operator, most important first.
     pub says: Vec<String>,
-    /// Supports of the plate.
+    /// Where the plate rested.
     pub supports: Option<String>,
-    /// Plate file at this stroke.
+    /// The plate as its file had it at this stroke.
     pub plate_file: PlateRecord,
-    /// Outline to which (u, v) refer; null in documents older than the baseline outline, which refer to the rectangle.
+    /// The outline that (u, v) refer to; null in documents of before it could be another than the rectangle.
     #[serde(default)]
     pub outline: Option<OutlineRecord>,
-    /// Calibration of the scanner.
+    /// How far the scanner was calibrated.
     pub calibration: CalibrationRecord,
-    /// Scan.
+    /// The scan.
     pub scan: ScanRecord,
     /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
     pub corners_m: [[f64; 3]; 4],
     /// Whether each corner was seen or extrapolated.
     pub corners_seen: [bool; 4],
-    /// Markers.
+    /// Marked places.
     pub markers: Vec<MarkerRecord>,
-    /// Dimension checks, as by tape, square and sight line.
+    /// What tape, square and sight line would show.
     pub shape_checks: ShapeChecksRecord,
-    /// Reference lines and the templates on them.
+    /// Lines and the templates on them.
     pub reference_lines: Vec<LineRecord>,
-    /// Curvatures, positions and fields on an even grid.
+    /// Places on an even grid.
     pub grid: GridRecord,
     /// S(u, v), the mid-surface.
     pub surface: SurfaceRecord,
-    /// Findings of each comparison.
+    /// What each comparison found.
     pub comparisons: Vec<Json>,
-    /// Quality of the measurement.
+    /// How good the measurement is.
     pub quality: QualityRecord,
-    /// Time of each stage.
+    /// Time spent.
     pub timings_ms: TimingsRecord,
 }
 
-/// Calibration of the scanner at this measurement.
+/// How far the scanner was calibrated when this was measured.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct CalibrationRecord {
     /// Correlated part of the level of detection, one sigma; 0 when no null pairs were taken.
@@ -90,7 +88,7 @@ pub struct CalibrationRecord {
     pub sigma_true_mm: Option<f64>,
 }
 
-/// Scan behind a measurement.
+/// The scan.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ScanRecord {
     /// Rows of the lattice.
@@ -103,13 +101,13 @@ pub struct ScanRecord {
     pub plate_points: usize,
     /// Maker, model, serial number.
     pub instrument: String,
-    /// Whether the scan is simulated.
+    /// No real instrument stood there.
     pub simulated: bool,
-    /// Notes of the driver on its decisions and corrections.
+    /// What the driver decided or changed.
     pub notes: Vec<String>,
 }
 
-/// Marker with its measured position.
+/// A marked place.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MarkerRecord {
     /// Name.
@@ -120,42 +118,42 @@ pub struct MarkerRecord {
     pub v_mm: f64,
     /// On the scanned face, scanner frame.
     pub position_m: [f64; 3],
-    /// Expanded uncertainty (95 %), all directions together.
+    /// Expanded (95 %), all directions together.
     pub uncertainty_mm: f64,
-    /// False where the surface is interpolated across unseen area.
+    /// False where the surface was bridged.
     pub seen: bool,
 }
 
-/// Spline S(u, v) of the mid-surface.
+/// S(u, v).
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SurfaceRecord {
-    /// Degree of the spline.
+    /// Of the spline.
     pub degree: u32,
-    /// Knots along u, metres.
+    /// Metres.
     pub knots_u: Vec<f64>,
-    /// Knots along v, metres.
+    /// Metres.
     pub knots_v: Vec<f64>,
     /// Control points, one list a row of constant v.
     pub control_m: Vec<Vec<[f64; 3]>>,
-    /// Root mean square distance of the samples from the surface.
+    /// Distance of the samples from the surface.
     pub rms_mm: f64,
 }
 
-/// Quality of a measurement.
+/// How good the measurement is.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct QualityRecord {
     /// Share of the plate that was seen.
     pub coverage: f64,
     /// Range noise, one sigma, from the scan itself.
     pub noise_mm: f64,
-    /// Mean distance of neighbouring samples.
+    /// Distance of neighbouring samples.
     pub lattice_step_mm: f64,
 }
 
-/// Time of each stage, milliseconds.
+/// Milliseconds of each stage.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TimingsRecord {
-    /// From the start to the last column, with extraction in parallel.
+    /// From the start to the last column; extraction runs beside it.
     pub acquire: f64,
     /// From the last column to the plate's face.
     pub extract: f64,
@@ -173,27 +171,27 @@ pub struct TimingsRecord {
     pub total: f64,
 }
 
-/// Circumstances of a measurement: plate file, task, stroke, verdict, comparisons.
+/// What is known of a measurement besides the plate's shape.
 #[derive(Debug, Clone, Copy)]
 pub struct Context<'a, E> {
-    /// Plate file.
+    /// Its plate file.
     pub plate: &'a PlateFile,
-    /// Task of the comparisons.
+    /// What the comparisons were asked.
     pub task: &'a Task,
-    /// Origin of the press in the scanner frame, where the plant file places it.
+    /// Where the press stands, scanner frame, when the plant file says so.
     pub press: Option<Vec3>,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
-    /// Verdict on the plate.
+    /// Judgement.
     pub verdict: Verdict,
-    /// Reports of the comparisons.
+    /// What the comparisons found.
     pub reports: &'a [Result<Report, E>],
-    /// Time of the comparisons.
+    /// How long they took.
     pub compare: std::time::Duration,
 }
 
 impl ResultRecord {
-    /// Assembles the document of a measurement.
+    /// Writes a measurement down.
     pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
         let Measured { outline, measurement, .. } = measured;
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
@@ -239,8 +237,10 @@ impl ResultRecord {
             timings_ms: timings(scanned, measured, context.compare),
         }
     }
+}
 
-    /// Returns the extent of the plate along u and v, millimetres.
+impl ResultRecord {
+    /// Extent of the plate along u and v, millimetres.
     pub fn extent_mm(&self) -> (f64, f64) {
         // Three knots lie beyond each end.
         let end =
@@ -309,7 +309,7 @@ fn comparison<E: Display>(report: &Result<Report, E>) -> Json {
     }
 }
 
-/// Converts a figure to JSON, lengths in millimetres.
+/// A figure in the units that people read.
 pub fn figure(figure: &Figure) -> Json {
     let (suffix, factor) = readable(&figure.unit);
     let mut record = Map::new();

@@ -1,11 +1,11 @@
-//! Header and trailer of a scan.
+//! What is said before the first column and after the last.
 
-/// Header of a scan, before its first column.
+/// What a driver says before the first column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScanHeader {
     /// Rows of the lattice.
     pub n_rows: u32,
-    /// Columns expected by the driver.
+    /// Columns that will come, as far as the driver knows.
     pub n_columns: u32,
     /// Nominal azimuth of column 0, radians.
     pub azimuth_start: f64,
@@ -20,17 +20,17 @@ pub struct ScanHeader {
     pub seam_column: Option<u32>,
     /// Smallest and largest intensity that the instrument can report.
     pub intensity_range: (u16, u16),
-    /// Whether the scan was simulated.
+    /// True when no real instrument stood there.
     pub simulated: bool,
     /// Maker, model and serial number, as far as known.
     pub instrument: String,
-    /// Time of the scan, seconds since 1970 UTC, where known.
+    /// Time of the scan, seconds since 1970 UTC, where the source knows it.
     pub acquired_unix_s: Option<f64>,
-    /// Decisions and changes of the driver, one sentence each (orientation, units, handedness).
+    /// What the driver decided or changed, one sentence each (orientation, units, handedness).
     pub notes: Vec<String>,
 }
 
-/// Outcome of a scan.
+/// How a scan ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Outcome {
     /// All columns were sent.
@@ -42,7 +42,7 @@ pub enum Outcome {
     Failed,
 }
 
-/// Trailer of a scan, after its last column; a scan without one is not used.
+/// What a driver says after the last column. No end, no scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanEnd {
     /// Columns sent.
@@ -51,6 +51,6 @@ pub struct ScanEnd {
     pub points: u64,
     /// Columns at the start, in time, that are laser warm-up and must not be used.
     pub warm_up_columns: u32,
-    /// Outcome.
+    /// How it ended.
     pub outcome: Outcome,
 }

@@ -1,23 +1,23 @@
-//! The face found in the sample plates, against their truth. Left out when the samples are absent.
+//! The face found in the sample plates, against their truth.
 
 mod support;
 
 use platen_shape::Vec3;
 use platen_shape::extract::Refusal;
+use platen_tests::samples;
 
 /// The mixed pixels that the truth counts are no loss, and a few samples of the side face no harm.
 #[test]
 fn the_face_is_found_to_the_sample() {
-    for folder in support::plate_folders() {
+    for folder in samples::plates() {
         let sample = support::read(&folder);
         let patch = support::extract(&sample, 0..sample.columns.len()).unwrap();
         let expected = sample.truth["counts"]["plate_top_valid_unmixed"].as_f64().unwrap();
         let ratio = patch.samples.len() as f64 / expected;
+        println!("{}: {} samples, {:.4} of the truth", folder.display(), patch.samples.len(), ratio);
+        assert!((0.995..1.004).contains(&ratio), "{ratio}");
         let noise = sample.truth["lattice"]["sigma_plate_mm"].as_f64().unwrap() / 1000.0;
-        println!("{}: {ratio:.4} of the truth, noise {:.4}", folder.display(), patch.noise / noise);
-        // Found: 1.0004 to 1.0012, a few samples of the side faces; noise 0.998 to 1.026 of the truth.
-        assert!((0.995..1.0024).contains(&ratio), "{ratio}");
-        assert!((patch.noise / noise - 1.0).abs() < 0.053, "{} against {noise}", patch.noise);
+        assert!((patch.noise / noise - 1.0).abs() < 0.06, "{} against {noise}", patch.noise);
         let plane = |point: Vec3| point.iter().all(|c| c.is_finite());
         assert!(patch.samples.iter().all(|s| plane(s.point) && s.sigma > 0.0));
     }
@@ -25,25 +25,25 @@ fn the_face_is_found_to_the_sample() {
 
 #[test]
 fn the_order_of_arrival_does_not_matter() {
-    let Some(folder) = support::plate_folders().into_iter().find(|f| f.ends_with("p6_occluded")) else {
-        return;
-    };
-    let sample = support::read(&folder);
-    let n = sample.columns.len();
-    let forwards = support::extract(&sample, 0..n).unwrap();
-    assert_eq!(forwards, support::extract(&sample, (0..n).rev()).unwrap());
-    // 397 has no factor in common with the number of columns: every column comes once, far from the last.
-    assert_ne!(n % 397, 0);
-    assert_eq!(forwards, support::extract(&sample, (0..n).map(|i| i * 397 % n)).unwrap());
+    for folder in samples::each("plates/p6_occluded") {
+        let sample = support::read(&folder);
+        let n = sample.columns.len();
+        let forwards = support::extract(&sample, 0..n).unwrap();
+        assert_eq!(forwards, support::extract(&sample, (0..n).rev()).unwrap());
+        // 397 has no factor in common with the number of columns: every column comes once, far from the last.
+        assert_ne!(n % 397, 0);
+        assert_eq!(forwards, support::extract(&sample, (0..n).map(|i| i * 397 % n)).unwrap());
+    }
 }
 
 #[test]
 fn another_size_is_refused_with_both_sizes() {
-    let Some(folder) = support::plate_folders().into_iter().next() else { return };
-    let mut sample = support::read(&folder);
-    (sample.spec.width, sample.spec.height) = (4.0, 2.5);
-    let refusal = support::extract(&sample, 0..sample.columns.len()).err().unwrap();
-    println!("{refusal}");
-    let Refusal::WrongSize { found_mm, .. } = refusal else { panic!("{refusal}") };
-    assert!((found_mm[0] - 3000.0).abs() < 60.0 && (found_mm[1] - 2500.0).abs() < 60.0);
+    for folder in samples::each("plates/p4a_stroke") {
+        let mut sample = support::read(&folder);
+        (sample.spec.width, sample.spec.height) = (4.0, 2.5);
+        let refusal = support::extract(&sample, 0..sample.columns.len()).err().unwrap();
+        println!("{refusal}");
+        let Refusal::WrongSize { found_mm, .. } = refusal else { panic!("{refusal}") };
+        assert!((found_mm[0] - 3000.0).abs() < 60.0 && (found_mm[1] - 2500.0).abs() < 60.0);
+    }
 }

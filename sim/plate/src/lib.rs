@@ -22,7 +22,7 @@
 //! This crate shares no code with the product: what it says is the truth that the product is judged by.
 
 mod cone;
-mod cutting_error;
+mod cut;
 mod error;
 mod material;
 mod plate;
@@ -32,7 +32,7 @@ mod shape;
 mod state;
 mod stroke;
 mod surface;
-mod swept_surface;
+mod swept;
 
 pub use error::PlateError;
 pub use plate::{Curvature, Plate, Side};

@@ -21,7 +21,7 @@ pub enum Label {
     Table,
     /// Frame and ram.
     Press,
-    /// RayCastHead floor.
+    /// Shop floor.
     Floor,
     /// Wall of the shop.
     Wall,

@@ -12,7 +12,8 @@ use object::read::elf::{ElfFile64, ProgramHeader};
 use object::{Object, ObjectSymbol};
 use platen_abi as abi;
 
-use super::{Descriptor, PluginError, host_table};
+use super::host_table;
+use super::{Descriptor, PluginError};
 
 /// A loaded library with one plugin; stays loaded until the program ends.
 #[derive(Debug, Clone)]

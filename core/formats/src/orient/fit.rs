@@ -1,7 +1,4 @@
-//! Weighted least-squares fit of an angle to the number of a line (row or column), with its correlation.
-//!
-//! Azimuths are averaged as unit vectors (circular mean and variance) and unwrapped from line to line by the median
-//! step, so that a blind sector of more than half a turn does not lose a turn.
+//! Lines of a lattice (rows or columns) and how well their number follows an angle.
 
 use std::f64::consts::{PI, TAU};
 
@@ -40,7 +37,8 @@ impl Line {
         (mean, (self.elevation2 / n - mean * mean).max(0.0))
     }
 
-    /// Circular mean and variance of the azimuth, radians and radians squared (2 (1 - R) for a small spread).
+    /// Direction of the mean beam and the circular variance about it, radians squared (2 (1 - R) for a small
+    /// spread).
     fn azimuth(&self) -> (f64, f64) {
         let mean = self.north.atan2(self.east);
         let resultant = self.east.hypot(self.north) / self.horizontal.max(f64::MIN_POSITIVE);
@@ -48,7 +46,7 @@ impl Line {
     }
 }
 
-/// Straight fit `angle = start + step * line`.
+/// How the number of a line follows an angle: `angle = start + step * line`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
     /// Correlation over all valid cells, not over line means.
@@ -61,7 +59,7 @@ pub(super) struct Fit {
     pub(super) spread: f64,
 }
 
-/// A line with valid cells: number, count of valid cells, mean angle, variance about it.
+/// A line that holds valid cells: number, valid cells, mean angle, variance about it.
 struct Mean {
     line: f64,
     weight: f64,
@@ -69,7 +67,7 @@ struct Mean {
     variance: f64,
 }
 
-/// Fits elevation to the number of the line; `None` with fewer than two lines of valid cells.
+/// Fits elevation to the number of the line; `None` with fewer than two lines that hold anything.
 pub(super) fn elevation(lines: &[Line]) -> Option<Fit> {
     let means: Vec<Mean> = means(lines, Line::elevation);
     fit(&means)
@@ -94,7 +92,8 @@ fn means(lines: &[Line], angle: fn(&Line) -> (f64, f64)) -> Vec<Mean> {
 
 /// Adds whole turns so that the angle grows evenly from line to line.
 ///
-/// Every line is predicted from the one before by the median step between neighbours.
+/// Every line is predicted from the one before by the median step between neighbours, so that missing columns
+/// (a blind sector of more than half a turn, even) do not lose a turn.
 fn unwrap(means: &mut [Mean]) {
     let mut steps: Vec<f64> = means
         .windows(2)
@@ -114,7 +113,7 @@ fn unwrap(means: &mut [Mean]) {
     }));
 }
 
-/// Fits a straight line to the line means; the correlation includes the variance within lines.
+/// Weighted straight fit through the line means; the correlation counts the variance within lines too.
 fn fit(means: &[Mean]) -> Option<Fit> {
     if means.len() < 2 {
         return None;

@@ -1,6 +1,6 @@
 //! Delivered columns as a lattice.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use platen_scan::Lattice;
 
@@ -36,28 +36,4 @@ pub(super) fn read(path: &Path, chosen: Option<usize>) -> Result<Lattice, ReadEr
 /// Reads a file to the end, with what the plant declares about the scanner.
 pub(super) fn read_with(path: &Path, chosen: Option<usize>, known: &Expected) -> Result<Lattice, ReadError> {
     collect(ScanReader::open(path, chosen, &|| true)?, known)
-}
-
-/// The folder of samples; `None`, said once, when it is not there.
-pub(super) fn samples() -> Option<PathBuf> {
-    let own = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/samples");
-    let folder = std::env::var_os("PLATEN_SAMPLES").map_or(own, PathBuf::from);
-    if folder.is_dir() {
-        Some(folder)
-    } else {
-        eprintln!("left out: no samples in {} (set PLATEN_SAMPLES)", folder.display());
-        None
-    }
-}
-
-/// A sample, unpacked when it is a gzip file, under its own name in `folder`.
-pub(super) fn unpacked(sample: &Path, folder: &Path) -> PathBuf {
-    if sample.extension().is_none_or(|e| e != "gz") {
-        return sample.to_owned();
-    }
-    let target = folder.join(sample.file_stem().unwrap());
-    let out = std::fs::File::create(&target).unwrap();
-    let status = std::process::Command::new("gzip").arg("-dc").arg(sample).stdout(out).status().unwrap();
-    assert!(status.success(), "gzip -dc {}", sample.display());
-    target
 }

@@ -2,20 +2,25 @@
 
 use std::time::Instant;
 
-use super::collect::{read, samples, unpacked};
+use platen_tests::samples;
+
+use super::collect::read;
 
 #[test]
 fn speed_of_every_format() {
-    let Some(folder) = samples() else { return };
     let temporary = tempfile::tempdir().unwrap();
-    for name in
-        ["plates/p1_cylinder/scan.e57", "plates/p5_cone_ptx/scan.ptx.gz", "lattice/pumpA_rowcol.xyz.gz"]
-    {
-        let path = unpacked(&folder.join(name), temporary.path());
+    let names =
+        ["plates/p1_cylinder/scan.e57", "plates/p5_cone_ptx/scan.ptx.gz", "lattice/pumpA_rowcol.xyz.gz"];
+    for sample in names.into_iter().flat_map(samples::each) {
+        let path = samples::unpacked(&sample, temporary.path());
         let start = Instant::now();
         let lattice = read(&path, None).unwrap();
         let seconds = start.elapsed().as_secs_f64();
         let points = lattice.n_valid();
-        eprintln!("{name}: {points} points in {seconds:.3} s, {:.2} M/s", points as f64 / seconds / 1e6);
+        eprintln!(
+            "{}: {points} points in {seconds:.3} s, {:.2} M/s",
+            points as f64 / seconds / 1e6,
+            sample.display()
+        );
     }
 }

@@ -1,6 +1,4 @@
-//! Simulated press as a child process, `platen-sim press`, and its control port.
-//!
-//! The control port takes one JSON object a line and answers with one: counts, registers, accepted results.
+//! The simulated press as a program of its own, and what it says over its second port.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -12,20 +10,20 @@ use serde_json::Value as Json;
 
 use super::CliError;
 
-/// Child process `platen-sim press`, ended with this program.
+/// `platen-sim press`, ended with this program.
 #[derive(Debug)]
 pub struct Cell {
     child: Child,
-    /// Address of the Modbus server; `None` on a serial line.
+    /// Where the press serves Modbus; `None` on a serial line.
     pub modbus: Option<SocketAddr>,
-    /// Address of the control port, from which the simulated scanner also reads the plate's shape.
+    /// Where it says what the plate looks like.
     pub plate: SocketAddr,
-    control: Option<BufReader<TcpStream>>,
+    line: Option<BufReader<TcpStream>>,
 }
 
-/// Result as the press accepted it.
+/// One result as the press took it.
 #[derive(Debug, Clone, Copy)]
-pub struct AcceptedResult {
+pub struct Taken {
     stroke: u16,
     session: u16,
     attempt: u16,
@@ -35,8 +33,8 @@ pub struct AcceptedResult {
     pub result_ms: f64,
 }
 
-impl AcceptedResult {
-    /// Returns whether it is the result of this stroke.
+impl Taken {
+    /// Whether it is the result of this stroke.
     pub fn is(&self, stroke: u16, session: u16, attempt: u16) -> bool {
         (self.stroke, self.session, self.attempt) == (stroke, session, attempt)
     }
@@ -47,14 +45,11 @@ fn failed(what: &str) -> impl Fn(std::io::Error) -> CliError + '_ {
 }
 
 impl Cell {
-    /// Starts the program that lies beside this one; `options` override the file.
-    ///
-    /// # Errors
-    /// The program is missing, or ends before it prints its ports.
+    /// Starts the program that lies beside this one; `options` overrule the file.
     pub fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
         let program =
             std::env::current_exe()?.with_file_name(format!("platen-sim{}", std::env::consts::EXE_SUFFIX));
-        let what = format!("{}: cannot be started (`cargo build --release` builds it)", program.display());
+        let what = format!("{}: cannot be started (`cargo build --release` makes it)", program.display());
         let mut child = Command::new(&program)
             .arg("press")
             .arg(config)
@@ -70,9 +65,10 @@ impl Cell {
         }
         let ports: Json = serde_json::from_str(&line).unwrap_or_default();
         let port = |name: &str| ports[name].as_str().and_then(|text| text.parse().ok());
-        let unready = || CliError::Failed("platen-sim ended before it was ready; its error is above".into());
+        let unready =
+            || CliError::Failed("platen-sim ended before it was ready; its reason stands above".into());
         let plate = port("plate").ok_or_else(unready)?;
-        Ok(Self { child, modbus: port("modbus"), plate, control: None })
+        Ok(Self { child, modbus: port("modbus"), plate, line: None })
     }
 
     /// Sends a line to the control port and returns the answer.
@@ -80,44 +76,44 @@ impl Cell {
     /// # Errors
     /// The control port does not answer with JSON.
     pub fn ask(&mut self, question: &str) -> Result<Json, CliError> {
-        let control = match &mut self.control {
-            Some(control) => control,
+        let line = match &mut self.line {
+            Some(line) => line,
             None => {
                 let stream = TcpStream::connect(self.plate).map_err(failed("simulated press"))?;
                 stream.set_read_timeout(Some(Duration::from_secs(5))).map_err(failed("simulated press"))?;
-                self.control.insert(BufReader::new(stream))
+                self.line.insert(BufReader::new(stream))
             }
         };
         let mut answer = String::new();
-        writeln!(control.get_mut(), "{question}").map_err(failed("simulated press"))?;
-        control.read_line(&mut answer).map_err(failed("simulated press"))?;
+        writeln!(line.get_mut(), "{question}").map_err(failed("simulated press"))?;
+        line.read_line(&mut answer).map_err(failed("simulated press"))?;
         serde_json::from_str(&answer).map_err(|e| CliError::Failed(format!("simulated press: {e}")))
     }
 
-    /// Returns whether the press has made all its strokes or its plate has passed.
+    /// The press has made its strokes, or its plate has passed.
     pub fn is_done(&mut self) -> Result<bool, CliError> {
         Ok(self.ask(r#"{"get":"stats"}"#)?["stats"]["done"] == true)
     }
 
-    /// Returns the host's block of registers.
+    /// The words that the host has written.
     pub fn registers(&mut self) -> Result<Vec<u16>, CliError> {
         let answer = self.ask(r#"{"get":"registers"}"#)?;
         let words = answer["registers"]["h"].as_array().cloned().unwrap_or_default();
         Ok(words.iter().filter_map(|word| u16::try_from(word.as_u64()?).ok()).collect())
     }
 
-    /// Returns the results that the press accepted, in order.
-    pub fn accepted_results(&mut self) -> Result<Vec<AcceptedResult>, CliError> {
+    /// Results as the press took them, in order.
+    pub fn taken(&mut self) -> Result<Vec<Taken>, CliError> {
         let answer = self.ask(r#"{"get":"stats"}"#)?;
         let all = answer["stats"]["taken"].as_array().cloned().unwrap_or_default();
-        let word = |result: &Json, name: &str| u16::try_from(result[name].as_u64()?).ok();
-        let one = |result: &Json| {
-            Some(AcceptedResult {
-                stroke: word(result, "stroke_id")?,
-                session: word(result, "session_id")?,
-                attempt: word(result, "attempt")?,
-                accepted_ms: result["accepted_ms"].as_f64()?,
-                result_ms: result["result_ms"].as_f64()?,
+        let word = |taken: &Json, name: &str| u16::try_from(taken[name].as_u64()?).ok();
+        let one = |taken: &Json| {
+            Some(Taken {
+                stroke: word(taken, "stroke_id")?,
+                session: word(taken, "session_id")?,
+                attempt: word(taken, "attempt")?,
+                accepted_ms: taken["accepted_ms"].as_f64()?,
+                result_ms: taken["result_ms"].as_f64()?,
             })
         };
         Ok(all.iter().filter_map(one).collect())

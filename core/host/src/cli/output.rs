@@ -1,4 +1,4 @@
-//! Output of the verbs: lines, JSON and tables on stdout, errors on stderr.
+//! Writing to the terminal.
 
 use std::io::Write as _;
 
@@ -33,7 +33,7 @@ pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Prints one error line to stderr.
+/// Prints one error to stderr.
 pub fn error(text: &str) {
     // Nowhere is left to report a failing stderr.
     let _ = writeln!(std::io::stderr(), "platen: {text}");

@@ -1,4 +1,4 @@
-//! `platen run`: serves a press until SIGTERM or Ctrl-C.
+//! `platen run`: the host.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,7 +35,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let (reports, mut strokes) = mpsc::unbounded_channel();
         let printer = tokio::spawn(async move {
             while let Some(report) = strokes.recv().await {
-                // A closed output does not stop the press.
+                // Whoever read the output has gone; the press goes on.
                 let _ = print(&report, json);
             }
         });
@@ -48,18 +48,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Builds the runtime of the press side: two workers, so that polling does not wait for a scan.
-///
-/// # Errors
-/// The system gives no threads.
+/// The runtime of the press side: polling needs little, but must not wait for a scan.
 pub fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
 }
 
-/// Returns a signal that turns true on SIGTERM and Ctrl-C.
-///
-/// # Errors
-/// The signals cannot be caught.
+/// Turns true on SIGTERM and Ctrl-C.
 pub fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
     use tokio::signal::unix::{SignalKind, signal};
     let (stop, stopped) = watch::channel(false);
@@ -86,7 +80,7 @@ impl From<HostError> for CliError {
     }
 }
 
-/// Prints one stroke as a line.
+/// One line for each stroke.
 fn print(report: &StrokeReport, json: bool) -> Result<(), CliError> {
     if json {
         let (verdict, why) = match &report.result {

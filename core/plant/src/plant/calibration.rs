@@ -1,4 +1,4 @@
-//! `[calibration]`: file written by `platen calibrate`, and its validity.
+//! `[calibration]`: what `platen calibrate` found about the scanner, and how long that holds.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -6,14 +6,14 @@ use std::time::Duration;
 use crate::document::Reported;
 use crate::{TomlTable, Unit};
 
-/// Calibration file and its validity.
+/// Where the calibration stands and when it holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationUse {
-    /// File that `platen calibrate` writes.
+    /// The file that `platen calibrate` writes.
     pub file: PathBuf,
-    /// Age beyond which the calibration is invalid; `None` for no limit.
+    /// A calibration older than this is not valid any more; `None`: it never ages.
     pub max_age: Option<Duration>,
-    /// Time for which the scanner must have been in reach before it counts as warm.
+    /// The scanner is cold until it has been in reach for this long.
     pub warm_up: Duration,
 }
 
@@ -27,7 +27,7 @@ impl CalibrationUse {
     }
 }
 
-/// Reads a time: a text with its unit, or in `unit` without one.
+/// A time as a text with its unit, or in `unit` where it names none.
 fn time<'d>(table: &mut TomlTable<'d>, key: &str, unit: Unit) -> crate::TomlKey<'d, Duration> {
     table.string(key).try_map(|text| {
         let value = unit.read(&text)?;

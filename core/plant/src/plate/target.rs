@@ -1,4 +1,4 @@
-//! `[target]`: the shape that the plate is bent toward, each shape with its own keys.
+//! The target: the shape that the plate is bent toward, each shape with its own keys.
 
 use std::f64::consts::TAU;
 
@@ -28,19 +28,13 @@ const SHAPES: &[(&str, Word)] = &[
 ];
 
 pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Target, Reported> {
-    let word = table.choice("shape", SHAPES).required();
-    let shape = word.and_then(|word| shape_of(word, &mut table, plate));
-    if let Err(reported) = word {
-        // A target of unknown shape may have the keys of every shape.
-        table.excuse_missing(reported);
-        for (_, word) in SHAPES {
-            let _ = shape_of(*word, &mut table, plate);
-        }
-    }
+    // Without the shape nobody knows which keys belong here: only this one is reported.
+    let word = table.choice("shape", SHAPES).required()?;
+    let shape = shape_of(word, &mut table, plate);
     let mut target =
         Target { shape: TargetShape::Flat, radius_of: RadiusOf::Inside, scanned_face: Facing::Inside };
     let mut faces = Ok(());
-    if !matches!(word, Ok(Word::Flat)) {
+    if !matches!(word, Word::Flat) {
         let radius_of = table.choice(
             "radius_of",
             &[("inside", RadiusOf::Inside), ("outside", RadiusOf::Outside), ("mid", RadiusOf::Mid)],
@@ -54,7 +48,6 @@ pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result
     faces?;
     Ok(Target { shape: shape?, ..target })
 }
-
 fn shape_of(
     word: Word,
     table: &mut TomlTable<'_>,
@@ -85,7 +78,7 @@ fn shape_of(
     }
 }
 
-/// Reads the direction of the straight lines, which has no default.
+/// Direction of the straight lines. Required: no direction is the usual one.
 fn axis(table: &mut TomlTable<'_>) -> Result<f64, Reported> {
     table.number("axis_deg").in_range(-180.0..=180.0).map(f64::to_radians).required()
 }
@@ -94,7 +87,7 @@ fn radius(table: &mut TomlTable<'_>, key: &str, plate: Option<Rectangle>) -> Res
     table.number(key).check(|mm| reaches(*mm, *mm, plate)).map(metres).required()
 }
 
-/// Refuses a radius of zero or less, or one that rolls the plate's shorter side into more than a full turn.
+/// A radius is above zero and does not roll the plate's shorter side into more than a full turn.
 fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), String> {
     if radius_mm <= 0.0 {
         let advice = if found == 0.0 { "" } else { "; scanned_face says which way the plate bends" };
@@ -111,7 +104,7 @@ fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), S
     Ok(())
 }
 
-/// Refuses a cone whose radius changes by more than the length of its straight line.
+/// A cone's radius cannot change by more than the length of its straight line.
 fn slopes(
     document: &Document,
     axis: f64,

@@ -1,8 +1,8 @@
-//! Field of a register map: place, type of its words, scale and unit.
+//! One field of a register map: where it stands, how its words are read, and what its number means.
 
 use crate::Unit;
 
-/// Type of a field's words.
+/// How the words of a field are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegisterType {
     /// One bit of a register.
@@ -25,7 +25,7 @@ pub enum RegisterType {
 }
 
 impl RegisterType {
-    /// Returns the number of registers of one value.
+    /// Registers of one value.
     pub fn registers(self) -> u16 {
         match self {
             Self::Bool | Self::U16 | Self::I16 => 1,
@@ -34,7 +34,7 @@ impl RegisterType {
         }
     }
 
-    /// Returns the name in the plant file.
+    /// The name in the plant file; the length of a text stands beside it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -47,7 +47,7 @@ impl RegisterType {
         }
     }
 
-    /// Returns the smallest and largest raw number; `None` for bits and text.
+    /// Smallest and largest raw number; `None` for bits and text.
     pub fn range(self) -> Option<(f64, f64)> {
         match self {
             Self::Bool | Self::Ascii { .. } => None,
@@ -75,10 +75,10 @@ pub enum WordOrder {
 }
 
 impl WordOrder {
-    /// All orders.
+    /// All four.
     pub const ALL: [Self; 4] = [Self::Abcd, Self::Cdab, Self::Badc, Self::Dcba];
 
-    /// Returns the name in the plant file.
+    /// The name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Abcd => "ABCD",
@@ -87,21 +87,26 @@ impl WordOrder {
             Self::Dcba => "DCBA",
         }
     }
+
+    /// The order of this name, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|order| order.name() == name)
+    }
 }
 
-/// Place of a field.
+/// Where a field stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RegisterPlace {
-    /// Offset of the first register in its block.
+    /// From this register of its block on.
     Register(u16),
-    /// Offset of a register in its block and a bit of it, 0 the lowest.
+    /// One bit (0 the lowest) of this register of its block.
     Bit(u16, u8),
-    /// No register: a fixed number, in the field's unit.
+    /// In no register: the press always means this number, in the field's unit.
     Constant(f64),
 }
 
 impl RegisterPlace {
-    /// Returns the offset of the first register, `None` for a constant.
+    /// First register in the block, `None` for a constant.
     pub fn offset(self) -> Option<u16> {
         match self {
             Self::Register(offset) | Self::Bit(offset, _) => Some(offset),
@@ -110,14 +115,16 @@ impl RegisterPlace {
     }
 }
 
-/// Field of a register map. Its number is `raw * scale` in `unit`.
+/// One field of a register map.
+///
+/// The number a field means is `raw * scale` in `unit`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegisterField {
-    /// Place.
+    /// Where it stands.
     pub place: RegisterPlace,
-    /// Type of its words.
+    /// How its words are read.
     pub kind: RegisterType,
-    /// Number of consecutive values; 1 except for lists.
+    /// Values one after the other; 1 but for lists.
     pub count: u16,
     /// Order of the words of a 32-bit value.
     pub order: WordOrder,
@@ -125,24 +132,24 @@ pub struct RegisterField {
     pub scale: f64,
     /// Unit of the scaled number.
     pub unit: Unit,
-    /// Raw bits that mean "no value".
+    /// Raw value (the bits, whatever the kind) that means "no value".
     pub invalid: Option<u32>,
-    /// Required raw number.
+    /// The only raw number that is right.
     pub expect: Option<i64>,
-    /// Smallest plausible number, in `unit`; below it the value counts as missing.
+    /// Least plausible number, in `unit`; below it the value counts as missing.
     pub min: Option<f64>,
-    /// Largest plausible number, in `unit`; above it the value counts as missing.
+    /// Greatest plausible number, in `unit`; above it the value counts as missing.
     pub max: Option<f64>,
-    /// Inverted bit: 0 means yes.
+    /// A bit that means yes when it is 0.
     pub active_low: bool,
-    /// Number of equal reads before a change of a bit counts.
+    /// Equal reads in a row before a bit's change counts.
     pub debounce_reads: u8,
-    /// Figure in an output field, if not the field's own.
+    /// The figure in an output field, when it is not the field's own.
     pub from: Option<platen_model::Measure>,
 }
 
 impl RegisterField {
-    /// Makes a field at `offset` of its block: scale 1, no unit, no limits.
+    /// A field of one register or more, at `offset` of its block: scale 1, no unit, no limits.
     pub fn register(offset: u16, kind: RegisterType) -> Self {
         Self {
             place: RegisterPlace::Register(offset),
@@ -161,22 +168,22 @@ impl RegisterField {
         }
     }
 
-    /// Makes a field of one bit of the register at `offset`.
+    /// One bit of the register at `offset`.
     pub fn bit(offset: u16, bit: u8) -> Self {
         Self { place: RegisterPlace::Bit(offset, bit), ..Self::register(offset, RegisterType::Bool) }
     }
 
-    /// Returns the field with a scale and a unit.
+    /// The same field with a scale and a unit.
     pub fn scaled(self, scale: f64, unit: Unit) -> Self {
         Self { scale, unit, ..self }
     }
 
-    /// Returns the field with raw bits that mean "no value".
+    /// The same field with a raw value that means "no value".
     pub fn invalid(self, raw: u32) -> Self {
         Self { invalid: Some(raw), ..self }
     }
 
-    /// Returns the number of registers in its block; 0 for a constant.
+    /// Registers it takes in its block; 0 for a constant.
     pub fn registers(&self) -> u16 {
         match self.place {
             RegisterPlace::Constant(_) => 0,

@@ -117,7 +117,7 @@ impl Handshake {
         }
         let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
         let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
-        let failed = job.outcome.as_ref().filter(|_| !job.acquired).and_then(Measurement::reason);
+        let failed = job.outcome.as_ref().filter(|_| !job.acquired).and_then(|outcome| outcome.reason);
         let overdue = now.saturating_sub(job.since) >= self.scan_limit();
         let unstored = job.journaled == Some(false) && self.storage_stops() && !scanning;
         failed
@@ -166,7 +166,7 @@ impl Handshake {
             self.effects.push(Effect::Cancel(key));
         }
         let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
-        let measured = outcome.verdict() != Verdict::NotMeasured;
+        let measured = outcome.verdict != Verdict::NotMeasured;
         self.finish(outcome, Work::Publish, now);
         if measured { Transition::T15 } else { Transition::T16 }
     }
@@ -174,7 +174,7 @@ impl Handshake {
     /// Makes the result final and journals it; it is written once that is done.
     pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
         let Some(job) = &mut self.job else { return };
-        if let Some(code) = measurement.reason() {
+        if let Some(code) = measurement.reason {
             self.effects.push(Effect::Alarm(code));
         } else {
             job.add_times(&mut measurement.figures, now);

@@ -1,4 +1,4 @@
-//! Errors between host and press, and the consequence of each Modbus exception.
+//! What can go wrong between host and press, and what follows from it.
 
 use std::time::Duration;
 
@@ -7,61 +7,61 @@ use platen_plant::press::Refused;
 use super::{Request, TransportError};
 use crate::Code;
 
-/// Reason why a request to the press failed.
+/// Why a request to the press failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// Connecting failed.
+    /// No connection could be built.
     #[error("press {peer}: no connection: {source}; check that it is on, and host and port in [press.link]")]
     Connect {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// Error of the transport.
+        /// Why.
         source: TransportError,
     },
-    /// Connecting took too long.
+    /// No connection could be built in time.
     #[error("press {peer}: no connection in {} ms; check that it is on, and host and port in [press.link]", limit.as_millis())]
     ConnectTimeout {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// Time limit.
+        /// The limit.
         limit: Duration,
     },
-    /// No answer in time. The connection is dropped; a write may have been executed.
+    /// No answer came in time. The connection is dropped; a write may have been done.
     #[error("press {peer}: no answer to {request} in {} ms; check the cable or response_timeout_ms", limit.as_millis())]
     Timeout {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// The request.
+        /// What was asked.
         request: Request,
-        /// Time limit.
+        /// The limit.
         limit: Duration,
     },
-    /// The connection failed and is dropped; a write may have been executed.
+    /// The connection failed. It is dropped; a write may have been done.
     #[error("press {peer}: {request} failed: {source}; connecting again")]
     Broken {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// The request.
+        /// What was asked.
         request: Request,
-        /// Error of the transport.
+        /// Why.
         source: TransportError,
     },
-    /// The answer does not fit the request. The connection is dropped.
+    /// The answer is not one to this request. The connection is dropped.
     #[error("press {peer}: wrong answer to {request}: {answer}; connecting again")]
     Mismatch {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// The request.
+        /// What was asked.
         request: Request,
-        /// The answer.
+        /// What came.
         answer: String,
     },
-    /// The press answered with an exception. The connection persists.
+    /// The press refused. The connection stays.
     #[error("press {peer}: {request} refused with exception {code:02X} ({}); {}", exception_name(*code), exception_remedy(*code))]
     Exception {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// The request.
+        /// What was asked.
         request: Request,
         /// Modbus exception code.
         code: u8,
@@ -70,9 +70,9 @@ pub enum LinkError {
     #[error("press {peer}: writing holding registers {}..={} refused: not in [press.write] allow; nothing was sent",
         refused.start, u32::from(refused.start) + u32::from(refused.count.max(1)) - 1)]
     Refused {
-        /// Address of the press.
+        /// Where.
         peer: String,
-        /// The write.
+        /// What was to be written.
         refused: Refused,
     },
 }
@@ -101,25 +101,25 @@ fn exception_remedy(code: u8) -> &'static str {
     }
 }
 
-/// Consequence of an exception.
+/// What follows from an exception.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Consequence {
-    /// Repeat after a pause; a fault after a number of exceptions in a row.
+    /// Ask again after a pause; after so many in a row it is a fault.
     Retry {
-        /// Exceptions in a row before the fault.
+        /// Refusals in a row that are borne.
         limit: u32,
-        /// Pause before the next request.
+        /// Wait before the next request.
         pause: Duration,
-        /// The fault.
+        /// The fault it becomes.
         fault: Code,
     },
     /// A fault at once.
     Fault(Code),
-    /// The gateway answers, the press behind it does not: off line, with the connection to the gateway kept.
+    /// The gateway answers, the press behind it does not: off line, without dropping the gateway's connection.
     UnitLost,
 }
 
-/// Returns the consequence of a Modbus exception (MODBUS Application Protocol V1.1b3, section 7).
+/// What follows from a Modbus exception (Modbus Application Protocol V1.1b3, section 7).
 pub fn consequence(exception: u8) -> Consequence {
     match exception {
         0x01 => Consequence::Fault(Code::IllegalFunction),

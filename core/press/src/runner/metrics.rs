@@ -1,20 +1,20 @@
-//! Counters and durations of the strokes since the start.
+//! What happened to strokes since the start.
 
 use std::time::Duration;
 
-/// Ring buffer of the latest durations of one kind, for percentiles.
+/// The latest durations of one kind, for percentiles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Durations {
     latest: std::collections::VecDeque<Duration>,
-    /// Number since the start.
+    /// How many there were since the start.
     pub count: u64,
 }
 
 impl Durations {
-    /// Number kept.
+    /// How many are kept.
     pub const KEPT: usize = 1000;
 
-    /// Adds a duration.
+    /// Adds one.
     pub fn add(&mut self, duration: Duration) {
         if self.latest.len() == Self::KEPT {
             self.latest.pop_front();
@@ -23,12 +23,12 @@ impl Durations {
         self.count += 1;
     }
 
-    /// Returns the latest duration.
+    /// The latest one.
     pub fn last(&self) -> Option<Duration> {
         self.latest.back().copied()
     }
 
-    /// Returns the percentile of the latest durations by nearest rank; `None` without any.
+    /// The duration that `percent` of the latest ones do not exceed (nearest rank); `None` when there are none.
     pub fn percentile(&self, percent: f64) -> Option<Duration> {
         let mut sorted: Vec<_> = self.latest.iter().copied().collect();
         sorted.sort_unstable();
@@ -37,12 +37,12 @@ impl Durations {
     }
 }
 
-/// Counters of the strokes since the start.
+/// What happened to strokes since the start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
     /// Strokes accepted, every attempt.
     pub strokes: u64,
-    /// Results published with a measurement.
+    /// Results published, but for those without a measurement.
     pub measured: u64,
     /// Results published without a measurement.
     pub not_measured: u64,
@@ -50,9 +50,9 @@ pub struct Metrics {
     pub missed: u64,
     /// Results that the press did not acknowledge in time.
     pub ack_timeouts: u64,
-    /// Torn reads of the press's block.
+    /// Reads of the press's block while it was being written.
     pub torn_reads: u64,
-    /// Read-backs of the host's own block that found it changed by the press.
+    /// Reads of the host's own block that found it changed by the press.
     pub rewrites: u64,
     /// From the poll that saw the trigger to the echo of busy.
     pub trigger_to_busy: Durations,
@@ -60,13 +60,13 @@ pub struct Metrics {
     pub stroke_to_result: Durations,
     /// From the echo of the result to the poll that saw the press's acknowledge.
     pub result_to_ack: Durations,
-    /// From queueing a record of the journal until it would survive a power cut.
+    /// From asking for a record of the journal until it would survive a power cut.
     pub journal: Durations,
-    /// Records that the journal could not store.
+    /// Records that the journal could not take.
     pub journal_failed: u64,
-    /// Time that the present result has waited for the press; `None` when none waits.
+    /// How long the result in hand has been waiting for the press; `None` when none waits.
     pub result_waits: Option<Duration>,
-    /// Time out of synchronisation with the press, without the present loss.
+    /// Time without being in step with the press, the present loss apart.
     pub link_down: Duration,
 }
 

@@ -120,7 +120,8 @@ impl Journal for Memory {
 pub fn measurement(key: StrokeKey) -> Measurement {
     let figure = f64::from(key.stroke % 30_000) * 1e-5;
     Measurement {
-        judgement: (if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail }).into(),
+        verdict: if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail },
+        reason: None,
         figures: Figures { values: [(Measure::DeviationMax, figure)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,

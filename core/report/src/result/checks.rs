@@ -1,37 +1,37 @@
-//! Dimension checks of the result document, in millimetres and degrees.
+//! Shape checks in the units of the shop.
 
 use serde::{Deserialize, Serialize};
 
 use platen_model::units::mm;
 use platen_shape::{Check, EXPANDED, EdgeCheck, ShapeChecks};
 
-/// Dimension checks, as by tape, square and sight line.
+/// What tape, square and sight line would show.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ShapeChecksRecord {
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeRecord; 4],
-    /// Diagonals from (0,0) to (W,H) and from (W,0) to (0,H), straight.
+    /// Straight from (0,0) to (W,H) and from (W,0) to (0,H).
     pub diagonals_mm: [CheckRecord; 2],
-    /// First diagonal minus the second.
+    /// The first diagonal less the second.
     pub diagonal_difference_mm: CheckRecord,
     /// Inner angles in the plate's surface, corners (0,0), (W,0), (W,H), (0,H).
     pub angles_deg: [CheckRecord; 4],
-    /// Twist along u and along v: turn of the far edge against the near one, clockwise positive.
+    /// Looking along u and along v: how far the far edge is turned clockwise against the near one.
     pub twist_deg: [CheckRecord; 2],
 }
 
-/// Lengths of one edge.
+/// One edge.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct EdgeRecord {
-    /// Arc length along the edge of the scanned face, as by tape.
+    /// A tape along the edge of the scanned face.
     pub face_mm: CheckRecord,
-    /// Arc length on the mid-surface, to be compared with the cut size.
+    /// The same on the mid-surface, to be held against the cut size.
     pub mid_mm: CheckRecord,
-    /// Chord from corner to corner.
+    /// Straight from corner to corner.
     pub chord_mm: CheckRecord,
 }
 
-/// Figure with its expanded uncertainty (95 %), in the unit of its name.
+/// A figure with its expanded uncertainty (95 %), in the unit of its name.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// Value.
@@ -58,7 +58,7 @@ impl ShapeChecksRecord {
         }
     }
 
-    /// Returns name, figure and unit of every check, in a fixed order.
+    /// Every check in words, in a fixed order: name, figure, unit.
     pub fn rows(&self) -> Vec<(String, CheckRecord, &'static str)> {
         let edges = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
         let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];

@@ -1,4 +1,4 @@
-//! Outline to which the plate's (u, v) refer.
+//! The outline that the plate's (u, v) refer to.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,39 +6,39 @@ use platen_shape::Blank;
 
 use platen_model::units::{metres, mm, mm_pair};
 
-/// Edges of the plate in (u, v), and their source.
+/// Where the four edges lie in (u, v), and how that is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutlineRecord {
-    /// Source of the outline.
+    /// How it is known.
     pub from: OutlineSource,
     /// Mean length of the edges along u, corner to corner.
     pub width_mm: f64,
-    /// Mean length of the edges along v.
+    /// Of those along v.
     pub height_mm: f64,
-    /// Diagonal from (0,0) minus the one from (W,0).
+    /// The diagonal from (0,0) less the one from (W,0).
     pub diagonal_difference_mm: f64,
-    /// Bow of the edges v = 0, u = W, v = H, u = 0: distance of the middle from the chord, positive outwards.
+    /// How far the middle of each edge v = 0, u = W, v = H, u = 0 lies outside the straight line between its corners; negative: inside.
     pub bows_mm: [f64; 4],
     /// Corners (0,0), (W,0), (W,H), (0,H) in (u, v).
     pub corners_mm: [[f64; 2]; 4],
-    /// Standard deviation of each corner along the outgoing and along the incoming edge, counter-clockwise.
+    /// One sigma of each corner, along the edge that leaves it counter-clockwise and along the one that arrives.
     pub corner_sigma_mm: [[f64; 2]; 4],
-    /// Standard deviation across each edge.
+    /// One sigma across each edge.
     pub edge_sigma_mm: [f64; 4],
 }
 
-/// Source of an outline.
+/// How an outline is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutlineSource {
-    /// Rectangle of the plate file.
+    /// The rectangle of the plate file.
     Nominal,
-    /// Scan of the blank.
+    /// A scan of the blank.
     Baseline,
 }
 
 impl OutlineRecord {
-    /// Records the outline of a blank, or without one the rectangle as ordered, metres.
+    /// The blank's, or without one the rectangle as ordered, metres.
     pub fn new(blank: Option<&Blank>, [width, height]: [f64; 2]) -> Self {
         let ordered = Blank::rectangle(width, height);
         let from = if blank.is_some() { OutlineSource::Baseline } else { OutlineSource::Nominal };
@@ -56,7 +56,7 @@ impl OutlineRecord {
         }
     }
 
-    /// Returns the blank, if its outline is from a scan, equal to the recorded one to the last bit.
+    /// The blank, when a scan of it told its outline: the same as was written down, to the last bit.
     pub fn blank(&self) -> Option<Blank> {
         let blank = Blank {
             corners: self.corners_mm.map(|corner| corner.map(metres)),
@@ -67,7 +67,7 @@ impl OutlineRecord {
         (self.from == OutlineSource::Baseline).then(|| blank.rounded())
     }
 
-    /// Describes the outline in one line.
+    /// For people, one line.
     pub fn words(&self) -> String {
         match self.from {
             OutlineSource::Nominal => {

@@ -1,5 +1,4 @@
-//! Mixed pixels by second differences of the inverse range: beams that straddle an edge return a range between that of the
-//! plate and that of what lies behind it. Own; Masuda et al. do not treat them.
+//! Mixed pixels: beams that straddle an edge float between the plate and what lies behind it.
 
 use super::range_noise::Noise;
 use super::window::Window;
@@ -8,19 +7,19 @@ use super::window::Window;
 /// difference, and is only lost when none of those that explain it holds.
 const BOUND: f32 = 5.0;
 
-/// Class of a cell by its neighbours.
+/// What the neighbours of a cell say of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Pixel {
-    /// No return, or too few neighbours.
+    /// No return, or too few neighbours to tell.
     #[default]
     Unknown,
     /// Part of a surface along its row and along its column.
     Sound,
-    /// Part of no surface.
+    /// Part of none.
     Mixed,
 }
 
-/// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
+/// Tells the mixed pixels: cells whose range, along the row or along the column, departs by more than the noise allows
 /// from the straight continuation of the two cells on either side and from the middle between its neighbours.
 ///
 /// Straight means in inverse range, so that no limit of the incidence enters.
@@ -46,7 +45,7 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
     pixels
 }
 
-/// Classifies a cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
+/// The cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
 #[inline]
 fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
     let q = [

@@ -1,8 +1,8 @@
-//! Errors of the extraction.
+//! Why a scan yields no plate.
 
 use crate::Vec3;
 
-/// Reason why no plate was found in a scan.
+/// Why no plate was taken from a scan. One sentence: what was found, against what was expected, what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// The header describes no lattice.
@@ -42,7 +42,7 @@ pub enum Refusal {
     },
     /// A face of another size.
     #[error(
-        "the face at ({:.1}, {:.1}, {:.1}) m measures about {:.0} x {:.0} mm, {:.0} x {:.0} mm in the plate file; \
+        "the face at ({:.1}, {:.1}, {:.1}) m measures about {:.0} x {:.0} mm, the plate file says {:.0} x {:.0} mm; \
          check the recipe",
         .at.x, .at.y, .at.z, .found_mm[0], .found_mm[1], .expected_mm[0], .expected_mm[1]
     )]
@@ -61,7 +61,7 @@ pub enum Refusal {
         .first.x, .first.y, .first.z, .second.x, .second.y, .second.z
     )]
     SeveralPlates {
-        /// Number of them.
+        /// How many.
         count: usize,
         /// Middle of one, metres.
         first: Vec3,

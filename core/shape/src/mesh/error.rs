@@ -1,6 +1,6 @@
-//! Errors of a mesh.
+//! What can be wrong with a mesh.
 
-/// Reason why a set of parts is no disk.
+/// Why a set of parts is no disk. Each is a fault of the program that made the parts.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// A length, index or number is outside what the type allows.

@@ -1,4 +1,4 @@
-//! Sample scans as columns. Tests that use them say so and pass when the samples are absent.
+//! Sample scans as columns.
 #![allow(
     dead_code,
     unreachable_pub,
@@ -7,25 +7,12 @@
 )]
 
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use platen_scan::{Column, Direction, ScanHeader, State, wrap_azimuth};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::{Patch, PlateSpec, Vec3};
 use serde_json::Value;
-
-/// Folders of the sample plates by name, none (said once) when they are absent.
-pub fn plate_folders() -> Vec<PathBuf> {
-    let root = std::env::var_os("PLATEN_SAMPLES")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/samples"), PathBuf::from);
-    let Ok(entries) = std::fs::read_dir(root.join("plates")) else {
-        println!("left out: no sample plates in {}", root.display());
-        return Vec::new();
-    };
-    let mut folders: Vec<_> = entries.map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
-    folders.sort();
-    folders
-}
 
 /// A scan in memory and what is known of its plate.
 pub struct Sample {

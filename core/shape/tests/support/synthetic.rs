@@ -139,7 +139,7 @@ impl Plate {
     }
 }
 
-/// A scene and the parameters of its scan.
+/// What is scanned, and how.
 #[derive(Clone)]
 pub struct Scene {
     pub plates: Vec<Plate>,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Part of the dome, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Window {
+pub struct Region {
     /// First azimuth.
     pub azimuth_start: f64,
     /// Towards growing azimuth.
@@ -17,7 +17,7 @@ pub struct Window {
 
 /// What is wanted of a scan, or what will be done.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ScanSettings {
+pub struct Wanted {
     /// Resolution 1/divisor.
     pub divisor: u32,
     /// Thousands of points per second.
@@ -27,7 +27,7 @@ pub struct ScanSettings {
     pub compression: u32,
     /// Part of the dome; everything without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub window: Option<Window>,
+    pub window: Option<Region>,
 }
 
 fn one() -> u32 {
@@ -46,7 +46,7 @@ pub enum Values {
 
 /// ScanBegin without its job: the lattice as it will be sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScanLayout {
+pub struct Begin {
     /// Cells of a column.
     pub rows: u32,
     /// Columns.
@@ -87,7 +87,7 @@ pub struct ScanLayout {
 pub(super) struct ScanBegin {
     pub(super) job: String,
     #[serde(flatten)]
-    pub(super) begin: ScanLayout,
+    pub(super) begin: Begin,
 }
 
 /// ScanEnd.
@@ -128,7 +128,7 @@ pub(super) enum Role {
 pub(super) struct Start {
     pub(super) job: String,
     #[serde(flatten)]
-    pub(super) settings: ScanSettings,
+    pub(super) wanted: Wanted,
 }
 
 #[derive(Debug, Deserialize)]
