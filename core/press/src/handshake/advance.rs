@@ -14,35 +14,39 @@ impl Handshake {
         match (self.link, self.work) {
             (LinkState::Stopped { .. }, _) => None,
             _ if self.stop => Some(self.end()),
-            (LinkState::Boot, _) => self.enter(LinkState::Offline, T1),
-            (LinkState::Offline, _) if self.connected => Some(self.begin_sync(now, T2)),
+            (LinkState::Boot, _) => self.enter(LinkState::Offline, LinkStarted),
+            (LinkState::Offline, _) if self.connected => Some(self.begin_sync(now, Connected)),
             (LinkState::Sync | LinkState::Online, _) if !self.connected => {
-                self.enter(LinkState::Offline, T21)
+                self.enter(LinkState::Offline, LinkLost)
             }
-            (LinkState::Fault(_), _) if self.reset && self.connected => Some(self.begin_sync(now, T23)),
-            (LinkState::Fault(_), _) if self.reset => self.enter(LinkState::Offline, T23),
-            (LinkState::Sync | LinkState::Online, _) if self.fault.is_some() => Some(self.fail(T22)),
+            (LinkState::Fault(_), _) if self.reset && self.connected => {
+                Some(self.begin_sync(now, FaultReset))
+            }
+            (LinkState::Fault(_), _) if self.reset => self.enter(LinkState::Offline, FaultReset),
+            (LinkState::Sync | LinkState::Online, _) if self.fault.is_some() => Some(self.fail(Faulted)),
             (LinkState::Sync | LinkState::Online, _) if self.wrong_press() => Some(self.leave_wrong_press()),
             (LinkState::Sync, _) if self.foreign.is_some_and(|host| host.alive) => {
-                Some(self.fail_as(Code::SecondHost, T4))
+                Some(self.fail_as(Code::SecondHost, SecondHostFound))
             }
             (LinkState::Sync, _) if self.synchronised(now) => Some(self.enter_online(now)),
-            (LinkState::Online, _) if self.intruder => Some(self.fail_as(Code::SecondHost, T22)),
+            (LinkState::Online, _) if self.intruder => Some(self.fail_as(Code::SecondHost, Faulted)),
             (LinkState::Online, _) if self.newly_stale(now) => Some(self.press_stale()),
             (LinkState::Online, work) if work.is_busy() && self.another_stroke() => Some(self.miss()),
 
-            (LinkState::Online, Work::Idle) if self.blocked() => self.turn(Work::Blocked, now, T9),
-            (LinkState::Online, Work::Blocked) if !self.blocked() => self.turn(Work::Idle, now, T10),
+            (LinkState::Online, Work::Idle) if self.blocked() => self.turn(Work::Blocked, now, Blocked),
+            (LinkState::Online, Work::Blocked) if !self.blocked() => self.turn(Work::Idle, now, Unblocked),
             (LinkState::Online, Work::WaitAck | Work::Idle | Work::Blocked) if self.acknowledged() => {
                 Some(self.acked(now))
             }
             (LinkState::Online, Work::WaitAck) if self.ack_overdue(now) => Some(self.go_on_without_ack(now)),
-            (LinkState::Online, Work::Clear) if self.ack_dropped(now) => self.turn(Work::Idle, now, T19),
+            (LinkState::Online, Work::Clear) if self.ack_dropped(now) => {
+                self.turn(Work::Idle, now, AckWithdrawn)
+            }
             (LinkState::Online, Work::Idle | Work::WaitAck) if self.stroke_waits() => {
-                Some(self.accept_stroke(now, T11))
+                Some(self.accept_stroke(now, StrokeAccepted))
             }
             (LinkState::Online, Work::Idle | Work::WaitAck) if self.rescan_wanted() => {
-                Some(self.accept_rescan(now, T27))
+                Some(self.accept_rescan(now, RescanAccepted))
             }
             (LinkState::Online, Work::Publish) if self.written && self.journaled() => {
                 Some(self.published(now))
@@ -52,7 +56,7 @@ impl Handshake {
             (_, Work::Accepted | Work::Scanning) if self.given_up(now).is_some() => Some(self.give_up(now)),
             (_, Work::Scanning) if self.scan_complete() => Some(self.begin_evaluation(now)),
             (_, Work::Evaluating) if self.evaluated(now) => Some(self.conclude(now)),
-            (_, Work::Aborted) if self.journaled() => self.turn(Work::Publish, now, T16),
+            (_, Work::Aborted) if self.journaled() => self.turn(Work::Publish, now, StrokeNotMeasured),
             (_, Work::Accepted | Work::Aborted | Work::Publish) if self.journal_overdue(now) => {
                 self.journal_failed();
                 None

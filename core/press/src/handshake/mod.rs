@@ -118,62 +118,94 @@ impl std::fmt::Display for State {
     }
 }
 
-/// A transition, by its number in the handshake's table.
+/// A transition of the handshake, named after the occurrence. The table is in the README of this crate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[rustfmt::skip]
 pub enum Transition {
-    /// Boot to offline.
-    T1,
-    /// Connected.
-    T2,
-    /// Another press or another map: off line again.
-    T3,
-    /// A second host writes to the press.
-    T4,
-    /// A result from before waits for the press.
-    T5,
-    /// A stroke waits since before the connection.
-    T6,
-    /// A restart interrupted the stroke.
-    T7,
-    /// Nothing waits: ready.
-    T8,
-    /// Not ready any more.
-    T9,
-    /// Ready again.
-    T10,
-    /// A stroke is accepted.
-    T11,
-    /// The press is clear, the scan starts.
-    T12,
-    /// The scan is taken.
-    T13,
-    /// The scan is given up.
-    T14,
-    /// There is a result.
-    T15,
-    /// There is none, and why.
-    T16,
-    /// The result stands in the registers.
-    T17,
-    /// The press has acknowledged.
-    T18,
-    /// The press has taken its acknowledge back.
-    T19,
-    /// The press has not acknowledged in time.
-    T20,
-    /// The connection is gone.
-    T21,
-    /// A fault.
-    T22,
+    /// The handshake has started and waits for a connection.
+    LinkStarted,
+    /// A connection to the press is open; both blocks are read next.
+    Connected,
+    /// The register map version or the press number is wrong; nothing was written.
+    PressRejected,
+    /// Another live host writes to this press; nothing was written.
+    SecondHostFound,
+    /// The active stroke goes on after a reconnection, or its journalled result is published after a restart.
+    StrokeResumed,
+    /// A trigger that was up at the first read is accepted as a stroke.
+    WaitingStrokeAccepted,
+    /// A stroke that a restart interrupted is evaluated again, scanned again or reported as interrupted.
+    InterruptedStrokeRecovered,
+    /// The first read is the baseline of the stroke counter; no stroke is active.
+    Synchronised,
+    /// READY is withdrawn: press not enabled, scanner not ready, stale heartbeat, storage or missed stroke by policy.
+    Blocked,
+    /// The cause of the block is gone.
+    Unblocked,
+    /// A new stroke is accepted.
+    StrokeAccepted,
+    /// The press is clear and the acceptance is journalled; the scanner starts.
+    ScanStarted,
+    /// The acquisition is complete: the plate may move, the evaluation starts.
+    ScanTaken,
+    /// The scan is aborted, failed, not allowed or overdue.
+    ScanGivenUp,
+    /// The evaluation has a verdict.
+    StrokeMeasured,
+    /// The stroke ends without a measurement; the reason is published instead.
+    StrokeNotMeasured,
+    /// All words of the result were echoed by the press.
+    ResultPublished,
+    /// The press has acknowledged the result.
+    ResultAcknowledged,
+    /// The press has lowered its acknowledgement, or the time for it is over.
+    AckWithdrawn,
+    /// The press has not acknowledged in time; the result stays valid.
+    AckTimedOut,
+    /// The connection is lost.
+    LinkLost,
+    /// A fault is latched.
+    Faulted,
     /// The fault is reset.
-    T23,
-    /// Stopped.
-    T24,
-    /// The press's heartbeat stands still.
-    T25,
-    /// A stroke came while another was in hand.
-    T26,
-    /// The press wants a stroke scanned again.
-    T27,
+    FaultReset,
+    /// The host ends.
+    Stopped,
+    /// The heartbeat of the press stands still.
+    HeartbeatLost,
+    /// A stroke came while another was active.
+    StrokeMissed,
+    /// The press requests another scan of its last stroke.
+    RescanAccepted,
+}
+
+impl Transition {
+    /// All transitions, in the order of the table.
+    pub const ALL: [Self; 27] = [
+        Self::LinkStarted,
+        Self::Connected,
+        Self::PressRejected,
+        Self::SecondHostFound,
+        Self::StrokeResumed,
+        Self::WaitingStrokeAccepted,
+        Self::InterruptedStrokeRecovered,
+        Self::Synchronised,
+        Self::Blocked,
+        Self::Unblocked,
+        Self::StrokeAccepted,
+        Self::ScanStarted,
+        Self::ScanTaken,
+        Self::ScanGivenUp,
+        Self::StrokeMeasured,
+        Self::StrokeNotMeasured,
+        Self::ResultPublished,
+        Self::ResultAcknowledged,
+        Self::AckWithdrawn,
+        Self::AckTimedOut,
+        Self::LinkLost,
+        Self::Faulted,
+        Self::FaultReset,
+        Self::Stopped,
+        Self::HeartbeatLost,
+        Self::StrokeMissed,
+        Self::RescanAccepted,
+    ];
 }

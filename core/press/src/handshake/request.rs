@@ -65,7 +65,7 @@ impl Handshake {
             self.counted = Some(here);
             self.count_missed(missed);
         }
-        Transition::T26
+        Transition::StrokeMissed
     }
 
     /// Steps of the stroke counter from where it was last accounted for, and whether it went back; `None` in another

@@ -104,7 +104,7 @@ impl Handshake {
             self.effects.push(Effect::StartScan { key: job.key, run_id: job.run_id, data });
         }
         self.work = Work::Scanning;
-        Transition::T12
+        Transition::ScanStarted
     }
 
     /// Why the scan of the stroke in hand must not go on, or not begin. A stroke whose acceptance is still on its way to
@@ -135,7 +135,7 @@ impl Handshake {
             self.effects.push(Effect::Cancel(key));
         }
         self.finish(Measurement::not_measured(code), Work::Aborted, now);
-        Transition::T14
+        Transition::ScanGivenUp
     }
 
     pub(super) fn scan_complete(&self) -> bool {
@@ -150,7 +150,7 @@ impl Handshake {
             self.effects.push(Effect::Evaluate(job.key));
         }
         self.work = Work::Evaluating;
-        Transition::T13
+        Transition::ScanTaken
     }
 
     pub(super) fn evaluated(&self, now: Duration) -> bool {
@@ -168,7 +168,7 @@ impl Handshake {
         let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
         let measured = outcome.verdict != Verdict::NotMeasured;
         self.finish(outcome, Work::Publish, now);
-        if measured { Transition::T15 } else { Transition::T16 }
+        if measured { Transition::StrokeMeasured } else { Transition::StrokeNotMeasured }
     }
 
     /// Makes the result final and journals it; it is written once that is done.
@@ -200,7 +200,7 @@ impl Handshake {
         if let Some(job) = &mut self.job {
             job.since = now;
         }
-        Transition::T17
+        Transition::ResultPublished
     }
 
     /// An acknowledge that stood before the result did belongs to another one.
@@ -218,7 +218,7 @@ impl Handshake {
         if let Some(job) = &mut self.job {
             job.since = now;
         }
-        Transition::T18
+        Transition::ResultAcknowledged
     }
 
     pub(super) fn ack_overdue(&self, now: Duration) -> bool {
@@ -230,7 +230,7 @@ impl Handshake {
     pub(super) fn go_on_without_ack(&mut self, _now: Duration) -> Transition {
         self.warn(Code::AckTimeout);
         self.work = Work::Idle;
-        Transition::T20
+        Transition::AckTimedOut
     }
 
     pub(super) fn ack_dropped(&self, now: Duration) -> bool {

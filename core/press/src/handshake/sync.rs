@@ -19,7 +19,7 @@ impl Handshake {
             self.effects.push(Effect::Cancel(job.key));
         }
         self.link = LinkState::Stopped { told: self.may_write() && self.connected };
-        Transition::T24
+        Transition::Stopped
     }
 
     pub(super) fn begin_sync(&mut self, now: Duration, transition: Transition) -> Transition {
@@ -65,7 +65,7 @@ impl Handshake {
         self.connected = false;
         self.link = LinkState::Offline;
         self.effects.push(Effect::Reconnect);
-        Transition::T3
+        Transition::PressRejected
     }
 
     pub(super) fn synchronised(&self, now: Duration) -> bool {
@@ -97,18 +97,18 @@ impl Handshake {
                 self.ack_was_low = true;
                 self.job = Some(Job { journaled: Some(true), ..job });
                 self.work = Work::Publish;
-                Transition::T5
+                Transition::StrokeResumed
             }
             Stage::Scanned if waits => {
                 self.effects.push(Effect::Evaluate(job.key));
                 self.job = Some(Job { acquired_at: Some(now), ..job });
                 self.work = Work::Evaluating;
-                Transition::T7
+                Transition::InterruptedStrokeRecovered
             }
             Stage::Accepted if waits && !may_rescan => {
                 self.job = Some(job);
                 self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
-                Transition::T7
+                Transition::InterruptedStrokeRecovered
             }
             _ => {
                 let key = job.key;
@@ -119,7 +119,7 @@ impl Handshake {
                 self.close(key, Acknowledgement::Never);
                 self.job = None;
                 if stage == Stage::Accepted && waits {
-                    return self.accept_rescan(now, Transition::T7);
+                    return self.accept_rescan(now, Transition::InterruptedStrokeRecovered);
                 }
                 self.become_idle(now)
             }
@@ -139,7 +139,7 @@ impl Handshake {
         if self.work == Work::WaitAck {
             self.work = Work::Publish;
         }
-        Transition::T5
+        Transition::StrokeResumed
     }
 
     /// Strokes that went by in the same session meanwhile are counted when the next one comes; a press that has made
@@ -153,9 +153,9 @@ impl Handshake {
         if self.blocked() {
             self.work = Work::Blocked;
         } else if self.stroke_waits() {
-            return self.accept_stroke(now, Transition::T6);
+            return self.accept_stroke(now, Transition::WaitingStrokeAccepted);
         }
-        Transition::T8
+        Transition::Synchronised
     }
 
     /// Ends a stroke that the press does not wait for any more.
@@ -178,6 +178,6 @@ impl Handshake {
     pub(super) fn press_stale(&mut self) -> Transition {
         self.stale = true;
         self.alarm(Code::PressStale);
-        Transition::T25
+        Transition::HeartbeatLost
     }
 }

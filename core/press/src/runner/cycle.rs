@@ -387,16 +387,18 @@ impl<L: Link> Runner<L> {
         let state = self.handshake.state();
         tracing::debug!(?transition, %state, stroke = ?self.handshake.stroke(), "handshake");
         match transition {
-            Transition::T5 | Transition::T7 | Transition::T8 => self.arrived(),
-            Transition::T6 | Transition::T11 | Transition::T27 => {
+            Transition::StrokeResumed | Transition::InterruptedStrokeRecovered | Transition::Synchronised => {
+                self.arrived()
+            }
+            Transition::WaitingStrokeAccepted | Transition::StrokeAccepted | Transition::RescanAccepted => {
                 self.arrived();
                 self.metrics.strokes += 1;
                 self.clock.triggered = self.clock.polled;
                 self.clock.busy_untold = true;
             }
-            Transition::T17 => self.delivered(),
-            Transition::T18 => self.metrics.result_to_ack.add(self.clock.delivered.elapsed()),
-            Transition::T20 => self.metrics.ack_timeouts += 1,
+            Transition::ResultPublished => self.delivered(),
+            Transition::ResultAcknowledged => self.metrics.result_to_ack.add(self.clock.delivered.elapsed()),
+            Transition::AckTimedOut => self.metrics.ack_timeouts += 1,
             _ => {}
         }
     }
