@@ -142,7 +142,7 @@ impl Player {
                 replayed.alarms.push((now, code));
                 None
             }
-            Effect::Took(transition) => {
+            Effect::Transition(transition) => {
                 replayed.transitions.push((now, transition, self.handshake.stroke()));
                 None
             }

@@ -16,7 +16,7 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::RngSeed;
 
 /// The handshake with the world round it: the journal, the scanner, and what they owe it.
-struct Bench {
+struct Harness {
     machine: Handshake,
     now: Duration,
     records: VecDeque<Record>,
@@ -33,7 +33,7 @@ struct Bench {
     alarms: Vec<Code>,
 }
 
-impl Bench {
+impl Harness {
     fn new(config: Config) -> Self {
         Self::after(config, Recalled::empty(7))
     }
@@ -85,7 +85,7 @@ impl Bench {
             }
             Effect::Evaluate(key) => self.judging = Some(key),
             Effect::Cancel(_) => (self.scanning, self.judging) = (None, None),
-            Effect::Took(transition) => {
+            Effect::Transition(transition) => {
                 use Transition::*;
                 match transition {
                     Connected | PressRejected | SecondHostFound | LinkLost | Faulted | FaultReset => {
@@ -314,58 +314,58 @@ fn configs() -> impl Strategy<Value = Config> {
     })
 }
 
-fn perform(bench: &mut Bench, act: Act) {
+fn perform(harness: &mut Harness, act: Act) {
     match act {
         Act::Press(image) => {
-            let session_id = bench.session;
-            bench.step(Event::Press(Box::new(PressImage { session_id, ..*image })));
+            let session_id = harness.session;
+            harness.step(Event::Press(Box::new(PressImage { session_id, ..*image })));
         }
-        Act::Session => bench.session += 1,
+        Act::Session => harness.session += 1,
         Act::Host { owner, heartbeat, mine } => {
-            bench.step(Event::Host { owner: Some(owner), heartbeat: Some(heartbeat), mine });
+            harness.step(Event::Host { owner: Some(owner), heartbeat: Some(heartbeat), mine });
         }
-        Act::Connected => bench.step(Event::Connected),
-        Act::Disconnected => bench.step(Event::Disconnected),
-        Act::Written if bench.machine.may_write() => bench.step(Event::Written),
+        Act::Connected => harness.step(Event::Connected),
+        Act::Disconnected => harness.step(Event::Disconnected),
+        Act::Written if harness.machine.may_write() => harness.step(Event::Written),
         Act::Written => {}
-        Act::Journal(ok) => bench.journal(ok),
-        Act::Acquire => bench.acquire(),
-        Act::Judge => bench.judge(),
+        Act::Journal(ok) => harness.journal(ok),
+        Act::Acquire => harness.acquire(),
+        Act::Judge => harness.judge(),
         Act::Failed(code) => {
-            if let Some(key) = bench.scanning.take().or(bench.judging.take()) {
-                bench.step(Event::Failed(key, code));
+            if let Some(key) = harness.scanning.take().or(harness.judging.take()) {
+                harness.step(Event::Failed(key, code));
             }
         }
-        Act::Stale(key) => bench.step(Event::Measured(key, Box::new(measurement()))),
+        Act::Stale(key) => harness.step(Event::Measured(key, Box::new(measurement()))),
         Act::Scanner(ok) => {
             let ready = if ok { Ok(()) } else { Err(Code::ScannerNotReady) };
-            bench.step(Event::Scanner { ready, estimate: Some(Duration::from_secs(20)) });
+            harness.step(Event::Scanner { ready, estimate: Some(Duration::from_secs(20)) });
         }
-        Act::Fault(code) => bench.step(Event::Fault(code)),
-        Act::Reset => bench.step(Event::Reset),
+        Act::Fault(code) => harness.step(Event::Fault(code)),
+        Act::Reset => harness.step(Event::Reset),
         Act::Pass(ms) => {
-            bench.pass(ms);
-            bench.step(Event::Tick);
+            harness.pass(ms);
+            harness.step(Event::Tick);
         }
     }
 }
 
 /// From wherever it is, a press that behaves brings the handshake back to idle.
-fn comes_to_rest(bench: &mut Bench) {
-    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
+fn comes_to_rest(harness: &mut Harness) {
+    harness.step(Event::Scanner { ready: Ok(()), estimate: None });
     let mut beat = 100;
     for _ in 0..3000 {
         beat += 1;
         if beat % 500 == 0 {
-            bench.step(Event::Reset);
+            harness.step(Event::Reset);
         }
-        bench.calm_cycle(beat);
-        let state = bench.machine.state();
+        harness.calm_cycle(beat);
+        let state = harness.machine.state();
         if beat > 110 && state.link == LinkState::Online && state.work == Work::Idle {
             return;
         }
     }
-    panic!("no way out of {:?}", bench.machine.state());
+    panic!("no way out of {:?}", harness.machine.state());
 }
 
 proptest! {
@@ -375,15 +375,15 @@ proptest! {
     /// known, and a way out of every state.
     #[test]
     fn any_order_of_events(config in configs(), acts in prop::collection::vec(act(), 0..120)) {
-        let mut bench = Bench::new(config);
-        bench.step(Event::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
-        bench.step(Event::Connected);
+        let mut harness = Harness::new(config);
+        harness.step(Event::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
+        harness.step(Event::Connected);
         for act in acts {
-            perform(&mut bench, act);
+            perform(&mut harness, act);
         }
-        comes_to_rest(&mut bench);
-        bench.step(Event::Stop);
-        assert!(matches!(bench.machine.state().link, LinkState::Stopped { told: true }));
+        comes_to_rest(&mut harness);
+        harness.step(Event::Stop);
+        assert!(matches!(harness.machine.state().link, LinkState::Stopped { writable: true }));
     }
 
     /// The same with a restart in the middle: what the journal has is all that is left.
@@ -396,19 +396,19 @@ proptest! {
     ) {
         let mut config = config;
         config.policy.on_interrupted = if rescan { OnInterrupted::Rescan } else { OnInterrupted::Report };
-        let mut bench = Bench::new(config.clone());
-        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-        bench.step(Event::Connected);
+        let mut harness = Harness::new(config.clone());
+        harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+        harness.step(Event::Connected);
         for act in before {
-            perform(&mut bench, act);
+            perform(&mut harness, act);
         }
-        let mut bench = bench.restarted(config);
-        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-        bench.step(Event::Connected);
+        let mut harness = harness.restarted(config);
+        harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+        harness.step(Event::Connected);
         for act in after {
-            perform(&mut bench, act);
+            perform(&mut harness, act);
         }
-        comes_to_rest(&mut bench);
+        comes_to_rest(&mut harness);
     }
 }
 
@@ -420,17 +420,17 @@ fn every_transition_is_taken() {
     for _ in 0..2000 {
         let run = (configs(), prop::collection::vec(act(), 40..120), prop::collection::vec(act(), 0..40));
         let (config, before, after) = run.new_tree(&mut runner).expect("no filter").current();
-        let mut bench = Bench::new(config.clone());
-        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-        bench.step(Event::Connected);
-        before.into_iter().for_each(|act| perform(&mut bench, act));
-        taken.append(&mut bench.taken);
-        let mut bench = bench.restarted(config);
-        bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-        bench.step(Event::Connected);
-        after.into_iter().for_each(|act| perform(&mut bench, act));
-        bench.step(Event::Stop);
-        taken.append(&mut bench.taken);
+        let mut harness = Harness::new(config.clone());
+        harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+        harness.step(Event::Connected);
+        before.into_iter().for_each(|act| perform(&mut harness, act));
+        taken.append(&mut harness.taken);
+        let mut harness = harness.restarted(config);
+        harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+        harness.step(Event::Connected);
+        after.into_iter().for_each(|act| perform(&mut harness, act));
+        harness.step(Event::Stop);
+        taken.append(&mut harness.taken);
     }
     let never: Vec<_> =
         Transition::ALL.into_iter().filter(|transition| !taken.contains(transition)).collect();
@@ -441,63 +441,63 @@ fn every_transition_is_taken() {
 /// acknowledge still stands when the link is back, and belongs to the result before.
 #[test]
 fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
-    let mut bench = Bench::new(config());
-    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-    bench.calm_cycle(1);
+    let mut harness = Harness::new(config());
+    harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+    harness.calm_cycle(1);
     let press =
         |stroke_id, trigger, ack| Event::Press(Box::new(PressImage { stroke_id, trigger, ack, ..calm() }));
-    let finish = |bench: &mut Bench| {
+    let finish = |harness: &mut Harness| {
         for _ in 0..2 {
-            while !bench.records.is_empty() {
-                bench.journal(true);
+            while !harness.records.is_empty() {
+                harness.journal(true);
             }
-            bench.acquire();
-            bench.judge();
+            harness.acquire();
+            harness.judge();
         }
-        bench.step(Event::Written);
+        harness.step(Event::Written);
     };
-    bench.step(press(2, true, false));
-    finish(&mut bench);
-    assert!(bench.machine.image().valid);
-    bench.step(Event::Disconnected);
-    bench.step(Event::Connected);
-    bench.step(press(3, true, true));
-    bench.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
-    finish(&mut bench);
-    assert_eq!((bench.machine.image().ack_stroke_id, bench.machine.image().valid), (3, true));
-    bench.step(press(3, false, true));
-    assert!(bench.machine.image().valid, "the acknowledge of stroke 2 withdrew the result of stroke 3");
-    bench.step(press(3, false, false));
-    bench.step(press(3, false, true));
-    assert!(!bench.machine.image().valid, "its own acknowledge");
+    harness.step(press(2, true, false));
+    finish(&mut harness);
+    assert!(harness.machine.image().valid);
+    harness.step(Event::Disconnected);
+    harness.step(Event::Connected);
+    harness.step(press(3, true, true));
+    harness.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
+    finish(&mut harness);
+    assert_eq!((harness.machine.image().ack_stroke_id, harness.machine.image().valid), (3, true));
+    harness.step(press(3, false, true));
+    assert!(harness.machine.image().valid, "the acknowledge of stroke 2 withdrew the result of stroke 3");
+    harness.step(press(3, false, false));
+    harness.step(press(3, false, true));
+    assert!(!harness.machine.image().valid, "its own acknowledge");
 }
 
 /// The host comes back before its scanner does: what the press reads under the stroke's number is why that stroke was
 /// not measured; that the scanner is not ready keeps READY low, and is said once the result is taken.
 #[test]
 fn an_interrupted_stroke_says_so_while_the_scanner_is_not_ready() {
-    let mut bench = Bench::new(config());
-    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-    bench.calm_cycle(1);
+    let mut harness = Harness::new(config());
+    harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+    harness.calm_cycle(1);
     let press = |trigger, ack| Event::Press(Box::new(PressImage { stroke_id: 2, trigger, ack, ..calm() }));
-    bench.step(press(true, false));
-    bench.journal(true);
-    assert!(bench.machine.image().busy);
-    let mut bench = bench.restarted(config());
-    bench.step(Event::Connected);
-    bench.step(press(true, false));
-    bench.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
-    while !bench.records.is_empty() {
-        bench.journal(true);
+    harness.step(press(true, false));
+    harness.journal(true);
+    assert!(harness.machine.image().busy);
+    let mut harness = harness.restarted(config());
+    harness.step(Event::Connected);
+    harness.step(press(true, false));
+    harness.step(Event::Host { owner: Some(7), heartbeat: Some(1), mine: true });
+    while !harness.records.is_empty() {
+        harness.journal(true);
     }
-    bench.step(Event::Written);
-    let image = bench.machine.image();
+    harness.step(Event::Written);
+    let image = harness.machine.image();
     assert_eq!((image.valid, image.ready, image.error), (true, false, Some(Code::Interrupted)));
     for ack in [true, false] {
-        bench.step(press(false, ack));
+        harness.step(press(false, ack));
     }
-    let image = bench.machine.image();
+    let image = harness.machine.image();
     assert_eq!((image.valid, image.ready, image.error), (false, false, Some(Code::ScannerNotReady)));
-    bench.step(Event::Scanner { ready: Ok(()), estimate: None });
-    assert!(bench.machine.image().ready);
+    harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+    assert!(harness.machine.image().ready);
 }

@@ -2,17 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-mod bench;
+mod simulated_plc;
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use bench::plc::{H, P};
-use bench::{Memory, Plc, SharedPlc};
 use platen_model::StrokeKey;
 use platen_plant::press::{Link, Press, Role};
 use platen_press::{Answer, PressLink, channels, run_press};
+use simulated_plc::plc::{H, P};
+use simulated_plc::{Memory, Plc, SharedPlc};
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::*;
 
@@ -47,14 +47,20 @@ async fn thirty_strokes_of_a_press_that_asks() {
     let (host, side) = channels();
     let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
     let ms = Duration::from_millis;
-    let scanner =
-        bench::host(host.orders, host.answers.clone(), ms(20), ms(5), Arc::clone(&scans), Arc::default());
+    let scanner = simulated_plc::host(
+        host.orders,
+        host.answers.clone(),
+        ms(20),
+        ms(5),
+        Arc::clone(&scans),
+        Arc::default(),
+    );
     tokio::spawn(scanner);
     let run = tokio::spawn(run_press(press, link, Memory::new(7), side));
-    tokio::spawn(bench::run_plc(plc.clone()));
+    tokio::spawn(simulated_plc::run_plc(plc.clone()));
     tokio::spawn(exchange(plc.clone(), host_at));
     plc.lock().unwrap().to_do = 30;
-    bench::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
+    simulated_plc::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
 
     // What is not its own the press may not write, and other functions and units it may not use.
     let mut stranger = ask(host_at).await;

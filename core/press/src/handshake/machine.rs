@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use platen_plant::press::{Counter, Input, Mode, Policy, Press, Timeouts};
 
-use super::edges::EdgeCounter;
+use super::trigger_edges::EdgeCounter;
 use super::{LinkState, State, Transition, Work};
 use crate::{
     Code, Entry, HostImage, Measurement, PressImage, Publication, Recalled, Record, Stage, StrokeData,
@@ -128,12 +128,12 @@ pub enum Effect {
     /// Tell people, once per cause.
     Alarm(Code),
     /// A transition was taken, for log and tests.
-    Took(Transition),
+    Transition(Transition),
 }
 
 /// The stroke in hand.
 #[derive(Debug, Clone)]
-pub(super) struct Job {
+pub(super) struct ActiveStroke {
     pub(super) key: StrokeKey,
     pub(super) run_id: u32,
     pub(super) data: StrokeData,
@@ -151,7 +151,7 @@ pub(super) struct Job {
     pub(super) publication: Option<Publication>,
 }
 
-impl Job {
+impl ActiveStroke {
     pub(super) fn new(key: StrokeKey, run_id: u32, data: StrokeData, now: Duration) -> Self {
         Self {
             key,
@@ -170,14 +170,14 @@ impl Job {
 
     fn from_entry(entry: &Entry) -> Self {
         let publication = entry.publication.clone();
-        let job = Self::new(entry.key, entry.run_id, entry.data.clone(), Duration::ZERO);
-        Self { publication, ..job }
+        let active = Self::new(entry.key, entry.run_id, entry.data.clone(), Duration::ZERO);
+        Self { publication, ..active }
     }
 }
 
 /// Another host's block, seen before the first write.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Foreign {
+pub(super) struct OtherHost {
     pub(super) heartbeat: Option<u16>,
     pub(super) since: Duration,
     pub(super) alive: bool,
@@ -189,7 +189,7 @@ pub struct Handshake {
     pub(super) config: Config,
     pub(super) link: LinkState,
     pub(super) work: Work,
-    pub(super) job: Option<Job>,
+    pub(super) active: Option<ActiveStroke>,
 
     /// The last stroke accepted, and the press's count of rescan requests then.
     pub(super) last: Option<StrokeKey>,
@@ -211,8 +211,8 @@ pub struct Handshake {
     pub(super) heartbeat_at: Duration,
     pub(super) stale: bool,
     pub(super) host_seen: bool,
-    pub(super) foreign: Option<Foreign>,
-    pub(super) intruder: bool,
+    pub(super) other_host: Option<OtherHost>,
+    pub(super) overwritten: bool,
     pub(super) written: bool,
     pub(super) scanner: Result<(), Code>,
     pub(super) scan_estimate: Option<Duration>,
@@ -221,7 +221,7 @@ pub struct Handshake {
     pub(super) reset: bool,
     pub(super) stop: bool,
     pub(super) rescan_rose: bool,
-    pub(super) edges: Option<EdgeCounter>,
+    pub(super) trigger_edges: Option<EdgeCounter>,
 
     // Latched until reset.
     pub(super) missed_count: u16,
@@ -242,12 +242,13 @@ pub struct Handshake {
 impl Handshake {
     /// A handshake that goes on where the journal ends.
     pub fn new(config: Config, recalled: Recalled) -> Self {
-        let edges = config.counter.is_none().then(|| EdgeCounter::new(config.debounce_reads, &recalled));
+        let trigger_edges =
+            config.counter.is_none().then(|| EdgeCounter::new(config.debounce_reads, &recalled));
         let last = recalled.last.as_ref().map(|entry| entry.key);
         Self {
             link: LinkState::Boot,
             work: Work::Idle,
-            job: None,
+            active: None,
             last,
             asked: last.map_or(0, |key| key.attempt),
             counted: last.map(|key| (key.session, key.stroke)),
@@ -262,8 +263,8 @@ impl Handshake {
             heartbeat_at: Duration::ZERO,
             stale: false,
             host_seen: false,
-            foreign: None,
-            intruder: false,
+            other_host: None,
+            overwritten: false,
             written: false,
             scanner: Err(Code::ScannerNotReady),
             scan_estimate: None,
@@ -272,7 +273,7 @@ impl Handshake {
             reset: false,
             stop: false,
             rescan_rose: false,
-            edges,
+            trigger_edges,
             missed_count: 0,
             missed_total: 0,
             missed: false,
@@ -294,7 +295,7 @@ impl Handshake {
     pub fn step(&mut self, event: Event, now: Duration) -> Vec<Effect> {
         self.note(event, now);
         while let Some(transition) = self.advance(now) {
-            self.effects.push(Effect::Took(transition));
+            self.effects.push(Effect::Transition(transition));
         }
         self.reset = false;
         self.rescan_rose = false;
@@ -317,11 +318,12 @@ impl Handshake {
     /// to have no other host.
     pub fn may_write(&self) -> bool {
         match self.link {
-            LinkState::Online | LinkState::Stopped { told: true } => true,
+            LinkState::Online | LinkState::Stopped { writable: true } => true,
             LinkState::Fault(code) => matches!(code, Code::DeviceFailure | Code::DeviceBusy),
-            LinkState::Boot | LinkState::Offline | LinkState::Sync | LinkState::Stopped { told: false } => {
-                false
-            }
+            LinkState::Boot
+            | LinkState::Offline
+            | LinkState::Sync
+            | LinkState::Stopped { writable: false } => false,
         }
     }
 
@@ -335,7 +337,7 @@ impl Handshake {
 
     /// The stroke in hand.
     pub fn stroke(&self) -> Option<StrokeKey> {
-        self.job.as_ref().map(|job| job.key)
+        self.active.as_ref().map(|active| active.key)
     }
 
     /// Strokes missed since the start, whatever was reset.
@@ -364,18 +366,18 @@ impl Handshake {
                 self.scan_estimate = estimate;
             }
             Event::Acquired(key) => {
-                if let Some(job) = self.job_of(key) {
-                    job.acquired = true;
+                if let Some(active) = self.active_mut(key) {
+                    active.acquired = true;
                 }
             }
             Event::Measured(key, measurement) => {
-                if let Some(job) = self.job_of(key) {
-                    job.outcome.get_or_insert(*measurement);
+                if let Some(active) = self.active_mut(key) {
+                    active.outcome.get_or_insert(*measurement);
                 }
             }
             Event::Failed(key, code) => {
-                if let Some(job) = self.job_of(key) {
-                    job.outcome.get_or_insert(Measurement::not_measured(code));
+                if let Some(active) = self.active_mut(key) {
+                    active.outcome.get_or_insert(Measurement::not_measured(code));
                 }
             }
             Event::Fault(code) => self.fault = Some(code),
@@ -386,8 +388,8 @@ impl Handshake {
     }
 
     /// The stroke in hand if it is this one; an answer about another one comes too late.
-    fn job_of(&mut self, key: StrokeKey) -> Option<&mut Job> {
-        self.job.as_mut().filter(|job| job.key == key)
+    fn active_mut(&mut self, key: StrokeKey) -> Option<&mut ActiveStroke> {
+        self.active.as_mut().filter(|active| active.key == key)
     }
 
     fn note_journaled(&mut self, key: StrokeKey, stage: Stage, ok: bool) {
@@ -401,13 +403,13 @@ impl Handshake {
             Work::Aborted | Work::Publish => Some(Stage::Finished),
             _ => None,
         };
-        if let Some(job) = self.job_of(key).filter(|_| awaited == Some(stage)) {
-            job.journaled = Some(ok);
+        if let Some(active) = self.active_mut(key).filter(|_| awaited == Some(stage)) {
+            active.journaled = Some(ok);
         }
     }
 
     fn note_press(&mut self, mut image: PressImage, now: Duration) {
-        if let Some(edges) = &mut self.edges {
+        if let Some(edges) = &mut self.trigger_edges {
             edges.number(&mut image);
         }
         let before = self.press.as_ref();
@@ -439,11 +441,13 @@ impl Handshake {
 
     fn note_host(&mut self, owner: Option<u16>, heartbeat: Option<u16>, mine: bool, now: Duration) {
         self.host_seen = true;
-        self.intruder = !mine;
+        self.overwritten = !mine;
         let theirs = owner.is_some_and(|owner| owner != 0 && owner != self.owner);
-        self.foreign = theirs.then(|| match self.foreign {
-            Some(foreign) => Foreign { alive: foreign.alive || heartbeat != foreign.heartbeat, ..foreign },
-            None => Foreign { heartbeat, since: now, alive: false },
+        self.other_host = theirs.then(|| match self.other_host {
+            Some(other_host) => {
+                OtherHost { alive: other_host.alive || heartbeat != other_host.heartbeat, ..other_host }
+            }
+            None => OtherHost { heartbeat, since: now, alive: false },
         });
     }
 
@@ -472,9 +476,9 @@ impl Handshake {
         self.alarm(code);
     }
 
-    pub(super) fn take_recalled(&mut self, now: Duration) -> Option<(Stage, Job)> {
+    pub(super) fn take_recalled(&mut self, now: Duration) -> Option<(Stage, ActiveStroke)> {
         let entry = self.recalled.take()?;
-        let job = Job { since: now, accepted_at: now, ..Job::from_entry(&entry) };
-        Some((entry.stage, job))
+        let active = ActiveStroke { since: now, accepted_at: now, ..ActiveStroke::from_entry(&entry) };
+        Some((entry.stage, active))
     }
 }

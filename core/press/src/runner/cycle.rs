@@ -370,7 +370,7 @@ impl<L: Link> Runner<L> {
                 self.last_press = None;
                 self.back_off();
             }
-            Effect::Took(transition) => self.took(transition),
+            Effect::Transition(transition) => self.took(transition),
         }
     }
 

@@ -52,13 +52,13 @@ impl Handshake {
 
     pub(super) fn another_stroke(&self) -> bool {
         let here = |press: &PressImage| (press.session_id, press.stroke_id);
-        let job = self.stroke().map(|key| (key.session, key.stroke));
+        let active = self.stroke().map(|key| (key.session, key.stroke));
         self.settled_trigger()
-            .is_some_and(|press| Some(here(press)) != job && Some(here(press)) != self.counted)
+            .is_some_and(|press| Some(here(press)) != active && Some(here(press)) != self.counted)
     }
 
     /// A stroke came while another was in hand: the plate has moved, it is not queued.
-    pub(super) fn miss(&mut self) -> Transition {
+    pub(super) fn record_missed(&mut self) -> Transition {
         if let Some(press) = &self.press {
             let here = (press.session_id, press.stroke_id);
             let missed = self.steps_to(here).map_or(1, |(steps, back)| if back { 1 } else { steps });

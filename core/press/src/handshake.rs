@@ -5,16 +5,16 @@
 //!
 //! Two things go on at once and are two regions of one state: the link to the press ([`LinkState`]) and the stroke in hand
 //! ([`Work`]). A cut link does not stop a scan; its result waits until the press is back. An event only changes what
-//! the machine has seen; then transitions are taken, one `match` ([`advance`]), until none is due. What the registers
-//! shall say follows from the state ([`image`]) and is never edited by hand.
+//! the machine has seen; then transitions are taken, one `match` ([`transitions`]), until none is due. What the registers
+//! shall say follows from the state ([`register_image`]) and is never edited by hand.
 
-mod advance;
-mod edges;
-mod image;
+mod acceptance;
+mod link_region;
 mod machine;
-mod request;
-mod stroke;
-mod sync;
+mod register_image;
+mod transitions;
+mod trigger_edges;
+mod work_region;
 
 pub use machine::{Config, Effect, Event, Handshake};
 
@@ -35,7 +35,7 @@ pub enum LinkState {
     /// The end; `told` says whether the safe registers may still be written.
     Stopped {
         /// The press was in step at the end.
-        told: bool,
+        writable: bool,
     },
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_plant::press::{Input, OnInterrupted};
 
-use super::machine::{Effect, Handshake, Job};
+use super::machine::{ActiveStroke, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 
@@ -12,13 +12,13 @@ use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 const OWNER_WATCH: Duration = Duration::from_secs(2);
 
 impl Handshake {
-    pub(super) fn end(&mut self) -> Transition {
+    pub(super) fn stop_host(&mut self) -> Transition {
         if matches!(self.work, Work::Accepted | Work::Scanning | Work::Evaluating)
-            && let Some(job) = &self.job
+            && let Some(active) = &self.active
         {
-            self.effects.push(Effect::Cancel(job.key));
+            self.effects.push(Effect::Cancel(active.key));
         }
-        self.link = LinkState::Stopped { told: self.may_write() && self.connected };
+        self.link = LinkState::Stopped { writable: self.may_write() && self.connected };
         Transition::Stopped
     }
 
@@ -30,8 +30,8 @@ impl Handshake {
         self.heartbeat_at = now;
         self.stale = false;
         self.host_seen = false;
-        self.foreign = None;
-        self.intruder = false;
+        self.other_host = None;
+        self.overwritten = false;
         transition
     }
 
@@ -69,7 +69,7 @@ impl Handshake {
     }
 
     pub(super) fn synchronised(&self, now: Duration) -> bool {
-        let alone = self.foreign.is_none_or(|host| now.saturating_sub(host.since) >= OWNER_WATCH);
+        let alone = self.other_host.is_none_or(|host| now.saturating_sub(host.since) >= OWNER_WATCH);
         self.press.is_some() && self.host_seen && alone
     }
 
@@ -77,9 +77,9 @@ impl Handshake {
     pub(super) fn enter_online(&mut self, now: Duration) -> Transition {
         self.link = LinkState::Online;
         self.link_error = None;
-        self.intruder = false;
-        if let Some((stage, job)) = self.take_recalled(now) {
-            self.resume(stage, job, now)
+        self.overwritten = false;
+        if let Some((stage, active)) = self.take_recalled(now) {
+            self.resume(stage, active, now)
         } else if self.work.is_busy() || self.work == Work::WaitAck {
             self.carry_on(now)
         } else {
@@ -88,36 +88,36 @@ impl Handshake {
     }
 
     /// A stroke of the time before the restart.
-    pub(super) fn resume(&mut self, stage: Stage, job: Job, now: Duration) -> Transition {
-        let waits = self.press_is_at(job.key);
+    pub(super) fn resume(&mut self, stage: Stage, active: ActiveStroke, now: Duration) -> Transition {
+        let waits = self.press_is_at(active.key);
         let may_rescan = self.config.policy.on_interrupted == OnInterrupted::Rescan
             && self.press.as_ref().is_some_and(|press| press.trigger && press.clear_to_scan);
         match stage {
             Stage::Finished if waits => {
                 self.ack_was_low = true;
-                self.job = Some(Job { journaled: Some(true), ..job });
+                self.active = Some(ActiveStroke { journaled: Some(true), ..active });
                 self.work = Work::Publish;
                 Transition::StrokeResumed
             }
             Stage::Scanned if waits => {
-                self.effects.push(Effect::Evaluate(job.key));
-                self.job = Some(Job { acquired_at: Some(now), ..job });
+                self.effects.push(Effect::Evaluate(active.key));
+                self.active = Some(ActiveStroke { acquired_at: Some(now), ..active });
                 self.work = Work::Evaluating;
                 Transition::InterruptedStrokeRecovered
             }
             Stage::Accepted if waits && !may_rescan => {
-                self.job = Some(job);
+                self.active = Some(active);
                 self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
                 Transition::InterruptedStrokeRecovered
             }
             _ => {
-                let key = job.key;
-                self.job = Some(job);
+                let key = active.key;
+                self.active = Some(active);
                 if stage < Stage::Finished {
                     self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
                 }
                 self.close(key, Acknowledgement::Never);
-                self.job = None;
+                self.active = None;
                 if stage == Stage::Accepted && waits {
                     return self.accept_rescan(now, Transition::InterruptedStrokeRecovered);
                 }

@@ -4,9 +4,9 @@
     dead_code,
     unused_imports,
     unreachable_pub,
-    reason = "each test program uses its own part of the bench"
+    reason = "each test program uses its own part of the simulation"
 )]
-#![allow(clippy::unwrap_used, reason = "a bench that cannot go on shall fail its test")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot continue must fail")]
 
 pub mod memory;
 pub mod plc;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_plant::press::OnStorageFull;
 
-use super::machine::{Effect, Handshake, Job};
+use super::machine::{ActiveStroke, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
 
@@ -56,7 +56,7 @@ impl Handshake {
         self.counted = Some((key.session, key.stroke));
         let data = Box::new(press.data.clone());
         self.effects.push(Effect::Journal(Record::Accepted { key, run_id: self.run_id, data }));
-        self.job = Some(Job::new(key, self.run_id, press.data, now));
+        self.active = Some(ActiveStroke::new(key, self.run_id, press.data, now));
         self.work = Work::Accepted;
     }
 
@@ -69,25 +69,25 @@ impl Handshake {
     }
 
     pub(super) fn journaled(&self) -> bool {
-        self.job.as_ref().is_some_and(|job| job.journaled.is_some())
+        self.active.as_ref().is_some_and(|active| active.journaled.is_some())
     }
 
     pub(super) fn journal_overdue(&self, now: Duration) -> bool {
-        self.job
-            .as_ref()
-            .is_some_and(|job| job.journaled.is_none() && now.saturating_sub(job.since) >= JOURNAL_LIMIT)
+        self.active.as_ref().is_some_and(|active| {
+            active.journaled.is_none() && now.saturating_sub(active.since) >= JOURNAL_LIMIT
+        })
     }
 
     pub(super) fn journal_failed(&mut self) {
-        if let Some(job) = &mut self.job {
-            job.journaled = Some(false);
+        if let Some(active) = &mut self.active {
+            active.journaled = Some(false);
         }
         self.storage_failed();
     }
 
     /// The press is clear, and the acceptance is on the disk, or the plant goes on without a journal.
     pub(super) fn clear_to_start(&self) -> bool {
-        let stored = self.job.as_ref().and_then(|job| job.journaled);
+        let stored = self.active.as_ref().and_then(|active| active.journaled);
         let may = stored == Some(true) || stored.is_some() && !self.storage_stops();
         may && self.press.as_ref().is_some_and(|press| press.clear_to_scan && press.enable && !press.abort)
     }
@@ -97,11 +97,11 @@ impl Handshake {
     }
 
     pub(super) fn start_scan(&mut self, now: Duration) -> Transition {
-        if let Some(job) = &mut self.job {
-            job.scan_started_at = Some(now);
-            job.since = now;
-            let data = Box::new(job.data.clone());
-            self.effects.push(Effect::StartScan { key: job.key, run_id: job.run_id, data });
+        if let Some(active) = &mut self.active {
+            active.scan_started_at = Some(now);
+            active.since = now;
+            let data = Box::new(active.data.clone());
+            self.effects.push(Effect::StartScan { key: active.key, run_id: active.run_id, data });
         }
         self.work = Work::Scanning;
         Transition::ScanStarted
@@ -110,20 +110,21 @@ impl Handshake {
     /// Why the scan of the stroke in hand must not go on, or not begin. A stroke whose acceptance is still on its way to
     /// the disk is not given up: it would be echoed.
     pub(super) fn given_up(&self, now: Duration) -> Option<Code> {
-        let job = self.job.as_ref()?;
+        let active = self.active.as_ref()?;
         let scanning = self.work == Work::Scanning;
-        if !scanning && job.journaled.is_none() {
+        if !scanning && active.journaled.is_none() {
             return None;
         }
         let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
         let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
-        let failed = job.outcome.as_ref().filter(|_| !job.acquired).and_then(|outcome| outcome.reason);
-        let overdue = now.saturating_sub(job.since) >= self.scan_limit();
-        let unstored = job.journaled == Some(false) && self.storage_stops() && !scanning;
+        let failed = active.outcome.as_ref().filter(|_| !active.acquired).and_then(|outcome| outcome.reason);
+        let overdue = now.saturating_sub(active.since) >= self.scan_limit();
+        let unstored = active.journaled == Some(false) && self.storage_stops() && !scanning;
         failed
             .or(asks(|press| press.abort).then_some(Code::ScanAborted))
             .or(asks(|press| !press.enable).then_some(Code::PressDisabled))
-            .or((scanning && !job.acquired && asks(|press| !press.clear_to_scan)).then_some(Code::NotClear))
+            .or((scanning && !active.acquired && asks(|press| !press.clear_to_scan))
+                .then_some(Code::NotClear))
             .or((overdue && scanning).then_some(Code::ScanTimeout))
             .or((overdue && !scanning).then_some(Code::NotClear))
             .or(unstored.then_some(Code::StorageFailed))
@@ -139,15 +140,15 @@ impl Handshake {
     }
 
     pub(super) fn scan_complete(&self) -> bool {
-        self.job.as_ref().is_some_and(|job| job.acquired || job.outcome.is_some())
+        self.active.as_ref().is_some_and(|active| active.acquired || active.outcome.is_some())
     }
 
     pub(super) fn begin_evaluation(&mut self, now: Duration) -> Transition {
-        if let Some(job) = &mut self.job {
-            job.acquired_at = Some(now);
-            job.since = now;
-            self.effects.push(Effect::Journal(Record::Scanned { key: job.key }));
-            self.effects.push(Effect::Evaluate(job.key));
+        if let Some(active) = &mut self.active {
+            active.acquired_at = Some(now);
+            active.since = now;
+            self.effects.push(Effect::Journal(Record::Scanned { key: active.key }));
+            self.effects.push(Effect::Evaluate(active.key));
         }
         self.work = Work::Evaluating;
         Transition::ScanTaken
@@ -155,11 +156,13 @@ impl Handshake {
 
     pub(super) fn evaluated(&self, now: Duration) -> bool {
         let limit = self.config.timeouts.evaluate;
-        self.job.as_ref().is_some_and(|job| job.outcome.is_some() || now.saturating_sub(job.since) >= limit)
+        self.active
+            .as_ref()
+            .is_some_and(|active| active.outcome.is_some() || now.saturating_sub(active.since) >= limit)
     }
 
     pub(super) fn conclude(&mut self, now: Duration) -> Transition {
-        let outcome = self.job.as_mut().and_then(|job| job.outcome.take());
+        let outcome = self.active.as_mut().and_then(|active| active.outcome.take());
         if outcome.is_none()
             && let Some(key) = self.stroke()
         {
@@ -173,32 +176,32 @@ impl Handshake {
 
     /// Makes the result final and journals it; it is written once that is done.
     pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
-        let Some(job) = &mut self.job else { return };
+        let Some(active) = &mut self.active else { return };
         if let Some(code) = measurement.reason {
             self.effects.push(Effect::Alarm(code));
         } else {
-            job.add_times(&mut measurement.figures, now);
+            active.add_times(&mut measurement.figures, now);
         }
         self.result_seq = self.result_seq.checked_add(1).unwrap_or(1);
         let publication = Publication {
-            key: job.key,
-            run_id: job.run_id,
+            key: active.key,
+            run_id: active.run_id,
             seq: self.result_seq,
-            recipe_id: job.data.recipe_id,
+            recipe_id: active.data.recipe_id,
             measurement,
         };
         self.effects.push(Effect::Journal(Record::Finished(Box::new(publication.clone()))));
-        job.publication = Some(publication);
-        job.journaled = None;
-        job.since = now;
+        active.publication = Some(publication);
+        active.journaled = None;
+        active.since = now;
         self.work = next;
     }
 
     pub(super) fn published(&mut self, now: Duration) -> Transition {
         self.unacked = self.stroke();
         self.work = Work::WaitAck;
-        if let Some(job) = &mut self.job {
-            job.since = now;
+        if let Some(active) = &mut self.active {
+            active.since = now;
         }
         Transition::ResultPublished
     }
@@ -215,14 +218,14 @@ impl Handshake {
         }
         self.ack_was_low = false;
         self.work = Work::Clear;
-        if let Some(job) = &mut self.job {
-            job.since = now;
+        if let Some(active) = &mut self.active {
+            active.since = now;
         }
         Transition::ResultAcknowledged
     }
 
     pub(super) fn ack_overdue(&self, now: Duration) -> bool {
-        let waited = self.job.as_ref().map_or(Duration::MAX, |job| now.saturating_sub(job.since));
+        let waited = self.active.as_ref().map_or(Duration::MAX, |active| now.saturating_sub(active.since));
         if self.held() { self.reset } else { waited >= self.config.timeouts.ack }
     }
 
@@ -234,7 +237,7 @@ impl Handshake {
     }
 
     pub(super) fn ack_dropped(&self, now: Duration) -> bool {
-        let waited = self.job.as_ref().map_or(Duration::MAX, |job| now.saturating_sub(job.since));
+        let waited = self.active.as_ref().map_or(Duration::MAX, |active| now.saturating_sub(active.since));
         let ack = self.press.as_ref().is_some_and(|press| press.ack);
         !ack || waited >= self.config.timeouts.clear
     }

@@ -5,8 +5,8 @@ use std::time::Duration;
 use platen_model::Measure;
 use platen_plant::press::OnMissed;
 
-use super::edges::EdgeCounter;
-use super::machine::{Handshake, Job};
+use super::machine::{ActiveStroke, Handshake};
+use super::trigger_edges::EdgeCounter;
 use super::{LinkState, Work};
 use crate::{Code, Figures, HostImage, Publication, Severity};
 
@@ -17,7 +17,7 @@ impl Work {
     }
 }
 
-impl Job {
+impl ActiveStroke {
     /// Adds the times that the machine itself knows, where the host has not given better ones.
     pub(super) fn add_times(&self, figures: &mut Figures, now: Duration) {
         let mut add = |measure, from: Option<Duration>, to: Option<Duration>| {
@@ -73,7 +73,7 @@ impl Handshake {
             ready: online && !busy && !self.blocked() && !self.held() && self.sees_the_next_stroke(),
             busy: busy && !stopped,
             valid,
-            scan_done: self.job.as_ref().is_some_and(|job| job.acquired_at.is_some()) && !stopped,
+            scan_done: self.active.as_ref().is_some_and(|active| active.acquired_at.is_some()) && !stopped,
             missed: self.missed && !stopped,
             missed_count: self.missed_count,
             simulated: self.config.simulated && !stopped,
@@ -94,13 +94,13 @@ impl Handshake {
     /// Without a stroke counter READY waits until the trigger has settled low: a press that raises it at once again,
     /// between two readings, would bend a plate that nobody measures.
     fn sees_the_next_stroke(&self) -> bool {
-        self.edges.as_ref().is_none_or(EdgeCounter::armed)
+        self.trigger_edges.as_ref().is_none_or(EdgeCounter::armed)
     }
 
     /// The result that may stand in the registers: the last one, once it is journalled.
     fn result(&self) -> Option<&Publication> {
         let pending = self.work == Work::Aborted || self.work == Work::Publish && !self.journaled();
-        self.job.as_ref().filter(|_| !pending)?.publication.as_ref()
+        self.active.as_ref().filter(|_| !pending)?.publication.as_ref()
     }
 
     /// The most urgent error: a fault; as long as its result is `valid`, why the stroke was not measured, so that no
