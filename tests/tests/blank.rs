@@ -124,7 +124,7 @@ fn a_baseline_that_tells_no_outline_says_why_in_one_sentence() {
     scan(folder, "other", far, FLAT, "0.1");
     // One that was pressed already goes on with the rectangle, another plate is refused.
     for (baseline, code, says) in [
-        ("sphere", 0, "baseline: the blank is curved two ways"),
+        ("sphere", 0, "baseline: the blank is curved in two directions"),
         ("other", 1, "off its rectangle as ordered, 20 mm at most; check width_mm"),
     ] {
         let output = measure(folder, "flat", "harmonic", Some(baseline));

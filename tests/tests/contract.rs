@@ -1,12 +1,11 @@
 //! The plugin boundary: header against Rust types, a scanner in C, and every way in which a library can be wrong.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use platen_engine::plugin::{Catalogue, JobSpec, Kind, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Kind, PluginError, Scanner};
 use platen_plant::{OptionValue, Value};
 use platen_scan::Lattice;
 
@@ -96,25 +95,25 @@ fn a_scanner_in_c_scans() {
 
     let scanner = Scanner::create(&library, &height(2.5)).unwrap();
     scanner.instance().open(LIMIT).unwrap();
-    let mut lattice = None;
-    let end = scanner.scan(JobSpec::untriggered(LIMIT), None, &mut |event| {
-        match event {
-            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
-            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
-        }
-        ControlFlow::Continue(())
-    });
-    let lattice = lattice.unwrap();
-    assert_eq!(end.unwrap().points, 4800);
+    let mut scan = scanner.start(JobSpec::untriggered(LIMIT), None).unwrap();
+    let mut lattice = Lattice::new(scan.header().clone());
+    scan.by_ref().for_each(|column| lattice.push(&column.unwrap()).unwrap());
+    assert_eq!(scan.finish().unwrap().points, 4800);
     assert_eq!(lattice.n_valid(), 4800);
     for cell in 0..4800 {
         assert!((lattice.point(cell).unwrap()[2] + 2.5).abs() < 1e-6);
     }
 
-    let stopped =
-        scanner.scan(JobSpec::untriggered(LIMIT), None, &mut |_| ControlFlow::Break(())).unwrap_err();
+    let spec = JobSpec::untriggered(LIMIT);
+    let cancel = spec.cancel.clone();
+    let mut scan = scanner.start(spec, None).unwrap();
+    cancel.cancel();
+    let stopped = scan.finish().unwrap_err();
     assert!(matches!(stopped, PluginError::Stopped { why: "it was cancelled", .. }), "{stopped}");
-    let late = scanner.scan(JobSpec::untriggered(Duration::ZERO), None, &mut |_| ControlFlow::Continue(()));
+    // One that is given up leaves the scanner ready for the next.
+    drop(scanner.start(JobSpec::untriggered(LIMIT), None).unwrap());
+    assert_eq!(scanner.start(JobSpec::untriggered(LIMIT), None).unwrap().finish().unwrap().points, 4800);
+    let late = scanner.start(JobSpec::untriggered(Duration::ZERO), None);
     assert!(matches!(late, Err(PluginError::Stopped { why: "its deadline passed", .. })), "{late:?}");
 }
 

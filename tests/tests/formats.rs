@@ -4,18 +4,17 @@
 //! `platen measure`. What `platen convert` writes must give the same cells again.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
 use platen_plant::Value;
 use platen_scan::{Lattice, wrap_azimuth};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::stream::{
-    Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Values, Wanted, column_payload,
+    Bridge, BridgeConfig, Head, Plan, Receiver, ScanLayout, ScanSettings, Values, column_payload,
 };
 use platen_sim_scanner::{
     E57Encoding, FileFormat, FileOrder, Instrument, Scene, SimLattice, SimScan, SimState, Surroundings,
@@ -128,13 +127,13 @@ fn write_all() -> Vec<(PathBuf, f64)> {
 struct Again(SimScan);
 
 impl Head for Again {
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
-        Ok(Plan { wanted: *wanted, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String> {
+        Ok(Plan { settings: *settings, duration_s: 0.0, computing_s: 0.0, altered: Vec::new() })
     }
 
     fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let lattice = &self.0.lattice;
-        let begin = Begin {
+        let begin = ScanLayout {
             rows: lattice.n_rows,
             columns: lattice.n_columns,
             azimuth_start: lattice.azimuth_start,
@@ -197,16 +196,11 @@ fn read(path: &Path) -> Lattice {
     let options = [("file", Value::Path(path.into()))];
     let (library, values) = pipeline::load_with(&catalogue, "faro-file", options).unwrap();
     let scanner = Scanner::create(&library, &values).unwrap();
-    let mut lattice = None;
-    let end = scanner.scan(JobSpec::untriggered(Duration::from_secs(100)), None, &mut |event| {
-        match event {
-            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
-            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
-        }
-        ControlFlow::Continue(())
-    });
-    let lattice = lattice.unwrap_or_else(|| panic!("{}: {end:?}", path.display()));
-    assert_eq!(lattice.n_valid() as u64, end.unwrap().points, "{}", path.display());
+    let scan = scanner.start(JobSpec::untriggered(Duration::from_secs(100)), None);
+    let mut scan = scan.unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let mut lattice = Lattice::new(scan.header().clone());
+    scan.by_ref().for_each(|column| lattice.push(&column.unwrap()).unwrap());
+    assert_eq!(lattice.n_valid() as u64, scan.finish().unwrap().points, "{}", path.display());
     lattice
 }
 

@@ -13,7 +13,7 @@ use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::LinkState;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
-use platen_sim_press::{Command, Config, SimPress, Tally};
+use platen_sim_press::{Command, Config, Counters, SimPress};
 use rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, done, quick, tcp};
 
 const SCAN: Duration = Duration::from_millis(5);
@@ -41,7 +41,7 @@ const FAULTS: [(&str, Set); 14] = [
     ("twice", |it| it.twice = 0.03),
 ];
 
-fn assert_all(what: &str, tally: &Tally, strokes: usize) {
+fn assert_all(what: &str, tally: &Counters, strokes: usize) {
     println!("{what}: {:?}, {} connections, {} writes", tally.line_faults, tally.connections, tally.writes);
     assert_clean(tally);
     assert_eq!((tally.taken.len(), tally.missed_reported), (strokes, 0), "{what}");
@@ -157,7 +157,7 @@ async fn an_adapter_that_is_pulled_is_found_under_its_name() {
         press.command(Command::PullMs(500)).unwrap();
         press.until("the result", LIMIT, |tally| tally.taken.len() as u64 == n).await.unwrap();
     }
-    let tally = press.tally();
+    let tally = press.counters();
     assert_all("pulled", &tally, 3);
     assert!(tally.connections > 3, "{} connections", tally.connections);
     assert!(host.heard.alarmed(Code::LinkBroken));
@@ -218,6 +218,6 @@ async fn a_press_that_comes_back_is_found_again() {
     let tally = back.until("a read", LIMIT, |tally| tally.reads > 0).await.unwrap();
     println!("found again after {} ms", tally.now_ms);
     host.until("ready again", |status| status.host.ready).await;
-    assert_eq!(back.tally().writes_before_sync, 0);
+    assert_eq!(back.counters().writes_before_sync, 0);
     host.stop().await;
 }

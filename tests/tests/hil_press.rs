@@ -26,7 +26,7 @@ async fn fifty_strokes_back_to_back() {
     assert_eq!(*host.heard.part_ends.lock().unwrap(), 1);
     host.stop().await;
     assert_eq!(press.h_block().word(2), 0, "status after the stop");
-    assert_eq!(press.tally().writes_outside, 0);
+    assert_eq!(press.counters().writes_outside, 0);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -80,7 +80,7 @@ async fn a_rescan_is_measured_as_a_new_attempt() {
         press.command(command).unwrap();
         press.until("its result", LIMIT, |tally| tally.taken.len() == n + 1).await.unwrap();
     }
-    let tally = press.tally();
+    let tally = press.counters();
     assert_clean(&tally);
     let identities: Vec<_> = tally.taken.iter().map(|it| (it.stroke_id, it.attempt, it.bends)).collect();
     assert_eq!(identities, [(1, 0, 1), (1, 1, 1), (1, 2, 1), (2, 0, 2)]);
@@ -164,9 +164,9 @@ async fn nothing_is_written_to_the_wrong_press() {
         let mut host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), ms(5));
         host.until("refusal", |status| status.link_error == Some(code)).await;
         press.until("some reads", LIMIT, |tally| tally.reads > 5).await.unwrap();
-        assert_eq!(press.tally().writes, 0, "{code}");
+        assert_eq!(press.counters().writes, 0, "{code}");
         host.stop().await;
-        assert_eq!(press.tally().writes, 0, "{code}, at the stop");
+        assert_eq!(press.counters().writes, 0, "{code}, at the stop");
     }))
     .await;
 }
@@ -179,9 +179,9 @@ async fn nothing_is_written_at_the_wrong_offset() {
     host.until("refusal", |status| status.link_error == Some(Code::MapVersion)).await;
     press.until("many reads", LIMIT, |tally| tally.reads > 20).await.unwrap();
     assert!(!host.heard.alarmed(Code::TornBlock), "a shifted map is no torn block");
-    assert_eq!(press.tally().writes, 0);
+    assert_eq!(press.counters().writes, 0);
     host.stop().await;
-    assert_eq!(press.tally().writes, 0, "at the stop");
+    assert_eq!(press.counters().writes, 0, "at the stop");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -197,7 +197,7 @@ async fn results_survive_a_frozen_press_and_a_cut_line() {
         press.command(disturbance).unwrap();
         press.until("the result", LIMIT, |tally| tally.taken.len() == n + 1).await.unwrap();
     }
-    let tally = press.tally();
+    let tally = press.counters();
     assert_clean(&tally);
     assert_eq!((tally.plates_served, tally.published, tally.missed_reported), (3, 3, 0));
     host.stop().await;
@@ -217,7 +217,7 @@ async fn a_killed_host_delivers_or_reports_every_stroke() {
         kills += 1;
         host = start();
     }
-    let tally = press.tally();
+    let tally = press.counters();
     println!("{kills} kills, {} strokes, {} results", tally.strokes, tally.taken.len());
     assert_clean(&tally);
     assert!(kills >= 10, "{kills} kills");

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use cell::{Host, Press, assert_clean, until};
 use nalgebra::Vector3;
 use platen_sim_plate::{Plate, PlateState, Reply};
-use platen_sim_scanner::stream::{Bridge, BridgeConfig, Shop};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
 use serde_json::Value as Json;
 
 /// `platen-sim cell`.
@@ -259,7 +259,7 @@ fn a_plate_that_left_its_window_is_scanned_again_once() {
         state.pose.centre_mm[1] += aside;
         Ok(Some(state))
     };
-    let shop = Shop { threads: 2, ..Shop::new(Box::new(moving)) };
+    let shop = RayCastHead { threads: 2, ..RayCastHead::new(Box::new(moving)) };
     let bridge = Bridge::start(BridgeConfig::default(), Box::new(shop)).unwrap();
     let mut press = Press::start(folder.path(), "strokes = 5\nwait_ready = true");
     let plant = plant(folder.path(), &press.modbus, &bridge.address().to_string(), |text| text);
@@ -268,7 +268,7 @@ fn a_plate_that_left_its_window_is_scanned_again_once() {
     assert_clean(&stats, &host.log());
     let log = host.log();
     let again = log.matches("scanning everything once").count();
-    assert_eq!((again, bridge.tally().scans), (2, 8), "{log}");
+    assert_eq!((again, bridge.counters().scans), (2, 8), "{log}");
     let history = Host::history(&plant);
     assert_registers(&history, stats["taken"].as_array().unwrap());
     for record in &history {

@@ -29,7 +29,7 @@ use platen_plant::PlantFile;
 use platen_scan::Window;
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 use platen_sim_plate::{Plate, PlateState, Pose};
-use platen_sim_scanner::stream::{BridgeConfig, Shop};
+use platen_sim_scanner::stream::{BridgeConfig, RayCastHead};
 use platen_sim_scanner::{Cyclic, Faces, Instrument, Surroundings};
 use stream::{LIMIT, driver, plate, start};
 
@@ -64,14 +64,14 @@ struct Found {
 
 fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let state = scene.plate.clone();
-    let shop = Shop {
+    let shop = RayCastHead {
         surroundings: scene.surroundings,
         instrument: scene.instrument,
         noise: Some(scene.instrument.range_sigma),
         faces: scene.faces.map(|(faces, _)| faces),
         mirrored: scene.clockwise,
         threads: 2,
-        ..Shop::new(Box::new(move || Ok(Some(state.clone()))))
+        ..RayCastHead::new(Box::new(move || Ok(Some(state.clone()))))
     };
     let bridge = start(&[], BridgeConfig::default(), shop);
     let scanner = driver(bridge.address(), "divisor = 8\nrate_kpts = 122");

@@ -42,7 +42,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use platen_engine::plugin::PluginError;
-use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeTally};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeCounters};
 use stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 
 type Cells = Vec<(Option<u64>, Option<[u64; 2]>, u16)>;
@@ -54,25 +54,25 @@ fn undisturbed() -> &'static (Cells, u32, u64) {
         let bridge = bridge(&[]);
         let (lattice, end) = scan(&driver(bridge.address(), COARSE), Some(&WINDOW), LIMIT).unwrap();
         assert!(lattice.n_columns() > 25 && lattice.n_valid() > 700, "{} cells", lattice.n_valid());
-        assert_eq!(bridge.tally().scans, 1);
+        assert_eq!(bridge.counters().scans, 1);
         (cells(&lattice), end.columns, end.points)
     })
 }
 
 /// The scan comes whole, from one scan of the head.
 #[track_caller]
-fn survives_on(bridge: &Bridge) -> BridgeTally {
+fn survives_on(bridge: &Bridge) -> BridgeCounters {
     let (lattice, end) = scan(&driver(bridge.address(), COARSE), Some(&WINDOW), LIMIT).unwrap();
     let (reference, columns, points) = undisturbed();
     assert_eq!((end.columns, end.points), (*columns, *points));
     assert!(cells(&lattice) == *reference, "another lattice");
-    let tally = bridge.tally();
+    let tally = bridge.counters();
     assert_eq!(tally.scans, 1, "{tally:?}");
     tally
 }
 
 #[track_caller]
-fn survives(faults: &[&str]) -> BridgeTally {
+fn survives(faults: &[&str]) -> BridgeCounters {
     survives_on(&bridge(faults))
 }
 
@@ -325,7 +325,7 @@ fn wrong_scanner() {
     let scanner = driver(bridge.address(), &format!("{COARSE}\nserial = \"SIM0001\""));
     let error = scan(&scanner, Some(&WINDOW), LIMIT).unwrap_err().to_string();
     assert!(error.contains("scanner SIM9999 answers, SIM0001 is expected"), "{error}");
-    assert_eq!(bridge.tally().scans, 0);
+    assert_eq!(bridge.counters().scans, 0);
 }
 
 #[test]

@@ -7,14 +7,13 @@ mod stream;
 use std::f64::consts::PI;
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddr;
-use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use platen_engine::plugin::{JobSpec, ScanEvent};
+use platen_engine::plugin::JobSpec;
 use platen_scan::{Face, Lattice, Window};
 use platen_sim_scanner::stream::{
-    Begin, Bridge, BridgeConfig, Head, Plan, Receiver, Shop, Values, Wanted, column_payload,
+    Bridge, BridgeConfig, Head, Plan, RayCastHead, Receiver, ScanLayout, ScanSettings, Values, column_payload,
 };
 use platen_sim_scanner::{Faces, Instrument, Label, SimColumn, SimState, TruthCell};
 use stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
@@ -70,7 +69,7 @@ fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
     let warm = || Instrument { warm_up_columns: 0, ..shop().instrument };
     for values in [Values::Range, Values::Polar] {
         let [plain, mirrored] = [false, true].map(|mirrored| {
-            let shop = Shop { values, mirrored, instrument: warm(), ..shop() };
+            let shop = RayCastHead { values, mirrored, instrument: warm(), ..shop() };
             lattice_of(&start(&[], BridgeConfig::default(), shop), COARSE, &WINDOW)
         });
         assert_eq!((plain.n_rows(), plain.n_columns()), (mirrored.n_rows(), mirrored.n_columns()));
@@ -87,7 +86,7 @@ fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
 #[test]
 fn a_window_of_more_than_half_a_turn_is_scanned_with_both_faces() {
     let faces = Faces { seam_column: 0, collimation: 0.0, trunnion: 0.0, moved: [0.0; 3] };
-    let shop = Shop { faces: Some(faces), ..shop() };
+    let shop = RayCastHead { faces: Some(faces), ..shop() };
     let bridge = start(&["shuffled=12"], BridgeConfig::default(), shop);
     let around = Window { azimuth_start: -0.6 * PI, azimuth_width: 1.2 * PI, ..WINDOW };
     let lattice = lattice_of(&bridge, COARSE, &around);
@@ -107,13 +106,13 @@ struct Dome {
 }
 
 impl Head for Dome {
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
-        Ok(Plan { wanted: *wanted, duration_s: 1.0, computing_s: 1.0, altered: Vec::new() })
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String> {
+        Ok(Plan { settings: *settings, duration_s: 1.0, computing_s: 1.0, altered: Vec::new() })
     }
 
     fn scan(&self, _: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let (step, n) = (2.0 * PI / f64::from(self.columns), self.rows as usize);
-        let begin = Begin {
+        let begin = ScanLayout {
             rows: self.rows,
             columns: self.columns,
             azimuth_start: -PI,
@@ -192,13 +191,9 @@ fn take_dome(address: &str) {
     let (before, started) = (most_memory_kb(), Instant::now());
     let mut points = 0;
     let spec = JobSpec::untriggered(10 * LIMIT);
-    let end = scanner.scan(spec, None, &mut |event| {
-        if let ScanEvent::Column(column) = event {
-            points += column.range_m.len() as u64;
-        }
-        ControlFlow::Continue(())
-    });
-    assert_eq!(end.unwrap().points, points);
+    let mut scan = scanner.start(spec, None).unwrap();
+    scan.by_ref().for_each(|column| points += column.unwrap().range_m.len() as u64);
+    assert_eq!(scan.finish().unwrap().points, points);
     let (taken, seconds) = (most_memory_kb() - before, started.elapsed().as_secs_f64());
     println!("\ndome {points} cells in {taken} kB beyond the {before} kB before, {seconds:.1} s");
 }

@@ -1,7 +1,7 @@
-//! How far a measurement is from a known truth: the figures by which a simulated scan is judged.
+//! Errors of a measurement against the true shape of a simulated plate.
 //!
-//! The truth comes as the document that the simulated scanner writes beside a scan (driver option `truth_file`,
-//! `platen-sim scanner --truth`). Nothing of the measurement goes into it, and it never goes into a measurement.
+//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`,
+//! `platen-sim scanner --truth`). Nothing of the measurement enters it, and it never enters a measurement.
 
 use std::path::Path;
 
@@ -12,19 +12,19 @@ use platen_shape::{Surface, Vec3};
 
 use platen_model::units::metres;
 
-/// Width of the strip along the edges whose surface is judged apart, metres.
+/// Width of the strip along the edges whose surface errors are counted apart, metres.
 pub const EDGE_STRIP: f64 = 0.1;
-/// Width of the strip along the edges whose curvature is not judged, metres.
+/// Width of the strip along the edges whose curvature errors are not counted, metres.
 pub const CURVATURE_STRIP: f64 = 0.15;
-/// Newton steps to the foot of a point on the face: the start is within millimetres.
+/// Newton steps of the projection of a point onto the face, from a start within millimetres.
 const FOOT_STEPS: usize = 3;
 
-/// What a measurement should find; metres, scanner frame.
+/// True shape of a plate; metres, scanner frame.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Truth {
     /// Corners (0,0), (W,0), (W,H), (0,H) of the scanned face.
     pub corners_m: [[f64; 3]; 4],
-    /// Marked places on the scanned face.
+    /// Markers on the scanned face.
     pub markers: Vec<TrueMarker>,
     /// Positions and curvatures at a few hundred places.
     pub grid: TrueGrid,
@@ -32,7 +32,7 @@ pub struct Truth {
     pub face: TrueFace,
 }
 
-/// A marked place.
+/// Marker with its true position.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueMarker {
     /// Along u.
@@ -43,7 +43,7 @@ pub struct TrueMarker {
     pub position_m: [f64; 3],
 }
 
-/// Places on an even grid over the plate, edges included, v outer, u inner.
+/// Even grid over the plate, edges included, v outer, u inner.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueGrid {
     /// Places along u.
@@ -58,7 +58,7 @@ pub struct TrueGrid {
     pub kappa_v_per_m: Vec<f64>,
 }
 
-/// As [`TrueGrid`], positions only.
+/// Even grid as [`TrueGrid`], positions only.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueFace {
     /// Places along u.
@@ -69,10 +69,10 @@ pub struct TrueFace {
     pub position_m: Vec<[f64; 3]>,
 }
 
-/// Why there is no truth.
+/// Failure to read a truth file.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// The file cannot be read.
+    /// Unreadable file.
     #[error("{path}: {source}; the simulated scanner writes it when its option truth_file is set")]
     Read {
         /// File.
@@ -80,8 +80,10 @@ pub enum TruthError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It is no such document.
-    #[error("{path}: no truth of a scan: {what}; rebuild the simulated driver together with this program")]
+    /// File that is no truth document.
+    #[error(
+        "{path}: not the truth of a scan: {what}; rebuild the simulated driver together with this program"
+    )]
     Malformed {
         /// File.
         path: String,
@@ -113,13 +115,13 @@ impl Truth {
 /// Errors of one measurement; metres, radians, 1/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Corners, root mean square of the distances.
+    /// Root mean square of the distances of the corners.
     pub corners: f64,
-    /// Markers, mean distance.
+    /// Mean distance of the markers.
     pub markers_mean: f64,
-    /// Markers, largest distance.
+    /// Largest distance of a marker.
     pub markers_worst: f64,
-    /// Distance of the true face from the measured one along its normal, root mean square, beyond [`EDGE_STRIP`].
+    /// Root mean square distance of the true face from the measured one along its normal, beyond [`EDGE_STRIP`].
     pub surface_inside: f64,
     /// The same within it.
     pub surface_edge: f64,
@@ -135,7 +137,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Judges a measurement.
+    /// Compares a measurement with the truth.
     #[must_use]
     pub fn of(measurement: &Measurement, truth: &Truth) -> Self {
         let surface = &measurement.surface;
@@ -165,13 +167,13 @@ impl Accuracy {
     }
 }
 
-/// Root mean square; 0 of nothing.
+/// Returns the root mean square, 0 for no values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (n, sum) = values.into_iter().fold((0_usize, 0.0), |(n, sum), x| (n + 1, sum + x * x));
     (sum / n.max(1) as f64).sqrt()
 }
 
-/// (u, v) of the k-th place of an even grid over the plate.
+/// Returns (u, v) of the k-th node of an even grid over the plate.
 fn place(surface: &Surface, k: usize, [nu, nv]: [usize; 2]) -> [f64; 2] {
     [
         surface.width() * (k % nu) as f64 / (nu - 1) as f64,
@@ -183,7 +185,7 @@ fn from_edge(surface: &Surface, [u, v]: [f64; 2]) -> f64 {
     u.min(v).min(surface.width() - u).min(surface.height() - v)
 }
 
-/// Distances of the true places from the measured face, inside and near an edge.
+/// Returns the distances of the true face from the measured one, inside and near an edge.
 fn heights(surface: &Surface, truth: &TrueFace) -> (Vec<f64>, Vec<f64>) {
     let (mut inside, mut edge) = (Vec::new(), Vec::new());
     for (k, at) in truth.position_m.iter().enumerate() {
@@ -194,7 +196,8 @@ fn heights(surface: &Surface, truth: &TrueFace) -> (Vec<f64>, Vec<f64>) {
     (inside, edge)
 }
 
-/// Height of a point over the measured face at its foot there: the point's own (u, v) is off by the error of the flattening.
+/// Returns the height of a point over the measured face at its orthogonal projection: the point's own (u, v) contains the
+/// error of the flattening.
 fn height(surface: &Surface, [mut u, mut v]: [f64; 2], point: Vec3) -> f64 {
     for _ in 0..FOOT_STEPS {
         let at = surface.derivatives(u, v);
@@ -234,7 +237,7 @@ impl Cells {
     }
 }
 
-/// Measured minus true curvatures along u and along v.
+/// Returns measured minus true curvatures along u and along v.
 fn curvature(surface: &Surface, truth: &TrueGrid) -> Vec<f64> {
     let mut errors = Vec::new();
     for k in 0..truth.nu * truth.nv {

@@ -1,11 +1,11 @@
-//! The figures of accuracy as people and programs read them.
+//! Figures of accuracy as table rows and as JSON.
 
 use serde_json::{Map, Value as Json, json};
 
 use crate::accuracy::Accuracy;
 use platen_model::units::mm;
 
-/// One figure: name in documents, head in tables, value in the unit of the name, digits after the point.
+/// Figure of accuracy: name in documents, head in tables, value in the unit of the name, digits after the point.
 type Figure = (&'static str, &'static str, fn(&Accuracy) -> f64, usize);
 
 const FIGURES: [Figure; 9] = [
@@ -20,18 +20,18 @@ const FIGURES: [Figure; 9] = [
     ("curvature_rms_per_m", "curvature 1/m", |a| a.curvature, 5),
 ];
 
-/// Heads of the columns, after that of the row's name.
+/// Returns the heads of the columns, after those of the row's name.
 pub(super) fn head(of: &[&str]) -> Vec<String> {
     of.iter().copied().chain(FIGURES.map(|(_, head, ..)| head)).map(str::to_owned).collect()
 }
 
-/// One measurement as a row.
+/// Returns one measurement as a row.
 pub(super) fn row(of: &[&str], accuracy: &Accuracy) -> Vec<String> {
     let cells = FIGURES.map(|(_, _, value, digits)| format!("{:.digits$}", value(accuracy)));
     of.iter().map(|cell| (*cell).to_owned()).chain(cells).collect()
 }
 
-/// Many measurements as a row: mean / worst.
+/// Returns many measurements as a row of mean / worst.
 pub(super) fn row_of_many(of: &[&str], all: &[Accuracy]) -> Vec<String> {
     let cells = FIGURES.map(|(_, _, value, digits)| {
         let [mean, worst] = mean_and_worst(all.iter().map(value));
@@ -40,12 +40,12 @@ pub(super) fn row_of_many(of: &[&str], all: &[Accuracy]) -> Vec<String> {
     of.iter().map(|cell| (*cell).to_owned()).chain(cells).collect()
 }
 
-/// One measurement as a document.
+/// Returns one measurement as a document.
 pub(super) fn document(accuracy: &Accuracy) -> Map<String, Json> {
     FIGURES.iter().map(|(name, _, value, _)| ((*name).to_owned(), json!(value(accuracy)))).collect()
 }
 
-/// Many measurements as a document: `{"mean": .., "worst": ..}` for each figure.
+/// Returns many measurements as a document: `{"mean": .., "worst": ..}` for each figure.
 pub(super) fn document_of_many(all: &[Accuracy]) -> Map<String, Json> {
     let entry = |(name, _, value, _): &Figure| {
         let [mean, worst] = mean_and_worst(all.iter().map(value));
@@ -54,7 +54,7 @@ pub(super) fn document_of_many(all: &[Accuracy]) -> Map<String, Json> {
     FIGURES.iter().map(entry).collect()
 }
 
-/// Mean and largest absolute value.
+/// Returns mean and largest absolute value.
 pub(super) fn mean_and_worst(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let n = values.clone().count().max(1) as f64;
     [values.clone().map(f64::abs).sum::<f64>() / n, values.map(f64::abs).fold(0.0, f64::max)]

@@ -24,31 +24,12 @@ mod tables;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use platen_host::cli::{self, Common};
-
-/// Benchmarks and long runs; started by `platen bench` and `platen press soak`.
-#[derive(Debug, Parser)]
-#[command(name = "platen", version, disable_help_subcommand = true)]
-struct Cli {
-    #[command(flatten)]
-    common: Common,
-    #[command(subcommand)]
-    verb: Verb,
-}
-
-#[derive(Debug, Subcommand)]
-enum Verb {
-    /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
-    Bench(bench::Command),
-    /// Run strokes against a simulated press on a faulty line: none wrong, doubled or lost
-    Soak(soak::Options),
-}
+use platen_host::cli::{self, BenchVerb};
 
 /// Runs the command line.
 pub fn main() -> ExitCode {
-    cli::run_program::<Cli>(|cli| match &cli.verb {
-        Verb::Bench(command) => bench::run(&cli.common, command),
-        Verb::Soak(options) => soak::run(&cli.common, options),
+    cli::main_of_bench(|common, verb| match verb {
+        BenchVerb::Bench(arguments) => bench::run(common, arguments),
+        BenchVerb::Soak(arguments) => soak::run(common, arguments),
     })
 }

@@ -5,12 +5,12 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
-/// Processor time of this process so far, all threads together: what else the machine does hardly counts in it.
+/// Returns the processor time of this process so far, all threads together; other load of the machine hardly enters it.
 pub(super) fn cpu_time() -> Duration {
     time_of(ClockId::ProcessCPUTime)
 }
 
-/// Processor time of this thread so far.
+/// Returns the processor time of this thread so far.
 pub(super) fn thread_time() -> Duration {
     time_of(ClockId::ThreadCPUTime)
 }
@@ -21,21 +21,21 @@ fn time_of(clock: ClockId) -> Duration {
     Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or(0))
 }
 
-/// Largest memory that this process has had so far, megabytes of 2^20 bytes; `None` where the system does not tell.
+/// Returns the peak resident memory of this process so far, in units of 2^20 bytes; `None` where the system does not report it.
 pub(super) fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().trim_end_matches(" kB").parse::<f64>().ok()? / 1024.0)
 }
 
-/// What the figures were taken on.
+/// Machine that the figures are of.
 #[derive(Debug, Serialize)]
 pub(super) struct Machine {
     /// Model of the processor.
     processor: String,
     /// Logical cores.
     cores: usize,
-    /// Mean number of running programs over the last minute: above 0.5 others were at work.
+    /// Load average of the last minute; above 0.5 other programs were running.
     load: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ impl Machine {
         }
     }
 
-    pub(super) fn says(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let load = self.load.map(|load| format!(", load {load:.1}")).unwrap_or_default();
         format!(
             "{}, {} cores{load}; times: CPU ms of one measurement on one thread, medians",

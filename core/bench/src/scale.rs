@@ -1,10 +1,9 @@
-//! Time and memory from a table scan to a full dome, columns as they come.
+//! Time and memory of one measurement, from the scan of the tables to a full dome, columns streamed.
 //!
-//! Each lattice is measured in a process of its own, whose largest memory is what one measurement needs, the ray caster in
-//! the same process included.
+//! Each lattice is measured in a process of its own. Its peak memory is that of one measurement and of the ray caster in
+//! the same process.
 
 use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
@@ -16,75 +15,62 @@ use platen_shape::outline::outline;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value as Json, json};
 
-use crate::bench::Command;
-use crate::scene::Setting;
+use crate::scene::{SCAN_LIMIT, Setting};
 use crate::stages::ms;
 use crate::{bench, machine, tables};
-use platen_engine::plugin::Catalogue;
+use platen_engine::plugin::{Catalogue, JobSpec};
+use platen_host::cli::bench::{BenchArguments, Cells, QUARTER_DEG};
 use platen_host::cli::{CliError, Common, output};
 use platen_host::progress;
 
-/// A lattice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Cells {
-    /// 1.6 million: the plate and what is round it, at a quarter of the finest resolution
-    Quarter,
-    /// 6.4 million: the same at half the step
-    Half,
-    /// 44 million: everything that a scanner sees, at quarter resolution
-    Dome,
+fn name(cells: Cells) -> String {
+    cells.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-impl Cells {
-    fn name(self) -> String {
-        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
-    }
-
-    fn step_deg(self) -> f64 {
-        match self {
-            Self::Quarter | Self::Dome => tables::QUARTER_DEG,
-            Self::Half => 0.5 * tables::QUARTER_DEG,
-        }
-    }
-
-    /// All round, from the scanner's own feet to the zenith; `None` for the plate and what is round it.
-    fn window(self) -> Option<Window> {
-        let step = self.step_deg().to_radians();
-        (self == Self::Dome).then(|| Window {
-            azimuth_start: -PI,
-            azimuth_width: TAU - step,
-            elevation_min: -PI,
-            elevation_max: 0.5 * PI,
-        })
+fn step_deg(cells: Cells) -> f64 {
+    match cells {
+        Cells::Quarter | Cells::Dome => QUARTER_DEG,
+        Cells::Half => 0.5 * QUARTER_DEG,
     }
 }
 
-/// What one lattice took.
+/// Returns the whole field of view for a dome; `None` for the plate and its surroundings.
+fn window(cells: Cells) -> Option<Window> {
+    let step = step_deg(cells).to_radians();
+    (cells == Cells::Dome).then(|| Window {
+        azimuth_start: -PI,
+        azimuth_width: TAU - step,
+        elevation_min: -PI,
+        elevation_max: 0.5 * PI,
+    })
+}
+
+/// Time and memory of one lattice.
 #[derive(Debug, Serialize, Deserialize)]
 struct Row {
     lattice: String,
     rows: u32,
     columns: u32,
     plate_points: usize,
-    /// On columns while they arrive.
+    /// Extraction while columns arrive.
     columns_ms: f64,
     /// From the last column to the plate's face.
     extract_ms: f64,
     /// From the plate's face to S(u, v).
     measure_ms: f64,
-    /// Cells times the bytes of one sample of a column.
+    /// Size of all cells uncompressed.
     raw_lattice_mb: f64,
-    /// Largest memory of the whole process.
+    /// Peak memory of the whole process.
     peak_mb: Option<f64>,
 }
 
-pub(super) fn scale(common: &Common, command: &Command) -> Result<Json, CliError> {
+pub(super) fn scale(common: &Common, arguments: &BenchArguments) -> Result<Json, CliError> {
     let mut rows = Vec::new();
-    for cells in &command.cells {
-        progress::phase(&format!("scanning the lattice `{}`", cells.name()));
-        rows.push(match command.cells.len() {
-            1 => here(&common.catalogue(), &command.out, command, *cells)?,
-            _ => elsewhere(common, command, *cells)?,
+    for cells in &arguments.cells {
+        progress::phase(&format!("scanning the lattice `{}`", name(*cells)));
+        rows.push(match arguments.cells.len() {
+            1 => here(&common.catalogue(), &arguments.out, arguments, *cells)?,
+            _ => elsewhere(common, arguments, *cells)?,
         });
     }
     progress::done();
@@ -94,20 +80,20 @@ pub(super) fn scale(common: &Common, command: &Command) -> Result<Json, CliError
     Ok(json!(rows))
 }
 
-/// Measures in a process of its own.
-fn elsewhere(common: &Common, command: &Command, cells: Cells) -> Result<Row, CliError> {
-    let failed = |what: String| CliError::Failed(format!("bench of the lattice `{}`: {what}", cells.name()));
+/// Measures in a child process.
+fn elsewhere(common: &Common, arguments: &BenchArguments, cells: Cells) -> Result<Row, CliError> {
+    let failed = |what: String| CliError::Failed(format!("bench of the lattice `{}`: {what}", name(cells)));
     let mut child = std::process::Command::new(std::env::current_exe()?);
-    child.args(["bench", "scale", "--json", "--cells", &cells.name()]);
-    child.arg("--out").arg(command.out.join(cells.name()));
-    child.args(["--seed", &command.seed.to_string(), "--threads", &command.threads.to_string()]);
-    child.args(["--flattening", &command.flattening.join(",")]);
+    child.args(["bench", "scale", "--json", "--cells", &name(cells)]);
+    child.arg("--out").arg(arguments.out.join(name(cells)));
+    child.args(["--seed", &arguments.seed.to_string(), "--threads", &arguments.threads.to_string()]);
+    child.args(["--flattening", &arguments.flattening.join(",")]);
     if let Some(folder) = &common.plugins {
         child.arg("--plugins").arg(folder);
     }
     let output = child.stderr(std::process::Stdio::inherit()).output()?;
     if !output.status.success() {
-        return Err(failed("it failed, see above".into()));
+        return Err(failed("failed, see above".into()));
     }
     let document: Json = serde_json::from_slice(&output.stdout).map_err(|e| failed(e.to_string()))?;
     let row = document.pointer("/scale/0").cloned().unwrap_or_default();
@@ -115,40 +101,41 @@ fn elsewhere(common: &Common, command: &Command, cells: Cells) -> Result<Row, Cl
 }
 
 /// Measures in this process.
-fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -> Result<Row, CliError> {
-    let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("lattice `{}`: {e}", cells.name()));
+fn here(
+    catalogue: &Catalogue,
+    folder: &Path,
+    arguments: &BenchArguments,
+    cells: Cells,
+) -> Result<Row, CliError> {
+    let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("lattice `{}`: {e}", name(cells)));
     let scene = tables::scene();
     let setting = Setting {
-        step_deg: cells.step_deg(),
+        step_deg: step_deg(cells),
         margin_deg: tables::MARGIN_DEG,
-        noise_mm: command.noise_mm.first().copied().unwrap_or(0.5),
-        seed: command.seed,
-        threads: command.threads,
+        noise_mm: arguments.noise_mm.first().copied().unwrap_or(0.5),
+        seed: arguments.seed,
+        threads: arguments.threads,
     };
-    let mut flattenings = bench::flattenings(catalogue, &command.flattening)?;
+    let mut flattenings = bench::flattenings(catalogue, &arguments.flattening)?;
     let Some(flattening) = flattenings.first_mut() else {
         return Err(CliError::Usage("give at least one --flattening".into()));
     };
-    let window = cells.window();
+    let window = window(cells);
+    let (spec, (scanner, _)) = (scene.spec(), scene.scanner(catalogue, folder, setting)?);
+    let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), window.as_ref())?;
+    let header = scan.header().clone();
+    let mut extractor = Extractor::new(&header, &spec);
     let mut on_columns = Duration::ZERO;
-    let mut wrong = None;
-    let push = |extractor: &mut Extractor, column: &Column| {
+    for column in &mut scan {
+        let column = column?;
         let start = machine::thread_time();
-        let pushed = extractor.push(column);
+        extractor.push(&column).map_err(|e| failed(&e))?;
         on_columns += machine::thread_time().saturating_sub(start);
-        match pushed {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                wrong = Some(error);
-                ControlFlow::Break(())
-            }
-        }
-    };
-    let streamed = scene.stream(catalogue, folder, setting, window.as_ref(), push);
-    if let Some(error) = wrong {
-        return Err(failed(&error));
     }
-    let (header, spec, extractor) = streamed?;
+    scan.finish()?;
+    drop(scan);
+    // Its memory is not that of measuring.
+    drop(scanner);
     let start = machine::cpu_time();
     let patch = extractor.finish().map_err(|e| failed(&e))?;
     let extracted = machine::cpu_time();
@@ -157,7 +144,7 @@ fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -
         .map_err(|e| failed(&e))?;
     let measured = machine::cpu_time();
     Ok(Row {
-        lattice: cells.name(),
+        lattice: name(cells),
         rows: header.n_rows,
         columns: header.n_columns,
         plate_points: patch.samples.len(),
@@ -171,7 +158,7 @@ fn here(catalogue: &Catalogue, folder: &Path, command: &Command, cells: Cells) -
 }
 
 fn print(rows: &[Row]) -> Result<(), CliError> {
-    output::line("\nFrom a table scan to a full dome, columns as they come (CPU ms, MB)")?;
+    output::line("\nFrom a table scan to a full dome, columns streamed (CPU ms, MB)")?;
     let head = [
         "lattice",
         "cells",
@@ -194,7 +181,7 @@ fn print(rows: &[Row]) -> Result<(), CliError> {
     }
     output::table(&table)?;
     output::line(
-        "columns: spent while they arrive, beside the scanner; extract: from the last column to the plate's face; measure: from there to \
-         S(u, v). Peak memory: of the whole process, the ray caster included.",
+        "columns: while they arrive, parallel to the scanner; extract: from the last column to the plate's face; measure: from there to \
+         S(u, v). Peak memory: of the whole process, ray caster included.",
     )
 }

@@ -1,37 +1,36 @@
-//! Simulated scans with known truth: a described plate, seen through the simulated scanner's driver library.
+//! Simulated scans with known truth, through the library of the driver `simulated`.
 //!
-//! Scan and truth come from one call of the driver: the columns over the plugin boundary, the truth through the file of its option
-//! `truth_file`. Every seed has errors of its own and moves and turns the plate a little, so that the lattice falls
-//! differently on its edges each time.
+//! Scan and truth come from one call of the driver: the columns over the plugin boundary, the truth through the file of its
+//! option `truth_file`. Every seed has errors of its own and shifts and turns the plate, so that the lattice meets its edges
+//! differently each time.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use platen_plant::Value;
-use platen_scan::{Column, ScanHeader, Window};
+use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
 use platen_shape::{Patch, PlateSpec, Vec3};
 
 use crate::accuracy::Truth;
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
 use platen_engine::stroke::NotMeasured;
 use platen_host::cli::CliError;
 use platen_model::units::metres;
 
-/// Casting the rays of a full dome takes minutes on a slow machine.
-const SCAN_LIMIT: Duration = Duration::from_secs(3600);
-/// Angle between cells of the scans of `accuracy`: 6 mm at 7 m.
+/// Time limit of a scan; a full dome takes minutes on a slow machine.
+pub(super) const SCAN_LIMIT: Duration = Duration::from_secs(3600);
+/// Angle between cells of the scans of `accuracy`, degrees: 6 mm at 7 m.
 const STEP_DEG: f64 = 0.05;
-/// Enough round their plates to see where they end.
+/// Margin round their plates, degrees: enough to show the edges.
 const MARGIN_DEG: f64 = 2.0;
-/// The plate is moved by up to this much from seed to seed, metres: many lattice steps.
+/// Largest shift of the plate from seed to seed, metres: many lattice steps.
 const SHIFT: f64 = 0.05;
-/// And turned by up to this much, degrees.
+/// Largest turn of the plate, degrees.
 const TURN_DEG: f64 = 3.0;
 
-/// A plate in front of the scanner.
+/// Plate in front of the scanner.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     /// Name in tables and files.
@@ -40,57 +39,57 @@ pub(super) struct Scene {
     pub(super) size_mm: [f64; 3],
     /// The `[shape]` table of the simulator's description.
     pub(super) shape: String,
-    /// Middle of the mid-surface in the scanner frame, millimetres.
+    /// Centre of the mid-surface in the scanner frame, millimetres.
     pub(super) centre_mm: [f64; 3],
-    /// Direction of u, counter-clockwise from the direction of sight.
+    /// Direction of u, counter-clockwise from the line of sight, degrees.
     pub(super) yaw_deg: f64,
 }
 
-/// How a scene is scanned.
+/// Settings of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Setting {
-    /// Angle between cells.
+    /// Angle between cells, degrees.
     pub(super) step_deg: f64,
-    /// What is scanned round the plate.
+    /// Margin scanned round the plate, degrees.
     pub(super) margin_deg: f64,
-    /// Standard deviation of a range at 10 m.
+    /// Standard deviation of a range at 10 m, millimetres.
     pub(super) noise_mm: f64,
-    /// Of all errors.
+    /// Seed of all errors.
     pub(super) seed: u64,
-    /// Threads that cast rays.
+    /// Number of threads that cast rays.
     pub(super) threads: usize,
 }
 
 impl Setting {
-    /// As the scans of `accuracy` are taken.
+    /// Returns the settings of the scans of `accuracy`.
     pub(super) fn of_accuracy(noise_mm: f64, seed: u64) -> Self {
         Self { step_deg: STEP_DEG, margin_deg: MARGIN_DEG, noise_mm, seed, threads: 1 }
     }
 }
 
-/// A scan in memory, with its truth.
+/// Scan in memory, with its truth.
 #[derive(Debug)]
 pub(super) struct Shot {
-    /// What the driver said.
+    /// Header of the scan.
     pub(super) header: ScanHeader,
     /// The lattice.
     pub(super) columns: Vec<Column>,
-    /// What a measurement should find.
+    /// True shape of the plate.
     pub(super) truth: Truth,
-    /// What is known of the plate beforehand.
+    /// Specification of the plate.
     pub(super) spec: PlateSpec,
 }
 
 impl Scene {
-    /// Nine places to be found again, millimetres.
+    /// Returns (u, v) of nine markers, millimetres.
     fn markers_mm(&self) -> Vec<[f64; 2]> {
         let [width, height, _] = self.size_mm;
         let shares = [0.1, 0.5, 0.9];
         shares.iter().flat_map(|v| shares.map(|u| [u * width, v * height])).collect()
     }
 
-    /// What is known of the plate before it is scanned.
-    fn spec(&self) -> PlateSpec {
+    /// Returns the specification of the plate.
+    pub(super) fn spec(&self) -> PlateSpec {
         let [width, height, thickness] = self.size_mm.map(metres);
         let (sin, cos) = self.yaw_deg.to_radians().sin_cos();
         PlateSpec {
@@ -103,7 +102,7 @@ impl Scene {
         }
     }
 
-    /// The simulator's description of the plate as it lies for this seed.
+    /// Returns the simulator's description of the plate in its pose for this seed.
     fn description(&self, seed: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut swing = |reach: f64| reach * (2.0 * random.f64() - 1.0);
@@ -126,53 +125,16 @@ impl Scene {
         setting: Setting,
     ) -> Result<Shot, CliError> {
         let (scanner, truth) = self.scanner(catalogue, folder, setting)?;
-        let mut header = None;
-        let mut columns = Vec::new();
-        let job = JobSpec::untriggered(SCAN_LIMIT);
-        scanner.scan(job, None, &mut |event| {
-            match event {
-                ScanEvent::Begin(begun) => header = Some(begun),
-                ScanEvent::Column(column) => columns.push(column),
-            }
-            ControlFlow::Continue(())
-        })?;
-        let header = header.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
+        let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), None)?;
+        let header = scan.header().clone();
+        let columns = scan.by_ref().collect::<Result<_, _>>()?;
+        scan.finish()?;
         let truth = Truth::read(&truth).map_err(|e| CliError::Failed(e.to_string()))?;
         Ok(Shot { header, columns, truth, spec: self.spec() })
     }
 
-    /// Scans and extracts at once, each column with `push`: nothing of the scan is kept but what the extractor keeps.
-    pub(super) fn stream(
-        &self,
-        catalogue: &Catalogue,
-        folder: &Path,
-        setting: Setting,
-        window: Option<&Window>,
-        mut push: impl FnMut(&mut Extractor, &Column) -> ControlFlow<()>,
-    ) -> Result<(ScanHeader, PlateSpec, Extractor), CliError> {
-        let (scanner, _) = self.scanner(catalogue, folder, setting)?;
-        let spec = self.spec();
-        let mut extractor = None;
-        scanner.scan(
-            JobSpec::untriggered(SCAN_LIMIT),
-            window,
-            &mut |event| match (event, &mut extractor) {
-                (ScanEvent::Begin(header), _) => {
-                    let empty = Extractor::new(&header, &spec);
-                    extractor = Some((header, empty));
-                    ControlFlow::Continue(())
-                }
-                (ScanEvent::Column(column), Some((_, extractor))) => push(extractor, &column),
-                (ScanEvent::Column(_), None) => ControlFlow::Break(()),
-            },
-        )?;
-        let (header, extractor) =
-            extractor.ok_or_else(|| CliError::Failed(NotMeasured::NoHeader.to_string()))?;
-        Ok((header, spec, extractor))
-    }
-
-    /// The driver set to this scene, and where its truth will lie.
-    fn scanner(
+    /// Starts the driver with this scene; returns it and the path of the truth file.
+    pub(super) fn scanner(
         &self,
         catalogue: &Catalogue,
         folder: &Path,
@@ -204,12 +166,12 @@ impl Scene {
 }
 
 impl Shot {
-    /// Cells of the lattice.
+    /// Returns the number of cells of the lattice.
     pub(super) fn n_cells(&self) -> usize {
         self.columns.iter().map(Column::len).sum()
     }
 
-    /// The plate's face, from the lattice in memory.
+    /// Extracts the plate's face from the lattice in memory.
     pub(super) fn extract(&self) -> Result<Patch, NotMeasured> {
         let mut extractor = Extractor::new(&self.header, &self.spec);
         for column in &self.columns {

@@ -1,6 +1,6 @@
 //! Accuracy over many simulated scans: each scene with several seeds, measured with each flattening.
 //!
-//! The work is shared out over threads; what comes out does not depend on how many there are.
+//! Threads share the cases; the results do not depend on their number.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,16 +8,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde_json::{Map, Value as Json, json};
 
 use crate::accuracy::Accuracy;
-use crate::bench::{self, Command};
+use crate::bench;
 use crate::scene::{Scene, Setting};
 use crate::strokes::{self, StrokeErrors};
 use crate::{figures, stages};
 use platen_engine::plugin::{Catalogue, Flattening};
 use platen_engine::stroke::NotMeasured;
+use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
 
-/// Plates as in the shop, 7 m away, scanned face concave.
+/// Returns plates of a shop, 7 m away, scanned face concave.
 pub(super) fn scenes() -> Vec<Scene> {
     let scene = |name: &str, size_mm: [f64; 3], yaw_deg: f64, shape: &str| Scene {
         name: name.into(),
@@ -70,18 +71,18 @@ struct PairRow {
 pub(super) fn accuracy(
     catalogue: &Catalogue,
     folder: &Path,
-    command: &Command,
+    arguments: &BenchArguments,
     silent: bool,
 ) -> Result<Json, CliError> {
-    let seeds: Vec<u64> = (0..command.seeds as u64).map(|k| command.seed.wrapping_add(k)).collect();
+    let seeds: Vec<u64> = (0..arguments.seeds as u64).map(|k| arguments.seed.wrapping_add(k)).collect();
     let scenes = scenes();
     let cases: Vec<(&Scene, f64, u64)> = scenes
         .iter()
-        .flat_map(|scene| command.noise_mm.iter().map(move |noise| (scene, *noise)))
+        .flat_map(|scene| arguments.noise_mm.iter().map(move |noise| (scene, *noise)))
         .flat_map(|(scene, noise)| seeds.iter().map(move |seed| (scene, noise, *seed)))
         .collect();
-    let load = || bench::flattenings(catalogue, &command.flattening);
-    let errors = shared(&cases, command.threads, load, |flattenings, (scene, noise_mm, seed)| {
+    let load = || bench::flattenings(catalogue, &arguments.flattening);
+    let errors = shared(&cases, arguments.threads, load, |flattenings, (scene, noise_mm, seed)| {
         progress::phase(&format!("{} at {noise_mm} mm, seed {seed}", scene.name));
         let shot = scene.scan(catalogue, folder, Setting::of_accuracy(*noise_mm, *seed))?;
         let failed =
@@ -93,18 +94,18 @@ pub(super) fn accuracy(
         };
         flattenings.iter_mut().map(of).collect::<Result<Vec<_>, CliError>>()
     })?;
-    // Cases lie scene outer, noise, seed inner.
+    // Order of the cases: scene outer, then noise, seed inner.
     let mut rows = Vec::new();
     for (group, cases) in errors.chunks(seeds.len()).zip(cases.chunks(seeds.len())) {
         let Some((scene, noise_mm, _)) = cases.first() else { continue };
-        rows.extend(command.flattening.iter().enumerate().map(|(k, flattening)| Row {
+        rows.extend(arguments.flattening.iter().enumerate().map(|(k, flattening)| Row {
             scene: scene.name.clone(),
             noise_mm: *noise_mm,
             flattening: flattening.clone(),
             errors: group.iter().filter_map(|errors| errors.get(k).copied()).collect(),
         }));
     }
-    let pairs = pairs(catalogue, folder, command, &seeds)?;
+    let pairs = pairs(catalogue, folder, arguments, &seeds)?;
     progress::done();
     if !silent {
         print(&rows, &pairs, seeds.len())?;
@@ -119,21 +120,21 @@ pub(super) fn accuracy(
 fn pairs(
     catalogue: &Catalogue,
     folder: &Path,
-    command: &Command,
+    arguments: &BenchArguments,
     seeds: &[u64],
 ) -> Result<Vec<PairRow>, CliError> {
     let cases: Vec<(f64, u64)> =
-        command.noise_mm.iter().flat_map(|noise| seeds.iter().map(move |seed| (*noise, *seed))).collect();
-    let load = || strokes::Tools::load(catalogue, &command.flattening);
-    let errors = shared(&cases, command.threads, load, |tools, (noise_mm, seed)| {
+        arguments.noise_mm.iter().flat_map(|noise| seeds.iter().map(move |seed| (*noise, *seed))).collect();
+    let load = || strokes::Tools::load(catalogue, &arguments.flattening);
+    let errors = shared(&cases, arguments.threads, load, |tools, (noise_mm, seed)| {
         progress::phase(&format!("strokes at {noise_mm} mm, seed {seed}"));
         strokes::errors(catalogue, folder, tools, *noise_mm, *seed)
     })?;
-    let rows = command.noise_mm.iter().zip(errors.chunks(seeds.len()));
+    let rows = arguments.noise_mm.iter().zip(errors.chunks(seeds.len()));
     Ok(rows.map(|(noise_mm, errors)| PairRow { noise_mm: *noise_mm, errors: errors.to_vec() }).collect())
 }
 
-/// Does `work` for every case on several threads, each with tools of its own; results in the order of the cases.
+/// Runs `work` for every case on several threads, each with tools of its own; returns the results in the order of the cases.
 fn shared<C: Sync, T, R: Send>(
     cases: &[C],
     threads: usize,

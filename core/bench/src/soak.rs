@@ -1,20 +1,21 @@
-//! `soak`: the host's press side against a simulated press with a bad line, stroke after stroke.
+//! `platen press soak`: the host's press side against a simulated press on a faulty line, stroke after stroke.
 //!
-//! The press is `platen-sim` in a process of its own; it counts and judges. Scanner and evaluation stand in: every result
-//! names its stroke, so that one under another's number shows.
+//! The press is `platen-sim` in a process of its own, which counts strokes, results and writes. A stand-in answers for scanner
+//! and evaluation: the figures of every result identify its stroke, so that a result under another stroke's number is
+//! detected.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
 use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::{Answer, Durations, HostSide, MemoryJournal, PressLink, channels, run_press};
 use serde::Deserialize;
 use serde_json::{Value as Json, json};
 use tokio::sync::mpsc;
 
+use platen_host::cli::bench::{Line, SoakArguments};
 use platen_host::cli::cell::Cell;
 use platen_host::cli::press::trial::{Seen, serve};
 use platen_host::cli::press::{self, Failure};
@@ -22,59 +23,20 @@ use platen_host::cli::run::{runtime, stop_signal};
 use platen_host::cli::{CliError, Common, output};
 use platen_host::progress;
 
-/// Strokes on one plate; then the next part comes, in a new session.
+/// Strokes on one plate; the next part follows in a new session.
 const PER_PART: u64 = 50;
-/// Time between two looks at the press's counts.
-const LOOK: Duration = Duration::from_millis(500);
-/// Far more than a stroke takes on any of these lines, however bad: without one for so long the run has failed.
+/// Interval of reading the press's counts.
+const INTERVAL: Duration = Duration::from_millis(500);
+/// Time without a result after which the run has failed: far more than a stroke takes on the worst of these lines.
 const STANDSTILL: Duration = Duration::from_secs(60);
-/// How late an answer comes, shortest and longest; on a serial line the host must be quiet for longer.
+/// Shortest and longest delay of a late answer; the silence of the host on a serial line must be longer.
 const LATE_MS: [u64; 2] = [150, 350];
-/// A bad serial line may keep the host's heartbeat away for longer than a press would bear.
+/// Heartbeat limit of the press: a faulty serial line may interrupt the host's heartbeat for longer than a real press allows.
 const HOST_MS: u64 = 10_000;
-/// Writes are not rationed here: strokes come as fast as the line carries them.
+/// Limit of writes, out of the way: strokes come as fast as the line carries them.
 const WRITES_PER_S: u32 = 1000;
 
-#[derive(Debug, Args)]
-pub(crate) struct Options {
-    /// How many strokes; whole plates of 50 beyond that
-    #[arg(short = 'n', long, default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    strokes: u64,
-    /// Share of requests that are answered late
-    #[arg(long, default_value = "1%", value_parser = share)]
-    late: f64,
-    /// Share of requests at which the connection is reset; on a serial line the adapter is pulled
-    #[arg(long, default_value = "0.5%", value_parser = share)]
-    reset: f64,
-    /// What the words travel over
-    #[arg(long, value_enum, default_value = "tcp")]
-    line: Line,
-    /// Time from one poll to the next
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
-    poll_ms: u64,
-    /// Seed of faults and sessions
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Line {
-    /// Modbus TCP
-    Tcp,
-    /// RTU on a pseudo terminal
-    Rtu,
-    /// RTU frames through TCP
-    RtuOverTcp,
-}
-
-/// Reads `1%` or `0.01`.
-fn share(text: &str) -> Result<f64, String> {
-    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
-    let share = number.trim().parse::<f64>().map(|number| number * unit).map_err(|e| e.to_string())?;
-    if (0.0..=0.2).contains(&share) { Ok(share) } else { Err("must lie between 0 and 20%".into()) }
-}
-
-/// What the press counted.
+/// Counts of the press.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Counts {
@@ -98,24 +60,24 @@ struct Counts {
     line_faults: std::collections::BTreeMap<String, u64>,
 }
 
-/// One result as the press took it.
+/// Result as the press accepted it.
 #[derive(Debug, Deserialize)]
-struct Taken {
+struct AcceptedResult {
     stroke_id: u16,
     session_id: u16,
     accepted_ms: u64,
     words: Vec<u16>,
 }
 
-/// How a run ended.
+/// Outcome of a run.
 struct Outcome {
     counts: Counts,
-    /// Results with another stroke's figures.
+    /// Number of results with another stroke's figures.
     wrong_figures: u64,
-    /// Scans ordered, and how many of them for a stroke that had been scanned before.
+    /// Number of scans ordered, and of those for a stroke that had been scanned before.
     scans: u64,
     scanned_twice: u64,
-    /// On the press's own clock, from its trigger to the echo of its number.
+    /// Times on the press's clock from the trigger to the echo of the stroke's number.
     trigger_to_busy: Durations,
     elapsed: Duration,
     stopped: bool,
@@ -132,11 +94,11 @@ impl Outcome {
         self.counts.duplicates + self.scanned_twice
     }
 
-    /// Strokes without a result that neither host nor press reported.
+    /// Returns the number of strokes without a result that neither host nor press reported.
     fn lost(&self) -> u64 {
         let counts = &self.counts;
-        let told = counts.missed_reported + counts.result_timeouts + counts.host_deaths;
-        self.counts.strokes.saturating_sub(self.counts.results + told)
+        let reported = counts.missed_reported + counts.result_timeouts + counts.host_deaths;
+        self.counts.strokes.saturating_sub(self.counts.results + reported)
     }
 
     fn good(&self) -> bool {
@@ -144,27 +106,27 @@ impl Outcome {
     }
 }
 
-/// 0 when nothing was wrong, doubled or lost.
-pub(crate) fn run(common: &Common, options: &Options) -> Result<ExitCode, CliError> {
-    press::report(common, soak_strokes(common, options))
+/// Runs the strokes; exit code 0 when nothing was wrong, doubled or lost.
+pub(crate) fn run(common: &Common, arguments: &SoakArguments) -> Result<ExitCode, CliError> {
+    press::report(common, soak_strokes(common, arguments))
 }
 
-fn soak_strokes(common: &Common, options: &Options) -> Result<ExitCode, Failure> {
+fn soak_strokes(common: &Common, arguments: &SoakArguments) -> Result<ExitCode, Failure> {
     let folder = Folder::new()?;
-    let per_part = PER_PART.min(options.strokes);
-    let parts = options.strokes.div_ceil(per_part);
+    let per_part = PER_PART.min(arguments.strokes);
+    let parts = arguments.strokes.div_ceil(per_part);
     let device = folder.0.join("adapter");
     let config = folder.0.join("press.toml");
-    std::fs::write(&config, press_file(options, per_part, parts, &device))?;
+    std::fs::write(&config, press_file(arguments, per_part, parts, &device))?;
     let mut cell = Cell::start(&config, &[])?;
-    let press = plant(options, &cell, &device);
+    let press = plant(arguments, &cell, &device);
     let outcome = runtime()?.block_on(soak(press, &mut cell, per_part * parts))?;
     progress::done();
-    report(common, options, &outcome)?;
+    report(common, arguments, &outcome)?;
     Ok(ExitCode::from(u8::from(!outcome.good())))
 }
 
-/// A folder that goes with its owner.
+/// Temporary folder, removed on drop.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -177,19 +139,19 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // What is left in the system's folder for such files goes with it.
+        // The system clears its temporary folder.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
-/// What the simulated press is told.
-fn press_file(options: &Options, per_part: u64, parts: u64, device: &Path) -> String {
-    let link = match options.line {
+/// Returns the configuration of the simulated press.
+fn press_file(arguments: &SoakArguments, per_part: u64, parts: u64, device: &Path) -> String {
+    let link = match arguments.line {
         Line::Tcp => "type = \"tcp\"".to_owned(),
         Line::RtuOverTcp => "type = \"rtu-over-tcp\"".to_owned(),
         Line::Rtu => format!("type = \"pty\"\ndevice = {:?}", device.display().to_string()),
     };
-    let Options { late, reset, seed, .. } = options;
+    let SoakArguments { late, reset, seed, .. } = arguments;
     let [least, most] = LATE_MS;
     format!(
         "strokes = {per_part}\nparts = {parts}\nbaseline = false\nseed = {seed}\n[link]\n{link}\n\
@@ -198,15 +160,15 @@ fn press_file(options: &Options, per_part: u64, parts: u64, device: &Path) -> St
     )
 }
 
-/// What the host is told.
-fn plant(options: &Options, cell: &Cell, device: &Path) -> Press {
+/// Returns the press as configured for the host.
+fn plant(arguments: &SoakArguments, cell: &Cell, device: &Path) -> Press {
     let (host, port) = cell.modbus.map_or((String::new(), 0), |at| (at.ip().to_string(), at.port()));
-    let mut link = match options.line {
+    let mut link = match arguments.line {
         Line::Tcp => Link::tcp(host, port, 1),
         Line::RtuOverTcp => Link::rtu_over_tcp(host, port, 1),
         Line::Rtu => Link::rtu(Serial::new(device, 115_200), 1),
     };
-    link.poll = Duration::from_millis(options.poll_ms);
+    link.poll = Duration::from_millis(arguments.poll_ms);
     link.response_timeout = link.response_timeout.min(Duration::from_millis(LATE_MS[0] - 50));
     if let Transport::Rtu(_, quiet) | Transport::RtuOverTcp(_, quiet) = &mut link.transport {
         *quiet = Quiet(Duration::from_millis(LATE_MS[1] + 100));
@@ -223,15 +185,15 @@ fn read<T: serde::de::DeserializeOwned>(document: Json) -> Result<T, CliError> {
 async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let (HostSide { orders, answers, status }, side) = channels();
-    let (tell, mut seen) = mpsc::unbounded_channel();
-    tokio::spawn(serve(orders, answers.clone(), tell));
+    let (observer, mut seen) = mpsc::unbounded_channel();
+    tokio::spawn(serve(orders, answers.clone(), observer));
     let link = PressLink::new(&press);
     let host = tokio::spawn(run_press(press, link, MemoryJournal::new(7), side));
     let mut stop = stop_signal()?;
     let (mut newest, mut since) = (0, Instant::now());
     let stopped = loop {
         tokio::select! {
-            () = tokio::time::sleep(LOOK) => {}
+            () = tokio::time::sleep(INTERVAL) => {}
             _ = stop.changed() => break true,
         }
         let counts: Counts = read(cell.ask(r#"{"get":"counts"}"#)?["counts"].take())?;
@@ -254,7 +216,7 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
     // The host may have ended by itself.
     let _ = answers.send(Answer::Stop);
     let _ = host.await;
-    let taken: Vec<Taken> = read(cell.ask(r#"{"get":"stats"}"#)?["stats"]["taken"].take())?;
+    let accepted: Vec<AcceptedResult> = read(cell.ask(r#"{"get":"stats"}"#)?["stats"]["taken"].take())?;
     let mut outcome = Outcome {
         counts,
         wrong_figures: 0,
@@ -264,7 +226,7 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
         elapsed: start.elapsed(),
         stopped,
     };
-    for it in &taken {
+    for it in &accepted {
         let [high, low] = it.session_id.to_be_bytes().map(u16::from);
         let figures = [it.words.get(55), it.words.get(57), it.words.get(58)].map(Option::<&u16>::copied);
         outcome.wrong_figures += u64::from(figures != [Some(it.stroke_id % 60_000), Some(low), Some(high)]);
@@ -280,7 +242,7 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
     Ok(outcome)
 }
 
-fn report(common: &Common, options: &Options, outcome: &Outcome) -> Result<(), CliError> {
+fn report(common: &Common, arguments: &SoakArguments, outcome: &Outcome) -> Result<(), CliError> {
     let counts = &outcome.counts;
     let busy = |percent| outcome.trigger_to_busy.percentile(percent).map(|time| time.as_secs_f64() * 1000.0);
     let seconds = outcome.elapsed.as_secs_f64();
@@ -292,7 +254,7 @@ fn report(common: &Common, options: &Options, outcome: &Outcome) -> Result<(), C
             "result_timeouts": counts.result_timeouts, "host_deaths": counts.host_deaths,
             "writes_outside": counts.writes_outside, "sentences": counts.wrong,
             "line_faults": counts.line_faults, "connections": counts.connections, "reads": counts.reads,
-            "writes": counts.writes, "seed": options.seed, "elapsed_s": seconds,
+            "writes": counts.writes, "seed": arguments.seed, "elapsed_s": seconds,
             "trigger_to_busy_ms": { "median": busy(50.0), "p99": busy(99.0), "most": busy(100.0) },
         }));
     }
@@ -308,11 +270,11 @@ fn report(common: &Common, options: &Options, outcome: &Outcome) -> Result<(), C
         counts.writes_outside
     ))?;
     let faults: Vec<_> = counts.line_faults.iter().map(|(name, count)| format!("{name} {count}")).collect();
-    output::line(&format!("faults of the line (seed {}): {}", options.seed, faults.join(", ")))?;
+    output::line(&format!("faults of the line (seed {}): {}", arguments.seed, faults.join(", ")))?;
     if let (Some(median), Some(p99), Some(most)) = (busy(50.0), busy(99.0), busy(100.0)) {
-        let kept = Durations::KEPT.min(counts.results as usize);
+        let newest = Durations::KEPT.min(counts.results as usize);
         output::line(&format!(
-            "trigger to busy on the press's clock, last {kept}: median {median:.0} ms, 99 % within {p99:.0} ms, most {most:.0} ms"
+            "trigger to busy on the press's clock, last {newest}: median {median:.0} ms, 99 % within {p99:.0} ms, most {most:.0} ms"
         ))?;
     }
     for sentence in &counts.wrong {
@@ -326,16 +288,4 @@ fn report(common: &Common, options: &Options, outcome: &Outcome) -> Result<(), C
         counts.missed_reported,
         counts.result_timeouts + counts.host_deaths
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shares_are_numbers_or_percentages() {
-        assert_eq!(share("1%"), Ok(0.01));
-        assert_eq!(share("0.005"), Ok(0.005));
-        assert!(share("50%").is_err() && share("-1%").is_err() && share("x").is_err());
-    }
 }

@@ -1,4 +1,4 @@
-//! One measurement of a scan in memory, stage by stage, in processor time.
+//! Measurement of a scan in memory, each stage timed in processor time.
 
 use std::time::Duration;
 
@@ -14,40 +14,40 @@ use platen_engine::stroke::NotMeasured;
 /// Processor time of each stage.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Stages {
-    /// From the lattice to the plate's face.
+    /// Extraction of the plate's face from the lattice.
     pub(super) extract: Duration,
-    /// Loop, corners, edges.
+    /// Boundary loop, corners, edges.
     pub(super) outline: Duration,
     /// Smooth face, mid-surface, mesh.
     pub(super) mesh: Duration,
     /// Flattening.
     pub(super) flatten: Duration,
-    /// S(u, v) and its covariance.
+    /// Fit of S(u, v) and its covariance.
     pub(super) surface: Duration,
 }
 
 impl Stages {
-    /// All of them.
+    /// Returns the sum of all stages.
     pub(super) fn total(&self) -> Duration {
         self.extract + self.outline + self.mesh + self.flatten + self.surface
     }
 }
 
-/// The plate as seen, and the time until then.
+/// Extracted face and outline, and their times.
 pub(super) struct Seen {
     pub(super) patch: Patch,
     pub(super) outline: Outline,
     times: [Duration; 2],
 }
 
-/// What came out, and after how long.
+/// Measurement with its intermediate results and times.
 pub(super) struct Run {
     pub(super) seen: Seen,
     pub(super) measurement: Measurement,
     pub(super) stages: Stages,
 }
 
-/// Finds the plate in a scan.
+/// Extracts the plate's face and outline from a scan.
 pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
     let start = cpu_time();
     let patch = shot.extract()?;
@@ -57,7 +57,7 @@ pub(super) fn see(shot: &Shot) -> Result<Seen, NotMeasured> {
     Ok(Seen { patch, outline, times })
 }
 
-/// Measures a plate that was found.
+/// Measures an extracted plate.
 pub(super) fn shape(
     shot: &Shot,
     seen: &Seen,
@@ -66,7 +66,7 @@ pub(super) fn shape(
     Ok(measure(&seen.patch, &seen.outline, &shot.spec, &shot.spec.rectangle(), flattening, &mut cpu_time)?)
 }
 
-/// Finds and measures.
+/// Extracts and measures.
 pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMeasured> {
     let seen = see(shot)?;
     let measurement = shape(shot, &seen, flattening)?;
@@ -76,13 +76,13 @@ pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMe
     Ok(Run { seen, measurement, stages })
 }
 
-/// The middle of several times; of an even number, the smaller of the two in the middle.
+/// Returns the median; of an even number of times, the smaller of the two in the middle.
 pub(super) fn median(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
     times.get(times.len().saturating_sub(1) / 2).copied().unwrap_or_default()
 }
 
-/// Milliseconds with a thousandth.
+/// Returns milliseconds, rounded to microseconds.
 pub(super) fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }

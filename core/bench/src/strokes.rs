@@ -1,7 +1,7 @@
-//! Errors of what is said of a stroke, and of a template, on pairs of simulated scans.
+//! Errors of the comparisons `displacement`, `curvature` and `template` on pairs of simulated scans.
 //!
-//! A plate with two bend bands is scanned, gets a third one, is scanned, and scanned again with nothing done: a stroke and a
-//! null pair. Between scans it is moved and turned, as on a press.
+//! A plate with two bend bands is scanned, receives a third band, is scanned, and is scanned again unchanged: a stroke and a
+//! null pair. Between scans it is shifted and turned, as on a press.
 
 use std::path::Path;
 use std::time::Duration;
@@ -23,31 +23,31 @@ use platen_model::{Field, NodeState, Report};
 
 /// Extent and thickness of the plates, millimetres.
 const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
-/// Middles of the bands, millimetres from the plate's middle, before and after the stroke.
+/// Centres of the bands, millimetres from the plate's centre, before and after the stroke.
 const BEFORE: &[f64] = &[-800.0, 0.0];
 pub(super) const AFTER: &[f64] = &[-800.0, 0.0, 700.0];
-/// Width of a band and angle by which it bends: 0.16 1/m at its middle, as press strokes leave.
+/// Width of a band and its bend angle: 0.16 1/m at its centre, as left by press strokes.
 const BAND_MM: f64 = 300.0;
 const BAND_DEG: f64 = 1.4;
 
-/// Radius of the plate under the template and that of the template, mid-surface, metres; length of the board.
+/// Radii of the plate and of the template, mid-surface, and the template's chord, metres.
 const ROLLED: f64 = 9.0;
 const WANTED: f64 = 8.5;
-const BOARD: f64 = 2.0;
+const CHORD: f64 = 2.0;
 
 const COMPARISON_LIMIT: Duration = Duration::from_secs(60);
 
 /// Errors of one plate's strokes: metres, radians, shares.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StrokeErrors {
-    /// Displacement after alignment, along the normal and as a vector, root mean square.
+    /// Root mean square errors of the displacement after alignment, along the normal and as a vector.
     displacement_normal: f64,
     displacement_vector: f64,
     /// Bend angle of the new band.
     angle: f64,
-    /// Gap of a board in the balanced seat.
+    /// Gap of a template in the balanced seat.
     gap: f64,
-    /// Share of the plate above the level of detection in a null pair, before patches are judged.
+    /// Share of the plate above the level of detection in a null pair, without the test of patch size.
     false_change: f64,
 }
 
@@ -81,14 +81,14 @@ pub(super) fn document(all: &[StrokeErrors]) -> Map<String, Json> {
     FIGURES.iter().map(entry).collect()
 }
 
-/// The `[shape]` table of a plate with these bands.
+/// Returns the `[shape]` table of a plate with these bands.
 pub(super) fn bands(at_mm: &[f64]) -> String {
     let band = |at: &f64| format!("{{ at_mm = {at:?}, width_mm = {BAND_MM:?}, angle_deg = {BAND_DEG:?} }}");
     let bands: Vec<String> = at_mm.iter().map(band).collect();
     format!("shape = \"bands\"\naxis_deg = 90.0\nbands = [{}]", bands.join(", "))
 }
 
-/// The plugins that say something of a stroke.
+/// Plugins under test.
 pub(super) struct Tools {
     flattening: Flattening,
     displacement: Comparison,
@@ -97,7 +97,7 @@ pub(super) struct Tools {
 }
 
 impl Tools {
-    /// The first of the flattenings, and the comparisons; single places count as changed, not only patches.
+    /// Loads the first of the flattenings and the comparisons; single nodes count as changed, not only patches.
     pub(super) fn load(catalogue: &Catalogue, names: &[String]) -> Result<Self, CliError> {
         let flattening = bench::flattenings(catalogue, names)?.into_iter().next();
         let comparison = |name: &str, option: Option<(&str, Value)>| -> Result<Comparison, CliError> {
@@ -113,7 +113,7 @@ impl Tools {
     }
 }
 
-/// Scans a plate before and after a stroke and once more, and a rolled one, and judges what is said of them.
+/// Scans a plate before and after a stroke and once more, and a rolled plate, and returns the errors of the comparisons.
 pub(super) fn errors(
     catalogue: &Catalogue,
     folder: &Path,
@@ -152,7 +152,7 @@ pub(super) fn errors(
     let null = compare(&tools.displacement, &again, Some(&after))?;
     let laid = compare(&tools.template, &rolled, None)?;
 
-    let missing = |what: &str| failed(&format!("no {what} in what the plugin found"));
+    let missing = |what: &str| failed(&format!("the plugin reports no {what}"));
     let field = moved.fields.iter().find(|field| field.name == "displacement" && field.components == 3);
     let field = field.ok_or_else(|| missing("displacement"))?;
     let [displacement_normal, displacement_vector] =
@@ -194,7 +194,7 @@ fn task() -> Task {
         templates: vec![Template {
             name: "board".into(),
             line: "middle".into(),
-            chord: BOARD,
+            chord: CHORD,
             centre: Centre::At(0.5 * width),
             limit: 0.003,
             seat: Seat::Balanced,
@@ -208,16 +208,16 @@ fn task() -> Task {
     }
 }
 
-/// A board of the wanted face's radius touches the flatter plate with its middle; its ends stand off by the difference of
-/// the sagittas.
+/// Returns the true gap: a template of the target face's radius touches the flatter plate with its middle, and its ends stand
+/// off by the difference of the sagittas.
 fn true_gap() -> f64 {
     let half_thickness = metres(0.5 * SIZE_MM[2]);
-    let sagitta = |radius: f64| radius - (radius * radius - 0.25 * BOARD * BOARD).sqrt();
+    let sagitta = |radius: f64| radius - (radius * radius - 0.25 * CHORD * CHORD).sqrt();
     sagitta(WANTED - half_thickness) - sagitta(ROLLED - half_thickness)
 }
 
-/// Error of a displacement field at the truth's places, along the normal and as a vector, root mean square. The plate's own
-/// motion is not part of it: true places before are moved rigidly onto where the field says that places were.
+/// Returns the root mean square errors of a displacement field at the true grid, along the normal and as a vector. The
+/// plate's own motion is no part of them: the true grid before is moved rigidly onto the places before of the field.
 fn displacement(field: &Field, now: &Surface, truth: [&Truth; 2]) -> [f64; 2] {
     let [before, after] = truth.map(|truth| &truth.grid);
     let [n_u, n_v] = field.nodes;

@@ -1,6 +1,7 @@
-//! The paper's tables on a simulated scan of the paper's size.
+//! Tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", on a
+//! simulated scan of the same size.
 //!
-//! The paper's times are those of one Intel i7 at 3.07 GHz; ours are processor time of this machine.
+//! The published times are of one Intel i7 at 3.07 GHz; those beside them are processor time of this machine.
 
 use std::path::Path;
 use std::time::Duration;
@@ -10,18 +11,17 @@ use platen_shape::mesh::SmoothFace;
 use serde_json::{Value as Json, json};
 
 use crate::accuracy::Accuracy;
-use crate::bench::{self, Command};
+use crate::bench;
 use crate::scene::{Scene, Setting, Shot};
 use crate::stages::{Run, Stages, median, ms, run};
 use crate::{figures, machine};
 use platen_engine::plugin::{Catalogue, Flattening};
+use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
 use platen_model::units::mm;
 
-/// A quarter of the finest scanner's resolution: 10,240 columns a turn.
-pub(super) const QUARTER_DEG: f64 = 360.0 / 10_240.0;
-/// As much round the plate as makes the lattice of the plate at quarter resolution 1.6 million cells.
+/// Margin scanned round the plate, degrees: the lattice at quarter resolution then has 1.6 million cells.
 pub(super) const MARGIN_DEG: f64 = 9.0;
 
 const PAPER_POINTS: usize = 277_721;
@@ -47,7 +47,8 @@ const PAPER_MARKERS_MM: f64 = 1.0;
 /// Meshes above this size are flattened at most three times.
 const LARGE_MESH: usize = 20_000;
 
-/// The plate: 11 square metres, rolled with its straight lines oblique to its edges, where the paper's pitch gives the paper's number of points.
+/// Returns the plate: 11 square metres, rolled with its straight lines oblique to its edges; the published pitch gives the
+/// published number of points on it.
 pub(super) fn scene() -> Scene {
     Scene {
         name: "rolled".into(),
@@ -58,8 +59,8 @@ pub(super) fn scene() -> Scene {
     }
 }
 
-/// What was found with one flattening.
-struct Found {
+/// Times and accuracy with one flattening.
+struct Outcome {
     name: String,
     stages: Stages,
     accuracy: Accuracy,
@@ -68,36 +69,36 @@ struct Found {
 pub(super) fn tables(
     catalogue: &Catalogue,
     folder: &Path,
-    command: &Command,
+    arguments: &BenchArguments,
     silent: bool,
 ) -> Result<Json, CliError> {
     progress::phase("casting rays");
     let scene = scene();
-    let noise_mm = command.noise_mm.first().copied().unwrap_or(0.5);
-    let (step_deg, threads) = (command.step_deg, command.threads);
-    let setting = Setting { step_deg, margin_deg: MARGIN_DEG, noise_mm, seed: command.seed, threads };
+    let noise_mm = arguments.noise_mm.first().copied().unwrap_or(0.5);
+    let (step_deg, threads) = (arguments.step_deg, arguments.threads);
+    let setting = Setting { step_deg, margin_deg: MARGIN_DEG, noise_mm, seed: arguments.seed, threads };
     let shot = scene.scan(catalogue, folder, setting)?;
-    let mut flattenings = bench::flattenings(catalogue, &command.flattening)?;
-    let mut found = Vec::new();
+    let mut flattenings = bench::flattenings(catalogue, &arguments.flattening)?;
+    let mut outcomes = Vec::new();
     let mut last = None;
     for flattening in &mut flattenings {
         progress::phase(&format!("measuring with {}", flattening.name()));
-        let (stages, one) = repeated(&shot, flattening, command.repeat)?;
+        let (stages, one) = repeated(&shot, flattening, arguments.repeat)?;
         let accuracy = Accuracy::of(&one.measurement, &shot.truth);
-        found.push(Found { name: flattening.name().to_owned(), stages, accuracy });
+        outcomes.push(Outcome { name: flattening.name().to_owned(), stages, accuracy });
         last = Some(one);
     }
     let Some(one) = last else { return Err(CliError::Usage("give at least one --flattening".into())) };
-    let meshes = meshes(&shot, &one, &mut flattenings, command)?;
+    let meshes = meshes(&shot, &one, &mut flattenings, arguments)?;
     progress::done();
-    let document = document(&shot, &one, &found, &meshes);
+    let document = document(&shot, &one, &outcomes, &meshes);
     if !silent {
-        print(&shot, &one, &found, &meshes, noise_mm, command)?;
+        print(&shot, &one, &outcomes, &meshes, noise_mm, arguments)?;
     }
     Ok(document)
 }
 
-/// Median of each stage over the repeats, and the last run.
+/// Measures several times; returns the median of each stage and the last run.
 fn repeated(shot: &Shot, flattening: &mut Flattening, repeat: usize) -> Result<(Stages, Run), CliError> {
     let failed = |e: platen_engine::stroke::NotMeasured| CliError::Failed(e.to_string());
     let mut last = run(shot, flattening).map_err(failed)?;
@@ -117,24 +118,24 @@ fn repeated(shot: &Shot, flattening: &mut Flattening, repeat: usize) -> Result<(
     Ok((stages, last))
 }
 
-/// Vertices of a mesh and the time of each flattening on it; `None` where it gave up.
+/// Vertices of a mesh and the time of each flattening on it; `None` where it failed.
 type MeshRow = (usize, Vec<Option<Duration>>);
 
-/// Meshes of several sizes over the same scanned plate, flattened through the plugin boundary.
+/// Flattens meshes of several sizes over the same scanned plate through the plugin boundary.
 fn meshes(
     shot: &Shot,
     one: &Run,
     flattenings: &mut [Flattening],
-    command: &Command,
+    arguments: &BenchArguments,
 ) -> Result<Vec<MeshRow>, CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(e.to_string());
     let face = SmoothFace::of(&one.seen.patch, &one.seen.outline, &shot.spec);
     let mut rows = Vec::new();
-    for n in &command.meshes {
+    for n in &arguments.meshes {
         progress::phase(&format!("flattening {n} vertices"));
         let (mesh, _) =
             face.mesh(&one.seen.outline, &shot.spec, &shot.spec.rectangle(), *n).map_err(|e| failed(&e))?;
-        let repeat = if *n > LARGE_MESH { command.repeat.min(3) } else { command.repeat };
+        let repeat = if *n > LARGE_MESH { arguments.repeat.min(3) } else { arguments.repeat };
         let times = flattenings.iter_mut().map(|flattening| time(flattening, &mesh, repeat)).collect();
         rows.push((mesh.vertices.len(), times));
     }
@@ -152,13 +153,13 @@ fn time(flattening: &mut Flattening, mesh: &DiskMesh, repeat: usize) -> Option<D
     match times {
         Ok(times) => Some(median(times)),
         Err(error) => {
-            tracing::warn!(%error, vertices = mesh.vertices.len(), "a flattening gave up");
+            tracing::warn!(%error, vertices = mesh.vertices.len(), "flattening failed");
             None
         }
     }
 }
 
-/// Name of a step of the paper's, and its time.
+/// Name of a step of table 2, and its time.
 type Step = (&'static str, fn(&Stages) -> Duration);
 
 const STEPS: [Step; 6] = [
@@ -173,15 +174,15 @@ const STEPS: [Step; 6] = [
 fn print(
     shot: &Shot,
     one: &Run,
-    found: &[Found],
+    outcomes: &[Outcome],
     meshes: &[MeshRow],
     noise_mm: f64,
-    command: &Command,
+    arguments: &BenchArguments,
 ) -> Result<(), CliError> {
     output::line(&format!(
         "scan: rolled plate of 4000 x 2755 x 36 mm, R 12 m, straight lines 20 degrees oblique, about 8 m away; {} x {} cells, \
          noise {noise_mm} mm at 10 m, seed {}; simulated",
-        shot.header.n_rows, shot.header.n_columns, command.seed
+        shot.header.n_rows, shot.header.n_columns, arguments.seed
     ))?;
     output::line("\nTable 1: the scan and its mesh")?;
     let sized = |name: &str, here: String, paper: String| vec![name.to_owned(), here, paper];
@@ -200,13 +201,13 @@ fn print(
         ),
     ])?;
 
-    let names = found.iter().map(|f| f.name.clone());
+    let names = outcomes.iter().map(|f| f.name.clone());
     let paper = ["paper, abf".to_owned(), "paper, harmonic".to_owned()];
     output::line("\nTable 2: ms of each step")?;
     let mut rows =
         vec![["step".to_owned()].into_iter().chain(names.clone()).chain(paper.clone()).collect::<Vec<_>>()];
     for ((step, take), paper) in STEPS.iter().zip(PAPER_STEPS) {
-        let here = found.iter().map(|f| format!("{:.1}", ms(take(&f.stages))));
+        let here = outcomes.iter().map(|f| format!("{:.1}", ms(take(&f.stages))));
         rows.push(
             [(*step).to_owned()].into_iter().chain(here).chain(paper.map(|p| format!("{p:.0}"))).collect(),
         );
@@ -215,8 +216,8 @@ fn print(
 
     output::line("\nTable 3: ms of flattening meshes of this scan, through the plugin boundary")?;
     let mut rows = vec![["vertices".to_owned()].into_iter().chain(names).chain(paper).collect::<Vec<_>>()];
-    for ((vertices, times), wanted) in meshes.iter().zip(&command.meshes) {
-        let here = times.iter().map(|t| t.map_or("gave up".to_owned(), |t| format!("{:.1}", ms(t))));
+    for ((vertices, times), wanted) in meshes.iter().zip(&arguments.meshes) {
+        let here = times.iter().map(|t| t.map_or("failed".to_owned(), |t| format!("{:.1}", ms(t))));
         let known = PAPER_FLATTENING.iter().find(|(n, _)| n == wanted);
         let paper = (0..2).map(|k| known.map_or("-".to_owned(), |(_, times)| format!("{:.0}", times[k])));
         rows.push([vertices.to_string()].into_iter().chain(here).chain(paper).collect());
@@ -224,10 +225,10 @@ fn print(
     output::table(&rows)?;
 
     output::line(
-        "\nTable 4: cells of a lattice drawn on the plate, and what else is known of the truth (mm, degrees, 1/m)",
+        "\nTable 4: cells of a lattice drawn on the plate, and other errors against the true shape (mm, degrees, 1/m)",
     )?;
     let mut rows = vec![figures::head(&["flattening"])];
-    rows.extend(found.iter().map(|f| figures::row(&[&f.name], &f.accuracy)));
+    rows.extend(outcomes.iter().map(|f| figures::row(&[&f.name], &f.accuracy)));
     for (name, [du, dv, angle]) in PAPER_CELLS {
         let cells = [
             name.to_owned(),
@@ -245,22 +246,23 @@ fn print(
     }
     output::table(&rows)?;
     output::line(
-        "ours: measured minus true sides and angles of cells W/20 x H/20, root mean square about zero; the paper's: their standard \
-         deviation. The paper's 1.0 mm of nine markers is one experiment, not one per flattening.",
+        "here: measured minus true sides and angles of cells W/20 x H/20, root mean square about zero; paper: their standard \
+         deviation. The paper's 1.0 mm of nine markers is one experiment, not one per flattening. Paper: Masuda et al., \
+         \"Point-based shape monitoring of plate bending for large-scale storage tanks\".",
     )
 }
 
-fn document(shot: &Shot, one: &Run, found: &[Found], meshes: &[MeshRow]) -> Json {
+fn document(shot: &Shot, one: &Run, outcomes: &[Outcome], meshes: &[MeshRow]) -> Json {
     let paper_step = |k: usize| json!({ "abf": PAPER_STEPS[k][0], "harmonic": PAPER_STEPS[k][1] });
     let step = |k: usize| {
         let (name, take) = STEPS[k];
         let here: serde_json::Map<String, Json> =
-            found.iter().map(|f| (f.name.clone(), json!(ms(take(&f.stages))))).collect();
+            outcomes.iter().map(|f| (f.name.clone(), json!(ms(take(&f.stages))))).collect();
         json!({ "step": name, "here_ms": here, "paper_ms": paper_step(k) })
     };
     let mesh = |(vertices, times): &MeshRow| {
         let here: serde_json::Map<String, Json> =
-            found.iter().zip(times).map(|(f, t)| (f.name.clone(), json!(t.map(ms)))).collect();
+            outcomes.iter().zip(times).map(|(f, t)| (f.name.clone(), json!(t.map(ms)))).collect();
         json!({ "vertices": vertices, "here_ms": here })
     };
     let paper_mesh = |(n, [abf, harmonic]): &(usize, [f64; 2])| json!({ "vertices": n, "abf_ms": abf, "harmonic_ms": harmonic });
@@ -281,7 +283,7 @@ fn document(shot: &Shot, one: &Run, found: &[Found], meshes: &[MeshRow]) -> Json
             "paper": PAPER_FLATTENING.iter().map(paper_mesh).collect::<Vec<_>>(),
         },
         "table_4": {
-            "here": found.iter().map(|f| (f.name.clone(), figures::document(&f.accuracy).into())).collect::<serde_json::Map<String, Json>>(),
+            "here": outcomes.iter().map(|f| (f.name.clone(), figures::document(&f.accuracy).into())).collect::<serde_json::Map<String, Json>>(),
             "paper": PAPER_CELLS.iter().map(paper_cells).collect::<Vec<_>>(),
             "paper_markers_mean_mm": PAPER_MARKERS_MM,
         },

@@ -6,10 +6,9 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_model::Task;
+use platen_model::units::{metres, mm};
 use platen_plant::plant::CalibrationUse;
 use platen_plant::{Document, Error as PlantError, PlateFile, Reported, TomlTable};
-
-use platen_model::units::{metres, mm};
 
 /// Largest plausible standard deviation, millimetres: above it a plate was bent or the scanner moved.
 const LARGEST_SIGMA_MM: f64 = 20.0;

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use platen_plant::PlateFile;
 use platen_plant::plant::RigidTransform;
-use platen_plant::{Error as PlantError, Faults, OptionValue, PlantFile, PluginUse, Value, check_options};
+use platen_plant::{
+    Error as PlantError, Faults, OptionValue, PlantFile, PlateFile, PluginUse, Value, check_options,
+};
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 
 use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};

@@ -30,4 +30,4 @@ pub use flattening::Flattening;
 pub use instance::{Emitted, Instance, RunningJob};
 pub use job::{CancelToken, JobSpec};
 pub use library::Library;
-pub use scanner::{ScanEvent, Scanner};
+pub use scanner::{RunningScan, Scanner};

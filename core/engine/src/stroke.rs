@@ -1,9 +1,9 @@
-//! One stroke, as the data travels: scanner, plate, outline, surface, comparisons, verdict.
+//! One stroke in the order of its data: scan, plate, outline, surface, comparisons, verdict.
 //!
 //! ```text
 //! columns -> Patch -> Outline -> Measurement (mid-surface, mesh, chart, S) -> Reports -> Verdict
 //! ```
-//! Each arrow is one function here, with one type on each side. Nothing travels back.
+//! Each arrow is one function here ([`scan`], [`measure_scanned`], [`compare`], [`verdict`]), with one type on each side.
 
 mod previous_pose;
 mod scan_buffer;
@@ -11,48 +11,43 @@ mod scan_buffer;
 pub use previous_pose::PreviousPose;
 pub use scan_buffer::ScanBuffer;
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
-use platen_model::{Task, Verdict};
-use platen_scan::{ColumnError, ScanHeader, Window};
+use platen_model::{Report, Task, Verdict};
+use platen_scan::{ColumnError, Window};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::measure::{MeasureError, measure};
 use platen_shape::outline::{Outline, OutlineError, outline};
 use platen_shape::{Blank, BlankError, Measured, Patch, PlateSpec, Reorientation, Scanned, reorientation};
 
 use crate::pipeline::Pipeline;
-use crate::plugin::{JobSpec, PluginError, ScanEvent, Scanner, Surfaces};
-use platen_model::Report;
+use crate::plugin::{JobSpec, PluginError, Scanner, Surfaces};
 
-/// Why a stroke was not measured, by who must act.
+/// Reason why a stroke was not measured, by the person who must act.
 #[derive(Debug, thiserror::Error)]
 pub enum NotMeasured {
     /// The scanner gave no scan.
     #[error("scanner {0}")]
     Scanner(#[from] PluginError),
-    /// The scanner's driver sent what is no lattice.
+    /// A column of the driver does not fit its lattice.
     #[error("scan: {0}; report this to the driver's author")]
     Column(#[from] ColumnError),
-    /// The driver sent columns before it said what they are.
-    #[error("scan: columns without a header; report this to the driver's author")]
-    NoHeader,
     /// The plate was not found in the scan.
     #[error("scan: {0}")]
     Plate(#[from] Refusal),
     /// The plate's outline was not found.
     #[error("plate: {0}")]
     Outline(#[from] OutlineError),
-    /// The plate lies another way than at the scan before.
+    /// The plate is turned against the previous scan.
     #[error(
         "plate: its nearest edge lies {angle_deg:.0} degrees from where u ran at the scan before; turn it back, or let the \
          press send plate_rot"
     )]
     Askew {
-        /// Degrees.
+        /// Angle between its nearest edge and the previous direction of u, degrees.
         angle_deg: f64,
     },
-    /// Its corners would be mistaken.
+    /// The corner assignment is ambiguous: the plate fits the previous scan only after a quarter or half turn.
     #[error(
         "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
     )]
@@ -65,7 +60,7 @@ pub enum NotMeasured {
     Shape(#[from] MeasureError),
 }
 
-/// Scans; the plate is extracted while columns arrive. All that came goes to the buffer, when there is one.
+/// Scans; the plate is extracted while columns arrive. The whole scan goes to `buffer`, if there is one.
 ///
 /// # Errors
 /// No scan, or no plate in it.
@@ -77,40 +72,23 @@ pub fn scan(
     mut buffer: Option<&mut ScanBuffer>,
 ) -> Result<Scanned, NotMeasured> {
     let start = Instant::now();
-    let mut extractor: Option<(ScanHeader, Extractor)> = None;
-    let mut wrong: Option<NotMeasured> = None;
-    let mut take = |event| match (event, &mut extractor) {
-        (ScanEvent::Begin(header), _) => {
-            if let Some(buffer) = buffer.as_deref_mut() {
-                buffer.begin(header.clone());
-            }
-            extractor = Some((header.clone(), Extractor::new(&header, spec)));
-            Ok(())
-        }
-        (ScanEvent::Column(column), Some((_, extractor))) => {
-            extractor.push(&column)?;
-            if let Some(buffer) = buffer.as_deref_mut() {
-                buffer.push(column);
-            }
-            Ok(())
-        }
-        (ScanEvent::Column(_), None) => Err(NotMeasured::NoHeader),
-    };
-    let end = scanner.scan(job, window, &mut |event| match take(event) {
-        Ok(()) => ControlFlow::Continue(()),
-        Err(error) => {
-            wrong = Some(error);
-            ControlFlow::Break(())
-        }
-    });
-    if let Some(error) = wrong {
-        return Err(error);
+    let mut scan = scanner.start(job, window)?;
+    let header = scan.header().clone();
+    let mut extractor = Extractor::new(&header, spec);
+    if let Some(buffer) = buffer.as_deref_mut() {
+        buffer.begin(header.clone());
     }
-    let end = end?;
+    for column in &mut scan {
+        let column = column?;
+        extractor.push(&column)?;
+        if let Some(buffer) = buffer.as_deref_mut() {
+            buffer.push(column);
+        }
+    }
+    let end = scan.finish()?;
     if let Some(buffer) = buffer {
         buffer.end(end);
     }
-    let (header, mut extractor) = extractor.ok_or(NotMeasured::NoHeader)?;
     let acquired = Instant::now();
     extractor.leave_out_warm_up(end.warm_up_columns);
     let patch = extractor.finish()?;
@@ -124,14 +102,15 @@ pub fn scan(
     })
 }
 
-/// What is known of the outline that the plate was really cut with.
+/// Outline of the blank, to which (u, v) refer.
 #[derive(Debug, Clone, Copy)]
 pub enum Baseline<'a> {
-    /// Nothing: it counts as the rectangle of its plate file.
+    /// Unknown: the nominal rectangle of the plate file.
     None,
-    /// What an earlier scan of the blank told.
+    /// From an earlier scan of the blank.
     Earlier(&'a Blank),
-    /// What this scan tells: it is the blank's. Where it tells no outline, the log says why, and it counts as [`None`](Self::None).
+    /// From this scan, which is the baseline. Without an outline in it the nominal rectangle is used, and the log names the
+    /// reason.
     This,
 }
 
@@ -152,11 +131,11 @@ impl Baseline<'_> {
     }
 }
 
-/// From the plate's face to its shape. At its first scan the hint of `spec` tells its corners apart, later the way
-/// that it lay at the `last` one. Its edges lie where the `baseline` tells.
+/// Measures the shape of the plate from its scanned face. The corners are assigned by the u-axis hint of `spec` at the
+/// first scan and by the `last` pose later; (u, v) refer to the outline of `baseline`.
 ///
 /// # Errors
-/// Why the plate was not measured.
+/// The reason why the plate was not measured.
 pub fn measure_scanned(
     pipeline: &mut Pipeline,
     scanned: &Scanned,
@@ -187,13 +166,13 @@ pub fn measure_scanned(
     }
 }
 
-/// What the comparisons found, in the plant's order. One that fails says so in its place and judges nothing.
+/// Runs the comparisons in the order of the plant file. A failed one leaves its error in its place.
 pub fn compare(pipeline: &Pipeline, task: &Task, surfaces: Surfaces<'_>) -> Vec<Result<Report, PluginError>> {
     pipeline.comparisons.iter().map(|comparison| comparison.compare(task, surfaces)).collect()
 }
 
-/// The plate's verdict: the worst of those given. Nothing is good by default: a comparison that failed, or none that
-/// judges, leaves `cannot_tell`.
+/// Returns the verdict of the plate: the worst of those given. A failed comparison counts as `cannot_tell`, and so does
+/// the absence of any judging comparison.
 pub fn verdict(reports: &[Result<Report, PluginError>]) -> Verdict {
     let given = reports.iter().filter_map(|report| match report {
         Ok(report) => report.findings.verdict,

@@ -12,7 +12,8 @@ pub mod orient;
 mod read;
 mod write;
 
-pub use read::{Columns, Oriented, ReadError, ScanReader};
+pub use orient::Columns;
+pub use read::{Oriented, ReadError, ScanReader};
 pub use write::{ScanFile, ScanWriter, WriteError, WriteFault, Written};
 
 /// File format of a lattice.

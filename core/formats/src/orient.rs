@@ -1,76 +1,75 @@
-//! Orientation, handedness and units of a stored lattice, decided from its geometry.
+//! Orientation, handedness and units of a stored lattice by monotone fits of elevation and azimuth to row and column.
 //!
-//! File formats disagree on what a row is, where row 0 lies, which way columns run and in which unit they are
-//! written, and their headers are no help: names are swapped, counts lie. So nothing here trusts a name. A
-//! [`Survey`] sees every stored cell once and keeps sums per row and per column; [`Survey::decide`] correlates
-//! rows and columns with elevation and unwrapped azimuth and gives a [`Plan`]; an [`Assembler`] sees the cells
-//! again and applies it, so that a scan larger than memory can be read twice but is never held. The result is
-//! the order of this crate: row 0 at the top, columns by increasing azimuth counter-clockwise seen from above,
-//! right-handed, metres.
+//! Formats disagree on what a row is, where row 0 lies, in which direction columns run and in which unit coordinates are
+//! written, and headers are unreliable: names are swapped, counts are wrong. The decision therefore uses the cells alone.
+//! The first pass (`Survey`) keeps sums per row and per column. `Survey::decide` fits elevation to the row number and
+//! unwrapped azimuth to the column number by weighted least squares, the other way round too, requires correlations of
+//! 0.99 and returns a `Plan`. The second pass ([`Columns`]) applies it to every cell. The result has row 0 at the top,
+//! columns by increasing azimuth (counter-clockwise seen from above), a right-handed frame, and metres.
 //!
-//! What geometry cannot tell: a mirrored scan looks like a real one whose head turned the other way. It is
-//! found only when the frame says so ([`Expected::mirror`]) or the direction of turning is known
-//! ([`Expected::turn`]). Which face of the mirror measured a column is not stored in any lattice file.
+//! Limits: a mirrored scan equals a real one whose head turns in the opposite direction. It is detected only when the
+//! frame declares it ([`Expected::mirror`]) or the direction of rotation is known ([`Expected::turn`]). The mirror face of
+//! a column is not stored in any lattice file.
 
 mod apply;
 mod decide;
 mod fit;
 mod intensity;
 mod occupancy;
-mod own;
+mod restore;
 mod survey;
 
-pub use apply::Assembler;
-pub use decide::{Plan, Unit};
-pub use survey::Survey;
+pub use apply::Columns;
+pub(crate) use decide::Plan;
+use decide::Unit;
+pub(crate) use survey::Survey;
 
 use platen_scan::{Direction, State};
 
-/// One cell as a file stores it.
+/// A cell as stored in a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RawCell {
-    /// What the file calls row.
-    pub row: u32,
-    /// What the file calls column.
-    pub column: u32,
+pub(crate) struct RawCell {
+    /// Row number in the file.
+    pub(crate) row: u32,
+    /// Column number in the file.
+    pub(crate) column: u32,
     /// Position in the file's own unit and frame; any point on the beam when only its direction is known.
-    pub xyz: [f64; 3],
-    /// The same place as range and direction, where the file stores these: they are kept to the last bit.
-    pub beam: Option<(f64, Direction)>,
-    /// In the file's own scale.
-    pub intensity: f64,
-    /// What the file says of the cell. A valid cell at the origin or without finite numbers counts as missing.
-    pub state: State,
+    pub(crate) xyz: [f64; 3],
+    /// The same position as range and direction, where the file stores these: they are kept to the last bit.
+    pub(crate) beam: Option<(f64, Direction)>,
+    /// Intensity in the scale of the file.
+    pub(crate) intensity: f64,
+    /// State in the file. A valid cell at the origin or without finite numbers counts as missing.
+    pub(crate) state: State,
 }
 
-/// Which way columns run by growing index, seen from above.
+/// Direction of columns by increasing index, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
-    /// As the head of most instruments turns.
+    /// Direction of rotation of most instruments.
     Clockwise,
-    /// By growing azimuth.
+    /// By increasing azimuth.
     CounterClockwise,
 }
 
-/// How to make a left-handed frame right-handed.
+/// Correction of a left-handed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mirror {
     /// The frame is right-handed.
     #[default]
     None,
-    /// x changes its sign.
+    /// x is negated.
     X,
-    /// y changes its sign.
+    /// y is negated.
     Y,
 }
 
-/// What is known of a scan besides its cells.
+/// Declarations about a scan beside its cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Expected {
     /// Smallest and largest intensity that the file declares.
     pub intensity: Option<(f64, f64)>,
-    /// Which way columns run in the files of this instrument, where that is known; the other way is a mirrored
-    /// scan.
+    /// Direction of columns in the files of this instrument, where it is known; the opposite one is a mirrored scan.
     pub turn: Option<Turn>,
     /// Set when the frame of the file is left-handed.
     pub mirror: Mirror,
@@ -78,10 +77,10 @@ pub struct Expected {
     pub cut_azimuth: Option<f64>,
 }
 
-/// Why stored cells are not a lattice of a scan.
+/// Reason why stored cells are no lattice of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OrientError {
-    /// No scanner has so many rows or columns.
+    /// A row or column number beyond any scanner.
     #[error(
         "cell (row {row}, column {column}) lies outside of any scanner's lattice ({max} rows or columns at most)"
     )]
@@ -93,7 +92,7 @@ pub enum OrientError {
         /// Largest number of either.
         max: u32,
     },
-    /// A cell comes twice.
+    /// Two cells at one place.
     #[error(
         "cell (row {row}, column {column}) comes twice: rows and columns were lost; export a structured scan"
     )]
@@ -103,7 +102,7 @@ pub enum OrientError {
         /// Stored column.
         column: u32,
     },
-    /// The indices spread over far more cells than there are.
+    /// Fewer cells than 2 % of the places between the first and the last row and column.
     #[error(
         "{cells} cells spread over {n_rows} x {n_columns} places ({percent:.2} %, at least {needed} % needed): the scan was thinned out; export every point"
     )]
@@ -119,7 +118,7 @@ pub enum OrientError {
         /// Share needed.
         needed: f64,
     },
-    /// Nothing or next to nothing was measured.
+    /// Fewer than 3 rows or columns with valid cells.
     #[error(
         "{valid} valid cells in {n_rows} rows and {n_columns} columns: too few to tell rows from columns (3 x 3 needed)"
     )]
@@ -131,7 +130,7 @@ pub enum OrientError {
         /// Columns with valid cells.
         n_columns: u32,
     },
-    /// Neither way of reading rows and columns follows the angles.
+    /// Neither assignment of rows and columns follows the angles.
     #[error(
         "rows follow elevation by {rows_elevation:+.3} and columns azimuth by {columns_azimuth:+.3} (swapped: {columns_elevation:+.3}, {rows_azimuth:+.3}), 0.99 needed: the points are not seen from the origin of the file; export in the scanner's own frame, structured, without registration applied"
     )]
@@ -145,7 +144,7 @@ pub enum OrientError {
         /// Correlation of row with azimuth.
         rows_azimuth: f64,
     },
-    /// Neither metres nor millimetres.
+    /// Ranges that are neither metres nor millimetres.
     #[error(
         "half of the {valid} ranges are {side} {limit}: neither metres nor millimetres; export in metres"
     )]
@@ -157,7 +156,7 @@ pub enum OrientError {
         /// The limit.
         limit: f64,
     },
-    /// Columns run against the known direction.
+    /// Columns in the direction opposite to the known one.
     #[error(
         "columns run {found}, this scanner's run {expected}: the file is mirrored; export in a right-handed frame, or set mirror"
     )]
@@ -167,7 +166,7 @@ pub enum OrientError {
         /// Direction expected.
         expected: &'static str,
     },
-    /// The second pass met other cells than the first.
+    /// Other cells in the second pass than in the first.
     #[error(
         "the scan changed while it was read ({expected} cells in the first pass, {found} in the second); wait until it is complete"
     )]
@@ -180,7 +179,7 @@ pub enum OrientError {
 }
 
 impl Turn {
-    fn says(self) -> &'static str {
+    fn name(self) -> &'static str {
         match self {
             Self::Clockwise => "clockwise",
             Self::CounterClockwise => "counter-clockwise",
@@ -195,7 +194,7 @@ const NO_RANGE: f64 = 1e-6;
 /// Range above which a number is no measurement in any unit.
 const NO_NUMBER: f64 = 1e12;
 
-/// State of a cell after a look at its numbers.
+/// Returns the state of a cell by its numbers.
 fn true_state(cell: &RawCell) -> State {
     let [x, y, z] = cell.xyz;
     let range2 = x * x + y * y + z * z;

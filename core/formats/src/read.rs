@@ -10,7 +10,7 @@ pub(crate) mod e57;
 mod error;
 mod lines;
 mod ptx;
-mod sweeps;
+mod scan_order;
 mod window;
 pub(crate) mod xyb;
 mod xyz;
@@ -19,10 +19,10 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use platen_scan::{Column, ScanEnd, ScanHeader};
+use platen_scan::ScanHeader;
 
 use crate::Format;
-use crate::orient::{Assembler, Expected, Mirror, Plan, RawCell, Survey};
+use crate::orient::{Columns, Expected, Mirror, Plan, RawCell, Survey};
 
 pub use error::ReadError;
 use error::Result;
@@ -52,7 +52,7 @@ struct About {
 }
 
 /// Cells in the order of the file. Nothing follows an error.
-type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + 'a>;
+pub(crate) type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
 trait Source {
@@ -135,7 +135,7 @@ impl<'a> ScanReader<'a> {
             survey.add(&cell).map_err(ReadError::from)?;
             checksum = add_to_checksum(checksum, &cell);
             if survey.cells().is_multiple_of(PROGRESS_EVERY) {
-                progress(share(survey.cells(), about.cells))?;
+                progress((survey.cells() as f64 / about.cells.max(1) as f64).min(1.0))?;
             }
         }
         if !fits {
@@ -159,13 +159,11 @@ impl<'a> ScanReader<'a> {
     /// # Errors
     /// When the file cannot be read from its start again.
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
-        let total = self.source.about().cells;
         let cells = match self.kept.as_slice() {
             [] => self.source.cells()?,
             kept => Box::new(kept.iter().copied().map(Ok)),
         };
-        let assembler = Assembler::new(&oriented.plan);
-        Ok(Columns { cells, assembler, rest: None, seen: 0, total })
+        Ok(Columns::new(&oriented.plan, cells))
     }
 }
 
@@ -186,60 +184,6 @@ impl Oriented {
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
-}
-
-/// Columns of a lattice, each once, in the order in which the file completes them. Nothing follows an error.
-pub struct Columns<'a> {
-    cells: Cells<'a>,
-    assembler: Assembler<'a>,
-    /// After the last cell: columns without any stored cell, and the trailer.
-    rest: Option<(std::vec::IntoIter<Column>, ScanEnd)>,
-    seen: u64,
-    total: u64,
-}
-
-impl Columns<'_> {
-    /// Returns the share of cells read, 0 to 1.
-    pub fn share(&self) -> f64 {
-        share(self.seen, self.total)
-    }
-
-    /// Ends the scan after its last column.
-    ///
-    /// # Errors
-    /// [`ReadError::Orient`] when cells of the first pass did not come.
-    pub fn finish(self) -> Result<ScanEnd> {
-        match self.rest {
-            Some((_, end)) => Ok(end),
-            None => Ok(self.assembler.finish()?.1),
-        }
-    }
-
-    fn next_column(&mut self) -> Result<Option<Column>> {
-        if self.rest.is_none() {
-            for cell in &mut self.cells {
-                self.seen += 1;
-                if let Some(column) = self.assembler.push(&cell?)? {
-                    return Ok(Some(column));
-                }
-            }
-            let (empty, end) = self.assembler.finish()?;
-            self.rest = Some((empty.into_iter(), end));
-        }
-        Ok(self.rest.as_mut().and_then(|(empty, _)| empty.next()))
-    }
-}
-
-impl Iterator for Columns<'_> {
-    type Item = Result<Column>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.next_column().transpose()
-    }
-}
-
-fn share(seen: u64, total: u64) -> f64 {
-    (seen as f64 / total.max(1) as f64).min(1.0)
 }
 
 /// Continues a CRC-32C over position, intensity, row and column of a cell.

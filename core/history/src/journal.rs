@@ -90,9 +90,9 @@ fn finished(publication: &Publication) -> Finished {
         key: publication.key,
         run_id: publication.run_id,
         seq: publication.seq,
-        verdict: measurement.verdict,
+        verdict: measurement.verdict(),
         reason: measurement
-            .reason
+            .reason()
             .map(|code| format!("{}: {}", code.number(), code.alarm().text(Language::En))),
         figures,
         publication: serde_json::to_string(publication).unwrap_or_default(),

@@ -1,6 +1,8 @@
-//! The command line: one module for each verb. Results go to stdout, the log to stderr.
+//! Command line of `platen`: one module for each verb. Results go to stdout, the log to stderr.
+//!
+//! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON document.
 
-mod bench;
+pub mod bench;
 mod calibrate;
 pub mod cell;
 mod check;
@@ -24,9 +26,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::scan_file::ScanFileError;
 use platen_engine::pipeline::PipelineError;
 use platen_engine::plugin::{Catalogue, PluginError};
+use platen_formats::WriteError;
 use platen_report::output_folder::FilesError;
 
 /// Measures plates on a press, stroke by stroke.
@@ -35,7 +37,7 @@ use platen_report::output_folder::FilesError;
     version,
     arg_required_else_help = true,
     after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or plant file.\n\
-                  PLATEN_LOG sets what is logged, e.g. PLATEN_LOG=debug or PLATEN_LOG=platen_press=trace."
+                  PLATEN_LOG sets the log filter, e.g. PLATEN_LOG=debug or PLATEN_LOG=platen_press=trace."
 )]
 struct Cli {
     #[command(flatten)]
@@ -44,10 +46,10 @@ struct Cli {
     verb: Verb,
 }
 
-/// What every verb takes.
+/// Options of every verb.
 #[derive(Debug, Clone, Args)]
 pub struct Common {
-    /// Folder to look for plugins in first
+    /// Folder searched for plugins first
     #[arg(long, global = true, value_name = "DIR")]
     pub plugins: Option<PathBuf>,
     /// Print the result as JSON
@@ -56,7 +58,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// Where plugins are looked for.
+    /// Returns the catalogue of the plugin folders, that of `--plugins` first.
     pub fn catalogue(&self) -> Catalogue {
         Catalogue::new(self.plugins.as_deref())
     }
@@ -64,44 +66,43 @@ impl Common {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// A simulated press and scanner on loopback: strokes until the plate is bent
+    /// Bend a simulated plate: press and scanner on loopback, strokes until it is in tolerance
     Demo(demo::Command),
     /// Serve a press: scan, measure and answer after each stroke
     Run(run::Command),
-    /// Measure a plate in one scan file
+    /// Measure the plate in one scan file
     Measure(measure::Command),
-    /// One scan of the plant's scanner to a file
+    /// Write one scan of the plant's scanner to a file
     Scan(scan::Command),
-    /// A scan file in another format
+    /// Convert a scan file to another format
     Convert(convert::Command),
-    /// What a scanner's errors are beyond noise, from scans of a plate left alone
+    /// Estimate a scanner's errors beyond noise from repeated scans of one plate
     Calibrate(calibrate::Command),
-    /// Painted markers in a scan against the virtual ones
+    /// Compare painted discs in a scan with the markers of the plate file
     Verify(verify::Command),
-    /// What is in a scan file, and how it was oriented
+    /// Describe a scan file: lattice, orientation, notes of the driver
     Inspect(inspect::Command),
-    /// Check plant and plate files, all faults at once
+    /// Check plant and plate files and list all faults
     Check(check::Command),
-    /// The register map in force, and what stands in the registers
+    /// Print the register map, read registers, test link and handshake
     Press(press::Command),
-    /// How a running host stands
+    /// Show the state of a running host
     Status(status::Command),
-    /// What is on record
+    /// Query the record
     History(history::Command),
-    /// What plugins are installed, and their options
+    /// List the installed plugins and their options
     Plugins(plugins::Command),
     /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
-    #[command(disable_help_flag = true)]
-    Bench(bench::Arguments),
+    Bench(bench::BenchArguments),
 }
 
-/// Why a verb ended without its result.
+/// Failure of a verb, by exit code.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// The user or the plant file is to be corrected: exit 2.
+    /// Wrong command line or plant file: exit 2.
     #[error("{0}")]
     Usage(String),
-    /// Something failed: exit 1.
+    /// Any other failure: exit 1.
     #[error("{0}")]
     Failed(String),
 }
@@ -127,10 +128,10 @@ impl From<PipelineError> for CliError {
     }
 }
 
-impl From<ScanFileError> for CliError {
-    fn from(error: ScanFileError) -> Self {
+impl From<WriteError> for CliError {
+    fn from(error: WriteError) -> Self {
         match error {
-            ScanFileError::Format(_) | ScanFileError::Exists(_) => Self::Usage(error.to_string()),
+            WriteError::Format(_) | WriteError::Exists(_) => Self::Usage(error.to_string()),
             failed => Self::Failed(failed.to_string()),
         }
     }
@@ -148,9 +149,18 @@ impl From<std::io::Error> for CliError {
     }
 }
 
-/// Runs the command line.
+/// A verb of the program `platen-bench`.
+#[derive(Debug)]
+pub enum BenchVerb<'a> {
+    /// `bench`
+    Bench(&'a bench::BenchArguments),
+    /// `press soak`
+    Soak(&'a bench::SoakArguments),
+}
+
+/// Runs the command line of `platen`.
 pub fn main() -> ExitCode {
-    run_program::<Cli>(|cli| match &cli.verb {
+    run_program(|cli| match &cli.verb {
         Verb::Demo(command) => demo::run(&cli.common, command),
         Verb::Run(command) => run::run(&cli.common, command),
         Verb::Scan(command) => scan::run(&cli.common, command),
@@ -164,14 +174,29 @@ pub fn main() -> ExitCode {
         Verb::Verify(command) => verify::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
-        Verb::Bench(arguments) => bench::run(&cli.common, "bench", arguments),
+        Verb::Bench(_) => bench::start(),
     })
 }
 
-/// Parses the command line of a program, starts its log, runs it and returns its exit code: 0 done, 1 failed, 2 bad usage.
-pub fn run_program<P: Parser>(run: impl FnOnce(&P) -> Result<ExitCode, CliError>) -> ExitCode {
-    let program = match P::try_parse() {
-        Ok(program) => program,
+/// Runs the command line of `platen-bench`: that of `platen` with `bench` and `press soak` alone.
+pub fn main_of_bench(run: impl FnOnce(&Common, BenchVerb<'_>) -> Result<ExitCode, CliError>) -> ExitCode {
+    run_program(|cli| {
+        let verb = match &cli.verb {
+            Verb::Bench(arguments) => Some(BenchVerb::Bench(arguments)),
+            Verb::Press(command) => command.soak().map(BenchVerb::Soak),
+            _ => None,
+        };
+        let verb = verb.ok_or_else(|| {
+            CliError::Usage("platen-bench runs `bench` and `press soak`; start platen".into())
+        })?;
+        run(&cli.common, verb)
+    })
+}
+
+/// Parses the command line, starts the log, runs the verb and returns the exit code: 0 done, 1 failed, 2 bad usage.
+fn run_program(run: impl FnOnce(&Cli) -> Result<ExitCode, CliError>) -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
         Err(error) => {
             let code = if error.use_stderr() { 2 } else { 0 };
             // Nothing is left to report a closed pipe to.
@@ -180,7 +205,7 @@ pub fn run_program<P: Parser>(run: impl FnOnce(&P) -> Result<ExitCode, CliError>
         }
     };
     start_log();
-    match run(&program) {
+    match run(&cli) {
         Ok(code) => code,
         Err(error) => {
             output::error(&error.to_string());
@@ -189,7 +214,7 @@ pub fn run_program<P: Parser>(run: impl FnOnce(&P) -> Result<ExitCode, CliError>
     }
 }
 
-/// Log lines go to stderr; `PLATEN_LOG` says which, warnings and errors by default.
+/// Starts the log on stderr, filtered by `PLATEN_LOG`; warnings and errors by default.
 fn start_log() {
     use tracing_subscriber::filter::{EnvFilter, LevelFilter};
     let filter = EnvFilter::builder()

@@ -3,4 +3,3 @@
 pub mod cli;
 pub mod progress;
 pub mod run;
-pub mod scan_file;

@@ -1,18 +1,18 @@
-//! Progress on a terminal; silent in a pipe.
+//! Progress line on stderr; silent where stderr is no terminal.
 
 use std::io::{IsTerminal, Write as _};
 
-/// Shows what is being done, in place of what was shown before.
+/// Replaces the progress line by the name of the work in progress.
 pub fn phase(what: &str) {
     show(&format!("\r\x1b[2K{what} ..."));
 }
 
-/// Shows how much of it is done, 0 to 1.
+/// Replaces the progress line by a name and the share done, 0 to 1.
 pub fn share(what: &str, done: f64) {
     show(&format!("\r\x1b[2K{what} ... {:.0} %", done.min(1.0) * 100.0));
 }
 
-/// Takes the progress line away.
+/// Clears the progress line.
 pub fn done() {
     show("\r\x1b[2K");
 }

@@ -35,7 +35,7 @@ pub use figures::{Figures, Measure};
 pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
 pub use journal::{Acknowledgement, Entry, Recalled, Record, Stage};
 pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support};
-pub use publication::{Measurement, Publication};
+pub use publication::{Judgement, Measurement, Publication};
 pub use stroke::{StrokeData, StrokeKey, Timestamp};
 pub use target::{Facing, RadiusOf, Target, TargetShape};
 pub use task::Task;

@@ -4,14 +4,34 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Code, Figures, StrokeKey, Timestamp, Verdict};
 
+/// Judgement of a stroke for the press. In documents `"pass"`, `"cannot_tell"`, `"fail"` or `{"not_measured": code}`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Judgement {
+    /// The verdict of a measurement.
+    Measured(Verdict),
+    /// No measurement, for this reason.
+    NotMeasured {
+        /// The reason.
+        not_measured: Code,
+    },
+}
+
+impl From<Verdict> for Judgement {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::NotMeasured => Self::NotMeasured { not_measured: Code::EvaluationFailed },
+            measured => Self::Measured(measured),
+        }
+    }
+}
+
 /// Result of a stroke, without its identity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Judgement.
-    pub verdict: Verdict,
-    /// Reason of [`Verdict::NotMeasured`]; `None` with every other verdict.
-    #[serde(default)]
-    pub reason: Option<Code>,
+    #[serde(rename = "verdict")]
+    pub judgement: Judgement,
     /// Figures; empty when nothing was measured.
     pub figures: Figures,
     /// Time of the scan.
@@ -25,11 +45,28 @@ impl Measurement {
     #[must_use]
     pub fn not_measured(reason: Code) -> Self {
         Self {
-            verdict: Verdict::NotMeasured,
-            reason: Some(reason),
+            judgement: Judgement::NotMeasured { not_measured: reason },
             figures: Figures::default(),
             scanned_at: None,
             warning: None,
+        }
+    }
+
+    /// Returns the verdict.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match self.judgement {
+            Judgement::Measured(verdict) => verdict,
+            Judgement::NotMeasured { .. } => Verdict::NotMeasured,
+        }
+    }
+
+    /// Returns the reason why nothing was measured.
+    #[must_use]
+    pub fn reason(&self) -> Option<Code> {
+        match self.judgement {
+            Judgement::Measured(_) => None,
+            Judgement::NotMeasured { not_measured } => Some(not_measured),
         }
     }
 }
@@ -47,4 +84,28 @@ pub struct Publication {
     pub recipe_id: Option<u16>,
     /// The result.
     pub measurement: Measurement,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_journal_of_an_earlier_version_is_read_and_written_as_it_was() {
+        let text = |verdict: &str| {
+            format!(
+                "{{\"verdict\":{verdict},\"figures\":{{\"values\":{{\"gap.max\":0.5}},\"stations\":[null]}},\
+                 \"scanned_at\":null,\"warning\":402}}"
+            )
+        };
+        for (verdict, expected) in [
+            ("\"pass\"", Judgement::Measured(Verdict::Pass)),
+            ("\"cannot_tell\"", Judgement::Measured(Verdict::CannotTell)),
+            ("{\"not_measured\":202}", Judgement::NotMeasured { not_measured: Code::ScanTimeout }),
+        ] {
+            let read: Measurement = serde_json::from_str(&text(verdict)).unwrap();
+            assert_eq!(read.judgement, expected);
+            assert_eq!(serde_json::to_string(&read).unwrap(), text(verdict));
+        }
+    }
 }

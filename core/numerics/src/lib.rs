@@ -1,4 +1,4 @@
-//! Numerics of platen: linear solvers, splines, smoothing and sampling that know of no plate and no scan.
+//! Numerics of platen: linear solvers, splines, smoothing and sampling, without reference to a plate or a scan.
 //!
 //! In order of use, each room only using those above it:
 //!

@@ -1,4 +1,4 @@
-//! A TOML file that is being read, and the faults found so far.
+//! Parsed TOML document with the faults found so far.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -11,15 +11,13 @@ use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
 use crate::{Error, Fault, Faults, TomlTable};
 
-/// Proof that a fault has been recorded: only [`Document`] makes it, so a reader that returns it cannot refuse a file
-/// without a word.
+/// Proof that a fault has been recorded. Only [`Document`] makes it, so no reader can refuse a file without a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reported(());
 
-/// A TOML file that is being read: [`Document::root`] gives the cursor, [`Document::finish`] the result or all faults.
+/// Parsed TOML document: [`Document::root`] returns its table, [`Document::finish`] the result or all faults.
 ///
-/// Faults are collected, never returned one by one: a reader goes on after a fault, and takes its values out with `?`
-/// only when everything has been read.
+/// Faults are collected: a reader goes on after a fault and takes its values out with `?` when everything has been read.
 ///
 /// ```
 /// use platen_plant::{Document, Faults, Reported, TomlTable};
@@ -48,8 +46,6 @@ pub struct Document {
     source: Arc<Source>,
     path: String,
     root: Node,
-    /// Bytes of the errors of syntax.
-    syntax_errors: Vec<Range<usize>>,
     faults: RefCell<Vec<Fault>>,
 }
 
@@ -59,7 +55,7 @@ impl Document {
     /// The parser recovers from an error and goes on, so one slip may have several errors and may hide keys. Of the errors
     /// in one value or one line only the first is reported, the value is skipped, and no key is reported as missing.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
-        let source = Source { file: file.into(), text: text.into() };
+        let mut source = Source { file: file.into(), text: text.into(), syntax_errors: Vec::new() };
         let (table, mut errors) = DeTable::parse_recoverable(&source.text);
         errors.sort_by_key(|error| span(error).start);
         let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
@@ -77,8 +73,8 @@ impl Document {
             let line_end = at.start + line.len();
             end = Some(root.broken_at(at).map_or(line_end, |value| value.end.max(line_end)));
         }
-        let faults = RefCell::new(faults);
-        Self { source: Arc::new(source), path: String::new(), root, syntax_errors: spans, faults }
+        source.syntax_errors = spans;
+        Self { source: Arc::new(source), path: String::new(), root, faults: RefCell::new(faults) }
     }
 
     /// Reads and parses a file.
@@ -92,51 +88,51 @@ impl Document {
         let text = String::from_utf8(bytes).map_err(|error| {
             let offset = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            let source = Source { file: file.clone(), text };
+            let source = Source { file: file.clone(), text, syntax_errors: Vec::new() };
             let message = "this byte is not UTF-8; save the file as UTF-8".to_owned();
             Faults::one(source.fault(&Place { key: String::new(), offset }, message))
         })?;
         Ok(Self::parse(file, text))
     }
 
-    /// A part of a file that was read before, to be read on its own.
+    /// Makes a document of a part of another one.
     pub(crate) fn part(source: Arc<Source>, path: String, root: Node) -> Self {
-        Self { source, path, root, syntax_errors: Vec::new(), faults: RefCell::default() }
+        Self { source, path, root, faults: RefCell::default() }
     }
 
-    /// The cursor over the whole file.
+    /// Returns the root table.
     pub fn root(&self) -> TomlTable<'_> {
         TomlTable::new(self, Place { key: self.path.clone(), offset: self.root.span.start }, self.entries())
     }
 
-    /// Records a fault at `place`.
+    /// Records a fault at `place`, unless an error of syntax lies there.
     pub fn fault(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if !self.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
+        if !self.source.syntax_errors.iter().any(|error| touch(error, &(place.offset..place.offset))) {
             self.faults.borrow_mut().push(self.source.fault(place, message.into()));
         }
         Reported(())
     }
 
-    /// Records that something is not there, unless broken syntax may have swallowed it.
+    /// Records that something is missing, unless an error of syntax may have hidden it.
     pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
-        if self.syntax_errors.is_empty() {
+        if self.source.syntax_errors.is_empty() {
             return self.fault(place, message);
         }
         Reported(())
     }
 
-    /// The proof for a value that a syntax fault has broken.
+    /// Returns the proof for a value that an error of syntax has broken.
     pub(crate) fn broken(&self) -> Reported {
         Reported(())
     }
 
-    /// `file:line:column` of a place, to name it in a message about another one.
+    /// Returns `file:line:column` of a place, for a message about another one.
     pub fn locate(&self, place: &Place) -> String {
         let (line, column) = self.source.line_column(place.offset);
         format!("{}:{line}:{column}", self.source.file)
     }
 
-    /// `result` when nothing at all was wrong, else every fault.
+    /// Returns `result` if there is no fault.
     ///
     /// # Errors
     /// All faults of the file in the order of their places.

@@ -1,10 +1,10 @@
-//! Why a file could not be taken.
+//! Error of reading a file.
 
 use std::path::PathBuf;
 
-use crate::Faults;
+use crate::{Fault, Faults};
 
-/// Why a file could not be taken.
+/// Error of reading a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be opened or read.
@@ -12,10 +12,26 @@ pub enum Error {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The file says something that cannot be.
+    /// The file has faults.
     #[error(transparent)]
     Faulty(#[from] Faults),
+}
+
+impl Error {
+    /// Returns the faults; a file that cannot be read is one at line 0.
+    pub fn into_faults(self) -> Vec<Fault> {
+        match self {
+            Self::Faulty(faults) => faults.into_iter().collect(),
+            Self::Unreadable { path, source } => vec![Fault {
+                file: path.display().to_string(),
+                line: 0,
+                column: 0,
+                key: String::new(),
+                message: source.to_string(),
+            }],
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! One value on its way out of the file: missing, found or already reported.
+//! Value of one key: missing, found or already reported.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -6,36 +6,43 @@ use std::ops::RangeInclusive;
 use crate::document::{Document, Reported};
 use crate::source::Place;
 
-/// The value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
+/// Value of one key. Checks chain; [`TomlKey::required`], [`TomlKey::optional`] or [`TomlKey::or`] ends the chain.
 #[derive(Debug)]
 #[must_use = "end the chain with required(), optional() or or()"]
 pub struct TomlKey<'d, T> {
     document: &'d Document,
     place: Place,
     state: Result<Option<T>, Reported>,
+    /// The fault because of which a missing value is no fault.
+    excuse: Option<Reported>,
 }
 
-/// A value with its place, for checks against other keys.
+/// Value with its place, for checks against other keys.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Located<T> {
-    /// The value.
+    /// Value.
     pub value: T,
-    /// Where it stands.
+    /// Place.
     pub place: Place,
 }
 
 impl<'d, T> TomlKey<'d, T> {
-    pub(crate) fn new(document: &'d Document, place: Place, state: Result<Option<T>, Reported>) -> Self {
-        Self { document, place, state }
+    pub(crate) fn new(
+        document: &'d Document,
+        place: Place,
+        state: Result<Option<T>, Reported>,
+        excuse: Option<Reported>,
+    ) -> Self {
+        Self { document, place, state, excuse }
     }
 
     /// Converts the value; the text of a refusal becomes the fault.
     pub fn try_map<U>(self, convert: impl FnOnce(T) -> Result<U, String>) -> TomlKey<'d, U> {
-        let Self { document, place, state } = self;
+        let Self { document, place, state, excuse } = self;
         let state = state.and_then(|value| {
             value.map(convert).transpose().map_err(|message| document.fault(&place, message))
         });
-        TomlKey { document, place, state }
+        TomlKey { document, place, state, excuse }
     }
 
     /// Converts the value.
@@ -54,16 +61,16 @@ impl<'d, T> TomlKey<'d, T> {
         self.map(|value| Located { value, place })
     }
 
-    /// The value, or the fault that it is missing.
+    /// Returns the value; a missing one is a fault.
     ///
     /// # Errors
     /// [`Reported`] when it is missing or was refused.
     pub fn required(self) -> Result<T, Reported> {
-        let Self { document, place, state } = self;
-        state?.ok_or_else(|| document.absent(&place, "missing"))
+        let Self { document, place, state, excuse } = self;
+        state?.ok_or_else(|| excuse.unwrap_or_else(|| document.absent(&place, "missing")))
     }
 
-    /// The value if it is there.
+    /// Returns the value if it is there.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.
@@ -71,7 +78,7 @@ impl<'d, T> TomlKey<'d, T> {
         self.state
     }
 
-    /// The value, or its default.
+    /// Returns the value or its default.
     ///
     /// # Errors
     /// [`Reported`] when it was refused.

@@ -1,10 +1,12 @@
-//! Plant and plate TOML to checked types, every fault at once with file, line and column.
+//! Reader of plant and plate files: TOML to the types of `platen-model`, with all faults at once, each with file, line and
+//! column.
 //!
-//! [`Document`] parses a file and keeps every key and value with its place; [`TomlTable`] and [`TomlKey`] read it, key by key,
-//! and collect the faults; [`check_options`] does the same for the options of a plugin, from the plugin's own
-//! declarations. What leaves this crate is checked and in metres, radians and seconds.
+//! Order: [`Document`] parses the text with the `toml` crate's error recovery; [`TomlTable`] and [`TomlKey`] read it key by key and
+//! collect the faults; [`plant`] and [`plate`] are the readers of the two kinds of file, [`press`] of `[press]`. [`check_options`] checks
+//! the options of a plugin against the plugin's declarations. Values leave this crate checked and in metres, radians
+//! and seconds.
 //!
-//! It reads files and nothing else: no socket, no clock, no plugin.
+//! Limits: files are read and nothing else; no socket, no clock, no plugin.
 
 mod document;
 mod error;
@@ -26,7 +28,7 @@ pub use fault::{Fault, Faults};
 pub use key::{Located, TomlKey};
 pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options};
-pub use plant::{PlantFile, PluginUse, ScanWindow};
+pub use plant::{PlantFile, PluginRole, PluginUse, ScanWindow, Survey};
 pub use plate::PlateFile;
 pub use source::Place;
 pub use table::TomlTable;

@@ -1,10 +1,10 @@
-//! The nearest allowed name to a misspelt one.
+//! Nearest allowed name to a misspelt one, by Jaro-Winkler similarity.
 
 /// Below this Jaro-Winkler similarity a name is no likely misspelling. `raidus_mm` and `radius_mm` score 0.97,
 /// `chord` and `chord_mm` 0.93, `width_mm` and `height_mm` 0.82, unrelated keys of the plate file below 0.75.
 const LIKELY: f64 = 0.80;
 
-/// The allowed name most like `found`, if any is likely to be meant; on equal likeness the first.
+/// Returns the allowed name most similar to `found`, if any is likely to be meant; the first of equals.
 pub fn nearest<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let mut best: Option<(f64, &str)> = None;
     for name in allowed {
@@ -16,7 +16,7 @@ pub fn nearest<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
     best.map(|(_, name)| name)
 }
 
-/// `; did you mean "sphere"?` or nothing.
+/// Returns `; did you mean "sphere"?` or nothing.
 pub(crate) fn suggestion<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> String {
     nearest(found, allowed).map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default()
 }

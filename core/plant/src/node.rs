@@ -1,11 +1,11 @@
-//! A parsed TOML document as an owned tree in which every key and value knows its place.
+//! Owned tree of a parsed TOML document, with the place of every key and value.
 
 use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-/// A value and where it stands.
+/// Value and its place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Node {
     /// Bytes of the value in the text; of its header or key for a table that a header or a dotted key opened.
@@ -22,13 +22,13 @@ pub(crate) enum NodeKind {
     Datetime,
     Array(Vec<Node>),
     Table(Vec<Entry>),
-    /// An integer or float beyond 64 bits.
+    /// Integer or float beyond 64 bits.
     TooLarge,
-    /// Broken syntax, reported already.
+    /// Value that an error of syntax touches.
     Broken,
 }
 
-/// One key of a table.
+/// Entry of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
     pub(crate) key: String,
@@ -63,7 +63,7 @@ impl Node {
         Self { span: value.span(), kind }
     }
 
-    /// What the value is, in the words of a message: `the text "north"`, `4000`, `a table`.
+    /// Returns the value in the words of a message: `the text "north"`, `4000`, `a table`.
     pub(crate) fn describe(&self) -> String {
         match &self.kind {
             NodeKind::Bool(value) => value.to_string(),
@@ -92,7 +92,7 @@ impl Node {
         }
     }
 
-    /// The entries of a table.
+    /// Returns the entries of a table.
     pub(crate) fn as_table(&self) -> Option<&[Entry]> {
         match &self.kind {
             NodeKind::Table(entries) => Some(entries),

@@ -16,7 +16,7 @@ use crate::{Fault, Faults};
 /// Type of an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OptionType {
-    /// true or false.
+    /// True or false.
     Bool,
     /// A whole number, with or without a unit.
     Int,
@@ -28,42 +28,42 @@ pub enum OptionType {
     Choice,
     /// A file or folder; a relative one starts at the folder of the plant file.
     Path,
-    /// A time, in seconds unless [`OptionDecl::unit`] says another unit of time.
+    /// A time, in seconds unless [`OptionDecl::unit`] is another unit of time.
     Duration,
     /// A list of numbers.
     Floats,
 }
 
-/// What a plugin says of one of its options.
+/// Declaration of one option by its plugin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionDecl {
     /// The key: `[a-z][a-z0-9_]*`.
     pub name: String,
-    /// Its type.
+    /// Type.
     pub kind: OptionType,
-    /// Symbol of the unit of a bare number, as [`Unit::find`] knows it; none for numbers that measure nothing.
+    /// Symbol of the unit of a bare number, for [`Unit::find`]; none for pure numbers.
     pub unit: Option<String>,
     /// Smallest number allowed, of each element of a list, in the declared unit.
     pub min: Option<f64>,
     /// Largest number allowed.
     pub max: Option<f64>,
-    /// The words of a choice.
+    /// Words of a choice.
     pub choices: Vec<String>,
-    /// The value where the plant file gives none, as TOML text.
+    /// Value where the plant file gives none, as TOML text.
     pub default: Option<String>,
-    /// Whether the plant file must give it.
+    /// Required in the plant file.
     pub required: bool,
-    /// One sentence on what it does.
+    /// Purpose, in one sentence.
     pub doc: String,
-    /// Whether its value is kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
+    /// Value kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
     pub secret: bool,
-    /// Whether most users never need it.
+    /// Rarely needed.
     pub advanced: bool,
-    /// What to use in its place, for an option that will go.
+    /// Replacement of an option that will be removed.
     pub deprecated: Option<String>,
 }
 
-/// A checked value. Numbers are in the declared unit, durations in seconds.
+/// Checked value. Numbers are in the declared unit, durations in seconds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// Of a [`OptionType::Bool`].
@@ -82,44 +82,45 @@ pub enum Value {
     Floats(Vec<f64>),
 }
 
-/// One option's value and where it came from.
+/// Value of one option and its origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionValue {
     /// Name of the option.
     pub name: String,
-    /// Its value.
+    /// Value.
     pub value: Value,
-    /// Whether the plant file gave it; else it is the default.
+    /// Given in the plant file; else the default.
     pub given: bool,
 }
 
-/// The options of one plugin as they stand in the plant file, unchecked, with their places.
+/// Unchecked options of one plugin with their places in the plant file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawOptions {
     source: Arc<Source>,
     place: Place,
-    entries: Vec<Entry>,
+    /// The proof of a fault when the file has something else than a table.
+    entries: Result<Vec<Entry>, Reported>,
 }
 
 impl RawOptions {
-    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Vec<Entry>) -> Self {
+    pub(crate) fn new(source: Arc<Source>, place: Place, entries: Result<Vec<Entry>, Reported>) -> Self {
         Self { source, place, entries }
     }
 
-    /// No options at all, for a plugin that no plant file names; `owner` stands for the file in messages.
+    /// Makes an empty set, for a plugin that no plant file names; messages have `owner` in place of a file.
     pub fn none(owner: &str) -> Self {
-        let source = Source { file: owner.to_owned(), text: String::new() };
-        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Vec::new())
+        let source = Source { file: owner.to_owned(), text: String::new(), syntax_errors: Vec::new() };
+        Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Ok(Vec::new()))
     }
 
-    /// A fault of the options as a whole.
+    /// Makes a fault of the options as a whole.
     pub(crate) fn fault(&self, message: String) -> Fault {
         self.source.fault(&self.place, message)
     }
 
-    fn document(&self) -> Document {
+    fn document(&self, entries: &[Entry]) -> Document {
         let span = self.place.offset..self.place.offset;
-        let root = Node { span, kind: NodeKind::Table(self.entries.clone()) };
+        let root = Node { span, kind: NodeKind::Table(entries.to_vec()) };
         Document::part(self.source.clone(), self.place.key.clone(), root)
     }
 
@@ -140,7 +141,9 @@ pub fn check_options(
     raw: &RawOptions,
     declared: &[OptionDecl],
 ) -> Result<Vec<OptionValue>, Faults> {
-    let document = raw.document();
+    // Options that are no table were reported with the file.
+    let Ok(entries) = &raw.entries else { return Ok(Vec::new()) };
+    let document = raw.document(entries);
     let mut table = document.root();
     let mut faults = Vec::new();
     let mut values = Vec::new();
@@ -158,7 +161,7 @@ pub fn check_options(
             Err(Reported { .. }) => {}
         }
         if option.required && !table.has(&option.name) {
-            document.fault(
+            document.absent(
                 &Place { key: format!("{}.{}", raw.place.key, option.name), offset: raw.place.offset },
                 format!("missing; {plugin} needs it: {} ({option})", option.doc),
             );
@@ -185,7 +188,7 @@ fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String 
 }
 
 impl OptionDecl {
-    /// The default, checked as a given value is. Relative paths are left as they are.
+    /// Returns the default, checked as a given value is. Relative paths are left as they are.
     fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
         let Some(default) = &self.default else { return Ok(None) };
         let document = Document::parse(plugin, format!("{} = {default}", self.name));
@@ -256,13 +259,13 @@ impl OptionDecl {
         if inside { Ok(()) } else { Err(format!("found {}, allowed {}", node.describe(), self.range())) }
     }
 
-    /// The declared unit; seconds for a duration without one.
+    /// Returns the declared unit; seconds for a duration without one.
     fn declared_unit(&self) -> Unit {
         let default = if self.kind == OptionType::Duration { Unit::SECOND } else { Unit::ONE };
         self.unit.as_deref().and_then(Unit::find).unwrap_or(default)
     }
 
-    /// `0.6 to 130 m`.
+    /// Returns `0.6 to 130 m`.
     fn range(&self) -> String {
         let range = match (self.min, self.max) {
             (Some(min), Some(max)) => format!("{min} to {max}"),
@@ -278,7 +281,7 @@ impl OptionDecl {
     }
 }
 
-/// `float in m, 0.6 to 130 m, default 30`.
+/// Formats as `number in m, 0.6 to 130 m, default 30`.
 impl fmt::Display for OptionDecl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.kind {
@@ -313,7 +316,7 @@ fn whole(value: f64) -> Option<i64> {
     (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
 }
 
-/// A secret text, or where to find it: never quoted in a message.
+/// Returns a secret text, given directly or by its variable or file. No message quotes it.
 fn secret(node: &Node, folder: &Path) -> Result<String, String> {
     let entries = match &node.kind {
         NodeKind::String(text) => return Ok(text.clone()),

@@ -1,4 +1,4 @@
-//! The plant file: which scanner, which algorithms, where the plates and the results are.
+//! Plant file: press, scanner, algorithms, and the folders of plate files and results.
 //!
 //! Everything but `[scanner]` and `[press]` has a default, so that a scan can be measured without a plant file.
 //! Relative paths start at the folder of the plant file.
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use crate::document::{Document, Reported};
 use crate::press::Press;
-use crate::{Error, Faults, TomlTable};
+use crate::{Error, Fault, Faults, Located, TomlTable};
 
 /// Used where the plant file names no flattening.
 const FLATTENING: &str = "elastic";
@@ -28,48 +28,72 @@ const COMPARISONS: [&str; 2] = ["displacement", "template"];
 const WINDOWS: [(&str, ScanWindow); 3] =
     [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
 
-/// Which part of the dome is scanned, by a driver that plans its scans (one that estimates their time).
+/// Part of the dome that is scanned, by a driver that plans its scans (one that estimates their time).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ScanWindow {
-    /// Where the last stroke's plate lay and some room round it; the region of interest for a new plate, and once more
-    /// for a plate that has moved out.
+    /// Place of the last stroke's plate with a margin; the region of interest for a new plate, and once more for a plate
+    /// that has moved out.
     #[default]
     Plate,
-    /// Always the region of interest.
+    /// Region of interest.
     Region,
-    /// What the driver scans by itself.
+    /// Choice of the driver.
     Everything,
 }
 
-/// A checked plant file, but for the options of its plugins: those wait for the plugins' own declarations.
+/// Checked plant file. Options of plugins are not checked yet: the plugins declare them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantFile {
     /// Name for people; the file's name where none is given.
     pub name: String,
-    /// From which every random choice is drawn, so that a measurement can be repeated to the last bit.
+    /// Seed of every random choice, so that a measurement can be repeated to the last bit.
     pub seed: u64,
-    /// The press and how it is reached; needed to run, not to measure a file.
+    /// Press; required to run, not to measure a file.
     pub press: Option<Press>,
-    /// Where scans come from; needed to run, not to measure a file.
+    /// Scanner driver; required to run, not to measure a file.
     pub scanner: Option<PluginUse>,
-    /// Which part of the dome it scans.
+    /// Part of the dome that is scanned.
     pub scan_window: ScanWindow,
-    /// How the scanner stands to the press and the plate.
+    /// Position of the scanner relative to press and plate.
     pub frame: Frame,
-    /// What is known of the scanner; without it only its noise is in the uncertainties.
+    /// Calibration of the scanner; without it only its noise is in the uncertainties.
     pub calibration: Option<CalibrationUse>,
     /// Folder of the plate files.
     pub plates: PathBuf,
-    /// Turns the mesh into (u, v).
+    /// Flattening: the map of the mesh to (u, v).
     pub flattening: PluginUse,
-    /// What is compared after each stroke, in this order.
+    /// Comparisons after each stroke, in this order.
     pub comparisons: Vec<PluginUse>,
-    /// Where results go.
+    /// Destination of results.
     pub output: Output,
 }
 
+/// Use of a plugin: the table of the plant file that names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PluginRole {
+    /// `[scanner]`.
+    Scanner,
+    /// `[flattening]`.
+    Flattening,
+    /// `[[comparison]]`.
+    Comparison,
+}
+
+/// Parts of a plant file that further checks start from, whether or not other parts are faulty.
+#[derive(Debug)]
+pub struct Survey {
+    /// The file, or all its faults.
+    pub plant: Result<PlantFile, Faults>,
+    /// Every plugin named or implied.
+    pub plugins: Vec<(PluginRole, PluginUse)>,
+    /// Folder of the plate files, and the fault to report, with a message, at its place.
+    pub plates: Option<(PathBuf, Fault)>,
+    /// Whether the file describes a press, so that the folder of the plate files must exist.
+    pub has_press: bool,
+}
+
 impl Default for PlantFile {
-    /// What an empty plant file in the current folder would say.
+    /// The values of an empty plant file in the current folder.
     fn default() -> Self {
         Self {
             name: "no plant file".to_owned(),
@@ -104,49 +128,64 @@ impl PlantFile {
         Self::take(Document::parse(file, text), Path::new(file))
     }
 
-    /// The plate file of a recipe number: `plates/plate-017.toml` for 17.
+    /// Returns the plate file of a recipe number: `plates/plate-017.toml` for 17.
     pub fn plate_path(&self, recipe: u16) -> PathBuf {
-        self.plates.join(format!("plate-{recipe:03}.toml"))
-    }
-
-    /// All plate files with their recipe numbers, by number. Files of other names in the folder are left alone.
-    ///
-    /// # Errors
-    /// [`Error::Unreadable`] when there is no such folder.
-    pub fn plate_files(&self) -> Result<Vec<(u16, PathBuf)>, Error> {
-        let unreadable = |source| Error::Unreadable { path: self.plates.clone(), source };
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(&self.plates).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-            let recipe = stem.strip_prefix("plate-").and_then(|number| number.parse().ok());
-            files.extend(
-                recipe.filter(|recipe| self.plate_path(*recipe) == path).map(|recipe| (recipe, path)),
-            );
-        }
-        files.sort();
-        Ok(files)
+        plate_path(&self.plates, recipe)
     }
 
     fn take(document: Document, path: &Path) -> Result<Self, Faults> {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let plant = Self::read(document.root(), &stem, folder);
-        document.finish(plant)
+        Survey::of(document, path).plant
     }
 
-    fn read(mut root: TomlTable<'_>, stem: &str, folder: &Path) -> Result<Self, Reported> {
+    fn read(
+        mut root: TomlTable<'_>,
+        stem: &str,
+        folder: &Path,
+        survey: &mut Survey,
+    ) -> Result<Self, Reported> {
         let default = Self::default();
+        let document = root.document();
         let plant = root.section("plant").and_then(|mut table| {
             let name = table.name("name").or(stem.to_owned());
             let seed = table.integer("seed").at_least(0).map(i64::unsigned_abs).or(default.seed);
             table.finish();
             Ok((name?, seed?))
         });
-        let scanner = root.table("scanner").optional();
-        let window = |table: &mut TomlTable<'_>| table.choice("window", &WINDOWS).or(default.scan_window);
-        let scanner =
-            scanner.and_then(|table| table.map(|table| PluginUse::read_with(table, window)).transpose());
+        let mut plugin = |role, table: &mut TomlTable<'_>| {
+            let plugin = PluginUse::read(table);
+            survey.plugins.extend(plugin.iter().map(|plugin| (role, plugin.clone())));
+            plugin
+        };
+        let scanner = root.table("scanner").optional().and_then(|table| {
+            let Some(mut table) = table else { return Ok((None, default.scan_window)) };
+            let scanner = plugin(PluginRole::Scanner, &mut table);
+            let window = table.choice("window", &WINDOWS).or(default.scan_window);
+            table.finish();
+            Ok((Some(scanner?), window?))
+        });
+        let mut plugin = |role, mut table: TomlTable<'_>| {
+            let plugin = plugin(role, &mut table);
+            table.finish();
+            plugin
+        };
+        let flattening = root
+            .table("flattening")
+            .optional()
+            .and_then(|table| table.map(|table| plugin(PluginRole::Flattening, table)).transpose());
+        let comparisons = root.tables("comparison").and_then(|tables| {
+            let uses = tables.into_iter().map(|table| plugin(PluginRole::Comparison, table));
+            uses.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()
+        });
+        let listed = root.has("comparison");
+        if !root.has("flattening") {
+            let flattening = PluginUse::implied(FLATTENING, document, root.place());
+            survey.plugins.push((PluginRole::Flattening, flattening));
+        }
+        if !listed {
+            let uses = COMPARISONS.map(|name| PluginUse::implied(name, document, root.place()));
+            survey.plugins.extend(uses.map(|used| (PluginRole::Comparison, used)));
+        }
+        survey.has_press = root.has("press");
         let press = root.table("press").optional();
         let press = press.and_then(|table| table.map(Press::read).transpose());
         let frame = root.section("frame").and_then(Frame::read);
@@ -154,34 +193,66 @@ impl PlantFile {
         let calibration =
             calibration.and_then(|table| table.map(|table| CalibrationUse::read(table, folder)).transpose());
         let plates = root.section("plates").and_then(|mut table| {
-            let plates = table.name("folder").map(PathBuf::from).or(default.plates);
+            let implied = Located { value: default.plates, place: table.place().clone() };
+            let plates = table.name("folder").map(PathBuf::from).located().or(implied);
             table.finish();
-            plates
-        });
-        let flattening = root.table("flattening").optional();
-        let flattening = flattening.and_then(|table| table.map(PluginUse::read).transpose());
-        let listed = root.has("comparison");
-        let comparisons = root.tables("comparison").and_then(|tables| {
-            let uses: Vec<_> = tables.into_iter().map(PluginUse::read).collect();
-            uses.into_iter().collect::<Result<Vec<_>, _>>()
+            let Located { value, place } = plates?;
+            let plates = folder.join(value);
+            survey.plates = Some((plates.clone(), document.source().fault(&place, String::new())));
+            Ok(plates)
         });
         let output = root.section("output").and_then(|table| Output::read(table, folder));
         root.finish();
 
         let (name, seed) = plant?;
-        let (scanner, scan_window) = scanner?.unzip();
+        let (scanner, scan_window) = scanner?;
         Ok(Self {
             name,
             seed,
             press: press?,
             scanner,
-            scan_window: scan_window.unwrap_or(default.scan_window),
+            scan_window,
             frame: frame?,
             calibration: calibration?,
-            plates: folder.join(plates?),
+            plates: plates?,
             flattening: flattening?.unwrap_or(default.flattening),
             comparisons: if listed { comparisons? } else { default.comparisons },
             output: output?,
         })
     }
+}
+
+impl Survey {
+    /// Reads a plant file; `path` is the file's own.
+    pub fn of(document: Document, path: &Path) -> Self {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut survey =
+            Self { plant: Ok(PlantFile::default()), plugins: Vec::new(), plates: None, has_press: false };
+        let plant = PlantFile::read(document.root(), &stem, folder, &mut survey);
+        survey.plant = document.finish(plant);
+        survey
+    }
+}
+
+fn plate_path(folder: &Path, recipe: u16) -> PathBuf {
+    folder.join(format!("plate-{recipe:03}.toml"))
+}
+
+/// Returns the plate files of a folder with their recipe numbers, by number. Files of other names are left alone.
+///
+/// # Errors
+/// [`Error::Unreadable`] when there is no such folder.
+pub fn plate_files(folder: &Path) -> Result<Vec<(u16, PathBuf)>, Error> {
+    let unreadable = |source| Error::Unreadable { path: folder.to_owned(), source };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        let recipe = stem.strip_prefix("plate-").and_then(|number| number.parse().ok());
+        files
+            .extend(recipe.filter(|recipe| plate_path(folder, *recipe) == path).map(|recipe| (recipe, path)));
+    }
+    files.sort();
+    Ok(files)
 }

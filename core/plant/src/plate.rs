@@ -1,10 +1,8 @@
-//! The plate file: one plate, what it is to become, and what is to be measured on it.
+//! Plate file: a plate, its target, and the places, lines and templates to be evaluated.
 
 mod place;
 mod target;
 mod template;
-
-pub use template::{PRESETS, Preset};
 
 use std::path::Path;
 
@@ -14,31 +12,31 @@ use crate::document::{Document, Reported};
 use crate::{Error, Faults, TomlTable};
 use place::{Names, Rectangle};
 
-/// Smallest and largest side of a plate, millimetres: wide round the 2-5 m of the trade, narrow enough to catch metres.
+/// Range of a plate's sides, millimetres: wide enough for the 2-5 m of the trade, narrow enough to refuse metres.
 const SIDE_MM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
-/// Thinnest and thickest plate, millimetres.
+/// Range of thickness, millimetres.
 const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1.0..=300.0;
 
-/// A checked plate file. Lengths in metres, angles in radians, places as (u, v) on the original rectangle.
+/// Checked plate file. Lengths in metres, angles in radians, places as (u, v) on the original rectangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlateFile {
-    /// The plate as ordered.
+    /// Plate as ordered.
     pub plate: Plate,
-    /// What it is to become; without it nothing can be judged.
+    /// Target shape; without it nothing can be judged.
     pub target: Option<Target>,
-    /// Places to be reported.
+    /// Markers to be reported.
     pub markers: Vec<Marker>,
-    /// Lines to be reported, and for templates to lie on.
+    /// Lines to be reported, on which templates lie.
     pub reference_lines: Vec<ReferenceLine>,
-    /// Places that rest on the press's supports while the plate is scanned.
+    /// Places on the supports of the press during a scan.
     pub supports: Vec<Support>,
-    /// Boards to be laid on the plate.
+    /// Templates to be laid on the plate.
     pub templates: Vec<Template>,
-    /// Figures for the press's station registers, in their order.
+    /// Stations, in the order of the press's station registers.
     pub stations: Vec<Station>,
 }
 
-/// A line, and its name even where the rest is faulty, so that a template on it is not called faulty too.
+/// Reference line and its name, which is kept where the line is faulty: a template on it is then no second fault.
 #[derive(Debug, Clone)]
 struct NamedLine {
     name: Result<String, Reported>,
@@ -81,7 +79,16 @@ impl PlateFile {
         }
     }
 
-    fn take(document: Document) -> Result<Self, Faults> {
+    /// Returns whether a document is a plate file: it has a table `[plate]`.
+    pub fn recognises(document: &Document) -> bool {
+        document.root().has("plate")
+    }
+
+    /// Checks a parsed document.
+    ///
+    /// # Errors
+    /// Every fault of the document.
+    pub fn take(document: Document) -> Result<Self, Faults> {
         let file = Self::read(document.root());
         document.finish(file)
     }
@@ -110,7 +117,7 @@ impl PlateFile {
     }
 }
 
-/// Reads every element of an array of tables; `read` also gets the names taken so far.
+/// Reads every element of an array of tables with `read`, which also gets the names taken so far.
 fn read_all<'d, T>(
     root: &mut TomlTable<'d>,
     key: &str,
@@ -125,7 +132,7 @@ fn read_all<'d, T>(
     Ok(all)
 }
 
-/// Also sets `rectangle`, when both sides are sound, whatever else is not.
+/// Reads `[plate]`; sets `rectangle` if both sides are sound.
 fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
     let id = table.name("id").required();
     let width = table.number("width_mm").in_range(SIDE_MM).required();
@@ -136,29 +143,29 @@ fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Re
     let document = table.document();
     table.finish();
 
-    let (width, height) = (width?, height?);
-    *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
-    let thickness = thickness?;
-    let shorter = width.min(height);
-    if thickness.value > shorter / 4.0 {
+    if let (Ok(width), Ok(height)) = (width, height) {
+        *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
+    }
+    let inset = match (face_inset, &thickness) {
+        (Ok(Some(inset)), Ok(thickness)) if inset.value > thickness.value => {
+            let message =
+                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
+            Err(document.fault(&inset.place, message))
+        }
+        (inset, _) => inset.map(|inset| inset.map_or(0.0, |inset| inset.value)),
+    };
+    let (width, height, thickness) = (width?, height?, thickness?);
+    if thickness.value > width.min(height) / 4.0 {
         let message = format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
         return Err(document.fault(&thickness.place, message));
     }
-    let face_inset = match face_inset? {
-        Some(inset) if inset.value > thickness.value => {
-            let message =
-                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
-            return Err(document.fault(&inset.place, message));
-        }
-        inset => inset.map_or(0.0, |inset| inset.value),
-    };
     Ok(Plate {
         id: id?,
         width: metres(width),
         height: metres(height),
         thickness: metres(thickness.value),
         supports: supports?,
-        face_inset: metres(face_inset),
+        face_inset: metres(inset?),
     })
 }
 
@@ -185,13 +192,14 @@ fn read_line(mut table: TomlTable<'_>, names: &mut Names, plate: Option<Rectangl
     let to = place::point(&mut table, "to_mm", plate);
     let (document, place) = (table.document(), table.place().clone());
     table.finish();
-    let line = name.clone().and_then(|name| {
-        let line = ReferenceLine { name, from: from?, to: to? };
-        if line.from == line.to {
+    let ends = from.and_then(|from| {
+        let to = to?;
+        if from == to {
             return Err(document.fault(&place, "from_mm and to_mm are the same point; a line needs two"));
         }
-        Ok(line)
+        Ok((from, to))
     });
+    let line = ends.and_then(|(from, to)| Ok(ReferenceLine { name: name.clone()?, from, to }));
     NamedLine { name, line }
 }
 
@@ -215,12 +223,12 @@ fn read_station(
     Ok(Station { name: name?, at: at?, quantity: quantity? })
 }
 
-/// Millimetres of the file to metres.
+/// Converts millimetres of the file to metres.
 fn metres(mm: f64) -> f64 {
     mm / 1000.0
 }
 
-/// Metres to millimetres for a message, without the dust of the conversion.
+/// Converts metres to millimetres for a message, rounded to a micrometre.
 fn millimetres(m: f64) -> f64 {
     (m * 1e6).round() / 1000.0
 }

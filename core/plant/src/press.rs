@@ -1,4 +1,4 @@
-//! `[press]` of the plant file: how the press is reached, what stands in its registers, what the host may do there.
+//! `[press]` of the plant file: link, register map, write permissions, time limits and policy.
 
 mod allow;
 mod field;
@@ -17,31 +17,31 @@ pub use pph1::{INVALID_I16, INVALID_U16, MAP_VERSION, STATIONS};
 
 use std::time::Duration;
 
-/// Everything the plant file says about one press.
+/// Press of a plant file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Press {
     /// Name for people.
     pub name: String,
-    /// Plant number; compared with the press's own where its map has one, against the wrong controller.
+    /// Plant number; compared with the press's register where the map has one, against the wrong controller.
     pub press_id: u16,
-    /// Who asks and who answers on Modbus.
+    /// Modbus role of the host.
     pub role: Role,
-    /// How much the host does.
+    /// Operating mode.
     pub mode: Mode,
-    /// The way to the press.
+    /// Connection to the press.
     pub link: Link,
-    /// The only registers that may ever be written.
+    /// Registers that may be written.
     pub write: WriteAllow,
-    /// What stands where.
+    /// Register map.
     pub map: RegisterMap,
     /// Time limits of the handshake.
     pub timeouts: Timeouts,
-    /// What to do when things go wrong.
+    /// Reaction to faults.
     pub policy: Policy,
 }
 
 impl Press {
-    /// A press with the built-in map, measured, with every default.
+    /// Makes a press with the built-in map in mode `measure`, with every default.
     pub fn pph1(name: impl Into<String>, press_id: u16, link: Link) -> Self {
         let map = RegisterMap::pph1();
         Self {
@@ -58,34 +58,34 @@ impl Press {
     }
 }
 
-/// Who asks and who answers on Modbus.
+/// Modbus role of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Role {
-    /// The host asks, the press answers.
+    /// The host is the client, the press the server.
     #[default]
     Client,
-    /// The press asks, the host answers: for controllers that have client blocks only.
+    /// The press is the client, the host the server: for controllers that have client blocks only.
     Server,
 }
 
-/// How much the host does.
+/// Operating mode of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
-    /// The press is left alone.
+    /// No connection.
     Off,
     /// Reads and decodes; never writes, never scans.
     Listen,
-    /// Scans and judges; what it would write is only logged.
+    /// Scans and judges; writes are only logged.
     DryRun,
     /// The whole handshake with results marked as simulated.
     Simulate,
-    /// Everything.
+    /// Scans, judges and writes.
     #[default]
     Measure,
 }
 
 impl Mode {
-    /// All of them with their names in the plant file.
+    /// All modes with their names in the plant file.
     pub const ALL: [(&'static str, Self); 5] = [
         ("off", Self::Off),
         ("listen", Self::Listen),
@@ -94,7 +94,7 @@ impl Mode {
         ("measure", Self::Measure),
     ];
 
-    /// Whether registers may be written at all.
+    /// Returns whether registers may be written.
     pub fn writes(self) -> bool {
         matches!(self, Self::Simulate | Self::Measure)
     }
@@ -113,7 +113,7 @@ pub struct Timeouts {
     pub clear: Duration,
     /// Time between two heartbeats of the host.
     pub heartbeat: Duration,
-    /// The press is dead when its heartbeat stands still this long.
+    /// Time after which a press whose heartbeat has not changed counts as dead.
     pub heartbeat_in: Duration,
 }
 
@@ -130,7 +130,7 @@ impl Default for Timeouts {
     }
 }
 
-/// What to do when things go wrong.
+/// Reaction to faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Policy {
     /// A stroke came while another was being measured, or the stroke number jumped.
@@ -143,7 +143,7 @@ pub struct Policy {
     pub no_ack: NoAck,
 }
 
-/// What a missed stroke does beside being counted.
+/// Consequence of a missed stroke, which is counted in any case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OnMissed {
     /// A warning.
@@ -155,7 +155,7 @@ pub enum OnMissed {
     Block,
 }
 
-/// What becomes of a stroke whose scan a restart interrupted.
+/// Treatment of a stroke whose scan a restart interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OnInterrupted {
     /// Reported as not measured.
@@ -165,7 +165,7 @@ pub enum OnInterrupted {
     Rescan,
 }
 
-/// What happens while results cannot be recorded.
+/// Operation while results cannot be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OnStorageFull {
     /// Results still go to the press, marked as not recorded.
@@ -175,10 +175,10 @@ pub enum OnStorageFull {
     Stop,
 }
 
-/// What happens to a result that the press does not acknowledge.
+/// Treatment of a result that the press does not acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoAck {
-    /// It stays until the next stroke, which acknowledges it.
+    /// The result stays until the next stroke, which acknowledges it.
     #[default]
     NextStroke,
     /// No stroke is accepted until it is acknowledged.

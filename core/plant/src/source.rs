@@ -1,15 +1,19 @@
-//! The text of a file and the places in it.
+//! Text of a file and places in it.
+
+use std::ops::Range;
 
 use crate::Fault;
 
-/// The text of one file, with its name as the user gave it.
+/// Text of one file, with the file's name as the user gave it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Source {
     pub(crate) file: String,
     pub(crate) text: String,
+    /// Bytes of the errors of syntax.
+    pub(crate) syntax_errors: Vec<Range<usize>>,
 }
 
-/// A key and the place in the file that a message about it points at.
+/// Key and its place in the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// Dotted path of the key.
@@ -19,14 +23,14 @@ pub struct Place {
 }
 
 impl Place {
-    /// The dotted path of the key, as in [`Fault::key`].
+    /// Returns the dotted path of the key, as in [`Fault::key`].
     pub fn key(&self) -> &str {
         &self.key
     }
 }
 
 impl Source {
-    /// Line and column of a byte, both from 1, the column in characters.
+    /// Returns line and column of a byte, both from 1, the column in characters.
     pub(crate) fn line_column(&self, offset: usize) -> (usize, usize) {
         let before = self.text.get(..offset).unwrap_or(&self.text);
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
@@ -34,7 +38,7 @@ impl Source {
         (line, before[line_start..].trim_start_matches('\u{feff}').chars().count() + 1)
     }
 
-    /// A fault at `place`.
+    /// Makes a fault at `place`.
     pub(crate) fn fault(&self, place: &Place, message: String) -> Fault {
         let (line, column) = self.line_column(place.offset);
         Fault { file: self.file.clone(), line, column, key: place.key.clone(), message }

@@ -1,4 +1,4 @@
-//! The cursor over one table: every key is asked for by name and type, and what was not asked for is a fault.
+//! Reader of one table: every key is asked for by name and type; a key not asked for is a fault.
 
 use crate::RawOptions;
 use crate::document::{Document, Reported};
@@ -7,7 +7,7 @@ use crate::nearest;
 use crate::node::{Entry, Node, NodeKind};
 use crate::source::Place;
 
-/// A cursor over one table of a [`Document`].
+/// Reader of one table of a [`Document`].
 ///
 /// Each getter notes its key as known; [`TomlTable::finish`] reports the others. Read every key, then finish, then take the
 /// values out: see [`Document`].
@@ -18,34 +18,35 @@ pub struct TomlTable<'d> {
     place: Place,
     entries: &'d [Entry],
     asked: Vec<String>,
+    excuse: Option<Reported>,
 }
 
 impl<'d> TomlTable<'d> {
     pub(crate) fn new(document: &'d Document, place: Place, entries: &'d [Entry]) -> Self {
-        Self { document, place, entries, asked: Vec::new() }
+        Self { document, place, entries, asked: Vec::new(), excuse: None }
     }
 
-    /// The document, to record faults between several keys.
+    /// Lets missing keys pass from here on, because the fault `excuse` leaves open which keys are required.
+    pub(crate) fn excuse_missing(&mut self, excuse: Reported) {
+        self.excuse = Some(excuse);
+    }
+
+    /// Returns the document, to record faults between several keys.
     pub fn document(&self) -> &'d Document {
         self.document
     }
 
-    /// Where the table stands.
+    /// Returns the place of the table.
     pub fn place(&self) -> &Place {
         &self.place
     }
 
-    /// Every key that stands in the table, for tables whose keys are names given by the user.
-    pub fn keys(&self) -> impl Iterator<Item = &'d str> + use<'d> {
-        self.entries.iter().map(|entry| entry.key.as_str())
-    }
-
-    /// Whether the key is there, of whatever type; does not count as asking for it.
+    /// Returns whether the key is there, of any type; does not count as asking for it.
     pub fn has(&self, key: &str) -> bool {
         self.entries.iter().any(|entry| entry.key == key)
     }
 
-    /// true or false.
+    /// Reads true or false.
     pub fn bool(&mut self, key: &str) -> TomlKey<'d, bool> {
         self.value(key, "true or false", |node| match node.kind {
             NodeKind::Bool(value) => Some(value),
@@ -53,7 +54,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A whole number.
+    /// Reads a whole number.
     pub fn integer(&mut self, key: &str) -> TomlKey<'d, i64> {
         self.value(key, "a whole number", |node| match node.kind {
             NodeKind::Integer(value) => Some(value),
@@ -61,17 +62,17 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A finite number, with or without decimals.
+    /// Reads a finite number, with or without decimals.
     pub fn number(&mut self, key: &str) -> TomlKey<'d, f64> {
         self.value(key, "a number", number)
     }
 
-    /// A text.
+    /// Reads a text.
     pub fn string(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string)
     }
 
-    /// A text that is not empty.
+    /// Reads a text that is not empty.
     pub fn name(&mut self, key: &str) -> TomlKey<'d, String> {
         self.value(key, "a text", string).check(|name| match name.trim().is_empty() {
             true => Err("is empty, must have at least one character".to_owned()),
@@ -79,7 +80,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// One of a few words.
+    /// Reads one of a few words.
     pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> TomlKey<'d, T> {
         let words = || choices.iter().map(|(word, _)| *word);
         self.value(key, "a text", string).try_map(|found| {
@@ -90,20 +91,12 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A list of finite numbers.
-    pub fn numbers(&mut self, key: &str) -> TomlKey<'d, Vec<f64>> {
-        self.value(key, "a list of numbers", |node| match &node.kind {
-            NodeKind::Array(values) => values.iter().map(number).collect(),
-            _ => None,
-        })
-    }
-
-    /// A list of exactly `N` finite numbers: a point, a direction.
+    /// Reads a list of exactly `N` finite numbers: a point, a direction.
     pub fn vector<const N: usize>(&mut self, key: &str) -> TomlKey<'d, [f64; N]> {
         self.value(key, &format!("a list of {N} numbers"), vector)
     }
 
-    /// `R` lists of exactly `N` finite numbers: the rows of a matrix.
+    /// Reads `R` lists of exactly `N` finite numbers: the rows of a matrix.
     pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> TomlKey<'d, [[f64; N]; R]> {
         self.value(key, &format!("{R} lists of {N} numbers"), |node| match &node.kind {
             NodeKind::Array(rows) => rows.iter().map(vector).collect::<Option<Vec<_>>>()?.try_into().ok(),
@@ -111,7 +104,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A list of texts, each with its place.
+    /// Reads a list of texts, each with its place.
     pub fn strings(&mut self, key: &str) -> TomlKey<'d, Vec<Located<String>>> {
         let place = self.place_of(key);
         self.value(key, "a list of texts", |node| match &node.kind {
@@ -126,7 +119,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A table below this one, missing or not.
+    /// Reads a table below this one.
     pub fn table(&mut self, key: &str) -> TomlKey<'d, TomlTable<'d>> {
         let (document, path) = (self.document, self.place_of(key));
         self.value(key, "a table", |node| {
@@ -135,7 +128,7 @@ impl<'d> TomlTable<'d> {
         })
     }
 
-    /// A table below this one in which every key has a default: a missing one reads as empty.
+    /// Reads a table below this one in which every key has a default; a missing one is empty.
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no table.
@@ -144,7 +137,7 @@ impl<'d> TomlTable<'d> {
         Ok(self.table(key).optional()?.unwrap_or(empty))
     }
 
-    /// The elements of an array of tables (`[[key]]`) in their order; a missing one has none.
+    /// Reads the elements of an array of tables (`[[key]]`) in their order; a missing one has none.
     ///
     /// # Errors
     /// [`Reported`] when the key is there and is no array of tables.
@@ -164,27 +157,26 @@ impl<'d> TomlTable<'d> {
         Ok(field.optional()?.unwrap_or_default())
     }
 
-    /// A table of options that only a plugin can check, kept with its places; a missing one is empty.
-    ///
-    /// # Errors
-    /// [`Reported`] when the key is there and is no table.
-    pub fn options(&mut self, key: &str) -> Result<RawOptions, Reported> {
-        let table = self.section(key)?;
-        Ok(RawOptions::new(self.document.source().clone(), table.place, table.entries.to_vec()))
+    /// Keeps a table of options, which a plugin's declarations check later; a missing one is empty.
+    pub fn options(&mut self, key: &str) -> RawOptions {
+        let table = self.section(key);
+        let place = table.as_ref().map_or_else(|_| self.missing_place(key), |table| table.place.clone());
+        let entries = table.map(|table| table.entries.to_vec());
+        RawOptions::new(self.document.source().clone(), place, entries)
     }
 
-    /// The raw value, for keys that accept several types.
+    /// Reads the raw value, for keys that accept several types.
     pub(crate) fn node(&mut self, key: &str) -> TomlKey<'d, &'d Node> {
         self.asked.push(key.to_owned());
         let Some(entry) = self.entries.iter().find(|entry| entry.key == key) else {
-            return TomlKey::new(self.document, self.missing_place(key), Ok(None));
+            return TomlKey::new(self.document, self.missing_place(key), Ok(None), self.excuse);
         };
         let place = Place { key: self.place_of(key), offset: entry.value.span.start };
         let state = match entry.value.kind {
             NodeKind::Broken => Err(self.document.broken()),
             _ => Ok(Some(&entry.value)),
         };
-        TomlKey::new(self.document, place, state)
+        TomlKey::new(self.document, place, state, self.excuse)
     }
 
     /// Reports every key that was never asked for, with the nearest one that could have been meant.
@@ -195,7 +187,7 @@ impl<'d> TomlTable<'d> {
         });
     }
 
-    /// As [`TomlTable::finish`], with the message made from the nearest key, if any, and all that were asked for.
+    /// As [`TomlTable::finish`], with a message made from the nearest key and all keys that were asked for.
     pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
         for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
             let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };
@@ -204,7 +196,7 @@ impl<'d> TomlTable<'d> {
         }
     }
 
-    /// The value of `key` as `read` takes it; where `read` refuses, the fault names what was expected.
+    /// Reads the value of `key` with `read`; where that refuses, the fault names what was expected.
     fn value<T>(
         &mut self,
         key: &str,
@@ -228,7 +220,7 @@ impl<'d> TomlTable<'d> {
     }
 }
 
-/// A finite number; NaN and infinities are no measure of anything.
+/// Returns a finite number.
 pub(crate) fn number(node: &Node) -> Option<f64> {
     match node.kind {
         // Whole numbers above 2^53 lose their last digits; no quantity of a plant has so many.

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use platen_model::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
-use platen_plant::plant::{KeepScans, RegionOfInterest};
+use platen_plant::plant::{KeepScans, RegionOfInterest, plate_files};
 use platen_plant::{PlantFile, PlateFile, ScanWindow};
 
 fn config() -> PathBuf {
@@ -138,7 +138,8 @@ fn a_plant_file_arrives_with_its_paths_resolved() {
 #[test]
 fn the_plate_files_of_a_plant_are_those_that_a_recipe_number_finds() {
     let plant = PlantFile::load(&config().join("plant-faro-file.toml")).unwrap();
-    let recipes: Vec<u16> = plant.plate_files().unwrap().into_iter().map(|(recipe, _)| recipe).collect();
+    let recipes: Vec<u16> =
+        plate_files(&plant.plates).unwrap().into_iter().map(|(recipe, _)| recipe).collect();
     assert_eq!(recipes, [1, 9, 17, 21, 22]);
     let folder = tempfile::tempdir().unwrap();
     let plant = PlantFile { plates: folder.path().to_owned(), ..PlantFile::default() };
@@ -148,9 +149,9 @@ fn the_plate_files_of_a_plant_are_those_that_a_recipe_number_finds() {
         std::fs::write(folder.path().join(name), "").unwrap();
     }
     let expected = [(2, folder.path().join("plate-002.toml")), (1000, folder.path().join("plate-1000.toml"))];
-    assert_eq!(plant.plate_files().unwrap(), expected);
+    assert_eq!(plate_files(&plant.plates).unwrap(), expected);
     let absent = PlantFile { plates: folder.path().join("absent"), ..PlantFile::default() };
-    assert!(absent.plate_files().unwrap_err().to_string().contains("absent: No such file"));
+    assert!(plate_files(&absent.plates).unwrap_err().to_string().contains("absent: No such file"));
 }
 
 #[test]

@@ -4,10 +4,10 @@ mod codec;
 mod handshake;
 mod journal;
 mod link;
-mod page;
 mod probe;
 mod program;
 mod reconcile;
+mod register_page;
 mod replay;
 mod runner;
 
@@ -16,11 +16,11 @@ pub use handshake::{Config, Effect, Event, Handshake, LinkState, State, Transiti
 pub use journal::{Journal, MemoryJournal};
 pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,
-    Response, ServedLink, TransportError, consequence,
+    Response, ServerLink, TransportError, consequence,
 };
-pub use page::{MapPage, MapRow, alarms_csv, map_csv, map_markdown, map_page};
 pub use probe::{Reading, readings};
 pub use program::reference_program;
+pub use register_page::{MapPage, MapRow, alarms_csv, map_csv, map_markdown, map_page};
 pub use replay::{Replayed, Sample, Side, replay};
 pub use runner::{
     Answer, Durations, HostSide, Metrics, Order, PressSide, RunError, Status, channels, run_press,

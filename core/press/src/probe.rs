@@ -1,33 +1,33 @@
-//! Which order of words and which address a press means: every reading of the registers round an address.
+//! Search for word order and address of a 32-bit number: every interpretation of the registers round an address.
 
 use platen_plant::press::{RegisterType, WordOrder};
 
 use crate::codec::{bits, raw_number};
 
-/// One way to read two registers as a number.
+/// One interpretation of two registers as a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Registers away from the address asked for: manuals that count from 1 give one too many.
+    /// Offset from the given address, registers: manuals that count from 1 give one too many.
     pub shift: i8,
-    /// How the 32 bits are read.
+    /// Type of the 32 bits.
     pub kind: RegisterType,
     /// Order of the words and bytes.
     pub order: WordOrder,
     /// The two registers.
     pub words: [u16; 2],
-    /// What they mean then.
+    /// The number.
     pub number: f64,
 }
 
 impl Reading {
-    /// Whether it is the number expected, to the precision of the smaller of both types (24 bits).
+    /// Whether it equals the expected number to the precision of the smaller of both types (24 bits).
     pub fn is(&self, expected: f64) -> bool {
         (self.number - expected).abs() <= expected.abs().max(f64::MIN_POSITIVE) * f64::from(f32::EPSILON)
     }
 }
 
-/// Every reading of 32-bit numbers at an address and one register to either side of it. `around` are the registers from
-/// one before the address on; what lies beyond their end is left out.
+/// Returns every interpretation of 32-bit numbers at an address and one register to either side of it. `around` are the
+/// registers from one before the address on; pairs beyond their end are left out.
 pub fn readings(around: &[u16]) -> Vec<Reading> {
     let mut readings = Vec::new();
     for (shift, words) in (-1i8..=1).zip(around.windows(2)) {

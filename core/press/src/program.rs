@@ -1,8 +1,8 @@
-//! The program that the press needs, in Structured Text: for the programmer of the press, from the map in force.
+//! Reference program of the press in Structured Text (IEC 61131-3), generated from the register map in force.
 
 use platen_plant::press::{Input, Output, Press, Profile};
 
-/// The program of the press that goes with the map: P is its block, H the host's.
+/// Returns the program for the map: P is the block of the press, H that of the host.
 pub fn reference_program(press: &Press) -> String {
     let map = &press.map;
     if map.profile != Profile::Pph1 {
@@ -62,7 +62,7 @@ pub fn reference_program(press: &Press) -> String {
     )
 }
 
-/// What the press says all the time, where its map has it.
+/// Returns the assignments that hold at all times, for the fields of the map.
 fn standing(press: &Press) -> String {
     let mut text = String::from("IF first_cycle THEN");
     let has = |input: &Input| press.map.inputs.get(input).filter(|field| field.place.offset().is_some());

@@ -1,9 +1,8 @@
-//! Makes the registers of the host say what they shall say, whatever happens on the way.
+//! Reconciliation of the host's registers: drives them to their target values. Every write can be repeated safely.
 //!
-//! The wanted words are compared with those that the press is known to have (echoed, or read back); what differs is
-//! written until it is echoed. Data come first with the old commit word, then the commit word, then the status, so that
-//! a result is complete before it is valid; a result is withdrawn by its status first, also when the next one is there
-//! already because the link was lost in between. Every write is harmless to repeat.
+//! The desired words are compared with the known actual words (echoed or read back); differences are written until they are
+//! echoed. Order: data with the old commit word, the commit word, the status; a result is therefore complete before it is
+//! valid. A result is withdrawn by its status first, also when the next result is present after a loss of the link.
 
 use std::time::Duration;
 
@@ -12,39 +11,39 @@ use tokio::time::Instant;
 
 use crate::{Client, HostImage, Link, LinkError};
 
-/// Heartbeats of this many beats ago may still be under way on a slow line.
+/// Age in beats of the oldest heartbeat that may still be in transit on a slow line.
 const OLD_BEATS: u16 = 16;
 
-/// When a register is written.
+/// Phase in which a register is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// For people only: rides along with data, and with each beat.
+    /// Diagnostic: written along with data and with each beat.
     Idle,
     Data,
     Commit,
     Status,
 }
 
-/// The block of the host: what it shall be, what it is known to be.
+/// The block of the host: desired and known actual words.
 #[derive(Debug)]
 pub(crate) struct Reconciler {
     map: RegisterMap,
     turns: Vec<Turn>,
-    /// Registers that one write may span: neighbours inside the same range of the allow-list.
+    /// Spans of one write: neighbours inside the same range of the allow-list.
     spans: Vec<std::ops::Range<usize>>,
     pretend: bool,
     known: Option<Vec<u16>>,
-    /// Sequence number of the result that was made valid last.
+    /// Sequence number of the last result made valid.
     shown: Option<u16>,
     heartbeat: u16,
     beat_every: Duration,
     next_beat: Instant,
     budget: Budget,
-    /// Writes that repeated what had been echoed before: the press had lost or changed it.
+    /// Writes that repeated echoed words: the press had lost or changed them.
     pub(crate) rewrites: u64,
 }
 
-/// What a read of the host's own block says about who writes there.
+/// Writer of the host's own block, from a read-back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Witness {
     pub(crate) owner: Option<u16>,
@@ -70,17 +69,17 @@ impl Reconciler {
         }
     }
 
-    /// Nothing is known about the registers any more.
+    /// Marks all actual words as unknown.
     pub(crate) fn forget(&mut self) {
         self.known = None;
     }
 
-    /// Whether the registers are known to say something else than they shall, or a beat is due.
+    /// Whether actual and desired words differ, or a beat is due.
     pub(crate) fn is_due(&self, image: &HostImage) -> bool {
         Instant::now() >= self.next_beat || !self.says(&image.encode(&self.map, self.heartbeat))
     }
 
-    /// Takes note of the block as read back. `owner` is this host's number.
+    /// Sets the actual words from a read-back. `owner` is this host's number.
     pub(crate) fn read_back(&mut self, words: Vec<u16>, owner: u16) -> Witness {
         let field = |output, words: &[u16]| {
             let offset = self.map.output(output).and_then(|field| field.place.offset())?;
@@ -108,8 +107,8 @@ impl Reconciler {
         Witness { owner: found_owner, heartbeat: found_beat, mine }
     }
 
-    /// Writes what differs. True when the registers are known to say all of `image`; false when the limit of writes per
-    /// second puts the rest off.
+    /// Writes the differences. Returns true when the actual words equal `image`; false when the limit of writes per second
+    /// defers the rest.
     pub(crate) async fn write<L: Link>(
         &mut self,
         client: &mut Client<L>,
@@ -147,7 +146,7 @@ impl Reconciler {
         Ok(done)
     }
 
-    /// Whether the valid result in the registers is this one: by its sequence number there, else by this host's memory.
+    /// Whether the valid result in the registers is this one: by its sequence number there, else by the last one made valid.
     fn shows_this(&self, known: &[u16], wanted: &[u16], image: &HostImage) -> bool {
         match self.map.output(Output::ResultSeq).and_then(|field| field.place.offset()) {
             Some(offset) => known.get(usize::from(offset)) == wanted.get(usize::from(offset)),
@@ -155,7 +154,7 @@ impl Reconciler {
         }
     }
 
-    /// Whether the registers that may be written are known to say this.
+    /// Whether the actual words of the writable registers equal these.
     fn says(&self, wanted: &[u16]) -> bool {
         let same = |known: &Vec<u16>| {
             let mut registers = self.spans.iter().cloned().flatten().filter(|&i| self.turns[i] != Turn::Idle);
@@ -175,7 +174,7 @@ impl Reconciler {
         })
     }
 
-    /// From the first to the last register of this turn that differs within a span.
+    /// Returns the range from the first to the last register of this phase that differs within a span.
     fn differing(
         &self,
         turn: Turn,
@@ -189,7 +188,7 @@ impl Reconciler {
         Some(first..last + 1)
     }
 
-    /// Registers of other turns that lie between keep the words that the press has.
+    /// Returns the words of a write: registers of other phases in between keep their actual words.
     async fn write_range<L: Link>(
         &mut self,
         client: &mut Client<L>,
@@ -229,7 +228,7 @@ fn turns(map: &RegisterMap) -> Vec<Turn> {
     turns
 }
 
-/// The parts of the write block that the allow-list leaves, as register offsets.
+/// Returns the parts of the write block inside the allow-list, as register offsets.
 fn spans(press: &Press) -> Vec<std::ops::Range<usize>> {
     let block = press.map.write.addresses();
     let inside = |range: &std::ops::RangeInclusive<u16>| {
@@ -240,7 +239,7 @@ fn spans(press: &Press) -> Vec<std::ops::Range<usize>> {
     press.write.ranges().iter().filter_map(inside).collect()
 }
 
-/// A limit of writes per second, with a second's worth to spare.
+/// Token bucket: a limit of writes per second with a burst of one second.
 #[derive(Debug)]
 struct Budget {
     per_second: f64,

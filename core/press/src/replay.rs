@@ -1,8 +1,8 @@
-//! A recording of both blocks, played to the handshake: what it does now against what the host did then.
+//! Replay of a recording of both blocks to the handshake: strokes taken now against strokes taken by the recorded host.
 //!
-//! The recording holds what a reader of the registers saw, no more: the blocks as they changed. The handshake gets the
-//! press's block at the recorded times; its scanner is the recorded host, whose results come when they came then (at
-//! once where no host was there). So a fault of the field becomes a test case, with or without our host in it.
+//! A recording contains the blocks as they changed for a reader of the registers. The handshake receives the press's block
+//! at the recorded times; the recorded host stands in for the scanner, with results at their recorded times (at once in a
+//! recording without a host). A fault in the field becomes a test case, with or without this host in it.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -15,21 +15,21 @@ use crate::{
     Transition, Verdict,
 };
 
-/// Time between two looks at the timers of the handshake.
+/// Period of the check of the handshake's timers.
 const TICK: Duration = Duration::from_millis(100);
 
-/// One block as it was read.
+/// A block as read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sample {
-    /// Since the start of the recording.
+    /// Time since the start of the recording.
     pub at: Duration,
-    /// Whose block it is.
+    /// Side that writes the block.
     pub side: Side,
     /// Its words.
     pub words: Vec<u16>,
 }
 
-/// Who writes a block.
+/// Writer of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// The press.
@@ -38,12 +38,12 @@ pub enum Side {
     Host,
 }
 
-/// What the handshake made of a recording.
+/// Outcome of a replay.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Replayed {
-    /// Every transition with its time and the stroke then in hand.
+    /// Every transition with its time and the active stroke.
     pub transitions: Vec<(Duration, Transition, Option<StrokeKey>)>,
-    /// Alarms as they came.
+    /// Alarms in their order.
     pub alarms: Vec<(Duration, Code)>,
     /// Session and number of the strokes accepted now.
     pub accepted: Vec<(u16, u16)>,
@@ -51,18 +51,18 @@ pub struct Replayed {
     pub recorded: Vec<(u16, u16)>,
     /// Strokes missed now.
     pub missed: u64,
-    /// Reads that found the press writing its block.
+    /// Torn reads.
     pub torn: u64,
 }
 
 impl Replayed {
-    /// Whether the handshake takes the strokes that the recorded host took; true where there was none.
+    /// Whether the handshake accepts the strokes of the recorded host; true without one.
     pub fn agrees(&self) -> bool {
         self.recorded.is_empty() || self.recorded == self.accepted
     }
 }
 
-/// Plays a recording.
+/// Replays a recording.
 pub fn replay(press: &Press, samples: &[Sample]) -> Replayed {
     let mut replayed = Replayed { recorded: recorded_strokes(&press.map, samples), ..Replayed::default() };
     let results = recorded_results(&press.map, samples);
@@ -72,7 +72,7 @@ pub fn replay(press: &Press, samples: &[Sample]) -> Replayed {
         Event::Tick,
         Event::Scanner { ready: Ok(()), estimate: None },
         Event::Connected,
-        // The recorded host's registers are not another host's.
+        // The registers of the recorded host do not count as those of a second host.
         Event::Host { owner: None, heartbeat: None, mine: true },
     ] {
         player.step(event, now, &mut replayed);
@@ -96,7 +96,7 @@ pub fn replay(press: &Press, samples: &[Sample]) -> Replayed {
     replayed
 }
 
-/// The handshake with a journal that never fails, a press that takes every write, and the recorded host as scanner.
+/// The handshake with a journal that never fails, a press that accepts every write, and the recorded host as scanner.
 struct Player {
     handshake: Handshake,
     results: BTreeMap<(u16, u16), Duration>,
@@ -119,7 +119,7 @@ impl Player {
         }
     }
 
-    /// The answer of the recorded host that has come by now.
+    /// Returns the answer of the recorded host up to now.
     fn due(&self, now: Duration) -> Option<Event> {
         let key = self.handshake.stroke()?;
         let came = self.results.get(&(key.session, key.stroke)).is_none_or(|&at| at <= now);
@@ -157,15 +157,14 @@ impl Player {
 
 fn stand_in() -> Measurement {
     Measurement {
-        verdict: Verdict::CannotTell,
-        reason: None,
+        judgement: Verdict::CannotTell.into(),
         figures: Figures::default(),
         scanned_at: None,
         warning: None,
     }
 }
 
-/// The number in a field of the host's block.
+/// Returns the number in a field of the host's block.
 fn number(map: &RegisterMap, output: Output, words: &[u16]) -> Option<u16> {
     let field: &RegisterField = map.output(output)?;
     let start = usize::from(field.place.offset()?);
@@ -180,7 +179,7 @@ fn host_blocks(samples: &[Sample]) -> impl Iterator<Item = &Sample> {
     samples.iter().filter(|sample| sample.side == Side::Host)
 }
 
-/// Strokes in the order in which the recorded host echoed them. What stood there at the start is over.
+/// Returns the strokes in the order in which the recorded host echoed them; the one at the start is over.
 fn recorded_strokes(map: &RegisterMap, samples: &[Sample]) -> Vec<(u16, u16)> {
     let echo = |sample: &Sample| {
         let session = number(map, Output::SessionEcho, &sample.words).unwrap_or(0);
@@ -194,7 +193,7 @@ fn recorded_strokes(map: &RegisterMap, samples: &[Sample]) -> Vec<(u16, u16)> {
     echoes
 }
 
-/// When the recorded host's result of each stroke was first seen valid.
+/// Returns the time when the recorded host's result of each stroke was first valid.
 fn recorded_results(map: &RegisterMap, samples: &[Sample]) -> BTreeMap<(u16, u16), Duration> {
     let mut results = BTreeMap::new();
     for sample in host_blocks(samples) {

@@ -110,7 +110,7 @@ impl Harness {
         assert!(!(image.busy && image.valid), "busy and valid");
         assert!(!image.valid || image.result.is_some(), "valid without a result");
         if let (true, LinkState::Online, Some(code)) =
-            (image.valid, link, image.result.as_ref().and_then(|result| result.measurement.reason))
+            (image.valid, link, image.result.as_ref().and_then(|result| result.measurement.reason()))
         {
             assert_eq!(
                 image.error,
@@ -191,8 +191,7 @@ impl Harness {
 
 fn measurement() -> Measurement {
     Measurement {
-        verdict: Verdict::Pass,
-        reason: None,
+        judgement: Verdict::Pass.into(),
         figures: Figures { values: [(Measure::GapMax, 0.001)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,

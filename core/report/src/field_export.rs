@@ -1,8 +1,9 @@
-//! The plate as a table: even nodes with all that the comparisons found there, for spreadsheets and mesh viewers.
+//! Export of the comparisons' fields on an even grid over the plate: CSV for spreadsheets, PLY and VTK for mesh viewers.
+//!
+//! Positions are metres on the scanned face in the scanner frame, (u, v) and fields in the units of their names. Nodes
+//! without data are empty cells in CSV and NaN in the meshes.
 
 mod vtk;
-
-use std::fmt::Write as _;
 
 use ply_rs_bw::ply::{
     Addable as _, DefaultElement, ElementDef, Encoding, Ply, Property, PropertyDef, PropertyType, ScalarType,
@@ -14,10 +15,10 @@ use platen_shape::Surface;
 use platen_model::units::{mm, mm_pair, readable};
 use platen_model::{Field, NodeState, Report};
 
-/// Nodes along u and v: those at which our comparisons give their fields.
+/// Nodes along u and v, as in the fields of our comparisons.
 const NODES: [usize; 2] = [101, 101];
 
-/// Even nodes over the whole plate, v outer, u inner, edges included.
+/// Even grid over the plate, v outer, u inner, edges included, with the fields as columns.
 #[derive(Debug, Clone)]
 pub struct PlateTable {
     nodes: Vec<Node>,
@@ -26,23 +27,23 @@ pub struct PlateTable {
 
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    /// Metres.
+    /// Mid-surface coordinates, metres.
     uv: [f64; 2],
-    /// On the scanned face, scanner frame, metres.
+    /// Position on the scanned face, scanner frame, metres.
     face: [f64; 3],
     seen: bool,
 }
 
-/// One number a node.
+/// One component of a field.
 #[derive(Debug, Clone)]
 struct Column {
-    /// With its unit, e.g. `deviation_mm`.
+    /// Name with its unit, e.g. `deviation_mm`.
     name: String,
     values: Vec<Option<f64>>,
 }
 
 impl PlateTable {
-    /// The table of a measured surface with its comparisons' fields. A field on other nodes is interpolated.
+    /// Samples a measured surface and the fields of its comparisons; a field on other nodes is interpolated.
     pub fn new(surface: &Surface, reports: &[&Report]) -> Self {
         let along = |k: usize, n: usize, length: f64| length * k as f64 / (n - 1) as f64;
         let node = |k: usize| {
@@ -57,35 +58,31 @@ impl PlateTable {
         }
     }
 
-    /// As CSV: u_mm, v_mm, x_m, y_m, z_m, seen, then a column for each field; empty where nothing is known.
-    pub fn csv(&self) -> String {
-        let mut text = String::from("u_mm,v_mm,x_m,y_m,z_m,seen");
-        for column in &self.columns {
-            text.push(',');
-            text.push_str(&csv_cell(&column.name));
-        }
-        text.push('\n');
-        for (k, Node { uv: [u, v], face: [x, y, z], seen }) in self.nodes.iter().enumerate() {
-            let (seen, [u, v]) = (u8::from(*seen), mm_pair([*u, *v]));
-            // Writing to a string does not fail.
-            let _ = write!(text, "{:.3},{:.3},{x:.6},{y:.6},{z:.6},{seen}", u, v);
-            for column in &self.columns {
-                text.push(',');
-                if let Some(value) = column.values[k] {
-                    let _ = write!(text, "{value:.6}");
-                }
-            }
-            text.push('\n');
-        }
-        text
-    }
-
-    /// As a triangle mesh, PLY, binary little-endian: positions in metres, every column as a scalar field named as
-    /// CloudCompare names its own (`scalar_deviation_mm`), NaN where nothing is known. Triangles of nodes that were not
-    /// seen are left out: a hole in the data is a hole in the mesh.
+    /// Writes CSV: u_mm, v_mm, x_m, y_m, z_m, seen, then a column for each component of a field; empty cells without data.
     ///
     /// # Errors
-    /// The writer's refusal, in words.
+    /// The CSV writer's.
+    pub fn csv(&self) -> csv::Result<Vec<u8>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
+        let names = self.columns.iter().map(|column| column.name.as_str());
+        table.write_record(["u_mm", "v_mm", "x_m", "y_m", "z_m", "seen"].into_iter().chain(names))?;
+        for (k, Node { uv, face, seen }) in self.nodes.iter().enumerate() {
+            let place = mm_pair(*uv).map(|mm| format!("{mm:.3}"));
+            let face = face.map(|metres| format!("{metres:.6}"));
+            let seen = u8::from(*seen).to_string();
+            let values = self.columns.iter().map(|column| column.values[k]);
+            let values = values.map(|value| value.map(|value| format!("{value:.6}")).unwrap_or_default());
+            table.write_record(place.into_iter().chain(face).chain([seen]).chain(values))?;
+        }
+        table.into_inner().map_err(|e| e.into_error().into())
+    }
+
+    /// Writes a triangle mesh as binary little-endian PLY: positions in metres, every column as a scalar field in
+    /// CloudCompare's naming (`scalar_deviation_mm`), NaN without data. Triangles with unseen nodes are left out: a hole in
+    /// the data is a hole in the mesh.
+    ///
+    /// # Errors
+    /// The PLY writer's, as text.
     pub fn ply(&self) -> Result<Vec<u8>, String> {
         let scalar = |name: &str, kind: ScalarType| PropertyDef::new(name.into(), PropertyType::Scalar(kind));
         let mut vertex = ElementDef::new("vertex".into());
@@ -137,7 +134,7 @@ impl PlateTable {
         element
     }
 
-    /// Two triangles for each four nodes that were all seen, counter-clockwise from the scanner.
+    /// Returns two triangles for each square of four seen nodes, counter-clockwise from the scanner.
     fn triangles(&self) -> Vec<[usize; 3]> {
         let [n_u, n_v] = NODES;
         let squares = (0..(n_u - 1) * (n_v - 1)).map(|k| k / (n_u - 1) * n_u + k % (n_u - 1));
@@ -152,18 +149,10 @@ impl PlateTable {
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// The usual name of a face's corners in PLY.
+/// Usual name of a face's corners in PLY.
 const FACE: &str = "vertex_indices";
 
-/// A cell of CSV (RFC 4180): a name may hold a comma or a quote.
-pub(crate) fn csv_cell(text: &str) -> String {
-    match text.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    }
-}
-
-/// One column for each component of a field, in the unit that people read.
+/// Returns one column for each component of a field, lengths in millimetres.
 fn columns(field: &Field) -> Vec<Column> {
     let (suffix, factor) = readable(&field.unit);
     let one = |component: usize| {
@@ -210,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_node_without_data_is_an_empty_cell() {
-        let csv = table(|k| k != 1).csv();
+        let csv = String::from_utf8(table(|k| k != 1).csv().unwrap()).unwrap();
         let mut lines = csv.lines();
         assert_eq!(lines.next(), Some("u_mm,v_mm,x_m,y_m,z_m,seen,deviation_mm"));
         assert_eq!(lines.next(), Some("0.000,0.000,0.000000,0.000000,0.000000,1,0.000000"));
@@ -273,9 +262,16 @@ mod tests {
     }
 
     #[test]
-    fn cells_stay_in_their_column() {
-        assert_eq!(csv_cell("plain"), "plain");
-        assert_eq!(csv_cell("a, \"b\""), "\"a, \"\"b\"\"\"");
+    fn names_are_quoted_where_rfc_4180_requires_it() {
+        let names = ["plain", "a b", " a", "a, \"b\"", "a\"b", "two\nlines", "a\rb", "\u{b5}m;'"];
+        let quoted = |name: &str| match name.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", name.replace('"', "\"\"")),
+            false => name.to_owned(),
+        };
+        let columns = names.map(|name| Column { name: name.into(), values: Vec::new() }).to_vec();
+        let table = PlateTable { nodes: Vec::new(), columns };
+        let expected = format!("u_mm,v_mm,x_m,y_m,z_m,seen,{}\n", names.map(quoted).join(","));
+        assert_eq!(String::from_utf8(table.csv().unwrap()).unwrap(), expected);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What the history holds of a plate's strokes, as pictures and reports want it.
+//! Strokes on record in the form of pictures and reports: labels, points of the strip, worst template, earlier documents.
 
 use std::path::Path;
 
@@ -11,10 +11,11 @@ use crate::picture::StripPoint;
 use crate::result::{OutlineRecord, ResultRecord, TemplateRecord};
 use platen_model::units::mm;
 
-/// The strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have it yet.
+/// Returns the strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have
+/// it yet.
 ///
 /// # Errors
-/// The history's.
+/// The history cannot be read.
 pub fn strokes_until(
     archive: &Archive,
     run_id: u32,
@@ -26,7 +27,7 @@ pub fn strokes_until(
     Ok(earlier.chain([of_record(&this, record)]).collect())
 }
 
-/// What stands below a stroke in the strip and in tables.
+/// Returns the label of a stroke in the strip and in tables: number or `blank`, attempt, `trial`.
 pub fn label(stroke: &Stroke) -> String {
     let number = if stroke.baseline { "blank".to_owned() } else { stroke.key.stroke.to_string() };
     let again = if stroke.key.attempt > 0 { format!(".{}", stroke.key.attempt) } else { String::new() };
@@ -34,7 +35,7 @@ pub fn label(stroke: &Stroke) -> String {
     format!("{number}{again}{trial}")
 }
 
-/// A stroke of the strip, from its figures on record.
+/// Returns a stroke as a point of the strip, from its figures on record.
 pub fn of_stroke(stroke: &Stroke) -> StripPoint {
     let figure = |name: &str| stroke.figures.get(name).copied();
     StripPoint {
@@ -42,63 +43,52 @@ pub fn of_stroke(stroke: &Stroke) -> StripPoint {
         gap_mm: figure("gap.max").map(mm),
         uncertainty_mm: figure("gap.uncertainty").map(mm),
         sense: figure("sense").map_or(0, |sense| sense.clamp(-1.0, 1.0).round() as i8),
-        verdict: verdict(stroke),
+        verdict: stroke.verdict.unwrap_or(Verdict::NotMeasured),
     }
 }
 
-/// The judgement on record; none is no measurement.
-pub fn verdict(stroke: &Stroke) -> Verdict {
-    use platen_model::Verdict as Kept;
-    match stroke.verdict {
-        Some(Kept::Pass) => Verdict::Pass,
-        Some(Kept::Fail) => Verdict::Fail,
-        Some(Kept::CannotTell) => Verdict::CannotTell,
-        Some(Kept::NotMeasured) | None => Verdict::NotMeasured,
-    }
-}
-
-/// A stroke of the strip, from its document.
+/// Returns a stroke as a point of the strip, from its document.
 pub fn of_record(stroke: &Stroke, record: &ResultRecord) -> StripPoint {
-    let worst = worst_board(record);
+    let worst = worst_template(record);
     StripPoint {
         label: label(stroke),
-        gap_mm: worst.map(|board| board.max_gap_mm),
-        uncertainty_mm: worst.map(|board| board.uncertainty_mm),
-        sense: worst.map_or(0, |board| board.sense),
+        gap_mm: worst.map(|template| template.max_gap_mm),
+        uncertainty_mm: worst.map(|template| template.uncertainty_mm),
+        sense: worst.map_or(0, |template| template.sense),
         verdict: record.verdict,
     }
 }
 
-/// The board with the most gap per limit, as in the press's registers.
-pub fn worst_board(record: &ResultRecord) -> Option<&TemplateRecord> {
-    let share = |board: &TemplateRecord| board.max_gap_mm.abs() / board.limit_mm.max(f64::MIN_POSITIVE);
-    let boards = record.reference_lines.iter().flat_map(|line| &line.templates);
-    boards.max_by(|a, b| share(a).total_cmp(&share(b)))
+/// Returns the template with the largest gap per limit, as in the press's registers.
+pub fn worst_template(record: &ResultRecord) -> Option<&TemplateRecord> {
+    let share = |t: &TemplateRecord| t.max_gap_mm.abs() / t.limit_mm.max(f64::MIN_POSITIVE);
+    let templates = record.reference_lines.iter().flat_map(|line| &line.templates);
+    templates.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
-/// What a result document has of a plate for its later strokes.
+/// Part of a result document that later strokes of the plate use.
 #[derive(Debug, Default, serde::Deserialize)]
-pub struct Kept {
-    /// Where the plate rested.
+pub struct EarlierDocument {
+    /// Supports of the plate.
     pub supports: Option<String>,
     outline: Option<OutlineRecord>,
 }
 
-impl Kept {
-    /// The outline of the blank that its (u, v) refer to, where a scan of it told one.
+impl EarlierDocument {
+    /// Returns the outline of the blank to which (u, v) refer, where a scan of the blank gave one.
     pub fn blank(&self) -> Option<Blank> {
         self.outline.as_ref().and_then(OutlineRecord::blank)
     }
 }
 
-/// Reads that of a document; nothing is known from one that cannot be read.
-pub fn kept(document: &Path) -> Kept {
+/// Reads an earlier document; an unreadable one gives an empty record.
+pub fn read_document(document: &Path) -> EarlierDocument {
     let text = std::fs::read(document).unwrap_or_default();
     serde_json::from_slice(&text).unwrap_or_default()
 }
 
-/// Whether the plate rests on other supports than it did `before`; what is not known is not called a change.
-pub fn moved(before: Option<&str>, plate: &PlateFile) -> bool {
+/// Returns whether the plate rests on other supports than `before`; false where either is unknown.
+pub fn supports_changed(before: Option<&str>, plate: &PlateFile) -> bool {
     before.zip(plate.plate.supports.as_deref()).is_some_and(|(before, now)| before != now)
 }
 
@@ -115,9 +105,9 @@ mod tests {
             PlateFile::parse("plate.toml", &text).unwrap()
         };
         let trestles = plate("supports = \"trestles\"");
-        assert!(moved(Some("bed"), &trestles));
-        assert!(!moved(Some("trestles"), &trestles));
-        assert!(!moved(None, &trestles) && !moved(Some("bed"), &plate("")));
+        assert!(supports_changed(Some("bed"), &trestles));
+        assert!(!supports_changed(Some("trestles"), &trestles));
+        assert!(!supports_changed(None, &trestles) && !supports_changed(Some("bed"), &plate("")));
     }
 
     #[test]
@@ -125,9 +115,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("result.json");
         std::fs::write(&path, r#"{"schema": "platen.result/1", "supports": "bed", "grid": [1, 2]}"#).unwrap();
-        assert_eq!(kept(&path).supports.as_deref(), Some("bed"));
-        assert!(kept(&path).blank().is_none());
-        let gone = kept(&folder.path().join("gone.json"));
-        assert!(gone.supports.is_none() && gone.blank().is_none());
+        assert_eq!(read_document(&path).supports.as_deref(), Some("bed"));
+        assert!(read_document(&path).blank().is_none());
+        let missing = read_document(&folder.path().join("gone.json"));
+        assert!(missing.supports.is_none() && missing.blank().is_none());
     }
 }

@@ -1,10 +1,14 @@
-//! The files of one measurement: all documents or none, then the pictures beside them.
+//! Result folder of one measurement: its documents, written all or none, then tables, meshes and pictures.
+//!
+//! A folder and every single file appear under their name by one rename, so that a reader never finds half a file.
 
+use std::io::Write as _;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use platen_shape::Surface;
 
-use crate::field_export::{PlateTable, csv_cell};
+use crate::field_export::PlateTable;
 use crate::result::{LineRecord, PlateRecord, ResultRecord};
 use crate::{
     picture,
@@ -13,13 +17,13 @@ use crate::{
 use platen_model::Report;
 use platen_sdk::exchange::{AlignedBuffer, Decode, Encode};
 
-/// Name of the surface's file: what comparisons are given, a `platen.surface/1` buffer of `platen.h`.
+/// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";
 
-/// Why files were not written.
+/// Failure to write the files of a measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// The folder cannot be written.
+    /// Unwritable file or folder.
     #[error("{}: cannot be written: {source}; check the folder and the space on its disk", .path.display())]
     Write {
         /// File or folder.
@@ -27,25 +31,25 @@ pub enum FilesError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// There is something in the way.
+    /// Folder that exists already.
     #[error("{}: exists already; give another --out or remove it", .0.display())]
     Exists(PathBuf),
-    /// The picture cannot be drawn.
+    /// Picture that cannot be drawn.
     #[error("picture of {name}: {why}; report this with the result")]
     Picture {
-        /// What it shows.
+        /// Name of the picture.
         name: String,
         /// Reason.
         why: String,
     },
-    /// The mesh cannot be written.
-    #[error("mesh: {0}; report this with the result")]
-    Mesh(String),
+    /// Table or mesh that cannot be encoded.
+    #[error("{0}; report this with the result")]
+    Export(String),
 }
 
-/// Writes `result.json`, `reference_lines.csv` and the surface, which the next stroke is compared with, into a new folder.
+/// Writes `result.json`, `reference_lines.csv` and the surface, the reference of the next stroke, into a new folder.
 ///
-/// Everything is written beside the folder first and put in place by one rename, so that a reader never finds half.
+/// The folder is filled under a temporary name and renamed once, so that a reader finds it whole or not at all.
 ///
 /// # Errors
 /// [`FilesError`]; then nothing is left behind.
@@ -61,16 +65,16 @@ pub fn write(folder: &Path, record: &ResultRecord, surface: &Surface) -> Result<
         Ok(files.iter().map(|file| folder.join(file)).collect())
     });
     if written.is_err() {
-        // Whatever was written so far is of no use; what cannot be removed is named `.part`.
+        // A part that cannot be removed is recognised by its name.
         let _ = std::fs::remove_dir_all(&part);
     }
     written
 }
 
-/// The surface beside a result document.
+/// Reads the surface beside a result document.
 ///
 /// # Errors
-/// Which file, and why it cannot be read any more.
+/// The file and the reason why it cannot be read.
 pub fn surface_beside(document: &Path) -> Result<Surface, String> {
     let path = document.with_file_name(SURFACE);
     let read = std::fs::read(&path).map_err(|e| e.to_string()).and_then(|bytes| {
@@ -84,12 +88,17 @@ fn failed(path: &Path) -> impl Fn(std::io::Error) -> FilesError + use<> {
     move |source| FilesError::Write { path: path.clone(), source }
 }
 
+/// Names the file of a failed encoder.
+fn export<E: std::fmt::Display>(name: &'static str) -> impl Fn(E) -> FilesError {
+    move |why| FilesError::Export(format!("{name}: {why}"))
+}
+
 fn fill(part: &Path, record: &ResultRecord, surface: &Surface) -> Result<Vec<&'static str>, FilesError> {
     std::fs::create_dir_all(part).map_err(failed(part))?;
     let json = serde_json::to_vec_pretty(record).map_err(|e| failed(part)(e.into()))?;
     let files = [
         ("result.json", json),
-        ("reference_lines.csv", lines_csv(&record.reference_lines).into_bytes()),
+        ("reference_lines.csv", lines_csv(&record.reference_lines).map_err(export("reference_lines.csv"))?),
         (SURFACE, surface.to_buffer().as_ref().to_vec()),
     ];
     for (name, content) in &files {
@@ -101,10 +110,9 @@ fn fill(part: &Path, record: &ResultRecord, surface: &Surface) -> Result<Vec<&'s
     Ok(files.map(|(name, _)| name).to_vec())
 }
 
-/// Draws the pictures of a stroke into its folder, and writes the plate as a table (`grid.csv`) and as a mesh
-/// (`plate.ply`, `plate.vtk`). `strokes` are those of the plate so far, this one last; none for a measurement that has no history.
-///
-/// All of it can be made again from the documents; what was made already is replaced.
+/// Draws the pictures of a stroke into its folder, and writes the fields as a table (`grid.csv`) and as meshes
+/// (`plate.ply`, `plate.vtk`). `strokes` are those of the plate so far, this one last; empty for a measurement without
+/// history. Existing files are replaced.
 ///
 /// # Errors
 /// [`FilesError`].
@@ -130,8 +138,8 @@ pub fn illustrate(
     Ok(files)
 }
 
-/// What comparisons found at every place: as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`), and a
-/// map of each field.
+/// Writes the fields of the comparisons as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`) and as one
+/// map for each field of one component.
 ///
 /// # Errors
 /// [`FilesError`].
@@ -144,8 +152,8 @@ pub fn fields(
 ) -> Result<Vec<PathBuf>, FilesError> {
     let table = PlateTable::new(surface, reports);
     let mut files = vec![
-        put(folder, "grid.csv", table.csv().as_bytes())?,
-        put(folder, "plate.ply", &table.ply().map_err(FilesError::Mesh)?)?,
+        put(folder, "grid.csv", &table.csv().map_err(export("grid.csv"))?)?,
+        put(folder, "plate.ply", &table.ply().map_err(export("plate.ply"))?)?,
         put(folder, "plate.vtk", &table.vtk())?,
     ];
     for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
@@ -160,42 +168,80 @@ fn put_picture(folder: &Path, name: &str, svg: Result<String, PictureError>) -> 
     put(folder, &format!("{}.svg", file_name(name)), svg.as_bytes())
 }
 
-/// Replaces a file in a folder.
+/// Replaces a file in a folder and returns its path.
+///
+/// # Errors
+/// [`FilesError::Write`].
 pub fn put(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, FilesError> {
     let path = folder.join(name);
     replace(&path, content)?;
     Ok(path)
 }
 
-/// Replaces a file in one step: a reader finds the old one or the new one, never half.
+/// Replaces a file by one rename: a reader finds the old contents or the new ones, never half.
+///
+/// # Errors
+/// [`FilesError::Write`].
 pub fn replace(path: &Path, content: &[u8]) -> Result<(), FilesError> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path)).map_err(failed(path))
+    let write = || {
+        // Permissions of an ordinary new file: the umask applies.
+        let permissions = std::fs::Permissions::from_mode(0o666);
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut part =
+            tempfile::Builder::new().suffix(".part").permissions(permissions).tempfile_in(folder)?;
+        part.write_all(content)?;
+        part.persist(path).map(drop).map_err(|e| e.error)
+    };
+    write().map_err(failed(path))
 }
 
-/// A name as a file's: what a file system or a shell may mind becomes `_`.
+/// Returns a name as a file name: characters that a file system or a shell may interpret become `_`.
 pub(crate) fn file_name(name: &str) -> String {
     let kind = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
     name.chars().map(kind).collect()
 }
 
-fn lines_csv(lines: &[LineRecord]) -> String {
-    let mut text = String::from("line,u_mm,v_mm,x_m,y_m,z_m,seen\n");
+fn lines_csv(lines: &[LineRecord]) -> csv::Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["line", "u_mm", "v_mm", "x_m", "y_m", "z_m", "seen"])?;
     for line in lines {
-        let name = csv_cell(&line.name);
         for point in &line.points {
-            let [x, y, z] = point.position_m;
-            let seen = u8::from(point.seen);
-            text += &format!("{name},{:.3},{:.3},{x:.6},{y:.6},{z:.6},{seen}\n", point.u_mm, point.v_mm);
+            let place = [point.u_mm, point.v_mm].map(|mm| format!("{mm:.3}"));
+            let position = point.position_m.map(|metres| format!("{metres:.6}"));
+            table.serialize((&line.name, place, position, u8::from(point.seen)))?;
         }
     }
-    text
+    table.into_inner().map_err(|e| e.into_error().into())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::result::PointRecord;
+
+    #[test]
+    fn a_line_with_a_comma_in_its_name_stays_in_its_column() {
+        let point = PointRecord { u_mm: 1.0, v_mm: 0.25, position_m: [-0.1, 2.0, 3e-7], seen: true };
+        let lines = [LineRecord { name: "a, \"b\"".into(), points: vec![point], templates: Vec::new() }];
+        assert_eq!(
+            String::from_utf8(lines_csv(&lines).unwrap()).unwrap(),
+            "line,u_mm,v_mm,x_m,y_m,z_m,seen\n\"a, \"\"b\"\"\",1.000,0.250,-0.100000,2.000000,0.000000,1\n"
+        );
+    }
+
+    #[test]
+    fn a_replaced_file_has_the_permissions_of_a_new_one_and_nothing_stays_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let [ordinary, replaced] = ["ordinary", "replaced"].map(|name| folder.path().join(name));
+        std::fs::write(&ordinary, "").unwrap();
+        for content in ["old", "new"] {
+            put(folder.path(), "replaced", content.as_bytes()).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(&replaced).unwrap(), "new");
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ordinary), mode(&replaced));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
 
     #[test]
     fn names_stay_in_their_folder() {

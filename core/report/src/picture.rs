@@ -1,37 +1,37 @@
-//! Pictures of a stroke, as SVG: maps of the plate, sections under boards, the strip of strokes so far.
+//! Pictures of a stroke as SVG: maps of the plate, sections under templates, the strip of strokes so far.
 //!
-//! Drawn to be read at two metres. Colours and heights are locked for a plate: what they mean follows from its plate
-//! file alone ([`Yardstick`]), never from the stroke, so that two strokes can be laid side by side. Colours diverge
-//! evenly from neutral gray, blue against orange; numbers with their sign stand beside them. What was not seen is hatched.
+//! Legible at two metres. Scales of colours and heights follow from the plate file alone ([`PictureScale`]), never from the
+//! stroke, so that two strokes can be compared side by side. The colour map diverges from neutral gray, blue against orange,
+//! in steps of equal perceived difference; signed numbers stand beside it. Unseen areas are hatched.
 
+mod canvas;
 mod colour;
 mod map;
-mod page;
 mod scale;
 mod section;
 mod shades;
 mod strip;
 
 pub use map::map;
-pub use scale::Yardstick;
+pub use scale::PictureScale;
 pub use section::section;
 pub use strip::{StripPoint, strip};
 
 use platen_model::Verdict;
 
-/// The picture could not be drawn.
+/// Failure of the drawing library.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct PictureError(String);
 
-/// What stands over every picture.
+/// Heading of a picture: plate, stroke and verdict.
 #[derive(Debug, Clone, Copy)]
 pub struct Caption<'a> {
     /// Name of the plate.
     pub plate: &'a str,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
-    /// Judgement of the stroke.
+    /// Verdict of the stroke.
     pub verdict: Verdict,
 }
 
@@ -44,7 +44,7 @@ impl Caption<'_> {
     }
 }
 
-/// Millimetres for people: one decimal below 10, where the fit knows it; a real minus sign.
+/// Formats millimetres with their sign, one decimal below 10 and none above; the minus sign is U+2212.
 fn signed_mm(value: f64) -> String {
     let size = value.abs();
     let digits = if size < 9.95 { format!("{size:.1}") } else { format!("{size:.0}") };
@@ -55,7 +55,7 @@ fn signed_mm(value: f64) -> String {
     }
 }
 
-/// A gap with its uncertainty, millimetres with one decimal. The uncertainty is rounded up: none is shown as 0.
+/// Formats a gap with its uncertainty, millimetres with one decimal. The uncertainty is rounded up and never 0.
 pub fn with_uncertainty(gap_mm: f64, uncertainty_mm: Option<f64>) -> String {
     let up = |mm: f64| (mm * 10.0 - 1e-9).ceil().max(1.0) / 10.0;
     match uncertainty_mm {

@@ -1,14 +1,14 @@
-//! The report of one plate: one HTML file that prints on A4, with every stroke, its pictures and its doubts.
+//! Report of one plate: one HTML file that prints on A4, with every stroke, its pictures and its uncertainties.
 //!
-//! It is made from the documents on record and the pictures beside them, without scripts and without any other file, so
-//! that it can be sent and kept. What was not measured, and what cannot be told, is said in these words. Every text that a
-//! person or a press gave is escaped by the template.
+//! Made from the documents on record and the pictures beside them, without scripts and links, so that the file alone can be
+//! sent and archived. "Not measured" and "cannot tell" are written out, never left blank. Every text given by a person or a
+//! press is escaped.
 
 use std::path::{Path, PathBuf};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord as KeptPlate, Stroke};
+use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord, Stroke};
 use platen_model::Verdict;
 
 use crate::history_view;
@@ -21,24 +21,24 @@ use crate::{
 
 const STYLE: &str = include_str!("plate_report/style.css");
 
-/// Why there is no report.
+/// Failure to make a report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The history cannot be read.
+    /// Unreadable history.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// Nothing is on record.
+    /// Plate without strokes.
     #[error("no stroke of plate {0} is on record; `platen history list` shows the plates")]
     NoStrokes(u32),
-    /// It cannot be written.
+    /// Unwritable file.
     #[error(transparent)]
     Files(#[from] FilesError),
 }
 
-/// One stroke as the report shows it.
-struct Page<'a> {
+/// Stroke in the report.
+struct Entry<'a> {
     stroke: &'a Stroke,
-    /// Its document, or why there is none.
+    /// Its document, or the reason why there is none.
     document: Result<ResultRecord, String>,
     point: StripPoint,
 }
@@ -52,16 +52,17 @@ pub fn write(archive: &Archive, plant: &str, plate: u32, folder: &Path) -> Resul
     Ok(output_folder::put(folder, &format!("plate-{plate}.html"), text.as_bytes())?)
 }
 
-/// The report of a plate of the history.
+/// Returns the report of a plate of the history as HTML.
 ///
 /// # Errors
 /// [`ReportError`].
 pub fn report(archive: &Archive, plant: &str, plate: u32) -> Result<String, ReportError> {
     let strokes = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() })?;
-    let pages: Vec<Page<'_>> = strokes.iter().map(Page::of).collect();
-    let Some(last) = pages.last() else { return Err(ReportError::NoStrokes(plate)) };
-    let kept = archive.plates()?.into_iter().find(|kept| kept.plate == plate);
-    let newest = pages.iter().rev().find_map(|page| page.document.as_ref().ok().map(|record| (page, record)));
+    let entries: Vec<Entry<'_>> = strokes.iter().map(Entry::of).collect();
+    let Some(last) = entries.last() else { return Err(ReportError::NoStrokes(plate)) };
+    let plate_record = archive.plates()?.into_iter().find(|record| record.plate == plate);
+    let newest =
+        entries.iter().rev().find_map(|entry| entry.document.as_ref().ok().map(|record| (entry, record)));
     let name = newest.map_or_else(|| format!("plate {plate}"), |(_, record)| record.plate.clone());
     let markup = html! {
         (DOCTYPE)
@@ -76,20 +77,20 @@ pub fn report(archive: &Archive, plant: &str, plate: u32) -> Result<String, Repo
                 header {
                     div {
                         h1 { "Plate " (name) }
-                        p { (part(kept.as_ref())) }
+                        p { (part(plate_record.as_ref())) }
                         p.quiet { (plant) ", after stroke " (last.point.label) ", " (time(last.stroke)) }
                     }
                     (chip(last.point.verdict))
                 }
                 @match newest {
-                    Some((page, record)) => { (summary(&pages, page, record)) }
+                    Some((entry, record)) => { (summary(&entries, entry, record)) }
                     None => { p.warning { "Not measured: no stroke of this plate has a result." } }
                 }
                 h2 { "Strokes" }
-                (table(&pages))
+                (table(&entries))
                 @if let Some((_, record)) = newest { h2 { "Shape checks after the last measured stroke" } (checks(record)) }
                 h2 { "Every stroke" }
-                @for page in &pages { (stroke(page)) }
+                @for entry in &entries { (stroke(entry)) }
                 (footer(newest.map(|(_, record)| record)))
             }
         }
@@ -97,7 +98,7 @@ pub fn report(archive: &Archive, plant: &str, plate: u32) -> Result<String, Repo
     Ok(markup.into_string())
 }
 
-impl<'a> Page<'a> {
+impl<'a> Entry<'a> {
     fn of(stroke: &'a Stroke) -> Self {
         let missing = || stroke.reason.clone().unwrap_or_else(|| "no document is on record".to_owned());
         let document = stroke.document.as_deref().ok_or_else(missing).and_then(|path| {
@@ -106,13 +107,13 @@ impl<'a> Page<'a> {
         });
         let mut point = history_view::of_stroke(stroke);
         if let Ok(record) = &document {
-            // The host writes the report before the history has the press's receipt.
+            // The host writes the report before the history has the press's acknowledge.
             point = history_view::of_record(stroke, record);
         }
         Self { stroke, document, point }
     }
 
-    /// A picture that was drawn beside the document.
+    /// Returns a picture drawn beside the document.
     fn picture(&self, name: &str) -> Option<Markup> {
         let path = self
             .stroke
@@ -123,19 +124,19 @@ impl<'a> Page<'a> {
         Some(PreEscaped(svg))
     }
 
-    /// The map of what is still to do: by curvature where that was compared, else by height.
-    fn to_do(&self) -> Option<Markup> {
+    /// Returns the map of the remaining deviation: of curvature where that was compared, else of height.
+    fn remaining(&self) -> Option<Markup> {
         self.picture("curvature_deficit").or_else(|| self.picture("deviation"))
     }
 
-    /// The map of what the stroke did.
-    fn done(&self) -> Option<Markup> {
+    /// Returns the map of the stroke's change.
+    fn change(&self) -> Option<Markup> {
         self.picture("curvature_change").or_else(|| self.picture("displacement_normal"))
     }
 
     fn worst_section(&self) -> Option<Markup> {
-        let board = history_view::worst_board(self.document.as_ref().ok()?)?;
-        self.picture(&format!("section-{}", board.name))
+        let template = history_view::worst_template(self.document.as_ref().ok()?)?;
+        self.picture(&format!("section-{}", template.name))
     }
 }
 
@@ -144,31 +145,31 @@ fn chip(verdict: Verdict) -> Markup {
     html! { span class={ "verdict " (words.replace(' ', "_")) } { (words.to_uppercase()) } }
 }
 
-fn part(kept: Option<&KeptPlate>) -> String {
-    let Some(kept) = kept else { return String::new() };
-    let part = kept.part_id.map(|id| format!("part {id}, ")).unwrap_or_default();
-    let name = kept.part_name.as_ref().map(|name| format!("{name}, ")).unwrap_or_default();
-    format!("{part}{name}number {} of this history, press {}", kept.plate, kept.press)
+fn part(record: Option<&PlateRecord>) -> String {
+    let Some(record) = record else { return String::new() };
+    let part = record.part_id.map(|id| format!("part {id}, ")).unwrap_or_default();
+    let name = record.part_name.as_ref().map(|name| format!("{name}, ")).unwrap_or_default();
+    format!("{part}{name}number {} of this history, press {}", record.plate, record.press)
 }
 
-/// UTC, to the second.
+/// Formats the time of a stroke in UTC, to the second.
 fn time(stroke: &Stroke) -> String {
     stroke.accepted.strftime("%F %T UTC").to_string()
 }
 
-fn summary(pages: &[Page<'_>], page: &Page<'_>, record: &ResultRecord) -> Markup {
+fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> Markup {
     let plate = &record.plate_file;
     let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
-    let points: Vec<StripPoint> = pages.iter().map(|page| page.point.clone()).collect();
+    let points: Vec<StripPoint> = entries.iter().map(|entry| entry.point.clone()).collect();
     let strip = picture::strip(&points, &caption, &plate.scale).ok().map(PreEscaped);
-    let boards: Vec<String> = record
+    let templates: Vec<String> = record
         .reference_lines
         .iter()
-        .flat_map(|line| line.templates.iter().map(move |board| (line, board)))
-        .map(|(line, b)| {
+        .flat_map(|line| line.templates.iter().map(move |template| (line, template)))
+        .map(|(line, t)| {
             format!(
                 "{} on line {}: {:.0} mm, gap at most {:.1} mm",
-                b.name, line.name, b.chord_mm, b.limit_mm
+                t.name, line.name, t.chord_mm, t.limit_mm
             )
         })
         .collect();
@@ -178,7 +179,7 @@ fn summary(pages: &[Page<'_>], page: &Page<'_>, record: &ResultRecord) -> Markup
         dl {
             dt { "Size" } dd { (format!("{:.0} \u{d7} {:.0} \u{d7} {:.0} mm", plate.width_mm, plate.height_mm, plate.thickness_mm)) }
             dt { "Target" } dd { (plate.target.as_deref().unwrap_or("none: nothing can be judged")) }
-            dt { "Boards" } dd { @if boards.is_empty() { "none: nothing can be judged" } @for board in &boards { div { (board) } } }
+            dt { "Templates" } dd { @if templates.is_empty() { "none: nothing can be judged" } @for template in &templates { div { (template) } } }
             @if let Some(outline) = &record.outline { dt { "Outline" } dd { (outline.words()) } }
             dt { "Rests on" } dd { (record.supports.as_deref().unwrap_or("not recorded")) }
             dt { "Scanner" } dd { (record.scan.instrument) (seen(record)) }
@@ -186,8 +187,8 @@ fn summary(pages: &[Page<'_>], page: &Page<'_>, record: &ResultRecord) -> Markup
             dt { "Software" } dd { (record.software) ", " (record.schema) }
         }
         div.pictures {
-            @if let Some(map) = page.to_do() { figure.wide { (map) } } @else { p { "The map of this stroke is not kept." } }
-            @if let Some(section) = page.worst_section() { figure { (section) } }
+            @if let Some(map) = entry.remaining() { figure.wide { (map) } } @else { p { "The map of this stroke is missing." } }
+            @if let Some(section) = entry.worst_section() { figure { (section) } }
             @if let Some(strip) = strip { figure { (strip) } }
         }
     }
@@ -205,29 +206,31 @@ fn seen(record: &ResultRecord) -> String {
 
 fn calibration(state: &CalibrationRecord) -> String {
     let null_pairs = match state.sigma_correlated_mm {
-        0.0 => "no null pairs taken: changes may be called real a little too often".to_owned(),
+        0.0 => "no null pairs scanned: changes may be called real a little too often".to_owned(),
         sigma => format!("correlated error {sigma:.2} mm (one sigma, from null pairs)"),
     };
     let artefact = match state.sigma_true_mm {
-        None => "not held against an artefact: uncertainties leave the scanner's own bias out".to_owned(),
+        None => {
+            "not calibrated on an artefact: uncertainties do not include the scanner's own bias".to_owned()
+        }
         Some(sigma) => format!("bias against an artefact {sigma:.2} mm (one sigma)"),
     };
     format!("{null_pairs}; {artefact}")
 }
 
-fn table(pages: &[Page<'_>]) -> Markup {
+fn table(entries: &[Entry<'_>]) -> Markup {
     html! {
         table {
             thead { tr {
                 th { "stroke" } th { "time" } th { "verdict" } th.n { "worst gap, mm" } th.n { "at u, v, mm" }
-                th.n { "seen" } th { "what it says" }
+                th.n { "seen" } th { "finding" }
             } }
-            @for page in pages { tr {
-                td { (page.point.label) }
-                td.t { (page.stroke.accepted.strftime("%m-%d %H:%M").to_string()) }
-                td { (chip(page.point.verdict)) }
-                td.n { (gap(&page.point)) }
-                @match &page.document {
+            @for entry in entries { tr {
+                td { (entry.point.label) }
+                td.t { (entry.stroke.accepted.strftime("%m-%d %H:%M").to_string()) }
+                td { (chip(entry.point.verdict)) }
+                td.n { (gap(&entry.point)) }
+                @match &entry.document {
                     Ok(record) => {
                         td.n { (worst_place(record)) }
                         td.n { (format!("{:.0} %", record.quality.coverage * 100.0)) }
@@ -237,7 +240,7 @@ fn table(pages: &[Page<'_>]) -> Markup {
                 }
             } }
         }
-        p.quiet { "\u{b1}: expanded uncertainty, 95 %. A limit is passed or failed only outside it; between, the verdict is \u{201c}cannot tell\u{201d}." }
+        p.quiet { "\u{b1}: expanded uncertainty, 95 %. A gap passes or fails a limit only by more than its uncertainty; otherwise the verdict is \u{201c}cannot tell\u{201d}." }
     }
 }
 
@@ -249,9 +252,9 @@ fn gap(point: &StripPoint) -> String {
 }
 
 fn worst_place(record: &ResultRecord) -> String {
-    history_view::worst_board(record).map_or_else(
+    history_view::worst_template(record).map_or_else(
         || "\u{2013}".to_owned(),
-        |board| format!("{:.0}, {:.0}", board.max_gap_at_mm[0], board.max_gap_at_mm[1]),
+        |template| format!("{:.0}, {:.0}", template.max_gap_at_mm[0], template.max_gap_at_mm[1]),
     )
 }
 
@@ -278,18 +281,18 @@ fn checks(record: &ResultRecord) -> Markup {
     }
 }
 
-fn stroke(page: &Page<'_>) -> Markup {
+fn stroke(entry: &Entry<'_>) -> Markup {
     html! {
         section.stroke {
             h3 {
-                "Stroke " (page.point.label) (chip(page.point.verdict))
-                span.quiet { (time(page.stroke)) ", run " (page.stroke.run_id) }
+                "Stroke " (entry.point.label) (chip(entry.point.verdict))
+                span.quiet { (time(entry.stroke)) ", run " (entry.stroke.run_id) }
             }
-            @match &page.document {
+            @match &entry.document {
                 Ok(record) => {
                     @for sentence in &record.says { p { (sentence) } }
                     div.pictures {
-                        @for picture in [page.to_do(), page.done(), page.worst_section()].into_iter().flatten() {
+                        @for picture in [entry.remaining(), entry.change(), entry.worst_section()].into_iter().flatten() {
                             figure { (picture) }
                         }
                     }
@@ -304,10 +307,10 @@ fn footer(record: Option<&ResultRecord>) -> Markup {
     html! {
         footer {
             p {
-                "Positions (u, v) are those of the plate's mid-surface, from the marked corner (0, 0). Colours and heights mean the same in every "
-                "picture of this plate: their steps are 1, 2, 5, 10, 20 and 50 times the smallest limit of its boards"
+                "Positions (u, v) are those of the plate's mid-surface, from the marked corner (0, 0). Colours and heights have the same scale in every "
+                "picture of this plate: steps of 1, 2, 5, 10, 20 and 50 times the smallest limit of its templates"
                 @if let Some(record) = record { (format!(" ({:.1} mm)", record.plate_file.scale.limit_mm)) }
-                ". Gray is below the level of detection, hatching was not seen. Measured by "
+                ". Gray areas are below the level of detection, hatched areas were not seen. Measured by "
                 (concat!("platen ", env!("CARGO_PKG_VERSION"))) ", which only measures: it neither starts nor releases motion."
             }
         }
@@ -317,12 +320,12 @@ fn footer(record: Option<&ResultRecord>) -> Markup {
 #[cfg(test)]
 mod tests {
     use platen_history::{Accepted, Finished, History};
-    use platen_model::{StrokeKey, Verdict as Kept};
+    use platen_model::StrokeKey;
 
     use super::*;
 
     /// A history of one plate with these strokes, none of them with a document.
-    fn archive(folder: &Path, verdicts: &[Option<Kept>], name: &str) -> Archive {
+    fn archive(folder: &Path, verdicts: &[Option<Verdict>], name: &str) -> Archive {
         let path = folder.join("history.sqlite");
         let now = jiff::Timestamp::UNIX_EPOCH;
         let mut history = History::open(&path, 1, now).unwrap();
@@ -357,9 +360,9 @@ mod tests {
     }
 
     #[test]
-    fn a_stroke_without_result_is_not_measured_in_so_many_words() {
+    fn a_stroke_without_result_is_called_not_measured() {
         let folder = tempfile::tempdir().unwrap();
-        let archive = archive(folder.path(), &[Some(Kept::NotMeasured), None], "C9");
+        let archive = archive(folder.path(), &[Some(Verdict::NotMeasured), None], "C9");
         let text = report(&archive, "North hall", 1).unwrap();
         assert!(text.contains("Not measured: no stroke of this plate has a result."));
         assert_eq!(text.matches("class=\"verdict not_measured\"").count(), 1 + 2 + 2, "head, table, strokes");
@@ -367,10 +370,10 @@ mod tests {
     }
 
     #[test]
-    fn what_people_and_presses_write_is_escaped() {
+    fn texts_of_people_and_presses_are_escaped() {
         let folder = tempfile::tempdir().unwrap();
         let evil = "<script>alert(1)</script>";
-        let archive = archive(folder.path(), &[Some(Kept::NotMeasured)], evil);
+        let archive = archive(folder.path(), &[Some(Verdict::NotMeasured)], evil);
         let text = report(&archive, evil, 1).unwrap();
         assert!(!text.contains("<script"), "{text}");
         assert!(text.contains("&lt;script&gt;"));
@@ -390,7 +393,7 @@ mod tests {
     #[test]
     fn the_report_stands_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let archive = archive(folder.path(), &[Some(Kept::NotMeasured)], "C9");
+        let archive = archive(folder.path(), &[Some(Verdict::NotMeasured)], "C9");
         let path = write(&archive, "North hall", 1, folder.path()).unwrap();
         assert_eq!(path.file_name().unwrap(), "plate-1.html");
         let text = std::fs::read_to_string(path).unwrap();

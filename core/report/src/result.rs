@@ -1,7 +1,9 @@
-//! The result of one measurement as people and programs read it: `platen.result/1`.
+//! Result document of one measurement, schema `platen.result/1`.
 //!
-//! Inside everything is metres and radians; here lengths that a person reads are millimetres, named `_mm`, positions
-//! are metres, named `_m`. Grids are row-major, v outer, u inner. What is not known is null, never 0.
+//! Lengths that a person reads are millimetres, named `_mm`; positions are metres in the scanner frame, named `_m`; angles are
+//! degrees, named `_deg`; curvatures 1/m, named `_per_m`; times milliseconds. Grids are row-major, v outer, u inner. Unknown
+//! values are null, never 0. Uncertainties are expanded (95 %) unless named sigma. The program's own units are metres and
+//! radians.
 
 mod checks;
 mod grid;
@@ -42,44 +44,44 @@ pub struct ResultRecord {
     pub plate: String,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
-    /// Judgement.
+    /// Verdict on the plate.
     pub verdict: Verdict,
     /// Sentences for the operator, most important first.
     pub says: Vec<String>,
-    /// Where the plate rested.
+    /// Supports of the plate.
     pub supports: Option<String>,
-    /// The plate as its file had it at this stroke.
+    /// Plate file at this stroke.
     pub plate_file: PlateRecord,
-    /// The outline that (u, v) refer to; null in documents of before it could be another than the rectangle.
+    /// Outline to which (u, v) refer; null in documents older than the baseline outline, which refer to the rectangle.
     #[serde(default)]
     pub outline: Option<OutlineRecord>,
-    /// How far the scanner was calibrated.
+    /// Calibration of the scanner.
     pub calibration: CalibrationRecord,
-    /// The scan.
+    /// Scan.
     pub scan: ScanRecord,
     /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
     pub corners_m: [[f64; 3]; 4],
     /// Whether each corner was seen or extrapolated.
     pub corners_seen: [bool; 4],
-    /// Marked places.
+    /// Markers.
     pub markers: Vec<MarkerRecord>,
-    /// What tape, square and sight line would show.
+    /// Dimension checks, as by tape, square and sight line.
     pub shape_checks: ShapeChecksRecord,
-    /// Lines and the templates on them.
+    /// Reference lines and the templates on them.
     pub reference_lines: Vec<LineRecord>,
-    /// Places on an even grid.
+    /// Curvatures, positions and fields on an even grid.
     pub grid: GridRecord,
     /// S(u, v), the mid-surface.
     pub surface: SurfaceRecord,
-    /// What each comparison found.
+    /// Findings of each comparison.
     pub comparisons: Vec<Json>,
-    /// How good the measurement is.
+    /// Quality of the measurement.
     pub quality: QualityRecord,
-    /// Time spent.
+    /// Time of each stage.
     pub timings_ms: TimingsRecord,
 }
 
-/// How far the scanner was calibrated when this was measured.
+/// Calibration of the scanner at this measurement.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct CalibrationRecord {
     /// Correlated part of the level of detection, one sigma; 0 when no null pairs were taken.
@@ -88,7 +90,7 @@ pub struct CalibrationRecord {
     pub sigma_true_mm: Option<f64>,
 }
 
-/// The scan.
+/// Scan behind a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ScanRecord {
     /// Rows of the lattice.
@@ -101,13 +103,13 @@ pub struct ScanRecord {
     pub plate_points: usize,
     /// Maker, model, serial number.
     pub instrument: String,
-    /// No real instrument stood there.
+    /// Whether the scan is simulated.
     pub simulated: bool,
-    /// What the driver decided or changed.
+    /// Notes of the driver on its decisions and corrections.
     pub notes: Vec<String>,
 }
 
-/// A marked place.
+/// Marker with its measured position.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MarkerRecord {
     /// Name.
@@ -118,42 +120,42 @@ pub struct MarkerRecord {
     pub v_mm: f64,
     /// On the scanned face, scanner frame.
     pub position_m: [f64; 3],
-    /// Expanded (95 %), all directions together.
+    /// Expanded uncertainty (95 %), all directions together.
     pub uncertainty_mm: f64,
-    /// False where the surface was bridged.
+    /// False where the surface is interpolated across unseen area.
     pub seen: bool,
 }
 
-/// S(u, v).
+/// Spline S(u, v) of the mid-surface.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SurfaceRecord {
-    /// Of the spline.
+    /// Degree of the spline.
     pub degree: u32,
-    /// Metres.
+    /// Knots along u, metres.
     pub knots_u: Vec<f64>,
-    /// Metres.
+    /// Knots along v, metres.
     pub knots_v: Vec<f64>,
     /// Control points, one list a row of constant v.
     pub control_m: Vec<Vec<[f64; 3]>>,
-    /// Distance of the samples from the surface.
+    /// Root mean square distance of the samples from the surface.
     pub rms_mm: f64,
 }
 
-/// How good the measurement is.
+/// Quality of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct QualityRecord {
     /// Share of the plate that was seen.
     pub coverage: f64,
     /// Range noise, one sigma, from the scan itself.
     pub noise_mm: f64,
-    /// Distance of neighbouring samples.
+    /// Mean distance of neighbouring samples.
     pub lattice_step_mm: f64,
 }
 
-/// Milliseconds of each stage.
+/// Time of each stage, milliseconds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TimingsRecord {
-    /// From the start to the last column; extraction runs beside it.
+    /// From the start to the last column, with extraction in parallel.
     pub acquire: f64,
     /// From the last column to the plate's face.
     pub extract: f64,
@@ -171,27 +173,27 @@ pub struct TimingsRecord {
     pub total: f64,
 }
 
-/// What is known of a measurement besides the plate's shape.
+/// Circumstances of a measurement: plate file, task, stroke, verdict, comparisons.
 #[derive(Debug, Clone, Copy)]
 pub struct Context<'a, E> {
-    /// Its plate file.
+    /// Plate file.
     pub plate: &'a PlateFile,
-    /// What the comparisons were asked.
+    /// Task of the comparisons.
     pub task: &'a Task,
-    /// Where the press stands, scanner frame, when the plant file says so.
+    /// Origin of the press in the scanner frame, where the plant file places it.
     pub press: Option<Vec3>,
     /// Stroke, where there is one.
     pub stroke: Option<u64>,
-    /// Judgement.
+    /// Verdict on the plate.
     pub verdict: Verdict,
-    /// What the comparisons found.
+    /// Reports of the comparisons.
     pub reports: &'a [Result<Report, E>],
-    /// How long they took.
+    /// Time of the comparisons.
     pub compare: std::time::Duration,
 }
 
 impl ResultRecord {
-    /// Writes a measurement down.
+    /// Assembles the document of a measurement.
     pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
         let Measured { outline, measurement, .. } = measured;
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
@@ -237,10 +239,8 @@ impl ResultRecord {
             timings_ms: timings(scanned, measured, context.compare),
         }
     }
-}
 
-impl ResultRecord {
-    /// Extent of the plate along u and v, millimetres.
+    /// Returns the extent of the plate along u and v, millimetres.
     pub fn extent_mm(&self) -> (f64, f64) {
         // Three knots lie beyond each end.
         let end =
@@ -309,7 +309,7 @@ fn comparison<E: Display>(report: &Result<Report, E>) -> Json {
     }
 }
 
-/// A figure in the units that people read.
+/// Converts a figure to JSON, lengths in millimetres.
 pub fn figure(figure: &Figure) -> Json {
     let (suffix, factor) = readable(&figure.unit);
     let mut record = Map::new();

@@ -1,16 +1,16 @@
-//! The sequence of a plate as numbers that tell crews apart: order and place of bends, overshoot, re-hits, energy left.
+//! Bending sequence of a plate as figures that compare crews: order and place of bends, overshoot, re-hits, energy left.
 //!
-//! | number | how it is found |
+//! | figure | definition |
 //! |---|---|
-//! | bend: place, angle, direction, length, width | comparison `curvature` between the surfaces of two strokes in a row; only bands beyond doubt |
-//! | feed | distance from the bend before to this one, across this one's straight lines |
+//! | bend: place, angle, direction, length, width | comparison `curvature` between the surfaces of two strokes in a row; significant bands only |
+//! | feed | distance from the previous bend, across this one's straight lines |
 //! | re-hit | a bend that lies on an earlier one: straight lines within 20 degrees, overlapping along, and across them the middle of each within the other's width |
-//! | bent back | a bend against the target's sense |
-//! | overshoot | the gap under the worst board where its sense is "bent too far", else 0 |
-//! | beyond | share of the seen area whose curvature exceeds the target's by more than the limit of a board means, 8 g / c^2 |
+//! | bent back | a bend against the sense of the target |
+//! | overshoot | gap under the worst template where its sense is "bent too far", else 0 |
+//! | beyond | share of the seen area whose curvature exceeds the target's by more than 8 g / c^2, the equivalent of the limit g of a template of chord c |
 //! | energy left | [`platen_shape::BendingEnergy`]: elastic energy from the measured to the target's curvature, and its share of the first stroke's |
 //!
-//! Force, ram depth and die set are those that the press told. What is not known is null, never 0.
+//! Force, ram depth and die set are data of the press. Unknown values are null, never 0.
 
 use std::f64::consts::PI;
 
@@ -22,45 +22,45 @@ use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::{PlantFile, PlateFile};
 use platen_shape::{BendingEnergy, Surface, TargetSurface};
 
-use crate::picture::Yardstick;
+use crate::picture::PictureScale;
 use crate::{history_view, output_folder};
 use platen_model::units::{mm, mm_pair};
 
-/// Why there is no sequence.
+/// Failure to make a sequence.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
-    /// The history cannot be read.
+    /// Unreadable history.
     #[error(transparent)]
     History(#[from] HistoryError),
-    /// Nothing is on record.
+    /// Plate without strokes.
     #[error("no stroke of plate {0} is on record; `platen history list` shows the plates")]
     NoStrokes(u32),
-    /// The comparison failed.
+    /// Failed comparison.
     #[error("{0}")]
     Comparison(String),
 }
 
-/// The sequence of one plate.
+/// Sequence of one plate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sequence {
     /// Its number in the history.
     pub plate: u32,
     /// Its strokes, oldest first.
     pub strokes: Vec<SequenceStroke>,
-    /// The plate in one line.
+    /// Totals of the plate.
     pub summary: Summary,
 }
 
-/// One stroke of a sequence.
+/// Stroke of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceStroke {
-    /// Key of its record.
+    /// Run id, the key of its record.
     pub run_id: u32,
     /// Its number, or `blank`.
     pub stroke: String,
-    /// When the press asked for it.
+    /// Time of the press's request.
     pub accepted: Timestamp,
-    /// Judgement.
+    /// Verdict.
     pub verdict: Verdict,
     /// Die set.
     pub die_set: Option<u16>,
@@ -68,77 +68,77 @@ pub struct SequenceStroke {
     pub force_kn: Option<f64>,
     /// Deepest position of the ram.
     pub ram_depth_mm: Option<f64>,
-    /// Worst gap under a board.
+    /// Worst gap under a template.
     pub gap_mm: Option<f64>,
     /// Its expanded uncertainty (95 %).
     pub gap_uncertainty_mm: Option<f64>,
-    /// Gap where the board says "bent too far".
+    /// Gap where the template's sense is "bent too far", else 0.
     pub overshoot_mm: Option<f64>,
-    /// Bends that it made, strongest first; null where this stroke or the one before was not measured.
+    /// Bends of the stroke, strongest first; null where it or the previous stroke was not measured.
     pub bends: Option<Vec<Bend>>,
-    /// Energy left.
+    /// Elastic energy left to the target.
     pub energy_left_j: Option<f64>,
-    /// As a share of that of the first stroke on record.
+    /// Energy left as a share of that of the first stroke on record.
     pub energy_left_share: Option<f64>,
-    /// Area bent beyond the target.
+    /// Share of the seen area bent beyond the target.
     pub beyond_share: Option<f64>,
 }
 
-/// A band that a stroke bent.
+/// Bend: a band that a stroke bent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bend {
-    /// Middle of the band.
+    /// Centre of the band.
     pub at_mm: [f64; 2],
-    /// Turn from one side of the band to the other, positive towards the scanner.
+    /// Bend angle across the band, positive towards the scanner.
     pub angle_deg: f64,
     /// Its expanded uncertainty (95 %).
     pub uncertainty_deg: Option<f64>,
     /// Direction of its straight lines, from u towards v.
     pub direction_deg: f64,
-    /// Along the straight lines.
+    /// Extent along the straight lines.
     pub length_mm: f64,
-    /// Across them.
+    /// Extent across the straight lines.
     pub width_mm: f64,
-    /// Across its straight lines from the strongest bend of the stroke before.
+    /// Distance across its straight lines from the strongest bend of the previous stroke.
     pub feed_mm: Option<f64>,
-    /// The stroke whose bend it lies on.
+    /// Stroke whose bend it lies on.
     pub rehit_of: Option<String>,
-    /// It turns against the target; null without a target or where that is flat.
+    /// Whether it bends against the target; null without a target or where the target is flat.
     pub bent_back: Option<bool>,
 }
 
-/// A plate in one line.
+/// Totals of a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Strokes, the blank left out.
+    /// Number of strokes without the blank.
     pub strokes: usize,
-    /// Of these, how many were not measured.
+    /// Number of strokes not measured.
     pub not_measured: usize,
-    /// Bends.
+    /// Number of bends.
     pub bends: usize,
-    /// Bends on earlier ones.
+    /// Number of bends on earlier ones.
     pub rehits: usize,
-    /// Bends against the target.
+    /// Number of bends against the target.
     pub bent_back: usize,
-    /// Strokes after which a board said "bent too far".
+    /// Number of strokes after which a template was "bent too far".
     pub overshoots: usize,
-    /// The most of them.
+    /// Largest overshoot.
     pub overshoot_max_mm: Option<f64>,
-    /// Mean of the feeds.
+    /// Mean feed.
     pub feed_mean_mm: Option<f64>,
     /// Energy left after the last stroke, as a share of the first on record.
     pub energy_left_share: Option<f64>,
     /// Number of strokes until the first pass.
     pub strokes_to_pass: Option<usize>,
-    /// From the first to the last stroke.
+    /// Time from the first to the last stroke.
     pub minutes: f64,
     /// Die sets used, in the order of their first use.
     pub die_sets: Vec<u16>,
 }
 
 impl Sequence {
-    /// Reads the sequence of a plate on record. `curvature` runs the comparison of that name between the surface before a
-    /// stroke and the surface after it; `progress` receives the name of each stroke.
+    /// Evaluates the sequence of a plate on record. `curvature` runs the comparison of that name between the surfaces before
+    /// and after a stroke; `progress` receives the name of each stroke.
     ///
     /// # Errors
     /// [`SequenceError`].
@@ -149,13 +149,13 @@ impl Sequence {
         curvature: &dyn Fn(&Task, &Surface, &Surface) -> Result<Report, String>,
         progress: &dyn Fn(&str),
     ) -> Result<Self, SequenceError> {
-        let kept = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() })?;
-        if kept.is_empty() {
+        let recorded = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() })?;
+        if recorded.is_empty() {
             return Err(SequenceError::NoStrokes(plate));
         }
         let mut before: Option<Surface> = None;
         let mut strokes: Vec<SequenceStroke> = Vec::new();
-        for stroke in &kept {
+        for stroke in &recorded {
             progress(&format!("stroke {}", history_view::label(stroke)));
             let file = stroke.recipe.and_then(|recipe| PlateFile::load(&plant.plate_path(recipe)).ok());
             let now =
@@ -176,22 +176,22 @@ impl Sequence {
         for row in &mut strokes {
             row.energy_left_share = row.energy_left_j.zip(first).map(|(left, first)| left / first);
         }
-        Ok(Self { plate, summary: Summary::of(&strokes, &kept), strokes })
+        Ok(Self { plate, summary: Summary::of(&strokes, &recorded), strokes })
     }
 }
 
 impl SequenceStroke {
     fn of(stroke: &Stroke) -> Self {
-        let told = stroke.press_data();
+        let press = stroke.press_data();
         let point = history_view::of_stroke(stroke);
         Self {
             run_id: stroke.run_id,
             stroke: point.label,
             accepted: stroke.accepted,
             verdict: point.verdict,
-            die_set: told.die_id,
-            force_kn: told.force.map(|newtons| newtons / 1e3),
-            ram_depth_mm: told.ram_depth.map(mm),
+            die_set: press.die_id,
+            force_kn: press.force.map(|newtons| newtons / 1e3),
+            ram_depth_mm: press.ram_depth.map(mm),
             gap_mm: point.gap_mm,
             gap_uncertainty_mm: point.uncertainty_mm,
             overshoot_mm: point.gap_mm.map(|gap| if point.sense > 0 { gap.abs() } else { 0.0 }),
@@ -204,14 +204,14 @@ impl SequenceStroke {
 
     fn add_forming(&mut self, surface: &Surface, file: &PlateFile) {
         let target = target(file);
-        let tolerance = Yardstick::of(file).tolerance_per_m();
+        let tolerance = PictureScale::of(file).tolerance_per_m();
         let forming = target.and_then(|target| BendingEnergy::new(surface, &target, tolerance));
         self.energy_left_j = forming.map(|forming| forming.energy);
         self.beyond_share = forming.map(|forming| forming.beyond_share);
     }
 }
 
-/// The bends among the figures of `curvature`: `bend.N.angle` with its place, `.direction`, `.length` and `.width`.
+/// Reads the bends from the figures of `curvature`: `bend.N.angle` with its place, `.direction`, `.length` and `.width`.
 fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Vec<Bend> {
     let find = |name: String| figures.iter().find(|figure| figure.name == name);
     let mut bends = Vec::new();
@@ -253,7 +253,7 @@ fn target(file: &PlateFile) -> Option<TargetSurface> {
     file.target.and_then(|target| TargetSurface::of_plate(&target, &file.plate).ok())
 }
 
-/// Whether a bend turns against the target there; `None` where the target is straight across it.
+/// Returns whether a bend is against the target; `None` where the target is straight across it.
 fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> Option<bool> {
     let target = target(file)?;
     let (sin, cos) = direction.sin_cos();
@@ -262,11 +262,11 @@ fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> 
     (wanted.abs() > 1e-6).then_some(wanted * angle < 0.0)
 }
 
-/// Largest angle between the straight lines of two bends that are one place hit twice.
+/// Largest angle between the straight lines of a bend and its re-hit, degrees.
 const SAME_DIRECTION_DEG: f64 = 20.0;
 
 impl Bend {
-    /// How far another bend's middle lies away, across and along this one's straight lines.
+    /// Returns the distances of another bend's centre across and along this one's straight lines.
     fn apart(&self, other: &Self) -> [f64; 2] {
         let (sin, cos) = self.direction_deg.to_radians().sin_cos();
         let [du, dv] = [0, 1].map(|k| other.at_mm[k] - self.at_mm[k]);
@@ -283,10 +283,14 @@ impl Bend {
 }
 
 impl Summary {
-    fn of(strokes: &[SequenceStroke], kept: &[Stroke]) -> Self {
+    fn of(strokes: &[SequenceStroke], recorded: &[Stroke]) -> Self {
         let bends = || strokes.iter().filter_map(|stroke| stroke.bends.as_ref()).flatten();
-        let real: Vec<&SequenceStroke> =
-            strokes.iter().zip(kept).filter(|(_, kept)| !kept.baseline).map(|(stroke, _)| stroke).collect();
+        let real: Vec<&SequenceStroke> = strokes
+            .iter()
+            .zip(recorded)
+            .filter(|(_, stroke)| !stroke.baseline)
+            .map(|(stroke, _)| stroke)
+            .collect();
         let overshoots: Vec<f64> =
             real.iter().filter_map(|stroke| stroke.overshoot_mm).filter(|mm| *mm > 0.0).collect();
         let feeds: Vec<f64> =
@@ -357,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn bends_are_read_strongest_first_and_know_whether_they_go_the_targets_way() {
+    fn bends_are_read_strongest_first_with_their_sense_against_the_target() {
         let text = include_str!("../../../config/plates/plate-009.toml");
         let file = PlateFile::parse("plate-009.toml", text).unwrap();
         let one = |number: usize, angle: f64, u: f64| {

@@ -12,13 +12,13 @@ pub struct Direction {
 }
 
 impl Direction {
-    /// Direction in which `point` (metres, scanner frame) is seen; the origin is seen along +x.
+    /// Returns the direction of `point` (metres, scanner frame); that of the origin is +x.
     pub fn of(point: [f64; 3]) -> Self {
         let [x, y, z] = point;
         Self { azimuth: y.atan2(x), elevation: z.atan2(x.hypot(y)) }
     }
 
-    /// Unit vector along the beam.
+    /// Returns the unit vector along the beam.
     pub fn unit(self) -> [f64; 3] {
         let (sin_az, cos_az) = self.azimuth.sin_cos();
         let (sin_el, cos_el) = self.elevation.sin_cos();
@@ -26,7 +26,7 @@ impl Direction {
     }
 }
 
-/// Azimuth brought into (-pi, pi]; one that lies there stays as it is, to the last bit.
+/// Returns the azimuth in (-pi, pi]; one within stays the same to the last bit.
 pub fn wrap_azimuth(azimuth: f64) -> f64 {
     if -PI < azimuth && azimuth <= PI {
         return azimuth;
@@ -37,13 +37,13 @@ pub fn wrap_azimuth(azimuth: f64) -> f64 {
 
 /// An angular window of the scanner: the part of the dome that a region scan covers, radians.
 ///
-/// `azimuth_width` runs counter-clockwise from `azimuth_start`, so a window across the seam at pi needs no
-/// special case.
+/// `azimuth_width` runs counter-clockwise from `azimuth_start`, so that a window across the seam at pi is no special
+/// case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// First azimuth.
     pub azimuth_start: f64,
-    /// Width towards growing azimuth, 0 to 2 pi.
+    /// Width towards increasing azimuth, 0 to 2 pi.
     pub azimuth_width: f64,
     /// Lowest elevation.
     pub elevation_min: f64,
@@ -56,7 +56,7 @@ impl Window {
     pub const DOME: Self =
         Self { azimuth_start: -PI, azimuth_width: TAU, elevation_min: -PI / 2.0, elevation_max: PI / 2.0 };
 
-    /// True when the window holds `direction`.
+    /// Returns whether `direction` lies in the window.
     pub fn contains(&self, direction: Direction) -> bool {
         let ahead = (direction.azimuth - self.azimuth_start).rem_euclid(TAU);
         ahead <= self.azimuth_width

@@ -1,6 +1,6 @@
 //! One vertical sweep of the mirror.
 
-/// Which side of the mirror turn measured a column.
+/// Side of the mirror's rotation that measured a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Face {
     /// The beam goes out on the side of the head's azimuth.
@@ -18,15 +18,15 @@ pub enum State {
     Valid = 0,
     /// Only the direction is known.
     DirectionOnly = 1,
-    /// No echo came back; nothing is known.
+    /// Without an echo.
     #[default]
     NoReturn = 2,
 }
 
-/// One vertical sweep of the mirror at one azimuth, rows from the top down.
+/// One vertical sweep of the mirror at one azimuth, rows from top to bottom.
 ///
 /// All vectors have one entry per row from `first_row` on. `azimuth` and `elevation` are the true directions of
-/// the beams (radians), which need not be those of an ideal lattice. `range_m` means nothing unless the state is
+/// the beams (radians), which need not be those of an ideal lattice. `range_m` is undefined unless the state is
 /// [`State::Valid`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Column {
@@ -44,11 +44,11 @@ pub struct Column {
     pub elevation: Vec<f64>,
     /// Raw reflectance in the range that the header declares.
     pub intensity: Vec<u16>,
-    /// What is known of each cell.
+    /// State of each cell.
     pub state: Vec<State>,
 }
 
-/// Why a column cannot be part of a lattice.
+/// Reason why a column cannot be part of a lattice.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ColumnError {
     /// The vectors of the column differ in length.
@@ -75,7 +75,7 @@ pub enum ColumnError {
         /// Rows of the lattice.
         n_rows: u32,
     },
-    /// A valid cell holds a range or an angle that no scanner measures.
+    /// A range or an angle that no scanner measures, in a valid cell.
     #[error(
         "column {index} row {row}: range {range_m} m, azimuth {azimuth}, elevation {elevation} is not a measurement"
     )]
@@ -97,20 +97,20 @@ impl Column {
     /// Bytes of one sample: range, two angles, intensity, state.
     pub const SAMPLE_BYTES: usize = 3 * size_of::<f64>() + size_of::<u16>() + size_of::<State>();
 
-    /// Number of rows held.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.range_m.len()
     }
 
-    /// True when no row is held.
+    /// Returns whether the column has no rows.
     pub fn is_empty(&self) -> bool {
         self.range_m.is_empty()
     }
 
-    /// Checks lengths, rows and numbers, so that nothing behind this door meets NaN.
+    /// Checks lengths, rows and numbers: a checked column holds no NaN in a measured cell.
     ///
     /// # Errors
-    /// The first thing found wrong, with its place.
+    /// The first fault, with its place.
     pub fn check(&self, n_rows: u32) -> Result<(), ColumnError> {
         let expected = self.len();
         for (field, found) in [

@@ -18,7 +18,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// An empty lattice of the size that `header` announces.
+    /// Returns an empty lattice of the size in `header`.
     pub fn new(header: ScanHeader) -> Self {
         let n_columns = header.n_columns;
         let mut lattice = Self {
@@ -48,10 +48,10 @@ impl Lattice {
         }
     }
 
-    /// Puts a column into its place. Arrival order does not matter; a column that comes twice replaces itself.
+    /// Stores a column, in any order of arrival; a column that comes twice replaces itself.
     ///
     /// # Errors
-    /// What [`Column::check`] finds.
+    /// As [`Column::check`].
     pub fn push(&mut self, column: &Column) -> Result<(), ColumnError> {
         column.check(self.header.n_rows)?;
         self.grow(column.index + 1);
@@ -68,60 +68,60 @@ impl Lattice {
         Ok(())
     }
 
-    /// What the driver said of the scan.
+    /// Returns the header of the scan.
     pub fn header(&self) -> &ScanHeader {
         &self.header
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn n_rows(&self) -> usize {
         self.header.n_rows as usize
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn n_columns(&self) -> usize {
         self.n_columns as usize
     }
 
-    /// Face of a column, `None` when it never came.
+    /// Returns the face of a column, `None` when it did not come.
     pub fn face(&self, column: usize) -> Option<Face> {
         self.present[column]
     }
 
-    /// Index of a cell into the flat arrays.
+    /// Returns the index of a cell, for the methods below.
     pub fn cell(&self, column: usize, row: usize) -> usize {
         column * self.n_rows() + row
     }
 
-    /// State of a cell.
+    /// Returns the state of a cell.
     pub fn state(&self, cell: usize) -> State {
         self.state[cell]
     }
 
-    /// Range of a valid cell, metres.
+    /// Returns the range of a valid cell, metres.
     pub fn range(&self, cell: usize) -> Option<f64> {
         (self.state[cell] == State::Valid).then(|| self.range_m[cell])
     }
 
-    /// Raw intensity of a cell.
+    /// Returns the raw intensity of a cell.
     pub fn intensity(&self, cell: usize) -> u16 {
         self.intensity[cell]
     }
 
-    /// Direction of a cell whose direction is known.
+    /// Returns the direction of a cell, where it is known.
     pub fn direction(&self, cell: usize) -> Option<Direction> {
         (self.state[cell] != State::NoReturn)
             .then(|| Direction { azimuth: self.azimuth[cell], elevation: self.elevation[cell] })
     }
 
-    /// Position of a valid cell, metres, scanner frame.
+    /// Returns the position of a valid cell, metres, scanner frame.
     pub fn point(&self, cell: usize) -> Option<[f64; 3]> {
         let range = self.range(cell)?;
         let unit = self.direction(cell)?.unit();
         Some(unit.map(|c| c * range))
     }
 
-    /// Number of valid cells.
+    /// Returns the number of valid cells.
     pub fn n_valid(&self) -> usize {
         self.state.iter().filter(|s| **s == State::Valid).count()
     }

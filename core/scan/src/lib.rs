@@ -1,18 +1,17 @@
-//! What leaves a scanner: a lattice of samples with gaps, delivered column by column.
+//! Lattice of a terrestrial laser scan: columns, cell states, directions, header and trailer.
 //!
 //! A terrestrial laser scanner turns a mirror about a horizontal axis (one *column* per sweep) while its head
 //! turns about the vertical (one azimuth per column). The cells therefore form a lattice with `n_rows` x
 //! `n_columns` places, most of them filled. Everything here is in the scanner frame: right-handed, z up, origin
 //! at the mirror; metres, radians; azimuth counter-clockwise from +x seen from above, elevation up from the
-//! horizontal. Row 0 is at the top, columns run by increasing azimuth. Drivers bring every scan into this order.
+//! horizontal. Row 0 is at the top, columns run by increasing azimuth. Drivers deliver every scan in this order.
 //!
-//! This crate does no I/O and knows no file format.
+//! This crate does no I/O and has no file format; those are in `platen-formats`.
 
 mod angle;
 mod column;
 mod lattice;
 mod scan;
-mod text;
 
 pub use angle::{Direction, Window, wrap_azimuth};
 pub use column::{Column, ColumnError, Face, State};

@@ -1,11 +1,11 @@
-//! What is said before the first column and after the last.
+//! Header and trailer of a scan.
 
-/// What a driver says before the first column.
+/// Header of a scan, before its first column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScanHeader {
     /// Rows of the lattice.
     pub n_rows: u32,
-    /// Columns that will come, as far as the driver knows.
+    /// Columns expected by the driver.
     pub n_columns: u32,
     /// Nominal azimuth of column 0, radians.
     pub azimuth_start: f64,
@@ -20,17 +20,17 @@ pub struct ScanHeader {
     pub seam_column: Option<u32>,
     /// Smallest and largest intensity that the instrument can report.
     pub intensity_range: (u16, u16),
-    /// True when no real instrument stood there.
+    /// Whether the scan was simulated.
     pub simulated: bool,
     /// Maker, model and serial number, as far as known.
     pub instrument: String,
-    /// Time of the scan, seconds since 1970 UTC, where the source knows it.
+    /// Time of the scan, seconds since 1970 UTC, where known.
     pub acquired_unix_s: Option<f64>,
-    /// What the driver decided or changed, one sentence each (orientation, units, handedness).
+    /// Decisions and changes of the driver, one sentence each (orientation, units, handedness).
     pub notes: Vec<String>,
 }
 
-/// How a scan ended.
+/// Outcome of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Outcome {
     /// All columns were sent.
@@ -42,7 +42,7 @@ pub enum Outcome {
     Failed,
 }
 
-/// What a driver says after the last column. No end, no scan.
+/// Trailer of a scan, after its last column; a scan without one is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanEnd {
     /// Columns sent.
@@ -51,6 +51,6 @@ pub struct ScanEnd {
     pub points: u64,
     /// Columns at the start, in time, that are laser warm-up and must not be used.
     pub warm_up_columns: u32,
-    /// How it ended.
+    /// Outcome.
     pub outcome: Outcome,
 }

@@ -1,4 +1,6 @@
-//! What is read off the fitted surface: markers, reference lines and the grid, each with its uncertainty.
+//! Evaluation of the fitted surface at material points: markers, reference lines and a grid, with standard deviations.
+//!
+//! Masuda et al., 4.4, map reference lines in the same way; the uncertainties are own.
 //!
 //! (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
 
@@ -10,7 +12,7 @@ pub const LINE_STEP: f64 = 0.05;
 /// Places of the grid along u and along v.
 pub const GRID: [usize; 2] = [21, 21];
 
-/// How well material points are located within the surface.
+/// Uncertainty of material points within the surface.
 ///
 /// A point's u follows from the edges u = 0 and u = W, each with its own standard deviation, and from the flattening's
 /// own uncertainty; likewise v.
@@ -61,7 +63,7 @@ pub struct Grid {
 }
 
 impl Place {
-    /// Standard deviation of the position, all directions together, metres.
+    /// Returns the standard deviation of the position, all directions together, metres.
     #[must_use]
     pub fn sigma_all(&self) -> f64 {
         self.sigma.iter().map(|s| s * s).sum::<f64>().sqrt()
@@ -72,7 +74,7 @@ impl Place {
 const CELLS: usize = 16;
 
 impl Location {
-    /// From the mesh's edges and the chart's own figures.
+    /// Collects the uncertainties of the mesh's edges and of the chart.
     #[must_use]
     pub fn new(mesh: &DiskMesh, chart: &Chart) -> Self {
         let mut cells = vec![[0.0_f64; 2]; CELLS * CELLS];
@@ -83,7 +85,7 @@ impl Location {
         Self { width: mesh.width, height: mesh.height, edge_sigma: mesh.edge_sigma, cells }
     }
 
-    /// Standard deviations of u and of v at a place, metres.
+    /// Returns the standard deviations of u and of v at a place, metres.
     #[must_use]
     pub fn sigma(&self, u: f64, v: f64) -> [f64; 2] {
         let (x, y) = ((u / self.width).clamp(0.0, 1.0), (v / self.height).clamp(0.0, 1.0));
@@ -100,7 +102,7 @@ fn cell(x: f64, length: f64) -> usize {
     ((x / length * CELLS as f64).max(0.0) as usize).min(CELLS - 1)
 }
 
-/// The material point (u, v) on the scanned face.
+/// Evaluates the material point (u, v) on the scanned face.
 #[must_use]
 pub fn place(surface: &Surface, location: &Location, u: f64, v: f64) -> Place {
     let [su, sv] = location.sigma(u, v);
@@ -108,7 +110,7 @@ pub fn place(surface: &Surface, location: &Location, u: f64, v: f64) -> Place {
     Place { u, v, position: surface.face(u, v), sigma, seen: surface.mask().seen(u, v) }
 }
 
-/// Points of a straight line of the rectangle, every [`LINE_STEP`] from `from`, and its end.
+/// Evaluates points of a straight line of the rectangle, every [`LINE_STEP`] from `from`, and its end.
 #[must_use]
 pub fn reference_line(surface: &Surface, location: &Location, from: [f64; 2], to: [f64; 2]) -> Vec<Place> {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
@@ -119,7 +121,7 @@ pub fn reference_line(surface: &Surface, location: &Location, from: [f64; 2], to
         .collect()
 }
 
-/// The grid of `n_u` x `n_v` places over the whole rectangle, at least 2 x 2.
+/// Evaluates the grid of `n_u` x `n_v` places over the whole rectangle, at least 2 x 2.
 #[must_use]
 pub fn grid(surface: &Surface, location: &Location, n_u: usize, n_v: usize) -> Grid {
     let (n_u, n_v) = (n_u.max(2), n_v.max(2));

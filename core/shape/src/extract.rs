@@ -1,12 +1,22 @@
-//! The plate's scanned face among the samples of a scan that arrives column by column.
+//! Extraction of the plate's scanned face from a scan that arrives column by column: connected components, segmentation by
+//! normals, region growing.
 //!
-//! The steps of the paper's 3.1 in its order. While columns arrive: lattice neighbours that the continuity criterion
-//! joins (`continuity`) grow into components (`regions`), and cells that cannot belong to the plate are let go
-//! (`columns`). Once a component that may hold the plate has ended, at the latest after the last column (`components`): range noise from the scan
-//! itself (`noise`), mixed pixels (`mixed`), a low-pass copy and its normals (`smooth`), faces by region growing on
-//! them (`grow`). Pieces of a face that something cuts apart are joined (`pieces`), the plate is chosen by its
-//! size (`choose`), its face is taken to the cell (`trim`), and where rows and columns leave it is measured
-//! (`crossings`).
+//! Input: header and columns of a scan, and the [`PlateSpec`]; output: the [`Patch`], samples and boundary crossings.
+//!
+//! | module | step | source |
+//! |---|---|---|
+//! | `continuity` | criterion that joins lattice neighbours | Masuda et al., 3.1, eq. 1 and 2 |
+//! | `connected_components`, `column_store` | components grown while columns arrive; cells that cannot belong to the plate are dropped | 3.1 |
+//! | `completed_components`, `extent` | components of about the plate's size, evaluated as soon as they have ended | own |
+//! | `window`, `beam_directions` | one component as a dense grid with its margin | |
+//! | `range_noise` | noise of the range from third differences | own |
+//! | `mixed_pixels` | beams that straddle an edge | own |
+//! | `smoothed_normals` | Taubin's low-pass filter of the inverse range and its normals | 3.1 |
+//! | `faces`, `segmented_component` | smooth faces: connected components of cells where the normal does not turn | 3.1 |
+//! | `occlusion` | faces joined across something nearer | own |
+//! | `plate_selection` | the candidate of the plate's size | own; Masuda et al. leave it open |
+//! | `local_quadric`, `region_growing` | erosion of the face and region growing to the cell | own |
+//! | `crossings` | where rows and columns leave the face | own |
 //!
 //! Limits: the plate is one smooth face of known size, all of it nearer than what lies behind its edges; a
 //! component whose area across the beams exceeds four times the plate's is never looked at.
@@ -55,9 +65,9 @@ const LEAST_PART: f64 = 0.005;
 /// A plate that reaches out of the region of interest over less than this is not cut by it, metres.
 const CUT_TOLERANCE: f64 = 0.05;
 
-/// Finds the plate's scanned face in a scan of which the columns may come in any order.
+/// Extractor of the plate's scanned face from columns in any order.
 ///
-/// Same columns, same patch, to the last bit, whatever the order.
+/// The same columns give the same patch, to the last bit, whatever their order.
 #[derive(Debug, Clone)]
 pub struct Extractor {
     header: ScanHeader,
@@ -75,7 +85,7 @@ pub struct Extractor {
 }
 
 impl Extractor {
-    /// Prepares for the scan that `header` announces.
+    /// Prepares for the scan of a header.
     pub fn new(header: &ScanHeader, spec: &PlateSpec) -> Self {
         let elevation = |row: u32| header.elevation_start - header.elevation_step * f64::from(row);
         Self {
@@ -91,10 +101,10 @@ impl Extractor {
         }
     }
 
-    /// Takes a column. One that has come before is ignored.
+    /// Adds a column. One that was added before is ignored.
     ///
     /// # Errors
-    /// What [`Column::check`] finds; the column is then not taken.
+    /// Those of [`Column::check`]; the column is then not added.
     pub fn push(&mut self, column: &Column) -> Result<(), ColumnError> {
         column.check(self.header.n_rows)?;
         if self.columns.get(column.index).is_some() {
@@ -123,7 +133,7 @@ impl Extractor {
         Ok(())
     }
 
-    /// Declares the first `columns` columns of each face laser warm-up: they are left out.
+    /// Excludes the first `columns` columns of each face of the scanner (laser warm-up).
     pub fn leave_out_warm_up(&mut self, columns: u32) {
         if self.warm_up_columns != columns {
             self.warm_up_columns = columns;
@@ -131,17 +141,17 @@ impl Extractor {
         }
     }
 
-    /// Cells that are held now: those of the columns, as far as the plate may lie in them, and those around the
-    /// components that have been looked at already. What a scan needs of memory follows from it.
+    /// Returns the number of cells held now, which determines the memory that a scan needs: those of the columns, as far as the
+    /// plate may lie in them, and those around the components that have been evaluated.
     #[must_use]
     pub fn cells_held(&self) -> usize {
         self.columns.n_cells() + self.closed.values().map(|c| c.surface.window.cells.len()).sum::<usize>()
     }
 
-    /// The plate's face, once all columns have come.
+    /// Returns the plate's face, once all columns were added.
     ///
     /// # Errors
-    /// Why there is none, or which of several it may be.
+    /// [`Refusal`]: no plate, or more than one.
     pub fn finish(mut self) -> Result<Patch, Refusal> {
         self.check()?;
         let (near_size, larger) = self.components();
@@ -256,14 +266,14 @@ impl Extractor {
         SegmentedComponent::of(roots[0], window, &self.continuity)
     }
 
-    /// The notable faces of surfaces that are numbered from `first` on.
+    /// Returns the notable faces of components that are numbered from `first` on.
     fn pieces(&self, surfaces: &[SegmentedComponent], first: usize) -> Vec<FacePiece> {
         let least = LEAST_PART * self.spec.width * self.spec.height;
         let numbered = surfaces.iter().zip(first..);
         numbered.flat_map(|(surface, number)| surface.pieces(number, least)).collect()
     }
 
-    /// The components that hold the chosen pieces.
+    /// Returns the components that contain the chosen pieces.
     fn roots(&self, surfaces: &[SegmentedComponent], chosen: &[&FacePiece]) -> Vec<u32> {
         let mut roots = Vec::new();
         for piece in chosen {

@@ -1,4 +1,8 @@
-//! The flattening as the pipeline sees it: every vertex of the mid-surface mesh gets its place on the rectangle.
+//! Flattening (parameterization) of the mid-surface mesh: every vertex gets its place (u, v) on the original rectangle.
+//!
+//! [`Flatten`] is the interface to the methods, which are plugins (Masuda et al., 4.3: angle based and harmonic maps). Here are
+//! the parts they share: `domain` checks what can be flattened, `fixed_boundary` solves for a map with its boundary held
+//! (the harmonic map), `free_boundary` develops a nearly developable plate with free edges, for the outline of a blank.
 
 #[cfg(any(test, feature = "closed-form"))]
 pub mod closed_form;
@@ -20,10 +24,10 @@ pub struct Chart {
     /// Per vertex: (u, v), metres, on the rectangle `[0, W] x [0, H]`. A method that holds the edges only as firmly as
     /// they are known may place vertices of the boundary outside of it by about `edge_sigma` of the mesh.
     pub uv: Vec<[f64; 2]>,
-    /// Per vertex, where the method knows it: membrane strain of the mid-surface against the rectangle,
+    /// Per vertex, where the method computes it: membrane strain of the mid-surface against the rectangle,
     /// `[e_uu, e_vv, e_uv]` (tensor component, half the engineering shear), positive when stretched.
     pub strain: Option<Vec<[f64; 3]>>,
-    /// Per vertex, where the method knows it: standard deviation of u and of v, metres.
+    /// Per vertex, where the method computes it: standard deviation of u and of v, metres.
     pub sigma: Option<Vec<[f64; 2]>>,
 }
 
@@ -36,21 +40,21 @@ pub trait Flatten {
     fn flatten(&mut self, mesh: &DiskMesh) -> Result<Chart, FlattenError>;
 }
 
-/// Why there is no chart.
+/// Reason why there is no chart.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FlattenError {
     /// The method refused the mesh or failed on it.
     #[error("flattening: {message}; {hint}")]
     Refused {
-        /// What went wrong.
+        /// Message of the method.
         message: String,
-        /// What to do.
+        /// Advice to the operator.
         hint: String,
     },
     /// The deadline passed, or the stroke was cancelled.
     #[error("flattening: stopped: {reason}; the scan is kept, measure it again")]
     Stopped {
-        /// Who stopped it.
+        /// Reason of the stop.
         reason: String,
     },
     /// The method answered with something that is no chart of this mesh: its author must act.

@@ -14,7 +14,7 @@
 //! | [`surface`] | patch, chart -> [`Surface`] | bicubic spline S(u, v), smoothing by restricted maximum likelihood |
 //! | [`evaluate`] | surface -> places, lines, grid | positions and curvatures with their standard deviations |
 //! | [`measure`](mod@measure) | patch, outline -> [`Measurement`] | the stages from mesh to surface in one call |
-//! | [`target`] | target shape -> [`TargetSurface`] | closed forms; rigid registration (Kabsch) |
+//! | [`target_surface`] | target shape -> [`TargetSurface`] | closed forms; rigid registration (Kabsch) |
 //! | [`correspondence`] | two scans of a plate | outline of the blank by a baseline scan; test for a plate put back turned |
 //! | [`inspection`] | outline, surface -> figures | dimension checks, bending energy, marker detection, calibration |
 //!
@@ -31,7 +31,7 @@ pub mod mesh;
 pub mod outline;
 pub mod plate;
 pub mod surface;
-pub mod target;
+pub mod target_surface;
 
 pub use correspondence::{BlankError, Reorientation, reorientation};
 pub use extract::{Beyond, Crossing, Patch, Sample};
@@ -43,7 +43,7 @@ pub use outline::{Corner, EdgeCurve, HeightField, Outline, OutlineError};
 pub use plate::{Blank, PlateSpec, RegionOfInterest};
 
 pub use surface::{Surface, SurfaceParts};
-pub use target::{Placement, TargetError, TargetSurface};
+pub use target_surface::{Placement, TargetError, TargetSurface};
 
 /// Half width of a 95 % interval in standard deviations: every stated uncertainty and level of detection is expanded by it.
 pub const EXPANDED: f64 = 1.96;

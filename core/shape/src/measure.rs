@@ -1,4 +1,4 @@
-//! From the plate's samples and outline to its surface S(u, v): one stroke, in the order of the data.
+//! The stages from the plate's samples and outline to its surface S(u, v), in one call.
 //!
 //! ```text
 //! Patch, Outline -> SmoothFace (smooth face and mid-surface) -> DiskMesh -> Chart (the flattening) -> Surface
@@ -14,12 +14,14 @@ pub use stages::{Measured, Scanned};
 
 use std::time::Duration;
 
+use platen_numerics::spline_fit::Undetermined;
+
 use crate::evaluate::Location;
 use crate::mesh::{MeshError, SmoothFace};
-use crate::surface::{FitToSamples, Quality, Surface, Undetermined, fit_surface};
+use crate::surface::{FitToSamples, Quality, Surface, fit_surface};
 use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
 
-/// Vertices of the mesh: as many as the paper's.
+/// Vertices of the mesh: about as many as in Masuda et al. (10,188).
 pub const N_VERTICES: usize = 10_000;
 
 /// One measured plate.
@@ -31,20 +33,20 @@ pub struct Measurement {
     pub mesh: DiskMesh,
     /// Its flattening.
     pub chart: Chart,
-    /// How well material points are located.
+    /// Uncertainty of material points.
     pub location: Location,
     /// The blank's corners (0,0), (W,0), (W,H), (0,H) on the scanned face, metres, scanner frame.
     pub corners: [Vec3; 4],
-    /// How good the scan was.
+    /// Quality of the scan.
     pub quality: Quality,
-    /// How long each stage took.
+    /// Time of each stage.
     pub timings: Timings,
 }
 
 /// Time spent in each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Timings {
-    /// SmoothFace, mid-surface and mesh.
+    /// Smooth face, mid-surface and mesh.
     pub mesh: Duration,
     /// Flattening.
     pub flatten: Duration,
@@ -52,7 +54,7 @@ pub struct Timings {
     pub surface: Duration,
 }
 
-/// Why there is no measurement.
+/// Reason why there is no measurement.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeasureError {
     /// No mesh.
@@ -66,7 +68,7 @@ pub enum MeasureError {
     Surface(#[from] Undetermined),
 }
 
-/// Measures the plate, whose edges lie on the outline of `blank`. `clock` tells the time since some fixed moment; it is read between the stages.
+/// Measures the plate, whose edges lie on the outline of `blank`. `clock` returns the time since some fixed moment; it is read between the stages.
 ///
 /// # Errors
 /// [`MeasureError`]: too few samples, a mesh that is no disk, or the flattening's own refusal.

@@ -1,11 +1,23 @@
-//! The boundary of the scanned face: four corners and four edge curves.
+//! The boundary of the scanned face: four corners and four edge curves, by maximum likelihood of censored edge positions.
 //!
-//! As in the paper's 3.2: the mesh of lattice neighbours and its longest boundary loop (`boundary`), corner candidates by
-//! the angle to the k-th neighbours, lines near them by RANSAC and their intersections (`corners`), a spline
-//! along each edge (`edge`). Beyond the paper: the edge is located between the lattice's samples, from the places
-//! where rows and columns leave the face, brought onto the face smoothed as a whole (`settled`), in the strip along it rolled
-//! out into the plane (`strip`). What hides a part of an edge or a corner's neighbourhood takes its crossings out (`rim`);
-//! the curve goes through what is left.
+//! Input: the [`Patch`] of `extract`; output: the [`Outline`], on the scanned face, with standard deviations. In order:
+//!
+//! | module | step | source |
+//! |---|---|---|
+//! | `boundary_loop` | mesh of lattice neighbours, its longest boundary loop by shortest paths | Masuda et al., 3.2 |
+//! | `visible_boundary` | boundary crossings along the loop, without those at what hides the plate | own |
+//! | `corners` | corners: angle to the k-th neighbours, RANSAC lines, intersections | Masuda et al., 3.2 |
+//! | `height_field` | the face as one smoothed height over its mean `plane` | own |
+//! | `projected_crossing` | crossings moved along their beams onto that height field | own |
+//! | `developed_strip` | each edge's surroundings developed into the plane | own |
+//! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
+//! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
+//! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
+//! | `coverage` | where along an edge it was seen | own |
+//!
+//! Then the edges are intersected, named from the u axis hint and compared with the plate's size. Masuda et al. fit a spline
+//! to the boundary samples themselves, which lie up to a lattice step inside the plate; this module locates the edge
+//! between the samples. Limits: four smooth edges meeting at 60 to 120 degrees, no hole that reaches an edge.
 
 mod boundary_loop;
 mod corners;
@@ -53,20 +65,20 @@ pub struct EdgeCurve {
     pub sigma: f64,
 }
 
-/// The boundary in the order (0,0), (W,0), (W,H), (0,H): edge k runs from corner k to corner k + 1.
+/// Boundary of the scanned face in the order (0,0), (W,0), (W,H), (0,H): edge k runs from corner k to corner k + 1.
 ///
-/// Coverage from the scanner the loop runs counter-clockwise: (u, v, towards the scanner) is right-handed.
+/// Seen from the scanner the loop runs counter-clockwise: (u, v, towards the scanner) is right-handed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
     /// Corners.
     pub corners: [Corner; 4],
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeCurve; 4],
-    /// The scanned face smoothed as a whole, on which they lie.
+    /// The smoothed scanned face, on which they lie.
     pub height_field: HeightField,
 }
 
-/// How the beams sample the plate.
+/// Sampling of the plate by the beams.
 #[derive(Debug, Clone, Copy)]
 struct Sampling {
     /// Spacing of the samples, metres.
@@ -86,23 +98,23 @@ const SEED: u64 = 0x706c_6174_656e;
 /// Spacing of the points of an edge curve, metres.
 const POINT_SPACING: f64 = 0.01;
 
-/// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not tell corners apart.
+/// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not distinguish corners.
 const LARGEST_HINT_ANGLE: f64 = 35.0;
 
 /// An edge that differs by more than this part from the plate file is that of another plate. Cut blanks differ by
 /// millimetres, bending changes edges of the mid-surface by up to 11 mm.
 const SIZE_TOLERANCE: f64 = 0.01;
 
-/// A wrong size is believed where at least this part of the edges that make it was seen.
-const TELLING_PART: f64 = 0.75;
+/// A wrong size is reported as such where at least this part of the edges that make it was seen.
+const REPORTED_PART: f64 = 0.75;
 
-/// The outline of a plate's face.
+/// Locates corners and edges of a plate's scanned face.
 ///
-/// Corners and edges are those of the scanned face as it is seen, not of the rectangle; the known size is used to
-/// refuse another plate, never to move an edge.
+/// They are those of the face as it is seen, not of the rectangle; the known size is used to refuse another plate, never
+/// to move an edge.
 ///
 /// # Errors
-/// Which corner, edge or side cannot be told, and why.
+/// [`OutlineError`]: the corner, edge or side that could not be located, and why.
 pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError> {
     let visible = VisibleBoundary::of(patch, spec)?;
     let corners = corners::find(&visible.flat, visible.step, spec.width.min(spec.height))?;
@@ -151,9 +163,9 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), height_field })
 }
 
-/// Where two edges meet, and where that is along each.
+/// Intersects two edges: the point, and its place along each. Gauss-Newton on the distance of the two curves.
 fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
-    /// Newton's method on two nearly straight curves: the third step no longer moves.
+    /// Nearly straight curves: the third step is below rounding.
     const STEPS: usize = 5;
     const DIFFERENCE: f64 = 0.02;
     let (mut a, mut b) = (arriving.along(near), leaving.along(near));
@@ -173,8 +185,8 @@ fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
     (0.5 * (arriving.point(a) + leaving.point(b)), a, b)
 }
 
-/// The corner that is (0, 0): the one from which the edge leaves that runs most along the hint. Without a hint, u runs
-/// to the right as the scanner sees it.
+/// Selects the corner (0, 0): the start of the edge that runs most along the hint. Without a hint, u runs to the right as
+/// seen from the scanner.
 fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result<usize, OutlineError> {
     let hint = hint.map_or_else(nalgebra::Vector2::x, |hint| plane.direction(hint));
     let angle = |k: usize| plane.direction(points[(k + 1) % 4] - points[k]).angle(&hint).to_degrees();
@@ -186,7 +198,7 @@ fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result
     Ok(first)
 }
 
-/// Compares the edges of the mid-surface with the plate file.
+/// Compares the lengths of the mid-surface's edges with the plate file.
 fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
     for (k, (side, size)) in
         [("width", spec.width), ("height", spec.height)].into_iter().cycle().take(4).enumerate()
@@ -198,7 +210,7 @@ fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
             // An edge ends where those beside it cross it.
             let beside = [&edges[(k + 3) % 4], &edges[k], &edges[(k + 1) % 4]];
             let seen = beside.map(|edge| edge.seen.share(edge.from, edge.to)).into_iter().fold(1.0, f64::min);
-            return Err(if seen < TELLING_PART {
+            return Err(if seen < REPORTED_PART {
                 OutlineError::Hidden { seen_percent: 100.0 * seen, side, found_mm, expected_mm }
             } else {
                 OutlineError::WrongSize { side, found_mm, expected_mm }
@@ -208,6 +220,7 @@ fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
     Ok(())
 }
 
+/// Samples an edge at equal steps, ending in the corners.
 fn curve(edge: &Edge, ends: [Vec3; 2]) -> EdgeCurve {
     let length = edge.to - edge.from;
     let n = (length / POINT_SPACING).ceil().max(1.0) as usize;

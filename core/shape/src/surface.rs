@@ -1,9 +1,9 @@
-//! The fitted surface S(u, v) of the plate's mid-surface, and what can be read off it at one place.
+//! The plate's mid-surface S(u, v): a bicubic spline over the original rectangle with the covariance of its control values.
 //!
-//! S is a bicubic spline over the original rectangle, fitted by penalised least squares to all samples, moved by
-//! half the thickness against the scanner ([`SplineFit`]). The samples' noise acts along the normal, so every standard
-//! deviation here is that of the normal direction; how well a material point is located within the surface is the
-//! flattening's affair.
+//! Fitted by penalised least squares to all samples, moved by half the thickness against the scanner (`fit_surface`;
+//! Masuda et al., 4.4, fit the scanned face without penalty). Here: positions, normals, curvatures and their standard
+//! deviations at one place. The samples' noise acts along the normal, so every standard deviation is that of the normal
+//! direction; the uncertainty of material points within the surface comes from the flattening.
 
 mod fit_surface;
 mod mask;
@@ -34,7 +34,7 @@ pub struct Surface {
     mask: Mask,
 }
 
-/// S and its derivatives at one place.
+/// Position and derivatives of S at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Derivatives {
     /// Position, metres.
@@ -69,7 +69,7 @@ pub struct Curvature {
 }
 
 impl Surface {
-    /// The surface of a fit over the original rectangle, which starts in (0, 0).
+    /// Builds the surface of a fit over the original rectangle, which starts in (0, 0).
     #[must_use]
     pub fn new(fitted: FittedSpline<3>, thickness: f64, mask: Mask) -> Self {
         let covariance = fitted.precision.local_inverse();
@@ -77,19 +77,19 @@ impl Surface {
         Self { spline: fitted.spline, thickness, precision: fitted.precision, covariance, noise_share, mask }
     }
 
-    /// Extent along u, metres.
+    /// Returns the extent along u, metres.
     #[must_use]
     pub fn width(&self) -> f64 {
         self.spline.u.end()
     }
 
-    /// Extent along v, metres.
+    /// Returns the extent along v, metres.
     #[must_use]
     pub fn height(&self) -> f64 {
         self.spline.v.end()
     }
 
-    /// Thickness of the plate, metres.
+    /// Returns the thickness of the plate, metres.
     #[must_use]
     pub fn thickness(&self) -> f64 {
         self.thickness
@@ -101,19 +101,19 @@ impl Surface {
         &self.spline
     }
 
-    /// What was seen.
+    /// Returns the mask of the parts that were seen.
     #[must_use]
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// Position on the mid-surface.
+    /// Returns the position on the mid-surface.
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> Vec3 {
         self.spline.point(u, v).into()
     }
 
-    /// Position and derivatives to second order.
+    /// Returns position and derivatives to second order.
     #[must_use]
     pub fn derivatives(&self, u: f64, v: f64) -> Derivatives {
         let jet = self.spline.jet(u, v);
@@ -127,34 +127,34 @@ impl Surface {
         }
     }
 
-    /// Unit normal, towards the scanner.
+    /// Returns the unit normal, towards the scanner.
     #[must_use]
     pub fn normal(&self, u: f64, v: f64) -> Vec3 {
         let [_, along_u, along_v] = self.spline.frame(u, v).map(Vec3::from);
         along_u.cross(&along_v).normalize()
     }
 
-    /// Position on the scanned face: half the thickness above the mid-surface.
+    /// Returns the position on the scanned face: half the thickness above the mid-surface.
     #[must_use]
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
         let [p, along_u, along_v] = self.spline.frame(u, v).map(Vec3::from);
         p + along_u.cross(&along_v).normalize() * (0.5 * self.thickness)
     }
 
-    /// Curvature of the mid-surface.
+    /// Returns the curvature of the mid-surface.
     #[must_use]
     pub fn curvature(&self, u: f64, v: f64) -> Curvature {
         self.derivatives(u, v).curvature()
     }
 
-    /// Standard deviation of the position along the normal, metres.
+    /// Returns the standard deviation of the position along the normal, metres.
     #[must_use]
     pub fn sigma_point(&self, u: f64, v: f64) -> f64 {
         let (su, sv) = (self.spline.u.local_basis(u), self.spline.v.local_basis(v));
         self.variance(&su, &sv, |i, k| su.value[i] * sv.value[k]).sqrt()
     }
 
-    /// Standard deviation of the position along the normal over scans of the same shape, metres: less than
+    /// Returns the standard deviation of the position along the normal over scans of the same shape, metres: less than
     /// [`Self::sigma_point`] by what smoothing takes from the shape, which is the same in every scan. For changes of a
     /// shape, not for the shape itself.
     #[must_use]
@@ -162,7 +162,7 @@ impl Surface {
         self.sigma_point(u, v) * f64::from(self.noise_share).sqrt()
     }
 
-    /// Standard deviations of the curvatures u, v and uv, 1/m.
+    /// Returns the standard deviations of the curvatures u, v and uv, 1/m.
     ///
     /// First order: noise along the normal changes S_uu . n, while n and the lengths of S_u and S_v change by
     /// tangential parts only, which meet nothing but other tangential parts.
@@ -178,9 +178,9 @@ impl Surface {
         ]
     }
 
-    /// Standard deviation of a weighted sum of heights along the normal: terms ((u, v), weight), metres.
+    /// Returns the standard deviation of a weighted sum of heights along the normal: terms ((u, v), weight), metres.
     ///
-    /// Unlike the figures of one place this respects how errors of different places go together. Costs one sweep over the
+    /// Unlike the figures of one place this includes the correlation of errors at different places. Costs one sweep over the
     /// factor (0.2 ms for 50 x 40 spans), however many terms.
     #[must_use]
     pub fn sigma_of_heights(&self, terms: &[([f64; 2], f64)]) -> f64 {
@@ -196,7 +196,7 @@ impl Surface {
         self.precision.variance(&functional).sqrt()
     }
 
-    /// Variance of the sum of the 16 coefficients of a span, weighted by `weight(i, k)`.
+    /// Returns the variance of the sum of the 16 coefficients of a span, weighted by `weight(i, k)`.
     fn variance(&self, su: &LocalBasis, sv: &LocalBasis, weight: impl Fn(usize, usize) -> f64) -> f64 {
         let weights: [[f64; 4]; 4] = std::array::from_fn(|k| std::array::from_fn(|i| weight(i, k)));
         let mut sum = 0.0;
@@ -212,13 +212,13 @@ impl Surface {
 }
 
 impl Derivatives {
-    /// Unit normal, towards the scanner.
+    /// Returns the unit normal, towards the scanner.
     #[must_use]
     pub fn normal(&self) -> Vec3 {
         self.u.cross(&self.v).normalize()
     }
 
-    /// Curvature: second fundamental form in the orthonormal frame of S_u and its normal in the surface.
+    /// Returns the curvature: second fundamental form in the orthonormal frame of S_u and its normal in the surface.
     #[must_use]
     pub fn curvature(&self) -> Curvature {
         let n = self.normal();
@@ -234,7 +234,7 @@ impl Derivatives {
 }
 
 impl Curvature {
-    /// From the second fundamental form in an orthonormal frame along u.
+    /// Builds the curvature from the second fundamental form in an orthonormal frame along u.
     #[must_use]
     pub fn from_form(along: f64, across: f64, twist: f64) -> Self {
         let mean = 0.5 * (along + across);
@@ -249,19 +249,19 @@ impl Curvature {
         }
     }
 
-    /// Normal curvature along a unit direction.
+    /// Returns the normal curvature along a unit direction.
     #[must_use]
     pub fn along(&self, [x, y]: [f64; 2]) -> f64 {
         x * x * self.u + 2.0 * x * y * self.uv + y * y * self.v
     }
 
-    /// The principal curvature that is larger in size.
+    /// Returns the principal curvature that is larger in size.
     #[must_use]
     pub fn strongest(&self) -> f64 {
         if self.max.abs() >= self.min.abs() { self.max } else { self.min }
     }
 
-    /// Unit direction of that curvature; u where every direction is alike.
+    /// Returns the unit direction of that curvature; u where every direction is alike.
     #[must_use]
     pub fn strongest_direction(&self) -> [f64; 2] {
         let strongest = self.strongest();

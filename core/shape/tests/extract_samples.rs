@@ -14,10 +14,11 @@ fn the_face_is_found_to_the_sample() {
         let patch = support::extract(&sample, 0..sample.columns.len()).unwrap();
         let expected = sample.truth["counts"]["plate_top_valid_unmixed"].as_f64().unwrap();
         let ratio = patch.samples.len() as f64 / expected;
-        println!("{}: {} samples, {:.4} of the truth", folder.display(), patch.samples.len(), ratio);
-        assert!((0.995..1.004).contains(&ratio), "{ratio}");
         let noise = sample.truth["lattice"]["sigma_plate_mm"].as_f64().unwrap() / 1000.0;
-        assert!((patch.noise / noise - 1.0).abs() < 0.06, "{} against {noise}", patch.noise);
+        println!("{}: {ratio:.4} of the truth, noise {:.4}", folder.display(), patch.noise / noise);
+        // Found: 1.0004 to 1.0012, a few samples of the side faces; noise 0.998 to 1.026 of the truth.
+        assert!((0.995..1.0024).contains(&ratio), "{ratio}");
+        assert!((patch.noise / noise - 1.0).abs() < 0.053, "{} against {noise}", patch.noise);
         let plane = |point: Vec3| point.iter().all(|c| c.is_finite());
         assert!(patch.samples.iter().all(|s| plane(s.point) && s.sigma > 0.0));
     }

@@ -1,4 +1,5 @@
-//! Whole measurements of the sample plates with the paper's harmonic map, against their truth.
+//! Whole measurements of the sample plates with the harmonic map of Masuda et al., "Point-based shape
+//! monitoring of plate bending for large-scale storage tanks", against their truth.
 
 #![allow(clippy::unwrap_used, reason = "test code: helpers fail like tests")]
 
@@ -62,6 +63,31 @@ fn bends(surface: &Surface, grid: &Value) -> Vec<f64> {
     out
 }
 
+/// Largest errors: millimetres, and 1/m for the curvature.
+struct Bounds {
+    corners: f64,
+    markers: f64,
+    inside: f64,
+    near_edge: f64,
+    curvature: f64,
+}
+
+/// Twice what is found on the worst plate of each kind.
+fn bounds(name: &str) -> Bounds {
+    // Corners 0.20 to 0.46 mm and markers 0.10 to 0.13 mm: edges located to a thirtieth of the lattice's step of 8 mm. Normal
+    // distances 0.002 to 0.007 mm inside and 0.006 to 0.014 mm near an edge: noise of 0.4 mm over 70,000 to 130,000 samples.
+    let all = Bounds { corners: 0.92, markers: 0.26, inside: 0.014, near_edge: 0.028, curvature: 2.4e-4 };
+    match name {
+        // 0.61 mm: the harmonic map is wrong on double curvature.
+        "p2_sphere" => Bounds { markers: 1.2, ..all },
+        // 3.8e-4: the curvature grows towards the apex.
+        "p5_cone_ptx" => Bounds { curvature: 7.6e-4, ..all },
+        // 1.2e-3 to 2.2e-3: flanks of narrow bends are smoothed.
+        name if name.starts_with("p3") || name.starts_with("p4") => Bounds { curvature: 4.4e-3, ..all },
+        _ => all,
+    }
+}
+
 #[test]
 fn sample_plates_are_met() {
     println!("plate: corners rms, markers mean/max, normal inside/edge rms (mm), curvature rms (1/m)");
@@ -82,10 +108,8 @@ fn sample_plates_are_met() {
         let bend = rms(&bends(&m.surface, &sample.truth["curvature_grid_mid"]));
         println!("{name}: {corners:.2}, {mean:.2}/{worst:.2}, {inside:.3}/{edge:.3}, {bend:.1e}");
         println!("    edges {:?} {:?} {:?}", m.mesh.edge_length, m.quality, m.timings);
-        // Twice the largest of all plates: corners 0.46, markers 0.14 and, by the harmonic map's own error, 0.61 on the sphere; surface
-        // 0.007 and 0.014; curvature 2.2e-3 where bend bands are narrow.
-        let markers = if name.starts_with("p2") { 1.2 } else { 0.28 };
-        assert!(corners < 0.92 && mean < markers, "{name}");
-        assert!(inside < 0.014 && edge < 0.028 && bend < 4.4e-3, "{name}");
+        let most = bounds(&name);
+        assert!(corners < most.corners && mean < most.markers, "{name}");
+        assert!(inside < most.inside && edge < most.near_edge && bend < most.curvature, "{name}");
     }
 }

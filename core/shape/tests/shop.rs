@@ -1,4 +1,4 @@
-//! What happens in a shop, on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
+//! Situations of a workshop on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test code")]
 
@@ -42,6 +42,7 @@ fn rms(off: [f64; 4]) -> f64 {
     (off.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt()
 }
 
+/// `corner_limit`: about twice the error found (root mean square of the four corners, metres).
 fn check(name: &str, scene: &Scene, corner_limit: f64) {
     let (patch, outline) = measure(scene);
     let off = corners_off(scene, &outline);
@@ -58,16 +59,16 @@ fn check(name: &str, scene: &Scene, corner_limit: f64) {
 
 #[test]
 fn flat_concave_and_convex() {
-    check("flat", &Scene::of(Plate { radius: None, ..plate() }), 1e-3);
-    check("concave", &Scene::of(plate()), 1e-3);
+    check("flat", &Scene::of(Plate { radius: None, ..plate() }), 8.2e-4);
+    check("concave", &Scene::of(plate()), 2.4e-4);
     check("convex", &Scene::of(Plate { radius: Some(-9.0), ..plate() }), 1e-3);
-    check("strong bend", &Scene::of(Plate { radius: Some(5.0), ..plate() }), 1e-3);
+    check("strong bend", &Scene::of(Plate { radius: Some(5.0), ..plate() }), 3.4e-4);
 }
 
 #[test]
 fn strong_bends_along_the_line_of_sight() {
     let along = |radius: f64| Plate { radius: Some(radius), turn: 0.0, ..plate() };
-    check("towards the scanner", &Scene::of(along(5.0)), 1e-3);
+    check("towards the scanner", &Scene::of(along(5.0)), 3.4e-4);
     // Seen at up to 80 degrees off the normal: at the far end rows are 43 mm apart on the plate.
     check("away from it", &Scene::of(along(-5.0)), 2e-3);
 }
@@ -76,7 +77,7 @@ fn strong_bends_along_the_line_of_sight() {
 fn an_edge_along_a_column_of_the_lattice() {
     // The edge v = 0 in the plane through the mirror's axis: all of it between the same two columns.
     let plate = Plate { turn: 0.0, centre: Vec3::new(6.0, 1.25, -3.6), ..plate() };
-    check("edge along a column", &Scene::of(plate), 1.5e-3);
+    check("edge along a column", &Scene::of(plate), 1.36e-3);
 }
 
 #[test]
@@ -96,7 +97,7 @@ fn coarse_lattices() {
     for step_deg in [0.12_f64, 0.15] {
         for radius in [None, Some(9.0), Some(-9.0)] {
             let scene = Scene { step: step_deg.to_radians(), ..Scene::of(Plate { radius, ..plate() }) };
-            check(&format!("{step_deg} degrees, {radius:?}"), &scene, 4e-3);
+            check(&format!("{step_deg} degrees, {radius:?}"), &scene, 2.1e-3);
         }
     }
 }
@@ -123,7 +124,7 @@ fn a_plate_on_its_bed() {
     // The floor is the bed: it touches the plate all around.
     let plate = Plate { radius: None, ..plate() };
     let scene = Scene { floor: plate.centre.z - 0.5 * plate.thickness, ..Scene::of(plate) };
-    check("on its bed", &scene, 1.5e-3);
+    check("on its bed", &scene, 9e-4);
 }
 
 #[test]
@@ -134,7 +135,7 @@ fn a_mirroring_patch_on_an_edge() {
     let unseen =
         outline.edges[0].seen.iter().filter(|s| !**s).count() as f64 / outline.edges[0].seen.len() as f64;
     println!("corners {:.2?} mm, {:.2} of the edge not seen", off.map(|d| d * 1e3), unseen);
-    assert!(rms(off) < 1.2e-3);
+    assert!(rms(off) < 2.3e-4);
     // 0.6 m of 3 m, less what lies within reach of what was seen.
     assert!((0.1..0.22).contains(&unseen), "{unseen}");
 }
@@ -147,7 +148,7 @@ fn a_chain_before_a_corner() {
     let (_, outline) = measure(&scene);
     let off = corners_off(&scene, &outline);
     println!("corners {:.2?} mm, seen {:?}", off.map(|d| d * 1e3), outline.corners.map(|c| c.seen));
-    assert!(rms(off) < 2e-3);
+    assert!(rms(off) < 2.4e-4);
 }
 
 #[test]
@@ -191,7 +192,7 @@ fn what_is_held_while_columns_stream_is_bounded_by_the_plate() {
 #[test]
 fn noise_of_two_millimetres_with_heavy_tails() {
     let scene = Scene { sigma: 2e-3, tails: 0.05, dropouts: 0.02, ..Scene::of(plate()) };
-    check("noise", &scene, 1e-3);
+    check("noise", &scene, 3.8e-4);
 }
 
 #[test]
@@ -216,7 +217,8 @@ fn a_person_hides_a_corner_and_part_of_an_edge() {
     let off = corners_off(&scene, &outline);
     println!("corners {:.2?} mm, seen {:?}", off.map(|d| d * 1e3), outline.corners.map(|c| c.seen));
     assert!(!outline.corners[0].seen && (1..4).all(|k| outline.corners[k].seen));
-    assert!(off[0] < 8e-3 && off[1..].iter().all(|d| *d < 1.5e-3));
+    // The hidden corner is extrapolated from its edges: 0.26 mm off.
+    assert!(off[0] < 5.2e-4 && off[1..].iter().all(|d| *d < 3e-4));
 }
 
 #[test]
@@ -270,6 +272,7 @@ fn a_seam_between_the_faces_and_warm_up_columns() {
         let outline = outline(&patch, &scene.spec()).unwrap();
         let off = corners_off(&scene, &outline);
         println!("{warm_up} columns left out: corners {:.2?} mm", off.map(|d| d * 1e3));
-        assert!(rms(off) < 2.5e-3);
+        // 1.0 mm: the second face is 1.5 mm farther, and both corners on it move by that.
+        assert!(rms(off) < 2.1e-3);
     }
 }

@@ -5,23 +5,10 @@ use std::time::Duration;
 
 use platen_formats::orient::Expected;
 use platen_formats::{Oriented, ScanReader};
-use platen_scan::{Column, ScanEnd, ScanHeader};
 use platen_sdk::{ErrorKind, Job, ScanSink};
 
 use crate::error::{Error, Result};
 use crate::watch::{Listing, Watch, list};
-
-/// Receiver of a scan: the host, or a test.
-pub(crate) trait Receiver {
-    /// Called every 65,536 cells; an error ends the work.
-    fn check(&mut self, fraction: f64, phase: &str) -> Result<()>;
-    /// First.
-    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
-    /// In any order.
-    fn column(&mut self, column: &Column) -> Result<()>;
-    /// Last.
-    fn end(&mut self, end: &ScanEnd) -> Result<()>;
-}
 
 /// Settings of reading.
 #[derive(Debug, Clone)]
@@ -33,36 +20,56 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
-    /// Reads one file.
-    pub(crate) fn file(&self, path: &Path, out: &mut dyn Receiver, alive: &dyn Fn() -> bool) -> Result<()> {
-        let mut reader = ScanReader::open(path, self.cloud, alive)?;
-        let oriented = self.orient(&mut reader, out)?;
-        deliver(reader, &oriented, out)
+    /// Opens and checks a file.
+    pub(crate) fn open<'a>(&self, path: &Path, alive: &'a dyn Fn() -> bool) -> Result<ScanReader<'a>> {
+        Ok(ScanReader::open(path, self.cloud, alive)?)
     }
 
-    fn orient(&self, reader: &mut ScanReader<'_>, out: &mut dyn Receiver) -> Result<Oriented> {
-        reader.orient(&self.known, |share| out.check(share, "looking at the lattice"))
+    /// Decides the orientation of the scan.
+    pub(crate) fn orient(
+        &self,
+        reader: &mut ScanReader<'_>,
+        progress: &mut Progress<'_>,
+    ) -> Result<Oriented> {
+        reader.orient(&self.known, progress)
+    }
+}
+
+/// Receives the share done, 0 to 1; an error ends the work.
+pub(crate) type Progress<'a> = dyn FnMut(f64) -> Result<()> + 'a;
+
+/// Returns the progress of a job as the host sees it.
+pub(crate) fn progress<'a>(job: &'a Job<'_>, phase: &'a str) -> impl FnMut(f64) -> Result<()> + 'a {
+    move |share| {
+        job.progress(share, phase);
+        Ok(job.check()?)
     }
 }
 
 /// Delivers all columns of an oriented scan.
-fn deliver(mut reader: ScanReader<'_>, oriented: &Oriented, out: &mut dyn Receiver) -> Result<()> {
+pub(crate) fn deliver(
+    job: &Job<'_>,
+    reader: &mut ScanReader<'_>,
+    oriented: &Oriented,
+    out: &mut ScanSink<'_>,
+) -> Result<()> {
     out.begin(oriented.header())?;
+    let mut progress = progress(job, "reading columns");
     let mut columns = reader.columns(oriented)?;
     for number in 0_u32.. {
         let Some(column) = columns.next() else { break };
         out.column(&column?)?;
         if number.is_multiple_of(CHECK_EVERY) {
-            out.check(columns.share(), "reading columns")?;
+            progress(columns.share())?;
         }
     }
-    out.end(&columns.finish()?)
+    Ok(out.end(&columns.finish()?)?)
 }
 
 /// Columns between two reports of progress.
 const CHECK_EVERY: u32 = 64;
 
-/// Where scans arrive.
+/// A watched folder.
 #[derive(Debug)]
 pub(crate) struct Folder {
     /// The folder.
@@ -71,20 +78,20 @@ pub(crate) struct Folder {
     pub(crate) pattern: String,
     /// Polls for which a file must stay the same.
     pub(crate) stable_polls: u32,
-    /// What lay there before the trigger; nothing until it could be listed.
+    /// Listing before the trigger; none until the folder could be listed.
     pub(crate) before: Option<Listing>,
     /// Checksum of the scan measured before.
     pub(crate) measured: Option<u32>,
 }
 
 impl Folder {
-    /// Notes what lies there now: none of it is the next scan.
+    /// Lists the folder: none of its present files is the next scan.
     pub(crate) fn look(&mut self) -> Result<()> {
         self.before = Some(list(&self.path).map_err(Error::Folder)?);
         Ok(())
     }
 
-    /// The pattern of one stroke.
+    /// Returns the pattern of one stroke.
     pub(crate) fn pattern(
         &self,
         stroke: u64,
@@ -94,37 +101,21 @@ impl Folder {
         glob::Pattern::new(&named)
     }
 
-    /// Waits for the next scan and delivers it. `pause` waits between two polls, receives the reason why there is no
-    /// scan yet, and ends the wait with an error. Files present afterwards are not the scan of the next stroke.
-    pub(crate) fn follow(
+    /// Waits for the next scan; returns it with its path. `pause` waits between two polls, receives the reason why there
+    /// is no scan yet, and ends the wait with an error.
+    pub(crate) fn wait<'a>(
         &mut self,
         reading: &Reading,
         pattern: glob::Pattern,
-        out: &mut dyn Receiver,
+        progress: &mut Progress<'_>,
         pause: &mut dyn FnMut(String) -> Result<()>,
-        alive: &dyn Fn() -> bool,
-    ) -> platen_sdk::Result<()> {
-        let watch = Watch::new(pattern, self.stable_polls, self.before.take());
-        let outcome = self.wait(watch, reading, out, pause, alive);
-        self.before = list(&self.path).ok();
-        self.measured = Some(outcome?);
-        Ok(())
-    }
-
-    /// Returns the checksum of the scan delivered.
-    fn wait(
-        &self,
-        mut watch: Watch,
-        reading: &Reading,
-        out: &mut dyn Receiver,
-        pause: &mut dyn FnMut(String) -> Result<()>,
-        alive: &dyn Fn() -> bool,
-    ) -> platen_sdk::Result<u32> {
+        alive: &'a dyn Fn() -> bool,
+    ) -> platen_sdk::Result<(PathBuf, ScanReader<'a>, Oriented)> {
+        let mut watch = Watch::new(pattern, self.stable_polls, self.before.take());
         loop {
-            let due = watch.poll(list(&self.path));
             let mut sound = Vec::new();
-            for name in due {
-                match ScanReader::open(&self.path.join(&name), reading.cloud, alive) {
+            for name in watch.poll(list(&self.path)) {
+                match reading.open(&self.path.join(&name), alive) {
                     Ok(reader) => sound.push((name, reader)),
                     Err(error) => watch.refuse(&name, error.to_string()),
                 }
@@ -135,21 +126,24 @@ impl Folder {
                 names.iter().for_each(|name| watch.refuse(name, why.clone()));
             } else if let Some((name, mut reader)) = sound.pop() {
                 let path = self.path.join(&name);
-                match reading.orient(&mut reader, out) {
+                match reading.orient(&mut reader, progress) {
                     Ok(oriented) if self.measured == Some(oriented.checksum()) => {
                         watch.refuse(&name, Error::Repeated.to_string());
                     }
-                    // Once columns are delivered there is no second file for this stroke.
-                    Ok(oriented) => {
-                        let delivered = deliver(reader, &oriented, out);
-                        return delivered.map(|()| oriented.checksum()).map_err(|error| error.at(&path));
-                    }
+                    Ok(oriented) => return Ok((path, reader, oriented)),
                     Err(error @ Error::Host(_)) => return Err(error.at(&path)),
                     Err(error) => watch.refuse(&name, error.to_string()),
                 }
             }
             pause(watch.why()).map_err(|error| error.at(&self.path))?;
         }
+    }
+
+    /// Ends the wait, with the checksum of the scan when one was delivered. Files present now are not the scan of the next
+    /// stroke.
+    pub(crate) fn close(&mut self, delivered: Option<u32>) {
+        self.before = list(&self.path).ok();
+        self.measured = delivered.or(self.measured);
     }
 }
 
@@ -169,32 +163,7 @@ pub(crate) fn pause(job: &Job<'_>, poll: Duration, why: String) -> Result<()> {
     Ok(())
 }
 
-/// The host as a receiver.
-pub(crate) struct ToHost<'a, 'j, 's> {
-    pub(crate) job: &'a Job<'j>,
-    pub(crate) out: &'a mut ScanSink<'s>,
-}
-
-impl Receiver for ToHost<'_, '_, '_> {
-    fn check(&mut self, fraction: f64, phase: &str) -> Result<()> {
-        self.job.progress(fraction, phase);
-        Ok(self.job.check()?)
-    }
-
-    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
-        Ok(self.out.begin(header)?)
-    }
-
-    fn column(&mut self, column: &Column) -> Result<()> {
-        Ok(self.out.column(column)?)
-    }
-
-    fn end(&mut self, end: &ScanEnd) -> Result<()> {
-        Ok(self.out.end(end)?)
-    }
-}
-
-/// The options contradict each other.
+/// Returns the error for contradictory options.
 pub(crate) fn config(what: &str, hint: &str) -> platen_sdk::Error {
     platen_sdk::Error::new(ErrorKind::Config, what).hint(hint)
 }

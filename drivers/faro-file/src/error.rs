@@ -40,10 +40,10 @@ impl Error {
                 io::ErrorKind::PermissionDenied => ErrorKind::Denied,
                 _ => ErrorKind::Io,
             },
-            Self::File(ReadError::Incomplete { .. }) | Self::Repeated => ErrorKind::NoData,
+            Self::File(ReadError::Incomplete(..)) | Self::Repeated => ErrorKind::NoData,
             Self::TooLate(_) => ErrorKind::Timeout,
-            Self::File(ReadError::Refused { .. }) => ErrorKind::Unsupported,
-            Self::File(ReadError::Several { .. } | ReadError::NoSuchCloud { .. }) | Self::Ambiguous(_) => {
+            Self::File(ReadError::Refused(..)) => ErrorKind::Unsupported,
+            Self::File(ReadError::Several(..) | ReadError::NoSuchCloud(..)) | Self::Ambiguous(_) => {
                 ErrorKind::Config
             }
             Self::File(_) => ErrorKind::BadData,

@@ -1,20 +1,19 @@
 //! Reads laser scans from files: structured E57, PTX, XYZ with row and column, XYB.
 //!
-//! # What it does
-//! It recognises the format from the content, checks that the file is complete, decides from the geometry how rows
-//! and columns lie, which way the frame turns and whether the file is in metres or millimetres, and delivers the
-//! lattice column by column in the scanner's frame. Every decision becomes a sentence of the scan's notes. The
-//! file is opened for reading only; it is never locked, changed or deleted.
+//! # Operation
+//! The format is detected from the content, the file is checked for completeness, rows, columns, handedness and units
+//! are decided from the geometry (`platen-formats`), and the lattice is delivered column by column in the scanner's
+//! frame. Every decision is a sentence in the scan's notes. The file is opened for reading only; it is never locked,
+//! changed or deleted.
 //!
 //! Missing cells may be flagged, left out, written as the origin or as NaN. A pose in the file is reported and not
-//! applied. Formats that hold no lattice, or that only their maker's software reads (`.fls`, `.fws`, `.lsproj`,
-//! `.las`, `.pts`, `.pod`, `.cpe`), are refused with what to export instead.
+//! applied. Formats without a lattice, or that only their maker's software reads (`.fls`, `.fws`, `.lsproj`, `.las`,
+//! `.pts`, `.pod`, `.cpe`), are refused with the format to export instead.
 //!
-//! A scan is read from one file, or from the next one that appears in a watched folder. There a file counts as the
-//! scan when its name fits the pattern, when it is new or changed since the press was ready, when it stays the same
-//! for some polls, and when its own structure is sound (lengths, checksums, number of lines). What is refused is
-//! looked at again until the stroke's deadline; then the reason is the answer. Polling works on every share; no
-//! events are needed.
+//! A scan is read from one file, or from the next one in a watched folder. There a file is taken when its name matches
+//! the pattern, when it is new or changed since the press was ready, when it stays the same for some polls, and when its
+//! structure is sound (lengths, checksums, number of lines). A refused file is examined again until the stroke's
+//! deadline; then the reason is the answer. Polling works on every share; no events are needed.
 //!
 //! # Example
 //! ```toml
@@ -30,12 +29,12 @@
 //! | `file` | the scan; or |
 //! | `folder` | where scans arrive |
 //! | `pattern` | names of scans, with `*`, `?`, `[..]`, and `{stroke}` or `{job}` for their numbers |
-//! | `poll_ms` | time between two looks into the folder |
-//! | `stable_polls` | looks for which a file must stay the same |
-//! | `cloud` | which scan of a file that holds several, from 1 |
-//! | `turn` | which way columns run in this scanner's files; the other way is refused as mirrored |
+//! | `poll_ms` | time between two polls of the folder |
+//! | `stable_polls` | polls for which a file must stay the same |
+//! | `cloud` | number of the scan in a file that holds several, from 1 |
+//! | `turn` | direction of columns in this scanner's files; the opposite one is refused as mirrored |
 //! | `mirror` | the axis to mirror where the exporter writes a left-handed frame |
-//! | `cut_azimuth_deg` | where a full circle is cut open, so that the plate is not |
+//! | `cut_azimuth_deg` | azimuth at which a full circle is cut, away from the plate |
 
 mod device;
 mod error;
@@ -47,7 +46,7 @@ use std::time::Duration;
 use platen_formats::orient::{Expected, Mirror, Turn};
 use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
 
-use device::{Folder, Reading, ToHost, config};
+use device::{Folder, Reading, config};
 
 options! {
     /// Options of the file driver; the module head is their manual.
@@ -59,18 +58,18 @@ options! {
         /// Names of scans in the folder: `*`, `?` and `[..]` as in a shell, `{stroke}` and `{job}` for the numbers of
         /// the stroke and the job.
         pattern: String = "*";
-        /// Time between two looks into the folder.
+        /// Time between two polls of the folder.
         poll_ms: i64 = 500, unit "ms", min 20, max 60000;
-        /// Looks for which a file must stay the same before it is opened.
+        /// Polls for which a file must stay the same before it is opened.
         stable_polls: i64 = 3, min 1, max 100;
-        /// Which scan of a file that holds several, from 1.
+        /// Number of the scan in a file that holds several, from 1.
         cloud: Option<i64>, min 1;
-        /// Which way columns run by growing number in this scanner's files, seen from above, where that is known:
-        /// a scan that runs the other way is mirrored and refused.
+        /// Direction of columns by increasing number in this scanner's files, seen from above, where it is known: a scan
+        /// in the opposite direction is mirrored and refused.
         turn: String = "any", choices ["any", "clockwise", "counter_clockwise"];
         /// Axis to mirror where the exporter writes a left-handed frame.
         mirror: String = "none", choices ["none", "x", "y"];
-        /// Azimuth at which a full circle is cut open, so that the plate is not.
+        /// Azimuth at which a full circle is cut, away from the plate.
         cut_azimuth_deg: Option<f64>, unit "deg", min -360.0, max 360.0;
     }
 }
@@ -83,7 +82,7 @@ pub struct FaroFile {
     poll: Duration,
 }
 
-/// Where the scan comes from.
+/// Source of the scan.
 #[derive(Debug)]
 enum Place {
     File(PathBuf),
@@ -142,11 +141,14 @@ impl Scanner for FaroFile {
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let alive = || job.check().is_ok();
-        let mut host = ToHost { job, out };
+        let mut progress = device::progress(job, "looking at the lattice");
         match &mut self.place {
             Place::File(path) => {
-                let read = self.reading.file(path, &mut host, &alive);
-                // A cancelled job ends reading with an error of its own. The host knows the file's name.
+                let read = self.reading.open(path, &alive).and_then(|mut reader| {
+                    let oriented = self.reading.orient(&mut reader, &mut progress)?;
+                    device::deliver(job, &mut reader, &oriented, out)
+                });
+                // A cancelled job ends reading with an error of its own. The host adds the name of the file.
                 read.map_err(|error| job.check().err().unwrap_or_else(|| error.into_sdk()))
             }
             Place::Folder(folder) => {
@@ -154,14 +156,20 @@ impl Scanner for FaroFile {
                 let pattern = pattern.map_err(|e| config(&format!("pattern: {e}"), "see its description"))?;
                 let poll = self.poll;
                 let mut pause = |why| device::pause(job, poll, why);
-                folder.follow(&self.reading, pattern, &mut host, &mut pause, &alive)
+                let found = folder.wait(&self.reading, pattern, &mut progress, &mut pause, &alive);
+                let delivered = found.and_then(|(path, mut reader, oriented)| {
+                    let sent = device::deliver(job, &mut reader, &oriented, out);
+                    sent.map(|()| oriented.checksum()).map_err(|error| error.at(&path))
+                });
+                folder.close(delivered.as_ref().ok().copied());
+                delivered.map(drop)
             }
         }
     }
 }
 
 impl FaroFile {
-    /// What lies in the watched folder now was not made by the next stroke.
+    /// Lists the watched folder: its present files are not the scan of the next stroke.
     fn look(&mut self) -> Result<()> {
         match &mut self.place {
             Place::File(_) => Ok(()),

@@ -1,23 +1,23 @@
-//! Which file of a watched folder is the scan that this stroke waits for. Pure: it is told what lies in the folder.
+//! Selection of the stroke's scan among the files of a watched folder, by polling; a pure function of the listings.
 //!
-//! Network shares send no events, report sizes before the bytes arrive, vanish and come back, and their clock is
-//! not ours. So the folder is listed again and again, what lay there before the trigger is told by name, size and
-//! time and not by age, a file counts as written when it stays the same for some polls, and then its own structure
-//! has the last word. A file that was refused is looked at again when it changes, and now and then when not.
+//! Network shares send no events, report sizes before the bytes arrive, vanish and come back, and have another clock.
+//! Files present before the trigger are therefore recognised by name, size and time and not by age; a file counts as
+//! written when it stays the same for some polls, and its own structure decides in the end. A refused file is due again
+//! when it changes, and with exponential back-off when it does not.
 
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// What a listing says of one entry.
+/// Properties of one entry of a listing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Entry {
     /// Bytes.
     pub(crate) size: u64,
     /// Last change, by the clock of the share.
     pub(crate) modified: Option<SystemTime>,
-    /// True for a folder.
+    /// Whether it is a folder.
     pub(crate) folder: bool,
 }
 
@@ -39,10 +39,10 @@ pub(crate) fn list(folder: &Path) -> io::Result<Listing> {
     Ok(listing)
 }
 
-/// Endings that programs give to files they are still writing.
+/// Endings of files that are still being written.
 const UNFINISHED: [&str; 6] = [".part", ".partial", ".tmp", ".temp", ".crdownload", ".filepart"];
 
-/// Most polls between two looks at a refused file that does not change, in units of the polls for stability.
+/// Largest number of polls between two examinations of an unchanged file, in units of the polls for stability.
 const MAX_PATIENCE: u32 = 16;
 
 /// A file that may be the scan.
@@ -50,7 +50,7 @@ const MAX_PATIENCE: u32 = 16;
 struct Candidate {
     entry: Entry,
     same_for: u32,
-    /// Polls after which it is looked at.
+    /// Polls after which it is due.
     due_after: u32,
     refused: Option<String>,
 }
@@ -66,13 +66,13 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// `before` lay in the folder before the trigger and is no candidate as long as it stays the same; when nobody
-    /// could look then, it is what the first listing shows.
+    /// Starts a wait. Files of `before`, the listing before the trigger, are no candidates while they stay the same; without
+    /// it the first listing takes its place.
     pub(crate) fn new(pattern: glob::Pattern, stable_polls: u32, before: Option<Listing>) -> Self {
         Self { pattern, stable_polls, before, candidates: BTreeMap::new(), lost: None }
     }
 
-    /// Takes a listing; gives the names that are due for a look, in order.
+    /// Evaluates a listing; returns the names that are due for examination, in order.
     pub(crate) fn poll(&mut self, listing: io::Result<Listing>) -> Vec<String> {
         let listing = match listing {
             Ok(listing) => listing,
@@ -114,7 +114,7 @@ impl Watch {
         !hidden && !old && self.pattern.matches_with(name, options)
     }
 
-    /// Says that a file was looked at and is not the scan, or not yet.
+    /// Records that a file was examined and is not the scan, or not yet.
     pub(crate) fn refuse(&mut self, name: &str, why: String) {
         if let Some(candidate) = self.candidates.get_mut(name) {
             let patience = (candidate.due_after / self.stable_polls).min(MAX_PATIENCE) * self.stable_polls;
@@ -123,7 +123,7 @@ impl Watch {
         }
     }
 
-    /// Why there is no scan yet, for the person who waits.
+    /// Returns the reason why there is no scan yet, for the operator.
     pub(crate) fn why(&self) -> String {
         if let Some(error) = &self.lost {
             return format!("the folder cannot be read: {error}");

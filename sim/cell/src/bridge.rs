@@ -1,20 +1,20 @@
 //! Scans over TCP: the bridge that `scanner --serve` and `cell --serve` run.
 
-use crate::device::Device;
+use crate::control_client::ControlClient;
 use crate::error::Error;
-use crate::line::Line;
+use crate::scanner_options::ScannerOptions;
 use clap::Args;
 use platen_sim_plate::PlateState;
 use platen_sim_scanner::Instrument;
-use platen_sim_scanner::stream::{Bridge, BridgeConfig, Fault, Head, PlateSource, Recording, Shop};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, Fault, Head, PlateSource, RayCastHead, Recording};
 use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// Where and how scans are served.
 #[derive(Debug, Clone, Args)]
-pub(crate) struct Serve {
-    /// Serve scans here by the scan bridge protocol; port 0 lets the system choose
+pub(crate) struct BridgeOptions {
+    /// BridgeOptions scans here by the scan bridge protocol; port 0 lets the system choose
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) serve: Option<SocketAddr>,
     /// Share of a real scanner's time that a scan takes; 0: no longer than the computer needs
@@ -29,7 +29,7 @@ pub(crate) struct Serve {
     /// Keep the frames of every scan in this folder
     #[arg(long, value_name = "FOLDER", requires = "serve")]
     record: Option<PathBuf>,
-    /// Serve the scan of such a file, whatever is asked for
+    /// BridgeOptions the scan of such a file, whatever is asked for
     #[arg(long, value_name = "FILE", requires = "serve")]
     pub(crate) replay: Option<PathBuf>,
     /// Without a window scan the whole dome, not the plate and `--margin-deg` round it
@@ -37,13 +37,13 @@ pub(crate) struct Serve {
     dome: bool,
 }
 
-impl Serve {
-    /// Starts the bridge, when one is wanted.
-    pub(crate) fn start(&self, device: &Device, plate: PlateSource) -> Result<Option<Bridge>, Error> {
+impl BridgeOptions {
+    /// Starts the bridge, when one is pending.
+    pub(crate) fn start(&self, device: &ScannerOptions, plate: PlateSource) -> Result<Option<Bridge>, Error> {
         let Some(address) = self.serve else { return Ok(None) };
         let head: Box<dyn Head> = match &self.replay {
             Some(path) => Box::new(Recording::open(path)?),
-            None => Box::new(self.shop(device, plate)),
+            None => Box::new(self.ray_cast_head(device, plate)),
         };
         let config = BridgeConfig {
             address,
@@ -57,32 +57,34 @@ impl Serve {
         Ok(Some(Bridge::start(config, head)?))
     }
 
-    fn shop(&self, device: &Device, plate: PlateSource) -> Shop {
-        let shop = Shop::new(plate);
-        let warm_up_columns = shop.instrument.warm_up_columns;
-        Shop {
+    fn ray_cast_head(&self, device: &ScannerOptions, plate: PlateSource) -> RayCastHead {
+        let head = RayCastHead::new(plate);
+        let warm_up_columns = head.instrument.warm_up_columns;
+        RayCastHead {
             surroundings: device.surroundings(),
             instrument: Instrument { warm_up_columns, ..device.instrument() },
             noise: device.noise_mm.map(|mm| mm * 1e-3),
             margin: (!self.dome).then(|| device.margin_deg.to_radians()),
-            ..shop
+            ..head
         }
     }
 }
 
 /// The plate of a press, asked on its second port.
-pub(crate) fn plate_of(press: String) -> PlateSource {
-    Box::new(move || Line::open(&press).and_then(|mut line| line.plate()).map_err(|error| error.to_string()))
+pub(crate) fn plate_of_press(press: String) -> PlateSource {
+    Box::new(move || {
+        ControlClient::open(&press).and_then(|mut line| line.plate()).map_err(|error| error.to_string())
+    })
 }
 
 /// Always the same plate.
-pub(crate) fn one_plate(state: Option<PlateState>) -> PlateSource {
+pub(crate) fn fixed_plate(state: Option<PlateState>) -> PlateSource {
     Box::new(move || Ok(state.clone()))
 }
 
 /// Says in one line what the bridge has done.
-pub(crate) fn report(bridge: &Bridge) -> Result<(), Error> {
-    let line = serde_json::json!({ "bridge": bridge.tally() });
+pub(crate) fn print_counters(bridge: &Bridge) -> Result<(), Error> {
+    let line = serde_json::json!({ "bridge": bridge.counters() });
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}")?;
     out.flush()?;

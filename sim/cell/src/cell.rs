@@ -5,10 +5,10 @@
 //! `SESSION-STROKE-ATTEMPT.e57` and appears whole, but for a late one (`--late-file`). The scanner knows the press only by its second port.
 
 use crate::bridge;
-use crate::device::Device;
+use crate::control_client::{ControlClient, PendingStroke};
 use crate::error::Error;
-use crate::line::{Line, Wanted};
 use crate::press;
+use crate::scanner_options::ScannerOptions;
 use clap::Args;
 use platen_sim_press::SimPress;
 use platen_sim_scanner::FileFormat;
@@ -40,9 +40,9 @@ pub(crate) struct Command {
     #[arg(long, default_value = "e57")]
     format: String,
     #[command(flatten)]
-    device: Device,
+    device: ScannerOptions,
     #[command(flatten)]
-    serve: bridge::Serve,
+    serve: bridge::BridgeOptions,
 }
 
 /// Runs press and scanner until the press is told to end.
@@ -53,7 +53,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
     }
     let press = press::start(&command.press).await?;
     let control = press.control().to_string();
-    let bridge = command.serve.start(&command.device, bridge::plate_of(control.clone()))?;
+    let bridge = command.serve.start(&command.device, bridge::plate_of_press(control.clone()))?;
     // What is announced can be used.
     command.drop.as_ref().map_or(Ok(()), std::fs::create_dir_all)?;
     press::announce(Some(&press), bridge.as_ref().map(Bridge::address))?;
@@ -63,15 +63,15 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
             let (format, device) = (command.format, command.device);
             let (address, late_file, ending_too) = (control, command.late_file, Arc::clone(&ending));
             let scanner = Scanner { address, drop, late_file, format, device, ending: ending_too };
-            dropping(press, &command.press, scanner, &ending).await?;
+            run_with_file_drop(press, &command.press, scanner, &ending).await?;
         }
-        None => press::until_told(press, &command.press).await?,
+        None => press::run_until_stopped(press, &command.press).await?,
     }
-    bridge.as_ref().map_or(Ok(()), bridge::report)
+    bridge.as_ref().map_or(Ok(()), bridge::print_counters)
 }
 
 /// Runs the press beside a scanner that drops files.
-async fn dropping(
+async fn run_with_file_drop(
     press: SimPress,
     command: &press::Command,
     scanner: Scanner,
@@ -79,7 +79,7 @@ async fn dropping(
 ) -> Result<(), Error> {
     let mut scans = tokio::task::spawn_blocking(move || scanner.run());
     tokio::select! {
-        ended = press::until_told(press, command) => {
+        ended = press::run_until_stopped(press, command) => {
             ending.store(true, Ordering::Relaxed);
             // Without the press the scanner loses its line; that is no failure any more.
             let _ = scans.await;
@@ -94,21 +94,21 @@ struct Scanner {
     drop: PathBuf,
     late_file: Option<u16>,
     format: String,
-    device: Device,
+    device: ScannerOptions,
     ending: Arc<AtomicBool>,
 }
 
 impl Scanner {
     fn run(&self) -> Result<(), Error> {
-        let mut line = Line::open(&self.address)?;
-        let mut last: Option<Wanted> = None;
+        let mut line = ControlClient::open(&self.address)?;
+        let mut last: Option<PendingStroke> = None;
         let mut number = 0;
         while !self.ending.load(Ordering::Relaxed) {
-            match line.wanted()? {
-                Some(wanted) if last != Some(wanted) => {
+            match line.pending()? {
+                Some(pending) if last != Some(pending) => {
                     number += 1;
-                    self.scan(&mut line, wanted, number)?;
-                    last = Some(wanted);
+                    self.scan(&mut line, pending, number)?;
+                    last = Some(pending);
                 }
                 _ => std::thread::sleep(LOOK),
             }
@@ -116,18 +116,18 @@ impl Scanner {
         Ok(())
     }
 
-    fn scan(&self, line: &mut Line, wanted: Wanted, number: u64) -> Result<(), Error> {
+    fn scan(&self, line: &mut ControlClient, pending: PendingStroke, number: u64) -> Result<(), Error> {
         let state = line.plate()?;
-        let Wanted { session, stroke, attempt } = wanted;
+        let PendingStroke { session, stroke, attempt } = pending;
         let path = self.drop.join(format!("{session:05}-{stroke:05}-{attempt}.{}", self.format));
-        let shot = self.device.shot(state.as_ref(), number).map_err(platen_sim_press::Error::from)?;
+        let capture = self.device.capture(state.as_ref(), number).map_err(platen_sim_press::Error::from)?;
         if self.late_file == Some(stroke) {
             let hidden = self.drop.join(format!(".late.{}", self.format));
-            shot.write(&hidden)?;
-            grow(&path, &std::fs::read(&hidden)?)?;
+            capture.write(&hidden)?;
+            write_in_halves(&path, &std::fs::read(&hidden)?)?;
             std::fs::remove_file(hidden)?;
         } else {
-            shot.write(&path)?;
+            capture.write(&path)?;
         }
         tracing::info!(path = %path.display(), "scan dropped");
         Ok(())
@@ -135,7 +135,7 @@ impl Scanner {
 }
 
 /// Writes a file late and in two halves.
-fn grow(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+fn write_in_halves(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let (first, second) = bytes.split_at(bytes.len() / 2);
     std::thread::sleep(LATE);
     let mut file = std::fs::File::create_new(path)?;

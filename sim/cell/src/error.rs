@@ -22,7 +22,7 @@ pub(crate) enum Error {
     Press(#[from] platen_sim_press::Error),
     /// The press does not say what lies in it.
     #[error("press at {address}: {what}")]
-    Line { address: String, what: String },
+    Control { address: String, what: String },
     /// A scan cannot be written.
     #[error(transparent)]
     File(#[from] platen_sim_scanner::FileError),
@@ -41,7 +41,7 @@ impl Error {
             | Self::Plate { .. }
             | Self::Format { .. }
             | Self::Press(Press::Config { .. } | Press::Plate(_)) => 2,
-            Self::Press(_) | Self::Line { .. } | Self::File(_) | Self::System(_) => 1,
+            Self::Press(_) | Self::Control { .. } | Self::File(_) | Self::System(_) => 1,
         }
     }
 }

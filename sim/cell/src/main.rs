@@ -15,12 +15,12 @@
 
 mod bridge;
 mod cell;
-mod device;
-mod document;
+mod control_client;
 mod error;
-mod line;
 mod press;
 mod scanner;
+mod scanner_options;
+mod toml_file;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

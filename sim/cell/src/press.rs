@@ -1,7 +1,7 @@
 //! Verb `press`.
 
-use crate::document;
 use crate::error::Error;
+use crate::toml_file;
 use clap::Args;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
@@ -35,7 +35,7 @@ pub(crate) struct Command {
 impl Command {
     /// The file with the options on top.
     fn config(&self) -> Result<Config, Error> {
-        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), document::read)?;
+        let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), toml_file::read)?;
         if let Some(port) = self.modbus_port {
             config.link = LinkConfig::Tcp { port };
         }
@@ -54,7 +54,7 @@ impl Command {
 pub(crate) async fn run(command: &Command) -> Result<(), Error> {
     let press = start(command).await?;
     announce(Some(&press), None)?;
-    until_told(press, command).await
+    run_until_stopped(press, command).await
 }
 
 /// Starts the press.
@@ -63,24 +63,24 @@ pub(crate) async fn start(command: &Command) -> Result<SimPress, Error> {
 }
 
 /// Lets the press run until it is told to end.
-pub(crate) async fn until_told(mut press: SimPress, command: &Command) -> Result<(), Error> {
+pub(crate) async fn run_until_stopped(mut press: SimPress, command: &Command) -> Result<(), Error> {
     tokio::select! {
         ended = press.ended() => ended?,
-        told = told_to_end(command.with_parent) => told?,
+        told = stop_requested(command.with_parent) => told?,
     }
-    if let Ok(tally) = serde_json::to_string(&press.tally()) {
-        tracing::info!(%tally, "press ends");
+    if let Ok(counters) = serde_json::to_string(&press.counters()) {
+        tracing::info!(%counters, "press ends");
     }
     Ok(())
 }
 
-/// Resolves on SIGTERM, on Ctrl-C and, where wanted, when standard input closes.
-pub(crate) async fn told_to_end(with_parent: bool) -> Result<(), Error> {
+/// Resolves on SIGTERM, on Ctrl-C and, where pending, when standard input closes.
+pub(crate) async fn stop_requested(with_parent: bool) -> Result<(), Error> {
     let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {
         _ = terminate.recv() => {}
         interrupted = tokio::signal::ctrl_c() => interrupted?,
-        () = orphaned(), if with_parent => {}
+        () = stdin_closed(), if with_parent => {}
     }
     Ok(())
 }
@@ -104,7 +104,7 @@ pub(crate) fn announce(press: Option<&SimPress>, scanner: Option<SocketAddr>) ->
 
 /// Resolves when standard input closes. A thread of its own waits for that: the runtime could not end while one of its
 /// threads does.
-async fn orphaned() {
+async fn stdin_closed() {
     let (closed, wait) = tokio::sync::oneshot::channel();
     std::thread::spawn(move || {
         let ended = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());

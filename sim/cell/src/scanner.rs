@@ -1,8 +1,8 @@
 //! Verb `scanner`: one scan of a plate into a file, or as many as are asked for over TCP.
 
-use crate::device::Device;
 use crate::error::Error;
-use crate::{bridge, document, press};
+use crate::scanner_options::ScannerOptions;
+use crate::{bridge, press, toml_file};
 use clap::Args;
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{CellCounts, FileFormat, truth_document};
@@ -20,7 +20,7 @@ pub(crate) struct Command {
     #[arg(long, requires = "out")]
     truth: Option<PathBuf>,
     #[command(flatten)]
-    serve: bridge::Serve,
+    serve: bridge::BridgeOptions,
     /// Second port of a simulated press whose plate is scanned
     #[arg(long, value_name = "ADDRESS", requires = "serve", conflicts_with = "plate")]
     press: Option<String>,
@@ -28,7 +28,7 @@ pub(crate) struct Command {
     #[arg(long, requires = "serve")]
     with_parent: bool,
     #[command(flatten)]
-    device: Device,
+    device: ScannerOptions,
 }
 
 /// Scans once into a file, or serves scans until told to end.
@@ -40,20 +40,20 @@ pub(crate) async fn run(command: &Command) -> Result<(), Error> {
 }
 
 fn read(path: &Path) -> Result<PlateState, Error> {
-    let state: PlateState = document::read(path)?;
+    let state: PlateState = toml_file::read(path)?;
     Plate::new(&state).map_err(|source| Error::Plate { path: path.into(), source })?;
     Ok(state)
 }
 
 async fn serve(command: &Command) -> Result<(), Error> {
     let plate = match &command.press {
-        Some(press) => bridge::plate_of(press.clone()),
-        None => bridge::one_plate(command.plate.as_deref().map(read).transpose()?),
+        Some(press) => bridge::plate_of_press(press.clone()),
+        None => bridge::fixed_plate(command.plate.as_deref().map(read).transpose()?),
     };
     if let Some(bridge) = command.serve.start(&command.device, plate)? {
         press::announce(None, Some(bridge.address()))?;
-        press::told_to_end(command.with_parent).await?;
-        bridge::report(&bridge)?;
+        press::stop_requested(command.with_parent).await?;
+        bridge::print_counters(&bridge)?;
     }
     Ok(())
 }
@@ -64,12 +64,12 @@ fn write(command: &Command, plate: &Path, out: &Path) -> Result<(), Error> {
     }
     let state = read(plate)?;
     let impossible = |source| Error::Plate { path: plate.into(), source };
-    let shot = command.device.shot(Some(&state), 0).map_err(impossible)?;
-    shot.write(out)?;
+    let capture = command.device.capture(Some(&state), 0).map_err(impossible)?;
+    capture.write(out)?;
     if let Some(path) = &command.truth {
         let mut counts = CellCounts::default();
-        shot.scan.columns.iter().for_each(|column| counts.add(column));
-        let truth = truth_document(&state, &shot.scene, &counts);
+        capture.scan.columns.iter().for_each(|column| counts.add(column));
+        let truth = truth_document(&state, &capture.scene, &counts);
         std::fs::write(path, format!("{truth:#}\n"))?;
     }
     Ok(())

@@ -22,7 +22,7 @@
 //! This crate shares no code with the product: what it says is the truth that the product is judged by.
 
 mod cone;
-mod cut;
+mod cutting_error;
 mod error;
 mod material;
 mod plate;
@@ -32,7 +32,7 @@ mod shape;
 mod state;
 mod stroke;
 mod surface;
-mod swept;
+mod swept_surface;
 
 pub use error::PlateError;
 pub use plate::{Curvature, Plate, Side};

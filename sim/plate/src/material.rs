@@ -6,7 +6,7 @@
 //! polynomials in both parameters; W is a sum of squares, so Gauss-Newton finds the minimum. What the energy does not
 //! decide on a sphere is fixed by the gauge: mean shift and mean rotation are zero.
 
-use crate::swept::Swept;
+use crate::swept_surface::SweptSurface;
 use nalgebra::{DMatrix, DVector};
 
 /// Poisson's ratio of steel.
@@ -81,7 +81,7 @@ impl MaterialMap {
 
     /// The map of least membrane energy onto `surface`. `axis` is the direction of r in (u, v), a unit vector;
     /// `size` holds width and height, metres.
-    pub(crate) fn least_energy(surface: &Swept, axis: [f64; 2], size: [f64; 2]) -> Self {
+    pub(crate) fn least_energy(surface: &SweptSurface, axis: [f64; 2], size: [f64; 2]) -> Self {
         let sheet = Sheet { surface, axis, half: size.map(|length| length / 2.0) };
         let mut tables = Box::new([[[0.0; DEGREE + 1]; DEGREE + 1]; 2]);
         for _ in 0..20 {
@@ -128,7 +128,7 @@ fn components([a, b, c]: Strain) -> [f64; 3] {
 
 /// A flat sheet about to be laid on a surface.
 struct Sheet<'a> {
-    surface: &'a Swept,
+    surface: &'a SweptSurface,
     axis: [f64; 2],
     half: [f64; 2],
 }

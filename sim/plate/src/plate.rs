@@ -1,11 +1,11 @@
 //! The prepared geometry of one state of a plate.
 
 use crate::cone::Cone;
-use crate::cut::Cut;
+use crate::cutting_error::CuttingError;
 use crate::material::MaterialMap;
 use crate::profile::Profile;
 use crate::shape::{band_profile, curvature, step_profile};
-use crate::swept::Swept;
+use crate::swept_surface::SweptSurface;
 use crate::{Blank, Jet, PlateError, PlateState, Shape, Vec3};
 use nalgebra::Isometry3;
 
@@ -44,7 +44,7 @@ pub struct Curvature {
 
 #[derive(Debug, Clone)]
 enum Surface {
-    Swept(Box<Swept>),
+    SweptSurface(Box<SweptSurface>),
     Cone(Cone),
 }
 
@@ -52,7 +52,7 @@ enum Surface {
 #[derive(Debug, Clone)]
 pub struct Plate {
     blank: Blank,
-    cut: Option<Cut>,
+    cut: Option<CuttingError>,
     width: f64,
     height: f64,
     thickness: f64,
@@ -79,14 +79,14 @@ impl Plate {
             height,
             thickness: blank.thickness_mm * 1e-3,
             markers: blank.markers_mm.iter().map(|m| m.map(|c| c * 1e-3)).collect(),
-            cut: Cut::new(&blank),
+            cut: CuttingError::new(&blank),
             blank,
             surface,
             axis,
             map: MaterialMap::identity(),
             scanner_from_plate: state.pose.scanner_from_plate(),
         };
-        if let Surface::Swept(swept) = &plate.surface
+        if let Surface::SweptSurface(swept) = &plate.surface
             && !swept.is_developable()
         {
             plate.map = MaterialMap::least_energy(swept, axis, [width, height]);
@@ -140,7 +140,7 @@ impl Plate {
             }
         }
         let jet = match &self.surface {
-            Surface::Swept(swept) => swept.jet(s, r),
+            Surface::SweptSurface(swept) => swept.jet(s, r),
             Surface::Cone(cone) => cone.jet(s, r),
         };
         // The surface has x across the axis; turn it so that x is along u.
@@ -267,7 +267,7 @@ fn surface(shape: &Shape, width: f64, height: f64) -> Result<(Surface, [f64; 2])
         let (sin, cos) = axis_deg.to_radians().sin_cos();
         [cos, sin]
     };
-    let swept = |profile, section| Surface::Swept(Box::new(Swept { profile, section }));
+    let swept = |profile, section| Surface::SweptSurface(Box::new(SweptSurface { profile, section }));
     Ok(match shape {
         Shape::Flat => (swept(constant(0.0), constant(0.0)), along(90.0)),
         Shape::Cylinder { radius_mm, axis_deg } => {

@@ -34,7 +34,7 @@ impl Stroke {
 }
 
 /// How a stroke's die lies on a plate that has bends already.
-enum Lie {
+enum DieOrientation {
     /// Along the axis, or against it (positions change sign).
     Along { sign: f64 },
     /// Across the axis, with the sign of its positions along the axis.
@@ -44,14 +44,14 @@ enum Lie {
 /// Directions closer than this are the same, degrees.
 const SAME_DIRECTION_DEG: f64 = 1e-6;
 
-fn lie(die_deg: f64, axis_deg: f64) -> Option<Lie> {
+fn die_orientation(die_deg: f64, axis_deg: f64) -> Option<DieOrientation> {
     let turned = (die_deg - axis_deg).rem_euclid(360.0);
     let near = |target: f64| (turned - target).abs() < SAME_DIRECTION_DEG;
     match () {
-        () if near(0.0) || near(360.0) => Some(Lie::Along { sign: 1.0 }),
-        () if near(180.0) => Some(Lie::Along { sign: -1.0 }),
-        () if near(90.0) => Some(Lie::Across { sign: 1.0 }),
-        () if near(270.0) => Some(Lie::Across { sign: -1.0 }),
+        () if near(0.0) || near(360.0) => Some(DieOrientation::Along { sign: 1.0 }),
+        () if near(180.0) => Some(DieOrientation::Along { sign: -1.0 }),
+        () if near(90.0) => Some(DieOrientation::Across { sign: 1.0 }),
+        () if near(270.0) => Some(DieOrientation::Across { sign: -1.0 }),
         () => None,
     }
 }
@@ -72,9 +72,11 @@ impl PlateState {
             return Err(refuse("the plate has a closed shape; start from a flat one"));
         };
         let band = stroke.band();
-        match lie(stroke.axis_deg, *axis_deg) {
-            Some(Lie::Along { sign }) => bands.push(Band { at_mm: sign * band.at_mm, ..band }),
-            Some(Lie::Across { sign }) => cross_bands.push(Band { at_mm: sign * band.at_mm, ..band }),
+        match die_orientation(stroke.axis_deg, *axis_deg) {
+            Some(DieOrientation::Along { sign }) => bands.push(Band { at_mm: sign * band.at_mm, ..band }),
+            Some(DieOrientation::Across { sign }) => {
+                cross_bands.push(Band { at_mm: sign * band.at_mm, ..band })
+            }
             None => return Err(refuse("the die must lie along or across the strokes before it")),
         }
         self.strokes += 1;

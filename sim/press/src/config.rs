@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::faults::{LineFaults, StrokeFaults};
-use crate::steel::{PlateConfig, Strategy};
+use crate::forming_model::{PlateConfig, Strategy};
 use crate::{Error, Result};
 
 /// A press. Every key has a default; an unknown key is an error.

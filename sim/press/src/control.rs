@@ -3,7 +3,7 @@
 //! | line | answer |
 //! |---|---|
 //! | `{"get":"plate"}` | `{"plate":{...}}`, `{"plate":null}` when no plate lies in the press, `{"error":"..."}` while it moves |
-//! | `{"get":"stats"}` | `{"stats":{...}}`, a [`crate::tally::Tally`] |
+//! | `{"get":"stats"}` | `{"stats":{...}}`, a [`crate::counters::Counters`] |
 //! | `{"get":"counts"}` | `{"counts":{...}}`, the same without the results taken, whose number is `results` |
 //! | `{"get":"registers"}` | `{"registers":{"p":[..],"h":[..]}}` |
 //! | `{"do":"stroke"}`, `{"do":{"counter":65530}}`, any [`Command`] | `{"ok":true}` or `{"error":"..."}` |
@@ -90,7 +90,7 @@ pub(crate) async fn serve(listener: TcpListener, shared: Arc<Shared>) {
             Ok((client, _)) => {
                 let shared = Arc::clone(&shared);
                 tokio::spawn(async move {
-                    let ended = talk(client, &shared).await;
+                    let ended = serve_client(client, &shared).await;
                     tracing::debug!(?ended, "control client left");
                 });
             }
@@ -102,7 +102,7 @@ pub(crate) async fn serve(listener: TcpListener, shared: Arc<Shared>) {
     }
 }
 
-async fn talk(client: TcpStream, shared: &Shared) -> io::Result<()> {
+async fn serve_client(client: TcpStream, shared: &Shared) -> io::Result<()> {
     client.set_nodelay(true)?;
     let (reader, mut writer) = client.into_split();
     let mut lines = BufReader::new(reader).lines();
@@ -120,14 +120,14 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
     let answered = match serde_json::from_str(line) {
         Ok(Line::Get(Get::Plate)) => {
             let press = &mut shared.machine().press;
-            press.tally.plates_served += 1;
+            press.counters.plates_served += 1;
             serde_json::to_value(press.plate())
         }
-        Ok(Line::Get(Get::Stats)) => serde_json::to_value(&shared.machine().press.tally)
-            .map(|tally| serde_json::json!({ "stats": tally })),
+        Ok(Line::Get(Get::Stats)) => serde_json::to_value(&shared.machine().press.counters)
+            .map(|counters| serde_json::json!({ "stats": counters })),
         Ok(Line::Get(Get::Counts)) => {
-            let (tally, results) = shared.machine().press.tally.counts();
-            serde_json::to_value(&tally).map(|mut counts| {
+            let (counters, results) = shared.machine().press.counters.counts();
+            serde_json::to_value(&counters).map(|mut counts| {
                 counts["results"] = results.into();
                 serde_json::json!({ "counts": counts })
             })
@@ -137,7 +137,7 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
             let (p, h) = (machine.table.p_block(), machine.table.h_block().0.to_vec());
             Ok(serde_json::json!({ "registers": { "p": p, "h": h } }))
         }
-        Ok(Line::Do(command)) => match obey(command, shared) {
+        Ok(Line::Do(command)) => match execute(command, shared) {
             Ok(()) => Ok(serde_json::json!({ "ok": true })),
             Err(refused) => Ok(error(refused.to_string())),
         },
@@ -147,7 +147,7 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
 }
 
 /// Carries out one command.
-pub(crate) fn obey(command: Command, shared: &Shared) -> Result<()> {
+pub(crate) fn execute(command: Command, shared: &Shared) -> Result<()> {
     let now = shared.now();
     let mut machine = shared.machine();
     let Machine { press, table } = &mut *machine;

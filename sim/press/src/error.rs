@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use platen_sim_plate::PlateError;
 
-/// Why a press cannot start, obey or go on.
+/// Why a press cannot start, execute or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The configuration contradicts itself: change it.
@@ -41,13 +41,13 @@ pub enum Error {
     #[error("simulated press: refused: {0}")]
     Refused(&'static str),
     /// A state that was waited for did not come.
-    #[error("simulated press: not within {limit:?}: {what}; the press saw {tally}")]
+    #[error("simulated press: not within {limit:?}: {what}; the press saw {counters}")]
     Late {
         /// What was waited for.
         what: String,
         /// How long.
         limit: Duration,
-        /// The tally as JSON.
-        tally: String,
+        /// The counters as JSON.
+        counters: String,
     },
 }

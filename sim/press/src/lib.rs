@@ -2,8 +2,8 @@
 //!
 //! The press serves the register map PPH-1 over TCP, over RTU through TCP or on a serial line. Its program
 //! ([`program::Program`]) is the press side of the handshake, run every few milliseconds as a controller runs its
-//! own; at each stroke it bends a simulated plate ([`steel::Steel`]), which it shows on a second port
-//! ([`control`]) to the simulated scanner. What the host does is counted on this side ([`tally::Tally`]): tests
+//! own; at each stroke it bends a simulated plate ([`forming_model::FormingModel`]), which it shows on a second port
+//! ([`control`]) to the simulated scanner. What the host does is counted on this side ([`counters::Counters`]): tests
 //! assert there. [`faults`] lists what can be made to go wrong.
 //!
 //! **Invariants.** Nothing is shared with the host: registers, check sum, handshake and framing are written from the
@@ -16,27 +16,27 @@
 //!
 //! let press = SimPress::start(Config { strokes: 5, ..Config::default() }).await?;
 //! println!("Modbus at {:?}, plate at {}", press.modbus(), press.control());
-//! let tally = press.until("all strokes", Duration::from_secs(60), |tally| tally.done).await?;
-//! assert_eq!(tally.writes_outside, 0);
+//! let counters = press.until("all strokes", Duration::from_secs(60), |counters| counters.done).await?;
+//! assert_eq!(counters.writes_outside, 0);
 //! # Ok(())
 //! # }
 //! ```
 
+mod answer_faults;
 pub mod config;
 pub mod control;
-mod damage;
+pub mod counters;
 mod error;
 pub mod faults;
+pub mod forming_model;
 pub mod frame;
-mod line;
+mod modbus_relay;
 pub mod press;
 pub mod program;
 mod pty;
 pub mod registers;
 mod server;
 mod shared;
-pub mod steel;
-pub mod tally;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -48,10 +48,10 @@ use tokio::time::MissedTickBehavior;
 
 pub use config::Config;
 pub use control::Command;
+pub use counters::Counters;
 pub use error::Error;
 pub use program::Cause;
 pub use registers::HBlock;
-pub use tally::Tally;
 
 use config::LinkConfig;
 use frame::Framing;
@@ -84,7 +84,7 @@ impl SimPress {
                 let framing =
                     if matches!(config.link, LinkConfig::Tcp { .. }) { Framing::Tcp } else { Framing::Rtu };
                 let (listener, address) = listen(SocketAddr::new(config.bind, *port)).await?;
-                tasks.spawn(forever(line::serve_tcp(
+                tasks.spawn(forever(modbus_relay::serve_tcp(
                     listener,
                     framing,
                     config.unit,
@@ -95,17 +95,24 @@ impl SimPress {
             }
             LinkConfig::Rtu { device, baud } => {
                 let device = device.display().to_string();
-                let serial = line::open_serial(&device, *baud)
+                let serial = modbus_relay::open_serial(&device, *baud)
                     .map_err(|source| Error::Serial { device: device.clone(), source })?;
-                let serve =
-                    line::serve_serial(serial, device, *baud, config.unit, server, Arc::clone(&shared));
+                let serve = modbus_relay::serve_serial(
+                    serial,
+                    device,
+                    *baud,
+                    config.unit,
+                    server,
+                    Arc::clone(&shared),
+                );
                 tasks.spawn(forever(serve));
                 None
             }
             LinkConfig::Pty { device } => {
                 let refused = |source| Error::Serial { device: device.display().to_string(), source };
                 let first = pty::plug(device).map_err(refused)?;
-                let serve = line::serve_pty(first, device.clone(), config.unit, server, Arc::clone(&shared));
+                let serve =
+                    modbus_relay::serve_pty(first, device.clone(), config.unit, server, Arc::clone(&shared));
                 tasks.spawn(forever(serve));
                 None
             }
@@ -130,8 +137,8 @@ impl SimPress {
 
     /// What the press has seen so far.
     #[must_use]
-    pub fn tally(&self) -> Tally {
-        self.shared.machine().press.tally.clone()
+    pub fn counters(&self) -> Counters {
+        self.shared.machine().press.counters.clone()
     }
 
     /// The H block as it stands.
@@ -151,14 +158,19 @@ impl SimPress {
     /// # Errors
     /// [`Error::Refused`] when it does not fit the state of the press.
     pub fn command(&self, command: Command) -> Result<()> {
-        control::obey(command, &self.shared)
+        control::execute(command, &self.shared)
     }
 
     /// Waits until `holds` is true of what the press saw, looked at once a cycle.
     ///
     /// # Errors
-    /// [`Error::Late`] with the tally when it does not come within `limit`.
-    pub async fn until(&self, what: &str, limit: Duration, holds: impl Fn(&Tally) -> bool) -> Result<Tally> {
+    /// [`Error::Late`] with the counters when it does not come within `limit`.
+    pub async fn until(
+        &self,
+        what: &str,
+        limit: Duration,
+        holds: impl Fn(&Counters) -> bool,
+    ) -> Result<Counters> {
         self.shared.until(what, limit, holds).await
     }
 

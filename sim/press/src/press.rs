@@ -8,11 +8,11 @@ use std::time::Duration;
 use platen_sim_plate::{PlateState, Reply, Stroke};
 
 use crate::config::Config;
+use crate::counters::{AcceptedResult, Counters, WriteMonitor, whole_ms};
 use crate::faults::StrokePlan;
+use crate::forming_model::{FormingModel, Next};
 use crate::program::{Cause, Event, Limits, Program, Request};
 use crate::registers::{HBlock, P_LEN, Table, ascii_words, control, h, p, status};
-use crate::steel::{Next, Steel};
-use crate::tally::{Taken, Tally, Witness, whole_ms};
 use crate::{Error, Result};
 
 /// How long part_end stands before the next part is laid in.
@@ -42,7 +42,7 @@ enum Phase {
 pub struct Press {
     config: Config,
     program: Program,
-    steel: Steel,
+    forming: FormingModel,
     phase: Phase,
     plan: StrokePlan,
     random: fastrand::Rng,
@@ -62,9 +62,9 @@ pub struct Press {
     pub(crate) masked: u16,
     pub(crate) automatic: bool,
     /// What the press saw.
-    pub tally: Tally,
+    pub counters: Counters,
     /// Sees every write.
-    pub witness: Witness,
+    pub write_monitor: WriteMonitor,
 }
 
 impl Press {
@@ -78,7 +78,7 @@ impl Press {
         let session_id = random.u16(1..);
         let mut press = Self {
             program: new_program(config, session_id, Duration::ZERO),
-            steel: Steel::new(&config.plate, config.strategy)?,
+            forming: FormingModel::new(&config.plate, config.strategy)?,
             phase: Phase::Rest { until: Duration::from_millis(config.timings.start_ms) },
             plan: StrokePlan::default(),
             random,
@@ -92,8 +92,8 @@ impl Press {
             forced: 0,
             masked: 0,
             automatic: config.automatic,
-            tally: Tally { parts: 1, ..Tally::default() },
-            witness: Witness::default(),
+            counters: Counters { parts: 1, ..Counters::default() },
+            write_monitor: WriteMonitor::default(),
             config: config.clone(),
         };
         press.program.stroke_id = config.stroke_id;
@@ -108,14 +108,14 @@ impl Press {
                 Reply::Error(String::from("the plate is moving: wait for the ram"))
             }
             Phase::PartEnd { .. } | Phase::Done => Reply::Plate(None),
-            _ => Reply::Plate(Some(self.steel.state().clone().into())),
+            _ => Reply::Plate(Some(self.forming.state().clone().into())),
         }
     }
 
     /// The plate, wherever it is.
     #[must_use]
-    pub fn steel(&self) -> &PlateState {
-        self.steel.state()
+    pub fn plate_state(&self) -> &PlateState {
+        self.forming.state()
     }
 
     /// The program.
@@ -126,7 +126,7 @@ impl Press {
 
     /// Whether the registers hold the map; a host must not write otherwise.
     #[must_use]
-    pub fn speaks_the_map(&self) -> bool {
+    pub fn serves_the_map(&self) -> bool {
         self.config.map_version == crate::registers::MAP_VERSION && !matches!(self.phase, Phase::Void { .. })
     }
 
@@ -135,7 +135,7 @@ impl Press {
     /// # Errors
     /// [`Error::Plate`] when a stroke cannot be made.
     pub fn step(&mut self, table: &mut Table, now: Duration) -> Result<()> {
-        self.tally.now_ms = whole_ms(now);
+        self.counters.now_ms = whole_ms(now);
         if self.halted_until.is_some_and(|until| now < until) {
             return Ok(());
         }
@@ -151,9 +151,9 @@ impl Press {
         }
         let host = table.h_block();
         for event in self.program.step(&host, now) {
-            self.note(event, now);
+            self.record(event, now);
         }
-        self.misbehave(table, &host, now)?;
+        self.apply_stroke_faults(table, &host, now)?;
         if matches!(self.phase, Phase::Void { .. }) {
             return Ok(());
         }
@@ -167,12 +167,12 @@ impl Press {
     /// # Errors
     /// [`Error::Refused`] after the last part, [`Error::Plate`] when the stroke cannot be made.
     pub fn stroke(&mut self, now: Duration) -> Result<()> {
-        match (self.phase, self.steel.next(u16::MAX)) {
+        match (self.phase, self.forming.next(u16::MAX)) {
             (Phase::Done | Phase::PartEnd { .. } | Phase::Void { .. }, _) => {
                 Err(Error::Refused("no plate lies in the press"))
             }
             (_, Next::Bend(stroke)) => {
-                self.steel.bend(&stroke)?;
+                self.forming.bend(&stroke)?;
                 self.raise(Cause::Stroke, now);
                 Ok(())
             }
@@ -204,7 +204,7 @@ impl Press {
     /// The controller restarts: registers 0, then a new session; the plate stays as it is.
     pub fn restart(&mut self, table: &mut Table, now: Duration) {
         table.clear();
-        self.tally.restarts += 1;
+        self.counters.restarts += 1;
         self.repeat_until = None;
         self.hasty_until = None;
         self.phase = Phase::Void { until: now + Duration::from_millis(self.config.timings.restart_ms) };
@@ -240,7 +240,7 @@ impl Press {
             }
             if self.plan.skip {
                 self.program.stroke_id = crate::program::next_stroke_id(self.program.stroke_id);
-                self.tally.skipped += 1;
+                self.counters.skipped += 1;
             }
         } else {
             self.plan = StrokePlan::default();
@@ -249,32 +249,32 @@ impl Press {
         self.repeat_until = None;
         self.hasty_until = None;
         if self.program.raise(cause, now).is_some() {
-            self.tally.superseded += 1;
+            self.counters.superseded += 1;
         }
         match cause {
-            Cause::Stroke => self.tally.strokes += 1,
-            Cause::Baseline => self.tally.baselines += 1,
-            Cause::Rescan => self.tally.rescans += 1,
+            Cause::Stroke => self.counters.strokes += 1,
+            Cause::Baseline => self.counters.baselines += 1,
+            Cause::Rescan => self.counters.rescans += 1,
         }
         self.phase = Phase::Wait;
     }
 
-    fn note(&mut self, event: Event, now: Duration) {
+    fn record(&mut self, event: Event, now: Duration) {
         match event {
             Event::Accepted => {}
-            Event::AcceptLate => self.tally.accepted_late += 1,
+            Event::AcceptLate => self.counters.accepted_late += 1,
             Event::ResultTimeout(request) => {
-                self.tally.result_timeouts += 1;
+                self.counters.result_timeouts += 1;
                 if request.cause == Cause::Baseline {
                     self.baseline_due = false;
                 }
             }
-            Event::HostDead(_) => self.tally.host_deaths += 1,
-            Event::Taken(request, host) => {
-                self.tally.judge(&host, self.config.recipe_id);
-                let taken = self.taken(&request, &host, now);
-                self.tally.taken.push(taken);
-                self.steel.learn(&host);
+            Event::HostDead(_) => self.counters.host_deaths += 1,
+            Event::ResultAccepted(request, host) => {
+                self.counters.check_result(&host, self.config.recipe_id);
+                let taken = self.accepted_result(&request, &host, now);
+                self.counters.taken.push(taken);
+                self.forming.record_result(&host);
                 if request.cause == Cause::Baseline {
                     self.baseline_due = false;
                 }
@@ -286,14 +286,14 @@ impl Press {
         }
     }
 
-    fn taken(&self, request: &Request, host: &HBlock, now: Duration) -> Taken {
-        Taken {
+    fn accepted_result(&self, request: &Request, host: &HBlock, now: Duration) -> AcceptedResult {
+        AcceptedResult {
             cause: request.cause,
             stroke_id: self.program.stroke_id,
             session_id: self.program.session_id,
             attempt: self.program.attempt,
             part_id: self.part_id,
-            bends: self.steel.state().strokes,
+            bends: self.forming.state().strokes,
             accepted_ms: request.accepted.map_or(0, |at| whole_ms(at - request.raised)),
             result_ms: whole_ms(now - request.raised),
             verdict: host.verdict(),
@@ -302,7 +302,7 @@ impl Press {
     }
 
     /// The faults that act while a request waits.
-    fn misbehave(&mut self, table: &mut Table, host: &HBlock, now: Duration) -> Result<()> {
+    fn apply_stroke_faults(&mut self, table: &mut Table, host: &HBlock, now: Duration) -> Result<()> {
         self.repeat_until = self.repeat_until.filter(|&until| now < until);
         let request = self.program.request().copied();
         let accepted = request.is_some_and(|request| request.accepted.is_some());
@@ -310,12 +310,12 @@ impl Press {
             self.hasty_until = None;
             if request.is_some() && !accepted {
                 self.program.withdraw();
-                self.tally.lost_while_busy += 1;
+                self.counters.lost_while_busy += 1;
             }
         }
         if self.plan.torn && host.word(h::ACK_STROKE_ID) == torn(self.program.stroke_id) {
             let number = torn(self.program.stroke_id);
-            self.tally
+            self.counters
                 .wrong(format!("stroke {}: the torn number {number} was accepted", self.program.stroke_id));
             self.plan.torn = false;
         }
@@ -338,7 +338,7 @@ impl Press {
         match self.phase {
             Phase::Rest { until } if now >= until && self.automatic => self.begin(host, now)?,
             Phase::Down { until, stroke } if now >= until => {
-                self.steel.bend(&stroke)?;
+                self.forming.bend(&stroke)?;
                 self.phase = Phase::Up { until: now + ms(self.config.timings.up_ms) };
             }
             Phase::Up { until } if now >= until => self.raise(Cause::Stroke, now),
@@ -361,8 +361,8 @@ impl Press {
             self.raise(Cause::Baseline, now);
             return Ok(());
         }
-        let next = if self.steel.state().strokes < self.config.strokes {
-            self.steel.next(self.program.attempt)
+        let next = if self.forming.state().strokes < self.config.strokes {
+            self.forming.next(self.program.attempt)
         } else {
             Next::End
         };
@@ -378,14 +378,14 @@ impl Press {
     }
 
     fn next_part(&mut self, now: Duration) -> Result<()> {
-        if self.tally.parts >= u64::from(self.config.parts) {
-            self.tally.done = true;
+        if self.counters.parts >= u64::from(self.config.parts) {
+            self.counters.done = true;
             self.phase = Phase::Done;
             return Ok(());
         }
-        self.tally.parts += 1;
+        self.counters.parts += 1;
         self.part_id += 1;
-        self.steel = Steel::new(&self.config.plate, self.config.strategy)?;
+        self.forming = FormingModel::new(&self.config.plate, self.config.strategy)?;
         self.baseline_due = self.config.baseline;
         let stroke_id = self.program.stroke_id;
         self.new_session(stroke_id);
@@ -432,7 +432,7 @@ impl Press {
         block[p::PART_ID] = part_high;
         block[p::PART_ID + 1] = part_low;
         block[p::PART_NAME..p::PART_NAME + 8].copy_from_slice(&ascii_words(&self.config.part_name));
-        block[p::BEND_INDEX] = u16::try_from(self.steel.state().strokes).unwrap_or(u16::MAX);
+        block[p::BEND_INDEX] = u16::try_from(self.forming.state().strokes).unwrap_or(u16::MAX);
         block[p::THICKNESS] = (self.config.plate.blank.thickness_mm * 100.0).round() as u16;
         block[p::ATTEMPT] = self.program.attempt;
         block[p::STROKE_ID_TAIL] = tail;

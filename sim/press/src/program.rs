@@ -57,7 +57,7 @@ pub enum Event {
     /// No echo within the accept limit; the request stands.
     AcceptLate,
     /// The result, as it stood in the H block when it was taken.
-    Taken(Request, Box<HBlock>),
+    ResultAccepted(Request, Box<HBlock>),
     /// No result within the limit: the press goes on without one.
     ResultTimeout(Request),
     /// The host's heartbeat stopped: the press goes on without a result.
@@ -184,7 +184,7 @@ impl Program {
                 if !self.withholds_ack {
                     self.ack_at = Some(now + self.limits.ack_delay);
                 }
-                events.push(Event::Taken(request, Box::new(*host)));
+                events.push(Event::ResultAccepted(request, Box::new(*host)));
             } else if now - request.raised >= self.limits.result {
                 self.request = None;
                 events.push(Event::ResultTimeout(request));

@@ -37,14 +37,14 @@ struct Connection {
 
 impl Connection {
     fn new(unit: u8, shared: Arc<Shared>) -> Self {
-        shared.machine().press.tally.connections += 1;
+        shared.machine().press.counters.connections += 1;
         Self { unit, shared, read_p: AtomicBool::new(false), read_h: AtomicBool::new(false) }
     }
 
     fn read(&self, address: u16, count: u16) -> Result<Response, ExceptionCode> {
         let mut machine = self.shared.machine();
         let Machine { press, table } = &mut *machine;
-        press.tally.reads += 1;
+        press.counters.reads += 1;
         let words = table.read(address, count).ok_or(ExceptionCode::IllegalDataAddress)?;
         if table.touches_p_block(address, count) {
             self.read_p.store(true, Ordering::Relaxed);
@@ -58,20 +58,20 @@ impl Connection {
     fn write(&self, address: u16, words: &[u16]) -> Result<(), ExceptionCode> {
         let mut machine = self.shared.machine();
         let Machine { press, table } = &mut *machine;
-        press.tally.writes += 1;
+        press.counters.writes += 1;
         if !(self.read_p.load(Ordering::Relaxed) && self.read_h.load(Ordering::Relaxed)) {
-            press.tally.writes_before_sync += 1;
+            press.counters.writes_before_sync += 1;
         }
-        if !press.speaks_the_map() {
-            press.tally.writes_while_void += 1;
+        if !press.serves_the_map() {
+            press.counters.writes_while_void += 1;
         }
         if !table.in_h_block(address, words.len()) {
-            press.tally.writes_outside += 1;
+            press.counters.writes_outside += 1;
         }
         if !table.write(address, words) {
             return Err(ExceptionCode::IllegalDataAddress);
         }
-        press.witness.observe(&table.h_block(), &mut press.tally);
+        press.write_monitor.observe(&table.h_block(), &mut press.counters);
         Ok(())
     }
 }

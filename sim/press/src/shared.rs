@@ -80,9 +80,9 @@ impl Shared {
         let now = self.now();
         let mut machine = self.machine();
         let Machine { press, table } = &mut *machine;
-        let restarts = press.tally.restarts;
+        let restarts = press.counters.restarts;
         press.step(table, now)?;
-        let restarted = press.tally.restarts != restarts;
+        let restarted = press.counters.restarts != restarts;
         drop(machine);
         if restarted {
             self.cut();
@@ -102,7 +102,7 @@ impl Shared {
         let Line { faults, random, .. } = &mut *line;
         let fault = faults.draw(random)?;
         drop(line);
-        *self.machine().press.tally.line_faults.entry(format!("{fault:?}")).or_default() += 1;
+        *self.machine().press.counters.line_faults.entry(format!("{fault:?}")).or_default() += 1;
         Some(fault)
     }
 
@@ -132,28 +132,30 @@ impl Shared {
         let _ = stop.wait_for(|&stop| stop).await;
     }
 
-    /// Waits until `what` holds of the tally.
+    /// Waits until `what` holds of the counters.
     pub(crate) async fn until(
         &self,
         what: &str,
         limit: Duration,
-        holds: impl Fn(&crate::tally::Tally) -> bool,
-    ) -> Result<crate::tally::Tally> {
+        holds: impl Fn(&crate::counters::Counters) -> bool,
+    ) -> Result<crate::counters::Counters> {
         let mut cycles = self.cycles.subscribe();
         let wait = async {
             loop {
-                if let Some(tally) = Some(&self.machine().press.tally).filter(|tally| holds(tally)) {
-                    return tally.clone();
+                if let Some(counters) =
+                    Some(&self.machine().press.counters).filter(|counters| holds(counters))
+                {
+                    return counters.clone();
                 }
                 // The sender is in `self`: this cannot fail.
                 let _ = cycles.changed().await;
             }
         };
         match tokio::time::timeout(limit, wait).await {
-            Ok(tally) => Ok(tally),
+            Ok(counters) => Ok(counters),
             Err(_) => {
-                let tally = serde_json::to_string(&self.machine().press.tally).unwrap_or_default();
-                Err(Error::Late { what: what.to_owned(), limit, tally })
+                let counters = serde_json::to_string(&self.machine().press.counters).unwrap_or_default();
+                Err(Error::Late { what: what.to_owned(), limit, counters })
             }
         }
     }

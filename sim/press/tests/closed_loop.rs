@@ -3,8 +3,8 @@
 
 use platen_sim_plate::{Plan, Plate, Shape};
 use platen_sim_press::HBlock;
+use platen_sim_press::forming_model::{FormingModel, Next, PlateConfig, Strategy};
 use platen_sim_press::registers::{h, status};
-use platen_sim_press::steel::{Next, PlateConfig, Steel, Strategy};
 
 const CHORD: f64 = 2.0;
 const LIMIT: f64 = 0.003;
@@ -50,8 +50,8 @@ fn lay(radius: f64, surface: impl Fn(f64) -> f64) -> Gap {
 }
 
 /// The worst board on lines along u and along v through the plate's middle, centred at `centres`.
-fn measure(steel: &Steel, radii: [Option<f64>; 2], centres: &[f64]) -> HBlock {
-    let plate = Plate::new(steel.state()).unwrap();
+fn measure(model: &FormingModel, radii: [Option<f64>; 2], centres: &[f64]) -> HBlock {
+    let plate = Plate::new(model.state()).unwrap();
     let half = 2.0;
     let mut worst: Option<(Gap, [f64; 2])> = None;
     for (along_v, radius) in radii.into_iter().enumerate().filter_map(|(i, r)| Some((i == 1, r?))) {
@@ -80,14 +80,14 @@ fn measure(steel: &Steel, radii: [Option<f64>; 2], centres: &[f64]) -> HBlock {
 
 /// Bends until the press leaves the plate; strokes made and gaps in millimetres on the way.
 fn press(config: &PlateConfig, radii: [Option<f64>; 2], centres: &[f64]) -> (bool, Vec<f64>) {
-    let mut steel = Steel::new(config, Strategy::ClosedLoop).unwrap();
+    let mut model = FormingModel::new(config, Strategy::ClosedLoop).unwrap();
     let mut gaps = Vec::new();
     for _ in 0..80 {
-        let result = measure(&steel, radii, centres);
+        let result = measure(&model, radii, centres);
         gaps.push(result.gap_max_mm().unwrap());
-        steel.learn(&result);
-        match steel.next(0) {
-            Next::Bend(stroke) => steel.bend(&stroke).unwrap(),
+        model.record_result(&result);
+        match model.next(0) {
+            Next::Bend(stroke) => model.bend(&stroke).unwrap(),
             Next::Rescan => return (false, gaps),
             Next::End => return (result.sense() == 0, gaps),
         }

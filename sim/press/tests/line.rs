@@ -29,7 +29,7 @@ fn quick() -> Config {
 
 async fn idle(faults: LineFaults) -> (SimPress, TcpStream) {
     let press = SimPress::start(Config { automatic: false, line_faults: faults, ..quick() }).await.unwrap();
-    press.until("a cycle", LIMIT, |tally| tally.now_ms > 0).await.unwrap();
+    press.until("a cycle", LIMIT, |counters| counters.now_ms > 0).await.unwrap();
     let stream = TcpStream::connect(press.modbus().unwrap()).await.unwrap();
     (press, stream)
 }
@@ -52,7 +52,7 @@ async fn a_late_answer_is_overtaken() {
     let (press, mut stream) =
         idle(LineFaults { late: 1.0, late_ms: [200, 200], ..LineFaults::default() }).await;
     stream.write_all(&READ).await.unwrap();
-    press.until("the late one", LIMIT, |tally| tally.line_faults.contains_key("Late")).await.unwrap();
+    press.until("the late one", LIMIT, |counters| counters.line_faults.contains_key("Late")).await.unwrap();
     press.command(Command::LineFaults(LineFaults::default())).unwrap();
     let mut second = READ;
     second[1] = 8;
@@ -72,7 +72,7 @@ async fn a_reset_ends_the_connection_before_or_after_the_service() {
         stream.write_all(&write).await.unwrap();
         let ended = timeout(LIMIT, stream.read(&mut [0; 16])).await.unwrap();
         assert!(matches!(ended, Ok(0) | Err(_)), "{ended:?}");
-        assert_eq!(press.tally().writes, writes);
+        assert_eq!(press.counters().writes, writes);
     }
 }
 
@@ -81,7 +81,7 @@ async fn an_exception_is_not_served() {
     let (press, mut stream) = idle(LineFaults { exception: 1.0, ..LineFaults::default() }).await;
     stream.write_all(&[0, 1, 0, 0, 0, 6, 1, 6, 0, 100, 0, 1]).await.unwrap();
     assert_eq!(read_exact(&mut stream).await, [0, 1, 0, 0, 0, 3, 1, 0x86, 6]);
-    assert_eq!(press.tally().writes, 0);
+    assert_eq!(press.counters().writes, 0);
 }
 
 #[tokio::test]
@@ -101,8 +101,8 @@ async fn rtu_through_tcp_carries_the_handshake() {
     let stream = TcpStream::connect(press.modbus().unwrap()).await.unwrap();
     stream.set_nodelay(true).unwrap();
     let host = tokio::spawn(Host::on(client::rtu::attach_slave(stream, Slave(1))).run(counted));
-    let tally = press.until("done", LIMIT, |tally| tally.done).await.unwrap();
-    assert_eq!((tally.taken.len(), tally.wrong_values, tally.writes_outside), (7, 0, 0));
+    let counters = press.until("done", LIMIT, |counters| counters.done).await.unwrap();
+    assert_eq!((counters.taken.len(), counters.wrong_values, counters.writes_outside), (7, 0, 0));
     host.abort();
 }
 
@@ -112,7 +112,7 @@ async fn serial(config: Config) -> (SimPress, SerialStream, tempfile::TempDir) {
     let device = folder.path().join("adapter");
     let config = Config { link: LinkConfig::Pty { device: device.clone() }, ..config };
     let press = SimPress::start(config).await.unwrap();
-    press.until("a cycle", LIMIT, |tally| tally.now_ms > 0).await.unwrap();
+    press.until("a cycle", LIMIT, |counters| counters.now_ms > 0).await.unwrap();
     let line = tokio_serial::new(device.to_string_lossy(), 115_200).open_native_async().unwrap();
     (press, line, folder)
 }
@@ -121,8 +121,8 @@ async fn serial(config: Config) -> (SimPress, SerialStream, tempfile::TempDir) {
 async fn a_serial_line_carries_the_handshake() {
     let (press, line, _folder) = serial(quick()).await;
     let host = tokio::spawn(Host::on(client::rtu::attach_slave(line, Slave(1))).run(counted));
-    let tally = press.until("done", LIMIT, |tally| tally.done).await.unwrap();
-    assert_eq!((tally.taken.len(), tally.wrong_values, tally.writes_outside), (7, 0, 0));
+    let counters = press.until("done", LIMIT, |counters| counters.done).await.unwrap();
+    assert_eq!((counters.taken.len(), counters.wrong_values, counters.writes_outside), (7, 0, 0));
     host.abort();
 }
 
@@ -175,5 +175,5 @@ async fn a_serial_press_is_silent_for_other_units_and_broken_frames() {
     timeout(LIMIT, line.read_exact(&mut bytes)).await.unwrap().unwrap();
     assert_eq!(bytes[..8], own, "the echo");
     assert_eq!(bytes[8..13], [1, 3, 2, 0, 3]);
-    assert_eq!(press.tally().reads, 1);
+    assert_eq!(press.counters().reads, 1);
 }

@@ -47,7 +47,7 @@ fn a_result_is_taken_once_and_acknowledged_until_valid_falls() {
     publish(&mut host);
     let events = program.step(&host, ms(20));
     assert!(
-        matches!(&events[..], [Event::Taken(request, words)] if request.cause == Cause::Stroke && **words == host)
+        matches!(&events[..], [Event::ResultAccepted(request, words)] if request.cause == Cause::Stroke && **words == host)
     );
     for now in [25, 30] {
         assert_eq!(program.step(&host, ms(now)), []);
@@ -119,7 +119,7 @@ fn a_rescan_is_accepted_by_a_host_that_is_busy_or_done_with_it() {
     publish(&mut host);
     assert_eq!(program.step(&host, ms(45)), []);
     host.0[h::ATTEMPT_ECHO] = 1;
-    assert!(matches!(program.step(&host, ms(50))[..], [Event::Taken(..)]));
+    assert!(matches!(program.step(&host, ms(50))[..], [Event::ResultAccepted(..)]));
 }
 
 /// A press and its registers, with a host that is alive and echoes, but never publishes.
@@ -163,11 +163,11 @@ fn echo(p: &[u16; 32], words: &mut [u16; 64]) {
 fn a_hasty_stroke_comes_while_the_host_is_busy_and_leaves() {
     let mut bench = Bench::new(StrokeFaults { hasty: 1.0, hasty_ms: 40, ..StrokeFaults::default() });
     bench.run(60, echo);
-    assert_eq!((bench.press.tally.strokes, bench.press.tally.superseded), (2, 1));
+    assert_eq!((bench.press.counters.strokes, bench.press.counters.superseded), (2, 1));
     assert_eq!(bench.press.program().stroke_id, 2);
     assert_eq!(bench.table.p_block()[p::CONTROL] & control::TRIGGER, control::TRIGGER);
     bench.run(40, echo);
-    assert_eq!(bench.press.tally.lost_while_busy, 1);
+    assert_eq!(bench.press.counters.lost_while_busy, 1);
     assert_eq!(bench.table.p_block()[p::CONTROL] & control::TRIGGER, 0);
 }
 
@@ -179,10 +179,10 @@ fn a_reboot_comes_while_the_host_is_busy() {
         bench.table.p_block()[p::SESSION_ID]
     };
     bench.run(40, echo);
-    assert_eq!(bench.press.tally.restarts, 1);
+    assert_eq!(bench.press.counters.restarts, 1);
     assert_eq!(bench.table.p_block(), [0; 32]);
-    assert!(!bench.press.speaks_the_map());
-    assert_eq!(bench.press.steel().strokes, 1, "the plate stays as it was bent");
+    assert!(!bench.press.serves_the_map());
+    assert_eq!(bench.press.plate_state().strokes, 1, "the plate stays as it was bent");
     bench.run(60, |_, words| *words = [0; 64]);
     let after = bench.table.p_block();
     assert_eq!(after[p::MAP_VERSION], 1);

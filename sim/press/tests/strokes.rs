@@ -8,7 +8,7 @@ use std::time::Duration;
 use host::{Host, counted};
 use platen_sim_press::config::Timings;
 use platen_sim_press::faults::StrokeFaults;
-use platen_sim_press::{Cause, Command, Config, SimPress, Tally};
+use platen_sim_press::{Cause, Command, Config, Counters, SimPress};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio_modbus::client::{Context, tcp};
@@ -34,23 +34,23 @@ async fn connect(press: &SimPress) -> Context {
 }
 
 /// Runs the plainest host against `config` until the press is done.
-async fn run(config: Config) -> (SimPress, Tally) {
+async fn run(config: Config) -> (SimPress, Counters) {
     let press = SimPress::start(config).await.unwrap();
     let host = Host::on(connect(&press).await);
     let host = tokio::spawn(host.run(counted));
-    let tally = press.until("done", LIMIT, |tally| tally.done).await.unwrap();
+    let counters = press.until("done", LIMIT, |counters| counters.done).await.unwrap();
     host.abort();
-    (press, tally)
+    (press, counters)
 }
 
-fn assert_right(tally: &Tally) {
-    assert_eq!(tally.wrong, Vec::<String>::new());
+fn assert_right(counters: &Counters) {
+    assert_eq!(counters.wrong, Vec::<String>::new());
     assert_eq!(
-        (tally.writes_outside, tally.writes_before_sync, tally.duplicates, tally.changed),
+        (counters.writes_outside, counters.writes_before_sync, counters.duplicates, counters.changed),
         (0, 0, 0, 0)
     );
-    assert_eq!(tally.owners, [4711]);
-    for taken in &tally.taken {
+    assert_eq!(counters.owners, [4711]);
+    for taken in &counters.taken {
         assert_eq!(u32::from(taken.words[55]), 1000 + taken.bends, "stroke {}", taken.stroke_id);
         assert_eq!(taken.words[4], taken.stroke_id);
     }
@@ -58,20 +58,20 @@ fn assert_right(tally: &Tally) {
 
 #[tokio::test]
 async fn strokes_follow_each_other_and_results_land_under_their_numbers() {
-    let (press, tally) = run(quick()).await;
-    assert_right(&tally);
-    assert_eq!((tally.baselines, tally.strokes, tally.taken.len()), (1, 12, 13));
-    let numbers: Vec<u16> = tally.taken.iter().map(|taken| taken.stroke_id).collect();
+    let (press, counters) = run(quick()).await;
+    assert_right(&counters);
+    assert_eq!((counters.baselines, counters.strokes, counters.taken.len()), (1, 12, 13));
+    let numbers: Vec<u16> = counters.taken.iter().map(|taken| taken.stroke_id).collect();
     assert_eq!(numbers, (1..=13).collect::<Vec<_>>());
-    assert_eq!(tally.taken[0].cause, Cause::Baseline);
+    assert_eq!(counters.taken[0].cause, Cause::Baseline);
     assert_eq!(press.p_block()[2] & 1 << 7, 1 << 7, "part_end stands at the end");
 }
 
 #[tokio::test]
 async fn the_counter_wraps_past_zero() {
-    let (_press, tally) = run(Config { stroke_id: 65_530, baseline: false, ..quick() }).await;
-    assert_right(&tally);
-    let numbers: Vec<u16> = tally.taken.iter().map(|taken| taken.stroke_id).collect();
+    let (_press, counters) = run(Config { stroke_id: 65_530, baseline: false, ..quick() }).await;
+    assert_right(&counters);
+    let numbers: Vec<u16> = counters.taken.iter().map(|taken| taken.stroke_id).collect();
     assert_eq!(numbers, [65_531, 65_532, 65_533, 65_534, 65_535, 1, 2, 3, 4, 5, 6, 7]);
 }
 
@@ -91,10 +91,10 @@ async fn bad_habits_do_not_lose_a_stroke_of_a_host_that_goes_by_numbers() {
         ("no acknowledge", every(|f| f.no_ack = 1.0)),
     ];
     for (name, stroke_faults) in cases {
-        let (_press, tally) = run(Config { stroke_faults, strokes: 5, ..quick() }).await;
-        assert_right(&tally);
-        assert_eq!((tally.strokes, tally.taken.len()), (5, 6), "{name}");
-        assert_eq!(tally.skipped, if name == "skip" { 5 } else { 0 }, "{name}");
+        let (_press, counters) = run(Config { stroke_faults, strokes: 5, ..quick() }).await;
+        assert_right(&counters);
+        assert_eq!((counters.strokes, counters.taken.len()), (5, 6), "{name}");
+        assert_eq!(counters.skipped, if name == "skip" { 5 } else { 0 }, "{name}");
     }
 }
 
@@ -107,12 +107,12 @@ async fn a_host_that_ignores_the_tail_is_caught() {
         ..quick()
     };
     let press = SimPress::start(config).await.unwrap();
-    press.until("a trigger", LIMIT, |tally| tally.strokes == 1).await.unwrap();
+    press.until("a trigger", LIMIT, |counters| counters.strokes == 1).await.unwrap();
     let mut client = connect(&press).await;
     let p = client.read_holding_registers(0, 32).await.unwrap().unwrap();
     assert_ne!(p[3], p[31]);
     client.write_single_register(103, p[3]).await.unwrap().unwrap();
-    press.until("a wrong value", LIMIT, |tally| tally.wrong_values == 1).await.unwrap();
+    press.until("a wrong value", LIMIT, |counters| counters.wrong_values == 1).await.unwrap();
 }
 
 #[tokio::test]
@@ -120,15 +120,15 @@ async fn writes_outside_and_before_sync_are_counted() {
     let press = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
     let mut client = connect(&press).await;
     client.write_single_register(100, 1).await.unwrap().unwrap();
-    let tally = press.tally();
-    assert_eq!((tally.writes, tally.writes_before_sync, tally.writes_outside), (1, 1, 0));
+    let counters = press.counters();
+    assert_eq!((counters.writes, counters.writes_before_sync, counters.writes_outside), (1, 1, 0));
     client.read_holding_registers(0, 32).await.unwrap().unwrap();
     client.read_holding_registers(100, 64).await.unwrap().unwrap();
     for address in [99, 163, 164] {
         client.write_multiple_registers(address, &[0, 0]).await.unwrap().unwrap();
     }
-    let tally = press.tally();
-    assert_eq!((tally.writes, tally.writes_before_sync, tally.writes_outside), (4, 1, 3));
+    let counters = press.counters();
+    assert_eq!((counters.writes, counters.writes_before_sync, counters.writes_outside), (4, 1, 3));
     assert_eq!(client.read_holding_registers(190, 20).await.unwrap(), Err(ExceptionCode::IllegalDataAddress));
     client.set_slave(Slave(2));
     assert_eq!(client.read_holding_registers(0, 1).await.unwrap(), Err(ExceptionCode::GatewayTargetDevice));
@@ -140,11 +140,11 @@ async fn a_rescan_is_a_new_attempt_of_the_same_stroke() {
     assert!(press.command(Command::Rescan).is_err(), "nothing to scan again yet");
     let host = tokio::spawn(Host::on(connect(&press).await).run(counted));
     press.command(Command::Stroke).unwrap();
-    press.until("the stroke", LIMIT, |tally| tally.taken.len() == 1).await.unwrap();
+    press.until("the stroke", LIMIT, |counters| counters.taken.len() == 1).await.unwrap();
     press.command(Command::Rescan).unwrap();
-    let tally = press.until("the rescan", LIMIT, |tally| tally.taken.len() == 2).await.unwrap();
+    let counters = press.until("the rescan", LIMIT, |counters| counters.taken.len() == 2).await.unwrap();
     let identities: Vec<_> =
-        tally.taken.iter().map(|taken| (taken.stroke_id, taken.attempt, taken.bends)).collect();
+        counters.taken.iter().map(|taken| (taken.stroke_id, taken.attempt, taken.bends)).collect();
     assert_eq!(identities, [(1, 0, 1), (1, 1, 1)]);
     host.abort();
 }
@@ -152,7 +152,7 @@ async fn a_rescan_is_a_new_attempt_of_the_same_stroke() {
 #[tokio::test]
 async fn a_restart_voids_the_registers_and_begins_a_session() {
     let press = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
-    press.until("a cycle", LIMIT, |tally| tally.now_ms > 0).await.unwrap();
+    press.until("a cycle", LIMIT, |counters| counters.now_ms > 0).await.unwrap();
     let before = press.p_block();
     press.command(Command::Restart).unwrap();
     assert_eq!(press.p_block(), [0; 32]);

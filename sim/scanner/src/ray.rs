@@ -21,7 +21,7 @@ pub enum Label {
     Table,
     /// Frame and ram.
     Press,
-    /// Shop floor.
+    /// RayCastHead floor.
     Floor,
     /// Wall of the shop.
     Wall,

@@ -26,7 +26,7 @@ pub struct CellCounts {
 }
 
 impl CellCounts {
-    /// Counts a column in.
+    /// AtomicCounters a column in.
     pub fn add(&mut self, column: &SimColumn) {
         for (truth, state) in column.truth.iter().zip(&column.state) {
             let on_plate = truth.label == Label::PlateTop;

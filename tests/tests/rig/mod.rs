@@ -17,8 +17,8 @@ use platen_plant::press::{Link, Press};
 use platen_press::{Answer, Journal, Order, PressLink, Status, channels, run_press};
 use platen_sim_plate::Plan;
 use platen_sim_press::config::Timings;
-use platen_sim_press::steel::PlateConfig;
-use platen_sim_press::{Config, SimPress, Tally};
+use platen_sim_press::forming_model::PlateConfig;
+use platen_sim_press::{Config, Counters, SimPress};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::sync::{mpsc, watch};
@@ -246,11 +246,11 @@ fn measurement(strokes: u32) -> Measurement {
         (Measure::Sense, -1.0),
     ]);
     let figures = Figures { values, stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
+    Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
 /// What must hold of every run, whatever was done to it.
-pub(crate) fn assert_clean(tally: &Tally) {
+pub(crate) fn assert_clean(tally: &Counters) {
     assert_eq!(tally.wrong, Vec::<String>::new());
     let counts = [
         ("writes outside the H block", tally.writes_outside),
@@ -274,7 +274,7 @@ pub(crate) fn assert_clean(tally: &Tally) {
 }
 
 /// Starts the press and the host on it, and waits until all strokes are made.
-pub(crate) async fn run(config: Config, scan: Duration) -> (SimPress, Host, Tally) {
+pub(crate) async fn run(config: Config, scan: Duration) -> (SimPress, Host, Counters) {
     let press = SimPress::start(config).await.unwrap();
     let host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), scan);
     let tally = done(&press, &host).await;
@@ -282,7 +282,7 @@ pub(crate) async fn run(config: Config, scan: Duration) -> (SimPress, Host, Tall
 }
 
 /// Waits until all strokes are made.
-pub(crate) async fn done(press: &SimPress, host: &Host) -> Tally {
+pub(crate) async fn done(press: &SimPress, host: &Host) -> Counters {
     match press.until("all strokes", LIMIT, |tally| tally.done).await {
         Ok(tally) => tally,
         Err(late) => {

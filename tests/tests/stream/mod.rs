@@ -2,15 +2,14 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::net::SocketAddr;
-use std::ops::ControlFlow;
 use std::time::Duration;
 
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{Catalogue, JobSpec, PluginError, Scanner};
 use platen_plant::PlantFile;
 use platen_scan::{Lattice, ScanEnd, Window};
 use platen_sim_plate::{PlateState, Shape};
-use platen_sim_scanner::stream::{Bridge, BridgeConfig, Shop};
+use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
 
 /// Longest scan that a test waits for; nothing here takes so long unless it is broken.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);
@@ -22,8 +21,8 @@ pub(crate) fn plate() -> PlateState {
 }
 
 /// A scanner before that plate.
-pub(crate) fn shop() -> Shop {
-    Shop { threads: 2, ..Shop::new(Box::new(|| Ok(Some(plate())))) }
+pub(crate) fn shop() -> RayCastHead {
+    RayCastHead { threads: 2, ..RayCastHead::new(Box::new(|| Ok(Some(plate())))) }
 }
 
 /// A bridge with these faults, its seed fixed.
@@ -31,7 +30,7 @@ pub(crate) fn bridge(faults: &[&str]) -> Bridge {
     start(faults, BridgeConfig::default(), shop())
 }
 
-pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: Shop) -> Bridge {
+pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: RayCastHead) -> Bridge {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     Bridge::start(BridgeConfig { faults, ..config }, Box::new(shop)).unwrap()
 }
@@ -60,15 +59,12 @@ pub(crate) fn scan(
     window: Option<&Window>,
     limit: Duration,
 ) -> Result<(Lattice, ScanEnd), PluginError> {
-    let mut lattice: Option<Lattice> = None;
-    let end = scanner.scan(JobSpec::untriggered(limit), window, &mut |event| {
-        match event {
-            ScanEvent::Begin(header) => lattice = Some(Lattice::new(header)),
-            ScanEvent::Column(column) => lattice.as_mut().unwrap().push(&column).unwrap(),
-        }
-        ControlFlow::Continue(())
-    })?;
-    Ok((lattice.unwrap(), end))
+    let mut scan = scanner.start(JobSpec::untriggered(limit), window)?;
+    let mut lattice = Lattice::new(scan.header().clone());
+    for column in &mut scan {
+        lattice.push(&column?).unwrap();
+    }
+    Ok((lattice, scan.finish()?))
 }
 
 /// Everything that a scan says, so that two can be compared to the last bit.

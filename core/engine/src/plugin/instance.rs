@@ -222,7 +222,7 @@ impl Emitted {
     }
 }
 
-/// A job in progress. Dropping it before its end cancels it.
+/// A job in progress. Dropping it before its end cancels it and waits for the plugin.
 #[derive(Debug)]
 pub struct RunningJob<'a> {
     instance: &'a Instance,
@@ -284,9 +284,9 @@ impl RunningJob<'_> {
     ///
     /// # Errors
     /// The reason of the failure.
-    pub fn finish(mut self) -> Result<(), PluginError> {
+    pub fn finish(&mut self) -> Result<(), PluginError> {
         while self.next_frame().is_some() {}
-        self.result.take().unwrap_or(Ok(()))
+        self.result.clone().unwrap_or(Ok(()))
     }
 
     /// Returns the name of the plugin, for messages.
@@ -297,9 +297,14 @@ impl RunningJob<'_> {
 
 impl Drop for RunningJob<'_> {
     fn drop(&mut self) {
-        if self.result.is_none() && self.cancelled_at.is_none() {
+        if self.result.is_some() {
+            return;
+        }
+        if self.cancelled_at.is_none() {
             self.cancel();
         }
+        let hung = matches!(self.finish(), Err(PluginError::Hangs { .. }));
+        tracing::debug!(plugin = self.name(), hung, "cancelled before its end");
     }
 }
 

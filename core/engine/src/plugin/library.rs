@@ -12,8 +12,7 @@ use object::read::elf::{ElfFile64, ProgramHeader};
 use object::{Object, ObjectSymbol};
 use platen_abi as abi;
 
-use super::host_table;
-use super::{Descriptor, PluginError};
+use super::{Descriptor, PluginError, host_table};
 
 /// A loaded library with one plugin; stays loaded until the program ends.
 #[derive(Debug, Clone)]

@@ -1,34 +1,24 @@
-//! Scanner drivers as the host sees them.
+//! Scanner drivers: scans are pulled column by column.
 
 use std::time::Duration;
 
 use platen_plant::OptionValue;
 use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, Window};
-use platen_sdk::exchange::DecodeError;
+use platen_sdk::exchange::Decode;
 
 use super::instance::InputFrame;
+use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError, RunningJob};
 
-use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError};
-
-/// Largest lattice believed: beyond the finest scanner's 17,351 x 40,960 cells.
+/// Largest lattice accepted: beyond the finest scanner's 17,351 x 40,960 cells.
 const MAX_ROWS: u32 = 1 << 16;
 const MAX_COLUMNS: u32 = 1 << 17;
 
-/// What comes out of a scan, in this order: one header, then columns in any order.
-#[derive(Debug)]
-pub enum ScanEvent {
-    /// What is coming.
-    Begin(ScanHeader),
-    /// One column, checked against the header.
-    Column(Column),
-}
-
-/// A scanner driver with its options.
+/// A configured scanner driver.
 #[derive(Debug)]
 pub struct Scanner(Instance);
 
 impl Scanner {
-    /// Makes a driver of checked options.
+    /// Creates a driver from checked options.
     ///
     /// # Errors
     /// As [`Instance::create`].
@@ -36,15 +26,15 @@ impl Scanner {
         Instance::create(library, Kind::Scanner, values).map(Self)
     }
 
-    /// The instance: opening, arming, estimating.
+    /// Returns the instance, to open and arm it.
     pub fn instance(&self) -> &Instance {
         &self.0
     }
 
-    /// Seconds that a scan takes, when the driver knows.
+    /// Returns the duration of a scan, if the driver can estimate it.
     ///
     /// # Errors
-    /// When the driver hangs.
+    /// [`PluginError::Hangs`].
     pub fn estimate(
         &self,
         window: Option<&Window>,
@@ -54,83 +44,100 @@ impl Scanner {
         Ok(seconds.and_then(|s| Duration::try_from_secs_f64(s).ok()))
     }
 
-    /// Scans. Every event goes to `sink` as it arrives; when `sink` says stop, the scan is cancelled.
+    /// Starts a scan and waits for its header.
     ///
     /// # Errors
-    /// The driver's reason, the deadline, or what was wrong with what it sent. Without `Ok` there was no scan.
-    pub fn scan(
-        &self,
-        spec: JobSpec,
-        window: Option<&Window>,
-        sink: &mut dyn FnMut(ScanEvent) -> std::ops::ControlFlow<()>,
-    ) -> Result<ScanEnd, PluginError> {
-        let mut reader = Reader { driver: self.0.name(), n_rows: None, end: None };
-        let mut job =
-            self.0.start(spec, window.map(|window| InputFrame::new(window, None)).into_iter().collect());
-        while let Some(frame) = job.next_frame() {
-            match reader.read(&frame) {
-                Ok(None) => {}
-                Ok(Some(event)) => {
-                    if sink(event).is_break() {
-                        job.cancel();
-                    }
-                }
-                Err(error) => {
-                    job.cancel();
-                    let hung = matches!(job.finish(), Err(PluginError::Hangs { .. }));
-                    tracing::debug!(hung, "cancelled a driver that misbehaved");
-                    return Err(error);
-                }
-            }
+    /// The driver's reason, the deadline, or the fault in what it sent.
+    pub fn start(&self, spec: JobSpec, window: Option<&Window>) -> Result<RunningScan<'_>, PluginError> {
+        let window = window.map(|window| InputFrame::new(window, None));
+        let mut job = self.0.start(spec, window.into_iter().collect());
+        let Some(frame) = job.next_frame() else {
+            job.finish()?;
+            return Err(misbehaved(&job, NO_END));
+        };
+        if !frame.is::<ScanHeader>() {
+            return Err(misbehaved(&job, out_of_turn(&frame)));
         }
-        job.finish()?;
-        reader.end.ok_or_else(|| reader.misbehaved("the scan has no end"))
+        let header: ScanHeader = decode(&job, &frame)?;
+        check(&header).map_err(|what| misbehaved(&job, what))?;
+        Ok(RunningScan { job, header, end: None })
     }
 }
 
-/// Reads a scan's frames in their order.
-struct Reader<'a> {
-    driver: &'a str,
-    n_rows: Option<u32>,
+/// A scan in progress: an iterator over its columns, checked against the header, in any order. Nothing follows an error.
+///
+/// Cancelling the job's token or reaching its deadline ends the scan with an error. Dropping it before its end cancels
+/// the job and waits for the driver.
+#[derive(Debug)]
+pub struct RunningScan<'a> {
+    job: RunningJob<'a>,
+    header: ScanHeader,
     end: Option<ScanEnd>,
 }
 
-impl Reader<'_> {
-    fn misbehaved(&self, what: impl Into<String>) -> PluginError {
-        PluginError::Misbehaved { name: self.driver.to_owned(), what: what.into() }
+const NO_END: &str = "the scan has no end";
+
+impl RunningScan<'_> {
+    /// Returns size, angles and notes of the lattice.
+    pub fn header(&self) -> &ScanHeader {
+        &self.header
     }
 
-    fn read(&mut self, frame: &Emitted) -> Result<Option<ScanEvent>, PluginError> {
-        if self.end.is_some() {
-            return Err(self.misbehaved(format!("{} after the scan's end", frame.format)));
-        }
-        let malformed = |e: DecodeError| self.misbehaved(format!("a malformed {}: {e}", frame.format));
-        match self.n_rows {
-            None if frame.is::<ScanHeader>() => {
-                let header: ScanHeader = frame.decode().map_err(malformed)?;
-                check(&header).map_err(|what| self.misbehaved(what))?;
-                self.n_rows = Some(header.n_rows);
-                Ok(Some(ScanEvent::Begin(header)))
-            }
-            Some(n_rows) if frame.is::<Column>() => {
-                let column: Column = frame.decode().map_err(malformed)?;
-                column.check(n_rows).map_err(|e| self.misbehaved(e.to_string()))?;
-                if column.index >= MAX_COLUMNS {
-                    return Err(self.misbehaved(format!("column {} of at most {MAX_COLUMNS}", column.index)));
-                }
-                Ok(Some(ScanEvent::Column(column)))
-            }
-            Some(_) if frame.is::<ScanEnd>() => {
-                let end: ScanEnd = frame.decode().map_err(malformed)?;
-                if end.outcome != Outcome::Complete {
-                    return Err(self.misbehaved("success without a complete scan"));
-                }
-                self.end = Some(end);
-                Ok(None)
-            }
-            _ => Err(self.misbehaved(format!("a frame {} out of turn", frame.format))),
-        }
+    /// Waits for the end of the scan; columns not taken are checked and dropped. Without `Ok` there was no scan.
+    ///
+    /// # Errors
+    /// The driver's reason, the deadline, or the fault in what it sent.
+    pub fn finish(&mut self) -> Result<ScanEnd, PluginError> {
+        self.by_ref().try_for_each(|column| column.map(drop))?;
+        self.end.ok_or_else(|| misbehaved(&self.job, NO_END))
     }
+
+    fn next_column(&mut self) -> Result<Option<Column>, PluginError> {
+        while let Some(frame) = self.job.next_frame() {
+            let job = &self.job;
+            if self.end.is_some() {
+                return Err(misbehaved(job, format!("{} after the scan's end", frame.format)));
+            }
+            if frame.is::<Column>() {
+                let column: Column = decode(job, &frame)?;
+                column.check(self.header.n_rows).map_err(|e| misbehaved(job, e.to_string()))?;
+                if column.index >= MAX_COLUMNS {
+                    return Err(misbehaved(job, format!("column {} of at most {MAX_COLUMNS}", column.index)));
+                }
+                return Ok(Some(column));
+            }
+            if !frame.is::<ScanEnd>() {
+                return Err(misbehaved(job, out_of_turn(&frame)));
+            }
+            let end: ScanEnd = decode(job, &frame)?;
+            if end.outcome != Outcome::Complete {
+                return Err(misbehaved(job, "success without a complete scan"));
+            }
+            self.end = Some(end);
+        }
+        self.job.finish()?;
+        if self.end.is_some() { Ok(None) } else { Err(misbehaved(&self.job, NO_END)) }
+    }
+}
+
+impl Iterator for RunningScan<'_> {
+    type Item = Result<Column, PluginError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_column().transpose()
+    }
+}
+
+fn misbehaved(job: &RunningJob<'_>, what: impl Into<String>) -> PluginError {
+    PluginError::Misbehaved { name: job.name().to_owned(), what: what.into() }
+}
+
+fn out_of_turn(frame: &Emitted) -> String {
+    format!("a frame {} out of turn", frame.format)
+}
+
+fn decode<T: Decode>(job: &RunningJob<'_>, frame: &Emitted) -> Result<T, PluginError> {
+    frame.decode().map_err(|e| misbehaved(job, format!("a malformed {}: {e}", frame.format)))
 }
 
 fn check(header: &ScanHeader) -> Result<(), String> {

@@ -1,11 +1,13 @@
-//! Second look at the cells: columns of the normalised lattice.
+//! Second pass: columns of the normalised lattice.
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
-/// One normalised cell that waits for the rest of its column.
+use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
+use crate::read::{Cells, ReadError};
+
+/// A normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     row: u32,
@@ -15,29 +17,63 @@ struct Sample {
     state: State,
 }
 
-/// Collects cells into columns by a [`Plan`] and gives each column out when its last cell came.
+/// Columns of an oriented lattice, each once, as soon as the file has completed it. Nothing follows an error.
 ///
-/// A file stored column by column needs memory for one column, a file stored row by row for all cells. Columns
-/// come in the order in which the file completes them.
-#[derive(Debug)]
-pub struct Assembler<'a> {
+/// A file stored column by column needs memory for one column, a file stored row by row for all cells.
+pub struct Columns<'a> {
     plan: &'a Plan,
+    cells: Cells<'a>,
     waiting: Vec<Vec<Sample>>,
     seen: u64,
     points: u64,
+    /// First column not yet examined for having no stored cell.
+    rest: usize,
 }
 
-impl<'a> Assembler<'a> {
-    /// Nothing collected yet.
-    pub fn new(plan: &'a Plan) -> Self {
-        Self { plan, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0 }
+impl<'a> Columns<'a> {
+    /// Starts the second pass over the cells.
+    pub(crate) fn new(plan: &'a Plan, cells: Cells<'a>) -> Self {
+        Self { plan, cells, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0, rest: 0 }
     }
 
-    /// Takes a cell; gives the column that it completes.
+    /// Returns the share of cells read, 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.seen as f64 / self.expected() as f64
+    }
+
+    /// Returns the trailer; columns not taken are read and dropped.
     ///
     /// # Errors
-    /// [`OrientError::Changed`] when the cell was not there in the first pass.
-    pub fn push(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
+    /// As the columns.
+    pub fn finish(&mut self) -> Result<ScanEnd, ReadError> {
+        self.try_for_each(|column| column.map(drop))?;
+        Ok(ScanEnd {
+            columns: self.plan.header.n_columns,
+            points: self.points,
+            warm_up_columns: self.plan.warm_up_columns,
+            outcome: Outcome::Complete,
+        })
+    }
+
+    fn next_column(&mut self) -> Result<Option<Column>, ReadError> {
+        while let Some(cell) = self.cells.next() {
+            if let Some(column) = self.add(&cell?)? {
+                return Ok(Some(column));
+            }
+        }
+        if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
+            return Err(self.changed().into());
+        }
+        let empty = self.plan.cells[self.rest..].iter().position(|cells| *cells == 0);
+        Ok(empty.map(|ahead| {
+            let index = self.rest + ahead;
+            self.rest = index + 1;
+            Column { index: index as u32, ..Column::default() }
+        }))
+    }
+
+    /// Adds a cell; returns the column that it completes.
+    fn add(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
         self.seen += 1;
         let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
         let samples = &mut self.waiting[column as usize];
@@ -62,25 +98,6 @@ impl<'a> Assembler<'a> {
         Ok(Some(column))
     }
 
-    /// Ends the scan: the columns of which the file stores no cell, and the trailer.
-    ///
-    /// # Errors
-    /// [`OrientError::Changed`] when cells of the first pass did not come.
-    pub fn finish(&self) -> Result<(Vec<Column>, ScanEnd), OrientError> {
-        if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
-            return Err(self.changed());
-        }
-        let empty = self.plan.cells.iter().enumerate().filter(|(_, cells)| **cells == 0);
-        let empty = empty.map(|(index, _)| Column { index: index as u32, ..Column::default() }).collect();
-        let end = ScanEnd {
-            columns: self.plan.header.n_columns,
-            points: self.points,
-            warm_up_columns: self.plan.warm_up_columns,
-            outcome: Outcome::Complete,
-        };
-        Ok((empty, end))
-    }
-
     fn expected(&self) -> u64 {
         self.plan.cells.iter().map(|cells| u64::from(*cells)).sum()
     }
@@ -90,9 +107,17 @@ impl<'a> Assembler<'a> {
     }
 }
 
+impl Iterator for Columns<'_> {
+    type Item = Result<Column, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_column().transpose()
+    }
+}
+
 impl Plan {
-    /// Normalised column and row of a stored cell, `None` when it lies outside of the lattice decided.
-    pub fn place(&self, cell: &RawCell) -> Option<(u32, u32)> {
+    /// Returns normalised column and row of a stored cell, `None` outside of the lattice decided.
+    pub(crate) fn place(&self, cell: &RawCell) -> Option<(u32, u32)> {
         let (row, column) = if self.swapped { (cell.column, cell.row) } else { (cell.row, cell.column) };
         let (n_rows, n_columns) = (self.header.n_rows, self.header.n_columns);
         let row = row.checked_sub(self.first_row).filter(|row| *row < n_rows)?;
@@ -102,8 +127,8 @@ impl Plan {
         Some(((column + n_columns - self.cut) % n_columns, row))
     }
 
-    /// Position of a stored cell: right-handed, metres.
-    pub fn position(&self, cell: &RawCell) -> [f64; 3] {
+    /// Returns the position of a stored cell: right-handed, metres.
+    pub(crate) fn position(&self, cell: &RawCell) -> [f64; 3] {
         let metres = match self.unit {
             Unit::Metre => cell.xyz,
             Unit::Millimetre => cell.xyz.map(|c| c / 1000.0),
@@ -116,7 +141,7 @@ impl Plan {
         }
     }
 
-    /// Range in metres and direction of a cell that is stored so; not beyond the zenith, where azimuth means another.
+    /// Returns range and direction of a cell stored so, in metres; not beyond the zenith, where the azimuth is another.
     fn beam(&self, cell: &RawCell) -> Option<(f64, Direction)> {
         let plain = self.mirror == Mirror::None && self.unit == Unit::Metre;
         let (range, direction) = cell.beam.filter(|_| plain)?;
@@ -139,7 +164,7 @@ impl Plan {
     }
 }
 
-/// Spreads samples over the rows between the first and the last of which something is known.
+/// Returns the column from the first to the last row of known direction.
 fn to_column(index: u32, samples: &[Sample]) -> Column {
     let known = || samples.iter().filter(|sample| sample.state != State::NoReturn);
     let first_row = known().map(|sample| sample.row).min().unwrap_or(0);

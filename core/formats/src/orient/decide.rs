@@ -1,4 +1,4 @@
-//! From sums to a decision.
+//! Decision from the sums of the first pass: axes, directions, unit, cut of a full circle.
 
 use std::f64::consts::TAU;
 
@@ -8,54 +8,52 @@ use super::survey::{FAR, MIN_FILL, NEAR, stored_range};
 use super::{Expected, Mirror, OrientError, Survey, Turn};
 use platen_scan::{ScanHeader, wrap_azimuth};
 
-/// Correlation from which rows and columns count as following the angles.
+/// Least correlation of row with elevation and of column with azimuth.
 const MIN_CORRELATION: f64 = 0.99;
 
-/// Rows and columns with valid cells from which an orientation can be told.
+/// Least number of rows and of columns with valid cells.
 const MIN_LINES: u32 = 3;
 
 /// Unit of length of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// As it should be.
+pub(crate) enum Unit {
+    /// Coordinates as stored.
     Metre,
-    /// Divided by 1000.
+    /// Coordinates divided by 1000.
     Millimetre,
 }
 
-/// What was decided of a stored lattice, and how to read it.
+/// Orientation of a stored lattice.
 #[derive(Debug, Clone)]
-pub struct Plan {
-    /// Size, angles, intensity range and one sentence per decision; the driver adds the instrument.
-    pub header: ScanHeader,
-    /// What the file calls rows are columns.
-    pub swapped: bool,
+pub(crate) struct Plan {
+    /// Size, angles, intensity range and one sentence per decision; the reader adds the instrument.
+    pub(crate) header: ScanHeader,
+    /// The file's rows are columns.
+    pub(crate) swapped: bool,
     /// Row 0 was at the bottom.
-    pub rows_flipped: bool,
+    pub(crate) rows_flipped: bool,
     /// Columns ran clockwise.
-    pub columns_flipped: bool,
+    pub(crate) columns_flipped: bool,
     /// Unit of the file.
-    pub unit: Unit,
-    /// What became of the frame.
-    pub mirror: Mirror,
-    /// Correlations of the normalised rows with elevation and columns with azimuth, as stored.
-    pub correlation: (f64, f64),
+    pub(crate) unit: Unit,
+    /// Correction of the frame.
+    pub(crate) mirror: Mirror,
     pub(super) intensity: Scale,
     pub(super) warm_up_columns: u32,
     pub(super) first_row: u32,
     pub(super) first_column: u32,
     /// Column (after flipping) that becomes column 0 of a full circle.
     pub(super) cut: u32,
-    /// Cells of every normalised column.
+    /// Number of cells of each normalised column.
     pub(super) cells: Vec<u32>,
 }
 
 impl Survey {
-    /// Decides how the cells seen form a lattice.
+    /// Decides the orientation of the lattice.
     ///
     /// # Errors
-    /// Why they do not: every variant of [`OrientError`] but those of single cells.
-    pub fn decide(self, expected: &Expected) -> Result<Plan, OrientError> {
+    /// Every variant of [`OrientError`] but those of single cells.
+    pub(crate) fn decide(self, expected: &Expected) -> Result<Plan, OrientError> {
         self.check_size()?;
         let (swapped, down, round) = self.choose_axes()?;
         let (rows, columns) = if swapped { (&self.columns, &self.rows) } else { (&self.rows, &self.columns) };
@@ -102,7 +100,6 @@ impl Survey {
             columns_flipped,
             unit,
             mirror: expected.mirror,
-            correlation: (down.correlation, round.correlation),
             intensity,
             warm_up_columns: 0,
             first_row: row_range.start as u32,
@@ -129,7 +126,7 @@ impl Survey {
         if (self.cells as f64) < MIN_FILL * places { Err(self.too_sparse()) } else { Ok(()) }
     }
 
-    /// True when rows and columns are swapped, then how elevation and azimuth follow them.
+    /// Returns whether rows and columns are swapped, with the fits of elevation and azimuth.
     fn choose_axes(&self) -> Result<(bool, Fit, Fit), OrientError> {
         let nothing = Fit { correlation: 0.0, start: 0.0, step: 0.0, spread: 0.0 };
         let fits = |rows: &[Line], columns: &[Line]| {
@@ -152,7 +149,7 @@ impl Survey {
         }
     }
 
-    /// Unit in which half of the ranges are ones that a scanner measures.
+    /// Returns the unit in which half of the ranges lie within those of scanners.
     fn unit(&self) -> Result<Unit, OrientError> {
         let half = self.valid / 2;
         let refuse = |side, limit| Err(OrientError::Unit { valid: self.valid, side, limit });
@@ -184,7 +181,7 @@ impl Plan {
         ));
         note(format!(
             "columns run {} in the file (correlation of column with azimuth {:+.6}){}",
-            if round.step < 0.0 { Turn::Clockwise } else { Turn::CounterClockwise }.says(),
+            if round.step < 0.0 { Turn::Clockwise } else { Turn::CounterClockwise }.name(),
             round.correlation,
             if self.columns_flipped { ": columns reversed" } else { "" },
         ));
@@ -236,7 +233,7 @@ impl Plan {
     }
 }
 
-/// How azimuth follows columns once the frame is right-handed.
+/// Returns the fit of azimuth in the right-handed frame.
 fn mirrored(round: Fit, mirror: Mirror) -> Fit {
     match mirror {
         Mirror::None => round,
@@ -249,13 +246,13 @@ fn check_turn(clockwise: bool, expected: Option<Turn>) -> Result<(), OrientError
     let found = if clockwise { Turn::Clockwise } else { Turn::CounterClockwise };
     match expected {
         Some(expected) if expected != found => {
-            Err(OrientError::Mirrored { found: found.says(), expected: expected.says() })
+            Err(OrientError::Mirrored { found: found.name(), expected: expected.name() })
         }
         _ => Ok(()),
     }
 }
 
-/// True when the last column is the neighbour of the first.
+/// Returns whether the last column is the neighbour of the first.
 fn is_closed(n_columns: u32, step: f64) -> bool {
     (f64::from(n_columns) * step - TAU).abs() < 0.5 * step
 }

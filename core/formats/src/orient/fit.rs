@@ -1,4 +1,7 @@
-//! Lines of a lattice (rows or columns) and how well their number follows an angle.
+//! Weighted least-squares fit of an angle to the number of a line (row or column), with its correlation.
+//!
+//! Azimuths are averaged as unit vectors (circular mean and variance) and unwrapped from line to line by the median
+//! step, so that a blind sector of more than half a turn does not lose a turn.
 
 use std::f64::consts::{PI, TAU};
 
@@ -37,8 +40,7 @@ impl Line {
         (mean, (self.elevation2 / n - mean * mean).max(0.0))
     }
 
-    /// Direction of the mean beam and the circular variance about it, radians squared (2 (1 - R) for a small
-    /// spread).
+    /// Circular mean and variance of the azimuth, radians and radians squared (2 (1 - R) for a small spread).
     fn azimuth(&self) -> (f64, f64) {
         let mean = self.north.atan2(self.east);
         let resultant = self.east.hypot(self.north) / self.horizontal.max(f64::MIN_POSITIVE);
@@ -46,7 +48,7 @@ impl Line {
     }
 }
 
-/// How the number of a line follows an angle: `angle = start + step * line`.
+/// Straight fit `angle = start + step * line`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
     /// Correlation over all valid cells, not over line means.
@@ -59,7 +61,7 @@ pub(super) struct Fit {
     pub(super) spread: f64,
 }
 
-/// A line that holds valid cells: number, valid cells, mean angle, variance about it.
+/// A line with valid cells: number, count of valid cells, mean angle, variance about it.
 struct Mean {
     line: f64,
     weight: f64,
@@ -67,7 +69,7 @@ struct Mean {
     variance: f64,
 }
 
-/// Fits elevation to the number of the line; `None` with fewer than two lines that hold anything.
+/// Fits elevation to the number of the line; `None` with fewer than two lines of valid cells.
 pub(super) fn elevation(lines: &[Line]) -> Option<Fit> {
     let means: Vec<Mean> = means(lines, Line::elevation);
     fit(&means)
@@ -92,8 +94,7 @@ fn means(lines: &[Line], angle: fn(&Line) -> (f64, f64)) -> Vec<Mean> {
 
 /// Adds whole turns so that the angle grows evenly from line to line.
 ///
-/// Every line is predicted from the one before by the median step between neighbours, so that missing columns
-/// (a blind sector of more than half a turn, even) do not lose a turn.
+/// Every line is predicted from the one before by the median step between neighbours.
 fn unwrap(means: &mut [Mean]) {
     let mut steps: Vec<f64> = means
         .windows(2)
@@ -113,7 +114,7 @@ fn unwrap(means: &mut [Mean]) {
     }));
 }
 
-/// Weighted straight fit through the line means; the correlation counts the variance within lines too.
+/// Fits a straight line to the line means; the correlation includes the variance within lines.
 fn fit(means: &[Mean]) -> Option<Fit> {
     if means.len() < 2 {
         return None;

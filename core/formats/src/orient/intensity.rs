@@ -1,6 +1,6 @@
-//! Bringing intensities of any scale into 16 bits.
+//! Linear scaling of intensities to 16 bits.
 
-/// Intensities seen in valid cells.
+/// Extent of the intensities of valid cells.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Observed {
     min: f64,
@@ -15,7 +15,7 @@ impl Default for Observed {
 }
 
 impl Observed {
-    /// Takes a value into account; what is not finite counts for nothing.
+    /// Adds a value; one that is not finite is ignored.
     pub(super) fn add(&mut self, value: f64) {
         if value.is_finite() {
             self.min = self.min.min(value);
@@ -30,17 +30,17 @@ impl Observed {
 pub(super) struct Scale {
     low: f64,
     high: f64,
-    /// What the header declares.
+    /// Smallest and largest value in the header.
     pub(super) range: (u16, u16),
 }
 
-/// Full scales seen in files, with 0 as the other end unless said.
+/// Full scales in use for whole numbers.
 const WHOLE: [(f64, f64); 5] =
     [(0.0, 255.0), (0.0, 2047.0), (0.0, 4095.0), (0.0, 65535.0), (-2048.0, 2047.0)];
 
 impl Scale {
-    /// Chooses the scale: the declared one where it holds what was seen, else the smallest usual scale that
-    /// does, else what was seen. The sentence says what a reader of the figures should know.
+    /// Chooses the declared scale where it contains all values, else the smallest scale in use that does, else the
+    /// extent of the values; with a note on every choice but the declared one.
     pub(super) fn choose(declared: Option<(f64, f64)>, seen: &Observed) -> (Self, Option<String>) {
         if seen.min >= seen.max {
             let range = (seen.min.is_finite()).then(|| format!("all intensities are {}", seen.min));
@@ -65,14 +65,14 @@ impl Scale {
         (Self::new(a, b), Some(note))
     }
 
-    /// Whole numbers that fit stay as they are; everything else fills 16 bits.
+    /// Keeps whole numbers that fit; stretches everything else to 16 bits.
     fn new(low: f64, high: f64) -> Self {
         let fits = low.fract() == 0.0 && high.fract() == 0.0 && low >= 0.0 && high > 1.0 && high <= 65535.0;
         let range = if fits { (low as u16, high as u16) } else { (0, u16::MAX) };
         Self { low, high, range }
     }
 
-    /// The 16-bit value; what lies outside of the scale is clamped.
+    /// Returns the 16-bit value, clamped to the scale.
     pub(super) fn apply(&self, value: f64) -> u16 {
         let (a, b) = (f64::from(self.range.0), f64::from(self.range.1));
         let scaled = a + (value - self.low) * (b - a) / (self.high - self.low);

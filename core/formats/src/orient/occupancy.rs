@@ -1,13 +1,13 @@
-//! Which cells were seen, one bit each, in memory that the number of cells justifies.
+//! Set of stored cells: a bitmap per column that grows in both directions, in memory bounded by the number of cells.
 
 use std::collections::VecDeque;
 
-/// Words of 64 rows that may be held beyond the cells seen; a lattice of any sensible filling stays far below.
+/// Words of 64 rows allowed regardless of the number of cells; lattices of usual filling stay far below.
 const FREE_WORDS: u64 = 1 << 16;
-/// Words that every cell seen justifies: 16 words are 1024 rows for one cell.
+/// Words allowed per cell: 16 words are 1024 rows for one cell.
 const WORDS_PER_CELL: u64 = 16;
 
-/// A set of (row, column) that grows from wherever it is first touched.
+/// A set of (row, column).
 #[derive(Debug, Default)]
 pub(super) struct Occupancy {
     columns: Vec<Rows>,
@@ -22,14 +22,14 @@ struct Rows {
     words: VecDeque<u64>,
 }
 
-/// What inserting a cell found.
+/// Result of an insertion.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Inserted {
     /// A new cell.
     New,
-    /// A cell that was there.
+    /// A cell that the set contains already.
     Twice,
-    /// A cell so far from all others that no memory is spent on it.
+    /// A cell so far from all others that the bitmap would exceed its bound.
     TooFar,
 }
 
@@ -62,7 +62,7 @@ impl Occupancy {
 }
 
 impl Rows {
-    /// Words to add until `word` is held.
+    /// Returns how many words to add until `word` is held.
     fn missing(&self, word: usize) -> usize {
         if self.words.is_empty() {
             1

@@ -1,4 +1,4 @@
-//! First look at the cells of a stored lattice.
+//! First pass: sums over the cells of a stored lattice.
 
 use super::occupancy::{Inserted, Occupancy};
 use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
@@ -7,18 +7,18 @@ use platen_scan::State;
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
 pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;
 
-/// Share of places that hold a cell, from which a set of indices is a lattice. Real scans of halls fill more
+/// Least share of places that hold a cell. Real scans of halls fill more
 /// than half, a scan of the open air a third; a cloud thinned out on export fills less than a hundredth.
 pub(super) const MIN_FILL: f64 = 0.02;
 
-/// Range that no scanner of this trade reaches in metres, and nearly every one exceeds in millimetres.
+/// Range that no such scanner reaches in metres, and nearly every one exceeds in millimetres.
 pub(super) const FAR: f64 = 350.0;
 /// Range below which no terrestrial scanner measures in metres.
 pub(super) const NEAR: f64 = 0.2;
 
 /// Sums over all cells of a stored lattice: one pass, memory by rows, columns and one bit per cell.
 #[derive(Debug, Default)]
-pub struct Survey {
+pub(crate) struct Survey {
     pub(super) rows: Vec<Line>,
     pub(super) columns: Vec<Line>,
     occupancy: Occupancy,
@@ -33,11 +33,11 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// Takes a cell into account.
+    /// Adds a cell.
     ///
     /// # Errors
     /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
-    pub fn add(&mut self, cell: &RawCell) -> Result<(), OrientError> {
+    pub(crate) fn add(&mut self, cell: &RawCell) -> Result<(), OrientError> {
         let (row, column) = (cell.row, cell.column);
         if row.max(column) > MAX_INDEX {
             return Err(OrientError::IndexOutOfRange { row, column, max: MAX_INDEX + 1 });
@@ -73,8 +73,8 @@ impl Survey {
         Ok(())
     }
 
-    /// Cells seen so far.
-    pub fn cells(&self) -> u64 {
+    /// Returns the number of cells added.
+    pub(crate) fn cells(&self) -> u64 {
         self.cells
     }
 
@@ -91,7 +91,7 @@ impl Survey {
     }
 }
 
-/// First to last line that holds a cell.
+/// Returns the range from the first to the last line that holds a cell.
 pub(super) fn stored_range(lines: &[Line]) -> std::ops::Range<usize> {
     let first = lines.iter().position(|line| line.cells > 0).unwrap_or(0);
     first..lines.len()

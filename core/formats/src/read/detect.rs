@@ -18,20 +18,17 @@ const STRUCTURED: &str =
 
 /// Returns the refusal of a folder.
 pub(super) fn folder(extension: &str) -> ReadError {
-    match extension {
-        "fls" => refused(
+    let (format, instead) = match extension {
+        "fls" => (
             "FARO scan as a folder",
             "only the maker's software reads its points; import it into SCENE and export a structured E57",
         ),
-        _ => refused("a folder", "name the scan file itself"),
-    }
+        _ => ("a folder", "name the scan file itself"),
+    };
+    ReadError::Refused(format.to_owned(), instead)
 }
 
-fn refused(format: impl Into<String>, instead: &'static str) -> ReadError {
-    ReadError::Refused { format: format.into(), instead }
-}
-
-/// First bytes that name a format for certain.
+/// First bytes of formats without a readable lattice.
 const SIGNATURES: [(&[u8], &str); 9] = [
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "FARO .fls scan (compound file)"),
     (b"LASF", "LAS or LAZ point cloud, unorganised"),
@@ -44,7 +41,7 @@ const SIGNATURES: [(&[u8], &str); 9] = [
     (b"7z\xbc\xaf\x27\x1c", "7z archive"),
 ];
 
-/// Extensions of formats that have no signature known in public.
+/// Extensions of formats without a public signature.
 const EXTENSIONS: [(&str, &str); 11] = [
     ("fls", "FARO .fls scan"),
     ("fws", "FARO SCENE workspace, which points to scans and holds none"),
@@ -65,7 +62,7 @@ const EXTENSIONS: [(&str, &str); 11] = [
 /// [`ReadError::Refused`] for every other format, [`ReadError::Incomplete`] for no bytes.
 pub(crate) fn format(head: &[u8], extension: &str) -> Result<Format> {
     if head.is_empty() {
-        return Err(ReadError::Incomplete { format: "scan", what: "0 bytes".to_owned() });
+        return Err(ReadError::Incomplete("scan", "0 bytes".to_owned()));
     }
     if head.starts_with(b"ASTM-E57") {
         return Ok(Format::E57);
@@ -75,10 +72,10 @@ pub(crate) fn format(head: &[u8], extension: &str) -> Result<Format> {
     }
     if let Some((_, format)) = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature)) {
         let instead = if format.contains("archive") { "unpack it first" } else { STRUCTURED };
-        return Err(refused(*format, instead));
+        return Err(ReadError::Refused((*format).to_owned(), instead));
     }
     if let Some((_, format)) = EXTENSIONS.iter().find(|(known, _)| *known == extension) {
-        return Err(refused(*format, STRUCTURED));
+        return Err(ReadError::Refused((*format).to_owned(), STRUCTURED));
     }
     text_format(head, extension)
 }
@@ -91,14 +88,14 @@ fn text_format(head: &[u8], extension: &str) -> Result<Format> {
     // A first line that holds one number is a count of points.
     let data = if sizes.first() == Some(&1) { &lines[1..] } else { &lines[..] };
     let unorganised =
-        |what: &str| Err(refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
+        |what: &str| Err(ReadError::Refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
     match sizes.as_slice() {
         [1, 1] | [1, 1, 3, ..] => Ok(Format::Ptx),
         [1] if extension == "ptx" => Ok(Format::Ptx),
         [_, ..] if !data.is_empty() && data.iter().all(|line| line.cell) => Ok(Format::Xyz),
         [.., n] if extension == "pts" && *n >= 3 => unorganised("PTS point cloud"),
         [.., n] if *n >= 3 => unorganised("text point cloud"),
-        _ => Err(refused("a file of unknown format", STRUCTURED)),
+        _ => Err(ReadError::Refused("a file of unknown format".to_owned(), STRUCTURED)),
     }
 }
 
@@ -106,11 +103,11 @@ fn text_format(head: &[u8], extension: &str) -> Result<Format> {
 struct Sampled {
     /// Numbers in it.
     numbers: usize,
-    /// True when they can be row, column and a point.
+    /// Whether they can be row, column and a point.
     cell: bool,
 }
 
-/// The first lines that are no comments; nothing when one holds anything but numbers.
+/// Returns the first lines that are no comments; none when one holds anything but numbers.
 fn sample(head: &[u8]) -> Result<Vec<Sampled>> {
     // The last line is only whole when the file ends with it.
     let whole = if (head.len() as u64) < HEAD {

@@ -1,9 +1,10 @@
-//! E57 (ASTM E2807), structured: cells carry `rowIndex` and `columnIndex`.
+//! E57 (ASTM E2807; Huber, "The ASTM E57 file format for 3D imaging data exchange", Proc. SPIE 7864, 2011), structured:
+//! points with `rowIndex` and `columnIndex`.
 //!
 //! The file is checked before it is parsed: its length against its header, then the CRC-32C of every page.
-//! Coordinates may be Cartesian or spherical, float, double or scaled integer; missing cells may be flagged,
-//! left out, or written as the origin. The pose is reported and not applied: a lattice is seen from its scanner.
-//! Cells are placed by their indices, never by their order.
+//! Coordinates may be Cartesian or spherical, float, double or scaled integer; missing cells may be flagged, left out, or
+//! written as the origin. The pose is reported and not applied: the lattice stays in the scanner's frame. Cells are
+//! placed by their indices, never by their order.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -30,7 +31,7 @@ pub(crate) struct E57<R: Read + Seek> {
 }
 
 impl<R: Read + Seek> E57<R> {
-    /// Checks the file and finds the scan: `chosen` counts from 1 and may be left out when the file holds one.
+    /// Checks the file and finds the scan; `chosen` counts from 1 and is optional when the file holds one.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length_note = check_length(&mut file)?;
         check_pages(&mut file)?;
@@ -63,10 +64,10 @@ impl<R: Read + Seek> Source for E57<R> {
 }
 
 fn unsound(what: String) -> ReadError {
-    ReadError::Unsound { format: FORMAT, what }
+    ReadError::Unsound(FORMAT, what)
 }
 
-/// The crate's message with those of its causes that it does not repeat, in one line.
+/// Returns the message of the `e57` crate with the causes that it does not repeat, in one line.
 pub(crate) fn chain(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
@@ -77,13 +78,13 @@ pub(crate) fn chain(error: &dyn std::error::Error) -> String {
         }
         cause = inner.source();
     }
-    // The XML parser quotes the character that it met, a line break for one.
+    // The XML parser quotes the offending character, which may be a line break.
     text.replace(char::is_control, " ")
 }
 
-/// Compares the header's figures with the file; a sentence when they differ harmlessly.
+/// Compares the header with the length of the file; returns a note on a harmless difference.
 fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
-    let incomplete = |what| Err(ReadError::Incomplete { format: FORMAT, what });
+    let incomplete = |what| Err(ReadError::Incomplete(FORMAT, what));
     let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
     file.rewind().map_err(ReadError::io("going back to the start"))?;
     if length < PAGE {
@@ -114,8 +115,7 @@ fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
     Ok(None)
 }
 
-/// Checks the CRC-32C at the end of every page. The standard writes it with the highest byte first, unlike all
-/// other numbers of the file.
+/// Checks the CRC-32C at the end of every page, which is big-endian, unlike all other numbers of the file.
 fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
     let mut page = [0; PAGE as usize];
     let mut number = 0_u64;
@@ -127,20 +127,17 @@ fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
         }
         let (content, checksum) = page.split_at(page.len() - 4);
         if crc32c::crc32c(content).to_be_bytes() != checksum {
-            return Err(ReadError::Damaged {
-                format: FORMAT,
-                what: format!("the checksum of page {number} is wrong"),
-            });
+            return Err(ReadError::Damaged(FORMAT, format!("the checksum of page {number} is wrong")));
         }
     }
     file.rewind().map_err(ReadError::io("going back to the start"))
 }
 
-/// The one scan that holds points, or the one asked for.
+/// Returns the chosen scan, or the only one that holds points.
 fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> {
     let held = clouds.len();
     if let Some(chosen) = chosen {
-        let missing = ReadError::NoSuchCloud { format: FORMAT, held, chosen };
+        let missing = ReadError::NoSuchCloud(FORMAT, held, chosen);
         return chosen.checked_sub(1).and_then(|i| clouds.into_iter().nth(i)).ok_or(missing);
     }
     let name = |(i, cloud): (usize, &PointCloud)| {
@@ -150,13 +147,13 @@ fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> 
     let mut filled = clouds.into_iter().filter(|cloud| cloud.records > 0);
     match (filled.next(), filled.next()) {
         (Some(cloud), None) => Ok(cloud),
-        (Some(_), Some(_)) => Err(ReadError::Several { format: FORMAT, scans }),
+        (Some(_), Some(_)) => Err(ReadError::Several(FORMAT, scans)),
         (None, _) => Err(unsound("it holds no points".to_owned())),
     }
 }
 
-/// Refuses a prototype in which no record takes any bits: no data could ever run out, and the reader would
-/// fill all memory.
+/// Refuses a prototype in which no record takes any bits: the data would never end, and the reader would fill all
+/// memory.
 fn check_prototype(prototype: &[Record]) -> Result<()> {
     let takes_bits = |record: &Record| match record.data_type {
         RecordDataType::Single { .. } | RecordDataType::Double { .. } => true,
@@ -194,7 +191,7 @@ fn describe(cloud: &PointCloud) -> About {
     }
 }
 
-/// `intensityLimits`, which are in the unit of the values but may be written as raw scaled integers.
+/// Returns `intensityLimits`, which are in the unit of the values but may be written as raw scaled integers.
 fn declared_intensity(cloud: &PointCloud) -> Option<(f64, f64)> {
     let limits = cloud.intensity_limits.as_ref()?;
     let record = cloud.prototype.iter().find(|record| record.name == RecordName::Intensity)?;
@@ -209,7 +206,7 @@ struct Field {
     data_type: RecordDataType,
 }
 
-/// Where the parts of a cell lie in a point, and what is allowed.
+/// Fields of a point that make up a cell, with the bounds of its indices.
 #[derive(Debug)]
 struct Fields {
     position: [Field; 3],
@@ -246,10 +243,10 @@ impl Fields {
         let state =
             if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
         let (Some(row), Some(column)) = (find(RecordName::RowIndex), find(RecordName::ColumnIndex)) else {
-            return Err(ReadError::Refused {
-                format: format!("unorganised E57 ({} points without row and column)", cloud.records),
-                instead: "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
-            });
+            return Err(ReadError::Refused(
+                format!("unorganised E57 ({} points without row and column)", cloud.records),
+                "the lattice was lost on export; export a structured E57 (gridded, one scan, every point)",
+            ));
         };
         Ok(Self {
             position,
@@ -263,7 +260,7 @@ impl Fields {
         })
     }
 
-    /// How the cells are held, for people.
+    /// Describes the encoding of the cells.
     fn format(&self) -> String {
         let numbers = match self.position[0].data_type {
             RecordDataType::Single { .. } => "f32".to_owned(),
@@ -276,7 +273,7 @@ impl Fields {
         format!("{FORMAT}: {coordinates} coordinates, {numbers}, {gaps}")
     }
 
-    /// The cell of a point, `None` for the second and later echoes of a beam.
+    /// Returns the cell of a point, `None` for the second and later echoes of a beam.
     fn cell(&self, values: &RawValues) -> std::result::Result<Option<RawCell>, String> {
         let whole = |field: &Field| values[field.index].to_i64(&field.data_type).map_err(|e| chain(&e));
         let number = |field: &Field| values[field.index].to_f64(&field.data_type).map_err(|e| chain(&e));
@@ -308,15 +305,15 @@ impl Fields {
     }
 }
 
-/// Smallest and largest row, then column. Without `indexBounds` any index that is not negative will do: the limits
-/// of the prototype say how many bits an index takes, not how large the lattice is.
+/// Returns smallest and largest row, then column. Without `indexBounds` any index from 0 is valid: the limits of the
+/// prototype give the number of bits of an index, not the size of the lattice.
 fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
     let any = (0, i64::from(u32::MAX));
     let or_any = |min: Option<i64>, max: Option<i64>| (min.unwrap_or(any.0), max.unwrap_or(any.1));
     declared.map_or([any, any], |b| [or_any(b.row_min, b.row_max), or_any(b.column_min, b.column_max)])
 }
 
-/// A range that is not positive is no measurement; without a range the direction stands alone.
+/// Returns range and direction. A range that is not positive becomes 0, no measurement; without a range it is 1 m.
 fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> (f64, Direction) {
     let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
     (range, Direction { azimuth, elevation })

@@ -18,56 +18,24 @@ pub enum ReadError {
         /// Reason of the operating system.
         source: io::Error,
     },
-    /// The file is shorter than it declares: still being written, or cut in transfer.
-    #[error("{format} file is incomplete: {what}; wait until it is written, or copy it again")]
-    Incomplete {
-        /// Format.
-        format: &'static str,
-        /// Amount found and amount required.
-        what: String,
-    },
-    /// A checksum does not match: the file must be copied again.
-    #[error("{format} file is damaged: {what}; copy it again, or export it again")]
-    Damaged {
-        /// Format.
-        format: &'static str,
-        /// Place and checksum.
-        what: String,
-    },
-    /// The content violates the format: the scan must be exported again.
-    #[error("{format} file is not sound: {what}; export it again, as a structured scan")]
-    Unsound {
-        /// Format.
-        format: &'static str,
-        /// Place and fault.
-        what: String,
-    },
-    /// The format is recognised and holds no readable lattice.
-    #[error("{format}: {instead}")]
-    Refused {
-        /// Format found.
-        format: String,
-        /// Reason, or the format to export instead.
-        instead: &'static str,
-    },
-    /// The file holds several scans and none was chosen.
-    #[error("{format} file holds {} scans ({}); choose one with the option cloud = 1 to {}", .scans.len(), .scans.join(", "), .scans.len())]
-    Several {
-        /// Format.
-        format: &'static str,
-        /// Name or size of each scan.
-        scans: Vec<String>,
-    },
-    /// The chosen scan does not exist.
-    #[error("{format} file holds {held} scans; there is no cloud {chosen}")]
-    NoSuchCloud {
-        /// Format.
-        format: &'static str,
-        /// Number of scans.
-        held: usize,
-        /// Number chosen, from 1.
-        chosen: usize,
-    },
+    /// The file is shorter than it declares, still being written or cut in transfer: format, found and required.
+    #[error("{0} file is incomplete: {1}; wait until it is written, or copy it again")]
+    Incomplete(&'static str, String),
+    /// A checksum does not match, the file must be copied again: format, place.
+    #[error("{0} file is damaged: {1}; copy it again, or export it again")]
+    Damaged(&'static str, String),
+    /// The content violates the format, the scan must be exported again: format, place and fault.
+    #[error("{0} file is not sound: {1}; export it again, as a structured scan")]
+    Unsound(&'static str, String),
+    /// The format is recognised and holds no readable lattice: its name, and the reason or the format to export instead.
+    #[error("{0}: {1}")]
+    Refused(String, &'static str),
+    /// The file holds several scans and none was chosen: format, name or size of each scan.
+    #[error("{0} file holds {held} scans ({scans}); choose one with the option cloud = 1 to {held}", held = .1.len(), scans = .1.join(", "))]
+    Several(&'static str, Vec<String>),
+    /// The chosen scan does not exist: format, number of scans, number chosen from 1.
+    #[error("{0} file holds {1} scans; there is no cloud {2}")]
+    NoSuchCloud(&'static str, usize, usize),
     /// The cells are no lattice.
     #[error("{0}")]
     Orient(#[from] OrientError),
@@ -84,8 +52,8 @@ impl ReadError {
         matches!(
             self,
             Self::Io { .. }
-                | Self::Incomplete { .. }
-                | Self::Damaged { .. }
+                | Self::Incomplete(..)
+                | Self::Damaged(..)
                 | Self::Orient(OrientError::Changed { .. })
         )
     }

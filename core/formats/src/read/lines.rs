@@ -1,4 +1,4 @@
-//! Lines of numbers, as exporters write them: any line end, byte order mark, trailing blanks, decimal commas.
+//! Lines of numbers as exporters write them: any line end, byte order mark, trailing blanks, decimal commas.
 
 use std::io::{BufRead, Read};
 
@@ -7,10 +7,10 @@ use super::error::{ReadError, Result};
 /// Longest line that is read; scan files stay below 300 bytes.
 const MAX_LINE: u64 = 4096;
 
-/// Most fields of a line that anyone asks for.
+/// Number of fields kept of a line.
 pub(crate) const MAX_FIELDS: usize = 12;
 
-/// Reads lines one after the other into one buffer.
+/// Reader of lines into one buffer of bounded size.
 pub(crate) struct Lines<R> {
     reader: R,
     line: Vec<u8>,
@@ -23,12 +23,12 @@ pub(crate) struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// At the start of a file, or of a line.
+    /// Starts at the beginning of a file, or of a line.
     pub(crate) fn new(reader: R) -> Self {
         Self { reader, line: Vec::new(), number: 0, offset: 0, ended: true }
     }
 
-    /// The next line without its end, `None` behind the last.
+    /// Reads the next line without its end, `None` after the last.
     pub(crate) fn next(&mut self) -> Result<Option<&[u8]>> {
         self.line.clear();
         let mut bounded = self.reader.by_ref().take(MAX_LINE);
@@ -41,14 +41,14 @@ impl<R: BufRead> Lines<R> {
         self.ended = self.line.last() == Some(&b'\n');
         if !self.ended && n as u64 == MAX_LINE {
             let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
-            return Err(ReadError::Unsound { format: "text", what });
+            return Err(ReadError::Unsound("text", what));
         }
         let mark: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
         Ok(Some(self.line.strip_prefix(mark).unwrap_or(&self.line)))
     }
 }
 
-/// Fields of a line, separated by blanks; at most [`MAX_FIELDS`], the count goes on.
+/// Splits a line at blanks; returns the first [`MAX_FIELDS`] fields and the number of all.
 pub(crate) fn fields(line: &[u8]) -> ([&[u8]; MAX_FIELDS], usize) {
     let mut fields: [&[u8]; MAX_FIELDS] = [&[]; MAX_FIELDS];
     let mut n = 0;
@@ -61,13 +61,13 @@ pub(crate) fn fields(line: &[u8]) -> ([&[u8]; MAX_FIELDS], usize) {
     (fields, n)
 }
 
-/// A number, with a point or a comma before its decimals.
+/// Parses a number with a decimal point or comma.
 pub(crate) fn number(field: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(field).ok()?;
     if text.contains(',') { text.replacen(',', ".", 1).parse().ok() } else { text.parse().ok() }
 }
 
-/// Numbers of a whole line; `None` when there are not exactly `N`.
+/// Parses a line of exactly `N` numbers.
 pub(crate) fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
     let (fields, n) = fields(line);
     if n != N {
@@ -80,12 +80,12 @@ pub(crate) fn numbers<const N: usize>(line: &[u8]) -> Option<[f64; N]> {
     Some(out)
 }
 
-/// A whole number without sign.
+/// Parses a whole number without sign.
 pub(crate) fn whole(field: &[u8]) -> Option<u32> {
     if field.iter().all(u8::is_ascii_digit) { std::str::from_utf8(field).ok()?.parse().ok() } else { None }
 }
 
-/// The one whole number of a line.
+/// Parses a line of one whole number.
 pub(crate) fn only_whole(line: &[u8]) -> Option<u32> {
     let (fields, n) = fields(line);
     if n == 1 { whole(fields[0]) } else { None }
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_file_without_line_ends_takes_no_memory() {
         let mut lines = Lines::new(std::io::BufReader::new(std::io::repeat(b'1').take(1 << 20)));
-        assert!(matches!(lines.next(), Err(ReadError::Unsound { .. })));
+        assert!(matches!(lines.next(), Err(ReadError::Unsound(..))));
         assert!(lines.line.capacity() <= 2 * MAX_LINE as usize);
     }
 }

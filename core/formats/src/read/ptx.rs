@@ -1,8 +1,8 @@
-//! PTX (Leica's note of 2009): columns, points per column, position, axes, 4x4, then one line per cell.
+//! PTX (Leica's note of 2009): columns, points per column, position, axes, 4x4, one line per cell.
 //!
-//! The first number is that of the columns, the second that of the cells in one of them, whatever the note calls
-//! them; the geometry has the last word. A missing cell is a line whose coordinates are `0 0 0`. Nothing protects
-//! the content but the number of lines. Several scans may follow each other in one file.
+//! The first number is that of the columns, the second that of the cells per column; the geometry decides in the end. A
+//! missing cell is a line with the coordinates `0 0 0`. The only protection of the content is the number of lines. Several
+//! scans may follow each other in one file.
 
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
@@ -28,7 +28,7 @@ pub(crate) struct Ptx<R> {
     about: About,
 }
 
-/// Where one scan lies in the file.
+/// Place and header of one scan in the file.
 #[derive(Debug, Clone, PartialEq)]
 struct Part {
     /// Byte behind the header.
@@ -42,7 +42,7 @@ struct Part {
 }
 
 impl<R: Read + Seek> Ptx<R> {
-    /// Counts the lines of the whole file and finds the scan; `chosen` counts from 1.
+    /// Counts the lines of the whole file and finds the scan; `chosen` counts from 1 and is optional when the file holds one.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
         file.rewind().map_err(ReadError::io("going back to the start"))?;
@@ -52,10 +52,10 @@ impl<R: Read + Seek> Ptx<R> {
             None if held == 1 => parts.swap_remove(0),
             None => {
                 let size = |p: &Part| format!("{} x {} cells", p.per_column, p.columns);
-                return Err(ReadError::Several { format: FORMAT, scans: parts.iter().map(size).collect() });
+                return Err(ReadError::Several(FORMAT, parts.iter().map(size).collect()));
             }
             Some(chosen) if (1..=held).contains(&chosen) => parts.swap_remove(chosen - 1),
-            Some(chosen) => return Err(ReadError::NoSuchCloud { format: FORMAT, held, chosen }),
+            Some(chosen) => return Err(ReadError::NoSuchCloud(FORMAT, held, chosen)),
         };
         let about = part.describe();
         Ok(Self { file, part, about })
@@ -90,7 +90,7 @@ fn cell(line: &[u8]) -> Option<([f64; 3], f64)> {
     Some(([x?, y?, z?], i?))
 }
 
-/// Headers of all scans, with every line of the file counted.
+/// Returns the headers of all scans; counts every line of the file.
 fn parts<R: BufRead>(reader: R, length: u64) -> Result<Vec<Part>> {
     let mut lines = Lines::new(reader);
     let mut parts = Vec::new();
@@ -116,7 +116,7 @@ fn parts<R: BufRead>(reader: R, length: u64) -> Result<Vec<Part>> {
     if parts.is_empty() { Err(incomplete(HEADER_LINES, format_args!("found 0"))) } else { Ok(parts) }
 }
 
-/// The nine lines behind the number of columns.
+/// Reads the nine lines after the number of columns.
 fn header<R: BufRead>(columns: u32, lines: &mut Lines<R>) -> Result<Part> {
     let per_column = lines::only_whole(next(lines)?);
     let per_column = per_column.ok_or_else(|| unsound(lines.number, "the cells per column"))?;
@@ -141,18 +141,18 @@ fn next<R: BufRead>(lines: &mut Lines<R>) -> Result<&[u8]> {
 }
 
 fn unsound(line: u64, needed: &str) -> ReadError {
-    ReadError::Unsound { format: FORMAT, what: format!("line {line} does not hold {needed}") }
+    ReadError::Unsound(FORMAT, format!("line {line} does not hold {needed}"))
 }
 
 fn incomplete(needed: u64, found: std::fmt::Arguments<'_>) -> ReadError {
-    ReadError::Incomplete { format: FORMAT, what: format!("{needed} lines needed, {found}") }
+    ReadError::Incomplete(FORMAT, format!("{needed} lines needed, {found}"))
 }
 
 impl Part {
-    /// Whether the frame is right-handed, and what the pose says.
+    /// Returns the declared properties, handedness and notes on the pose included.
     ///
-    /// The points are in the scanner's own frame, so that the pose is not applied; only a matrix that mirrors
-    /// says something of the points themselves. Where position and matrix disagree the matrix counts.
+    /// The points are in the scanner's frame, so that the pose is not applied; only a mirroring matrix concerns the points
+    /// themselves. Where position and matrix disagree the matrix is used.
     fn describe(&self) -> About {
         let mut notes = Vec::new();
         let [a, b, c, translation] = self.matrix;
@@ -186,7 +186,7 @@ impl Part {
     }
 }
 
-/// How far the determinant of a motion written with six decimals may be from 1.
+/// Largest distance from 1 of the determinant of a motion written with six decimals.
 const RIGID: f64 = 1e-3;
-/// Metres within which two ways of writing the scanner's position agree.
+/// Largest distance of the two forms of the scanner's position, metres.
 const SAME_PLACE: f64 = 1e-3;

@@ -1,4 +1,4 @@
-//! A file read through one large buffer that survives small seeks, and that stops when the work is cancelled.
+//! Buffered reading that keeps its buffer over small seeks and stops when the caller cancels.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -7,8 +7,8 @@ const WINDOW: usize = 1 << 18;
 
 /// A reader behind a buffer.
 ///
-/// Readers of pages seek before every page; `BufReader` would throw its buffer away each time. Before every refill
-/// `alive` is asked: on a slow share that is the only place where a cancelled job can be noticed.
+/// Readers of E57 pages seek before every page, where `BufReader` would discard its buffer. `alive` is called before every
+/// refill: on a slow share that is the only place where a cancelled job can be noticed.
 pub(super) struct Window<'a, R> {
     file: R,
     alive: &'a dyn Fn() -> bool,
@@ -20,7 +20,7 @@ pub(super) struct Window<'a, R> {
 }
 
 impl<'a, R: Read + Seek> Window<'a, R> {
-    /// At the start of `file`.
+    /// Starts at the beginning of `file`.
     pub(super) fn new(file: R, alive: &'a dyn Fn() -> bool) -> Self {
         Self { file, alive, held: Vec::new(), start: 0, position: 0 }
     }
@@ -36,7 +36,7 @@ impl<'a, R: Read + Seek> Window<'a, R> {
         Ok(())
     }
 
-    /// Bytes held from the position on.
+    /// Returns the bytes held from the position on.
     fn rest(&self) -> &[u8] {
         let behind = self.position.checked_sub(self.start).and_then(|n| usize::try_from(n).ok());
         behind.and_then(|n| self.held.get(n..)).unwrap_or(&[])

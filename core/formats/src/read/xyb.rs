@@ -1,23 +1,23 @@
 //! XYB (SCENE binary, version 1.0): a text header, four zero bytes, then x, y, z as f64 and the reflectance as u16.
 //!
-//! There is no count and no checksum; only the length tells a whole record from a cut one. `Rows` and `Cols` are
-//! named either way round. When the records are as many as the cells they are all of them, and the geometry says
-//! along which of the two they run; else they are hits alone and get their rows and columns back from the order in
-//! which they were measured, where that proves possible.
+//! There is no count and no checksum; only the length of the file shows a cut record. `Rows` and `Cols` may be exchanged.
+//! Where the number of records equals that of the cells, all cells are stored and the geometry decides along which of the
+//! two the records run. Otherwise only hits are stored, and rows and columns are recovered from the order of measurement
+//! ([`super::scan_order`]).
 
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::{Direction, State};
 
 use super::error::{ReadError, Result};
-use super::sweeps::{self, Placed, Placer, Steps};
+use super::scan_order::{self, Placed, Placer, Steps};
 use super::{About, Cells, Source};
 use crate::orient::{Expected, RawCell, Survey};
 
 const FORMAT: &str = "XYB";
 /// First line, without its version.
 pub(crate) const SIGNATURE: &[u8] = b"# SCENE XYZ binary";
-/// The header ends within so many bytes.
+/// Longest header, bytes.
 const MAX_HEADER: u64 = 512;
 const RECORD: usize = 26;
 /// Full scale of the scanner's reflectance.
@@ -33,16 +33,16 @@ pub(crate) struct Xyb<R> {
     about: About,
 }
 
-/// How records become cells.
+/// Mapping of records to cells.
 #[derive(Debug, Clone)]
 enum Order {
-    /// Every cell is stored, so many in a line.
+    /// All cells, with the number of them per line.
     Lines(u32),
-    /// Hits alone, the lowest of which lies in this row of the steps.
+    /// Hits only, with the lowest row among them.
     Hits(Steps, u32),
 }
 
-/// What the header says.
+/// Length and sizes in the header.
 struct Header {
     length: u64,
     rows: u32,
@@ -50,14 +50,14 @@ struct Header {
 }
 
 impl<R: Read + Seek> Xyb<R> {
-    /// Reads the header, checks the length and finds out how records become cells.
+    /// Reads the header, checks the length and determines the mapping of records to cells.
     pub(crate) fn open(mut file: R) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
         let header = header(&mut file)?;
         let bytes = length - header.length;
         if bytes == 0 || !bytes.is_multiple_of(RECORD as u64) {
             let what = format!("{bytes} bytes of points, a multiple of {RECORD} needed");
-            return Err(ReadError::Incomplete { format: FORMAT, what });
+            return Err(ReadError::Incomplete(FORMAT, what));
         }
         let cells = bytes / RECORD as u64;
         let about =
@@ -80,7 +80,7 @@ impl<R: Read + Seek> Xyb<R> {
         Ok(xyb)
     }
 
-    /// Whether the records run along what the header calls rows or along what it calls columns.
+    /// Determines whether the records run along the header's rows or along its columns.
     fn choose_lines(&mut self, rows: u32, columns: u32) -> Result<()> {
         let mut first_error = None;
         for in_a_line in [rows, columns] {
@@ -101,7 +101,7 @@ impl<R: Read + Seek> Xyb<R> {
         let mut reader = self.records()?;
         let mut hits = Vec::new();
         while let Some((xyz, _)) = next(&mut reader)?
-            && hits.len() < sweeps::SAMPLE
+            && hits.len() < scan_order::SAMPLE
         {
             if is_hit(xyz) {
                 hits.push(Direction::of(xyz));
@@ -168,24 +168,22 @@ fn is_hit(xyz: [f64; 3]) -> bool {
     xyz.iter().all(|c| c.is_finite()) && xyz != [0.0; 3]
 }
 
-/// A reason of the placing is one to refuse the file.
+/// Failure of the recovery of rows and columns: the file is refused.
 impl From<String> for ReadError {
     fn from(why: String) -> Self {
-        Self::Refused {
-            format: format!("XYB file of hits alone ({why})"),
-            instead: "export it again with all cells, or as structured E57",
-        }
+        let format = format!("XYB file of hits alone ({why})");
+        Self::Refused(format, "export it again with all cells, or as structured E57")
     }
 }
 
-/// The next record, `None` behind the last.
+/// Reads the next record, `None` after the last.
 fn next<R: Read>(reader: &mut R) -> Result<Option<Point>> {
     let mut record = [0; RECORD];
     let mut filled = 0;
     while filled < RECORD {
         match reader.read(&mut record[filled..]).map_err(ReadError::io("reading points"))? {
             0 if filled == 0 => return Ok(None),
-            0 => return Err(ReadError::Incomplete { format: FORMAT, what: "a record is cut".to_owned() }),
+            0 => return Err(ReadError::Incomplete(FORMAT, "a record is cut".to_owned())),
             n => filled += n,
         }
     }
@@ -205,15 +203,13 @@ fn header<R: Read + Seek>(file: &mut R) -> Result<Header> {
     let end = head.windows(4).position(|four| four == [0; 4]);
     let Some(end) = end else {
         let what = format!("no end of the header in {} bytes", head.len());
-        return Err(ReadError::Incomplete { format: FORMAT, what });
+        return Err(ReadError::Incomplete(FORMAT, what));
     };
     let text = String::from_utf8_lossy(&head[..end]);
     let size = |name: &str| {
         let line = text.lines().find_map(|line| line.strip_prefix(name));
-        line.and_then(|number| number.trim().parse().ok()).ok_or_else(|| ReadError::Unsound {
-            format: FORMAT,
-            what: format!("its header does not say {name}"),
-        })
+        line.and_then(|number| number.trim().parse().ok())
+            .ok_or_else(|| ReadError::Unsound(FORMAT, format!("its header does not contain {name}")))
     };
     Ok(Header { length: end as u64 + 4, rows: size("Rows")?, columns: size("Cols")? })
 }

@@ -1,8 +1,8 @@
 //! XYZ text with row and column, as SCENE exports it: `row col x y z [reflectance] [r g b [reflectance]]`.
 //!
-//! Missing cells are left out, so that the lattice has gaps and its size is only known at the end. A first line
-//! may hold the number of points; lines that begin with `#` or `//` are comments. Without such a count nothing
-//! protects the content but the end of the last line.
+//! Missing cells are left out, so that the size of the lattice is known at the end only. The first line may hold the
+//! number of points; lines that begin with `#` or `//` are comments. Without a count the only protection of the content
+//! is the end of the last line.
 
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
@@ -25,7 +25,7 @@ pub(crate) struct Xyz<R> {
 }
 
 impl<R: Read + Seek> Xyz<R> {
-    /// Estimates the number of points from the first kilobytes.
+    /// Estimates the number of points from the length of the file.
     pub(crate) fn open(mut file: R) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
         let cells = length / TYPICAL_LINE;
@@ -34,7 +34,7 @@ impl<R: Read + Seek> Xyz<R> {
     }
 }
 
-/// Bytes of a line by which progress is told.
+/// Bytes of a line, for the estimate.
 const TYPICAL_LINE: u64 = 40;
 
 impl<R: Read + Seek> Source for Xyz<R> {
@@ -91,12 +91,12 @@ impl<R: BufRead> Points<R> {
     }
 }
 
-/// True for lines that hold no point by intention.
+/// Returns whether a line is blank or a comment.
 pub(crate) fn is_comment(line: &[u8]) -> bool {
     line.starts_with(b"#") || line.starts_with(b"//") || line.iter().all(u8::is_ascii_whitespace)
 }
 
-/// True when the numbers of a line can be row, column and a point.
+/// Returns whether the numbers of a line can be row, column and a point.
 pub(crate) fn is_cell(line: &[u8]) -> bool {
     let (fields, n) = lines::fields(line);
     cell(&fields, n).is_some()
@@ -116,11 +116,11 @@ fn cell(fields: &[&[u8]; lines::MAX_FIELDS], n: usize) -> Option<RawCell> {
 }
 
 fn cut<R>(lines: &Lines<R>, what: &str) -> ReadError {
-    ReadError::Incomplete { format: FORMAT, what: format!("line {}: {what}", lines.number) }
+    ReadError::Incomplete(FORMAT, format!("line {}: {what}", lines.number))
 }
 
 fn unsound<R>(lines: &Lines<R>, width: Option<usize>) -> ReadError {
     let needed = width.map_or_else(|| "5, 6, 8 or 9".to_owned(), |n| n.to_string());
     let what = format!("line {} does not hold row, column and a point in {needed} numbers", lines.number);
-    ReadError::Unsound { format: FORMAT, what }
+    ReadError::Unsound(FORMAT, what)
 }

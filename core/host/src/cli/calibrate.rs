@@ -1,4 +1,9 @@
-//! `platen calibrate`: what a scanner's errors are beyond noise, from repeated scans of one plate.
+//! `platen calibrate`: correlated and systematic errors of a scanner, from repeated scans of one plate.
+//!
+//! Each pair of scans of an untouched plate (a null pair) differs by noise, which every scan states, and by errors that
+//! are correlated over the plate. The excess over the stated noise, pooled over all pairs, is `sigma_correlated`. Gaps under
+//! templates on an artefact of known shape give `sigma_true`: the systematic error with which the stated uncertainty covers
+//! 95 % of them. Formulas: `platen_shape::inspection::calibration`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,20 +24,20 @@ use platen_engine::stroke::Baseline;
 use platen_model::units::mm;
 use platen_report::output_folder;
 
-/// Scans of a plate that was left alone differ by less than this, one sigma: beyond it the plate was bent or moved on its
-/// supports, metres.
+/// Largest plausible difference of scans of an untouched plate, one sigma, metres; beyond it the plate was bent or moved on
+/// its supports.
 const NULL_LIMIT: f64 = 2e-3;
 
-/// Pairs below which the estimate itself scatters by a quarter or more.
+/// Fewest pairs of a steady estimate: below, it scatters by a quarter or more.
 const FEW_PAIRS: usize = 6;
 
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate plates/plate-017.toml\n  \
                         platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate granite.toml --artefact\n\n\
-                        Scan one plate several times and leave it alone in between. What the scans differ by beyond their noise is the \
+                        Scan one plate several times without touching it. The difference of the scans beyond their noise is the \
                         correlated error in every level of detection. With --artefact the plate has exactly the [target] of its \
-                        file: gaps under boards on it are the scanner's own, and go into every template's uncertainty. Writes the \
+                        file: gaps under templates on it are the scanner's own, and enter every template's uncertainty. Writes the \
                         file that [calibration] of the plant file names."
 )]
 pub(super) struct Command {
@@ -41,37 +46,37 @@ pub(super) struct Command {
     /// Scans of the same plate, nothing changed in between; at least two
     #[arg(required = true, num_args = 2..)]
     scans: Vec<PathBuf>,
-    /// Plate file of the plate that was scanned
+    /// Plate file of the scanned plate
     #[arg(long, value_name = "PLATE.toml")]
     plate: PathBuf,
     /// The plate is an artefact that has exactly the shape of its [target]
     #[arg(long)]
     artefact: bool,
-    /// File to write instead of the plant file's
+    /// File to write, instead of the one in the plant file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// What was found.
+/// Estimated errors, with the scans behind them.
 #[derive(Debug, Serialize)]
-struct Found {
+struct Summary {
     made: Timestamp,
     /// Scanner: maker, model, serial number.
     instrument: String,
     plate: String,
-    /// Scans that were taken.
+    /// Number of scans.
     scans: usize,
     /// Correlated error of a pair of scans, one sigma.
     sigma_correlated_mm: f64,
     /// Systematic error of a gap, one sigma; null without an artefact.
     sigma_true_mm: Option<f64>,
     pairs: Vec<PairRecord>,
-    /// Gaps under boards on the artefact.
+    /// Gaps under templates on the artefact, one record a chord.
     artefact: Vec<GapRecord>,
     file: PathBuf,
 }
 
-/// Two scans of the plate.
+/// A null pair: two scans of the untouched plate, numbered from 1.
 #[derive(Debug, Serialize)]
 struct PairRecord {
     scans: [usize; 2],
@@ -79,7 +84,7 @@ struct PairRecord {
     stated_mm: f64,
 }
 
-/// Boards of one length on the artefact.
+/// Gaps under templates of one chord on the artefact.
 #[derive(Debug, Serialize)]
 struct GapRecord {
     chord_mm: f64,
@@ -121,7 +126,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     if sigma_correlated > NULL_LIMIT {
         return Err(CliError::Failed(format!(
             "the scans differ by {:.1} mm beyond their noise: the plate was bent between them, or is not the same; scan one \
-             plate and leave it alone",
+             plate without touching it",
             mm(sigma_correlated)
         )));
     }
@@ -135,7 +140,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         sigma_true,
     };
     output_folder::replace(&file, calibration.to_toml().as_bytes())?;
-    let found = Found {
+    let summary = Summary {
         made: calibration.made,
         instrument: calibration.instrument,
         plate: calibration.plate,
@@ -147,14 +152,14 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         file,
     };
     if common.json {
-        output::json(&found)?
+        output::json(&summary)?
     } else {
-        print(&found)?
+        print(&summary)?
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// The known shape of an artefact.
+/// Returns the known shape of an artefact, `None` without `--artefact`.
 fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetSurface>, CliError> {
     if !command.artefact {
         return Ok(None);
@@ -168,7 +173,7 @@ fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetS
     shape.map(Some).ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))
 }
 
-/// What every two of the scans differ by, along the normal, the plate's own movement taken away.
+/// Compares every two of the scans: difference along the normal after rigid alignment, and the noise stated for it.
 fn null_pairs(
     rig: &Pipeline,
     plate: &PlateFile,
@@ -201,7 +206,7 @@ fn null_pairs(
     Ok((pairs, pooled))
 }
 
-/// Lengths of the boards that the plate file asks for; half its shorter side where it asks for none.
+/// Returns the chords of the plate file's templates; half the shorter side where it has none.
 fn chords(plate: &PlateFile) -> Vec<f64> {
     let mut chords: Vec<f64> = plate.templates.iter().map(|template| template.chord).collect();
     chords.sort_by(f64::total_cmp);
@@ -209,7 +214,7 @@ fn chords(plate: &PlateFile) -> Vec<f64> {
     if chords.is_empty() { vec![0.5 * plate.plate.width.min(plate.plate.height)] } else { chords }
 }
 
-/// Gaps on the artefact, and the worst board's systematic error, one sigma.
+/// Returns the gaps on the artefact, and the systematic error of the worst chord, one sigma.
 fn artefact(
     surfaces: &[Surface],
     shape: &TargetSurface,
@@ -223,7 +228,7 @@ fn artefact(
             surfaces.iter().flat_map(|now| artefact_gaps(now, shape, chord, sigma_correlated)).collect();
         if found.is_empty() {
             return Err(CliError::Failed(format!(
-                "no board of {:.0} mm fits the part of the artefact that was seen",
+                "no template of {:.0} mm fits the seen part of the artefact; scan all of it or shorten chord_mm",
                 mm(chord)
             )));
         }
@@ -240,9 +245,9 @@ fn artefact(
     Ok((gaps, worst))
 }
 
-fn print(found: &Found) -> Result<(), CliError> {
+fn print(summary: &Summary) -> Result<(), CliError> {
     let mut rows = vec![["scans", "differ by mm", "stated mm"].map(str::to_owned).to_vec()];
-    for pair in &found.pairs {
+    for pair in &summary.pairs {
         let [a, b] = pair.scans;
         rows.push(vec![
             format!("{a} and {b}"),
@@ -251,22 +256,22 @@ fn print(found: &Found) -> Result<(), CliError> {
         ]);
     }
     output::table(&rows)?;
-    if found.pairs.len() < FEW_PAIRS {
+    if summary.pairs.len() < FEW_PAIRS {
         output::line(&format!(
             "only {} pairs: four scans or more make the estimate steady",
-            found.pairs.len()
+            summary.pairs.len()
         ))?;
     }
-    output::line(&format!("correlated error of a pair: {:.3} mm", found.sigma_correlated_mm))?;
-    for gap in &found.artefact {
+    output::line(&format!("correlated error of a pair: {:.3} mm", summary.sigma_correlated_mm))?;
+    for gap in &summary.artefact {
         output::line(&format!(
-            "boards of {:.0} mm on the artefact: {} gaps of {:.3} mm rms, of which {:.3} mm (one sigma) are systematic",
+            "templates of {:.0} mm on the artefact: {} gaps of {:.3} mm rms, of which {:.3} mm (one sigma) are systematic",
             gap.chord_mm, gap.boards, gap.gap_rms_mm, gap.systematic_mm
         ))?;
     }
-    match found.sigma_true_mm {
+    match summary.sigma_true_mm {
         Some(sigma) => output::line(&format!("systematic error of a gap: {sigma:.3} mm"))?,
-        None => output::line("systematic error of a gap: not known, for want of an artefact (--artefact)")?,
+        None => output::line("systematic error of a gap: unknown; scan an artefact and give --artefact")?,
     }
-    output::line(&format!("wrote {}", found.file.display()))
+    output::line(&format!("wrote {}", summary.file.display()))
 }

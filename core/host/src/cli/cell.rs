@@ -1,4 +1,6 @@
-//! The simulated press as a program of its own, and what it says over its second port.
+//! Simulated press as a child process, `platen-sim press`, and its control port.
+//!
+//! The control port takes one JSON object a line and answers with one: counts, registers, accepted results.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -10,20 +12,20 @@ use serde_json::Value as Json;
 
 use super::CliError;
 
-/// `platen-sim press`, ended with this program.
+/// Child process `platen-sim press`, ended with this program.
 #[derive(Debug)]
 pub struct Cell {
     child: Child,
-    /// Where the press serves Modbus; `None` on a serial line.
+    /// Address of the Modbus server; `None` on a serial line.
     pub modbus: Option<SocketAddr>,
-    /// Where it says what the plate looks like.
+    /// Address of the control port, from which the simulated scanner also reads the plate's shape.
     pub plate: SocketAddr,
-    line: Option<BufReader<TcpStream>>,
+    control: Option<BufReader<TcpStream>>,
 }
 
-/// One result as the press took it.
+/// Result as the press accepted it.
 #[derive(Debug, Clone, Copy)]
-pub struct Taken {
+pub struct AcceptedResult {
     stroke: u16,
     session: u16,
     attempt: u16,
@@ -33,8 +35,8 @@ pub struct Taken {
     pub result_ms: f64,
 }
 
-impl Taken {
-    /// Whether it is the result of this stroke.
+impl AcceptedResult {
+    /// Returns whether it is the result of this stroke.
     pub fn is(&self, stroke: u16, session: u16, attempt: u16) -> bool {
         (self.stroke, self.session, self.attempt) == (stroke, session, attempt)
     }
@@ -45,11 +47,14 @@ fn failed(what: &str) -> impl Fn(std::io::Error) -> CliError + '_ {
 }
 
 impl Cell {
-    /// Starts the program that lies beside this one; `options` overrule the file.
+    /// Starts the program that lies beside this one; `options` override the file.
+    ///
+    /// # Errors
+    /// The program is missing, or ends before it prints its ports.
     pub fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
         let program =
             std::env::current_exe()?.with_file_name(format!("platen-sim{}", std::env::consts::EXE_SUFFIX));
-        let what = format!("{}: cannot be started (`cargo build --release` makes it)", program.display());
+        let what = format!("{}: cannot be started (`cargo build --release` builds it)", program.display());
         let mut child = Command::new(&program)
             .arg("press")
             .arg(config)
@@ -65,10 +70,9 @@ impl Cell {
         }
         let ports: Json = serde_json::from_str(&line).unwrap_or_default();
         let port = |name: &str| ports[name].as_str().and_then(|text| text.parse().ok());
-        let unready =
-            || CliError::Failed("platen-sim ended before it was ready; its reason stands above".into());
+        let unready = || CliError::Failed("platen-sim ended before it was ready; its error is above".into());
         let plate = port("plate").ok_or_else(unready)?;
-        Ok(Self { child, modbus: port("modbus"), plate, line: None })
+        Ok(Self { child, modbus: port("modbus"), plate, control: None })
     }
 
     /// Sends a line to the control port and returns the answer.
@@ -76,44 +80,44 @@ impl Cell {
     /// # Errors
     /// The control port does not answer with JSON.
     pub fn ask(&mut self, question: &str) -> Result<Json, CliError> {
-        let line = match &mut self.line {
-            Some(line) => line,
+        let control = match &mut self.control {
+            Some(control) => control,
             None => {
                 let stream = TcpStream::connect(self.plate).map_err(failed("simulated press"))?;
                 stream.set_read_timeout(Some(Duration::from_secs(5))).map_err(failed("simulated press"))?;
-                self.line.insert(BufReader::new(stream))
+                self.control.insert(BufReader::new(stream))
             }
         };
         let mut answer = String::new();
-        writeln!(line.get_mut(), "{question}").map_err(failed("simulated press"))?;
-        line.read_line(&mut answer).map_err(failed("simulated press"))?;
+        writeln!(control.get_mut(), "{question}").map_err(failed("simulated press"))?;
+        control.read_line(&mut answer).map_err(failed("simulated press"))?;
         serde_json::from_str(&answer).map_err(|e| CliError::Failed(format!("simulated press: {e}")))
     }
 
-    /// The press has made its strokes, or its plate has passed.
+    /// Returns whether the press has made all its strokes or its plate has passed.
     pub fn is_done(&mut self) -> Result<bool, CliError> {
         Ok(self.ask(r#"{"get":"stats"}"#)?["stats"]["done"] == true)
     }
 
-    /// The words that the host has written.
+    /// Returns the host's block of registers.
     pub fn registers(&mut self) -> Result<Vec<u16>, CliError> {
         let answer = self.ask(r#"{"get":"registers"}"#)?;
         let words = answer["registers"]["h"].as_array().cloned().unwrap_or_default();
         Ok(words.iter().filter_map(|word| u16::try_from(word.as_u64()?).ok()).collect())
     }
 
-    /// Results as the press took them, in order.
-    pub fn taken(&mut self) -> Result<Vec<Taken>, CliError> {
+    /// Returns the results that the press accepted, in order.
+    pub fn accepted_results(&mut self) -> Result<Vec<AcceptedResult>, CliError> {
         let answer = self.ask(r#"{"get":"stats"}"#)?;
         let all = answer["stats"]["taken"].as_array().cloned().unwrap_or_default();
-        let word = |taken: &Json, name: &str| u16::try_from(taken[name].as_u64()?).ok();
-        let one = |taken: &Json| {
-            Some(Taken {
-                stroke: word(taken, "stroke_id")?,
-                session: word(taken, "session_id")?,
-                attempt: word(taken, "attempt")?,
-                accepted_ms: taken["accepted_ms"].as_f64()?,
-                result_ms: taken["result_ms"].as_f64()?,
+        let word = |result: &Json, name: &str| u16::try_from(result[name].as_u64()?).ok();
+        let one = |result: &Json| {
+            Some(AcceptedResult {
+                stroke: word(result, "stroke_id")?,
+                session: word(result, "session_id")?,
+                attempt: word(result, "attempt")?,
+                accepted_ms: result["accepted_ms"].as_f64()?,
+                result_ms: result["result_ms"].as_f64()?,
             })
         };
         Ok(all.iter().filter_map(one).collect())

@@ -1,10 +1,14 @@
-//! `platen check`: everything that can be checked without hardware.
+//! `platen check`: everything that can be checked without hardware, with every fault at once.
+//!
+//! A fault hides no other: plugins, their options and the plate files are checked also where other parts of the plant file
+//! are faulty.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use platen_plant::{Error as PlantError, PlantFile, PlateFile, PluginUse, check_options};
+use platen_plant::plant::plate_files;
+use platen_plant::{Document, Fault, Faults, PlateFile, PluginRole, PluginUse, Survey, check_options};
 
 use super::{CliError, Common, output};
 use platen_engine::plugin::{Catalogue, Kind};
@@ -12,7 +16,9 @@ use platen_engine::plugin::{Catalogue, Kind};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  platen check config/plant-north.toml\n  platen check config/plates/plate-017.toml\n\n\
-                        Prints every fault with file, line and column. Exit code 0 when there is none, 2 when there is."
+                        Prints every fault with file, line and column. With --json, `faults` is a list of\n\
+                        {file, line, column, key, message}; line and column are 0 for a file that cannot be read.\n\
+                        Exit code 0 when there is none, 2 when there is."
 )]
 pub(super) struct Command {
     /// Plant or plate files; a plant file's plates are checked with it
@@ -22,68 +28,64 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let catalogue = common.catalogue();
-    let mut faults = Vec::new();
-    for file in &command.files {
-        if is_plate(file) {
-            faults.extend(PlateFile::load(file).err().map(|e| e.to_string()));
-        } else {
-            check_plant(file, &catalogue, &mut faults);
+    let faults = command.files.iter().flat_map(|file| check(file, &catalogue)).collect();
+    let faults = Faults::new(faults);
+    match &faults {
+        _ if common.json => {
+            output::json(
+                &serde_json::json!({ "faults": faults.as_ref().map_or(&[][..], Faults::as_slice) }),
+            )?;
         }
+        Some(faults) => output::line(&faults.to_string())?,
+        None => output::line("no faults")?,
     }
-    if common.json {
-        output::json(&serde_json::json!({ "faults": faults }))?;
-    } else if faults.is_empty() {
-        output::line("no faults")?;
-    } else {
-        output::line(&faults.join("\n"))?;
-    }
-    Ok(ExitCode::from(if faults.is_empty() { 0 } else { 2 }))
+    Ok(ExitCode::from(if faults.is_some() { 2 } else { 0 }))
 }
 
-/// A plate file has a table `[plate]`; what cannot be read is checked as a plant file, which says why.
-fn is_plate(file: &Path) -> bool {
-    std::fs::read_to_string(file)
-        .is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("[plate]")))
+fn check(file: &Path, catalogue: &Catalogue) -> Vec<Fault> {
+    match Document::load(file) {
+        Err(error) => error.into_faults(),
+        Ok(document) if PlateFile::recognises(&document) => check_plate(document),
+        Ok(document) => check_plant(Survey::of(document, file), catalogue),
+    }
 }
 
-fn check_plant(file: &Path, catalogue: &Catalogue, faults: &mut Vec<String>) {
-    let plant = match PlantFile::load(file) {
-        Ok(plant) => plant,
-        Err(error) => return faults.push(error.to_string()),
-    };
-    let scanner = plant.scanner.iter().map(|used| (used, Kind::Scanner));
-    let comparisons = plant.comparisons.iter().map(|used| (used, Kind::Comparison));
-    for (used, kind) in scanner.chain([(&plant.flattening, Kind::Flattening)]).chain(comparisons) {
-        check_plugin(used, kind, catalogue, faults);
+fn check_plate(document: Document) -> Vec<Fault> {
+    PlateFile::take(document).err().into_iter().flatten().collect()
+}
+
+fn check_plant(survey: Survey, catalogue: &Catalogue) -> Vec<Fault> {
+    let mut faults: Vec<Fault> = survey.plant.err().into_iter().flatten().collect();
+    for (role, used) in &survey.plugins {
+        faults.extend(check_plugin(*role, used, catalogue));
     }
-    match plant.plate_files() {
-        Ok(plates) => {
-            faults.extend(
-                plates.iter().filter_map(|(_, path)| PlateFile::load(path).err()).map(|e| e.to_string()),
-            );
-        }
+    let Some((folder, at)) = survey.plates else { return faults };
+    match plate_files(&folder) {
+        Ok(plates) => faults.extend(plates.iter().flat_map(|(_, path)| match Document::load(path) {
+            Ok(document) => check_plate(document),
+            Err(error) => error.into_faults(),
+        })),
+        Err(error) if survey.has_press => faults.push(Fault { message: error.to_string(), ..at }),
         // A plant that measures single files needs no folder of plates.
-        Err(PlantError::Unreadable { .. }) if plant.press.is_none() => {}
-        Err(error) => faults.push(error.to_string()),
+        Err(_) => {}
     }
+    faults
 }
 
-fn check_plugin(used: &PluginUse, kind: Kind, catalogue: &Catalogue, faults: &mut Vec<String>) {
-    match catalogue.load(&used.plugin) {
-        Err(error) => faults.push(used.fault(error.to_string()).to_string()),
-        Ok(library) => {
-            let descriptor = library.descriptor();
-            if descriptor.kind != kind {
-                let message = format!(
-                    "{} is a {}, a {} is needed here",
-                    used.plugin,
-                    descriptor.kind.name(),
-                    kind.name()
-                );
-                faults.push(used.fault(message).to_string());
-            }
-            let wrong = check_options(&used.plugin, &used.options, &descriptor.options).err();
-            faults.extend(wrong.map(|faults| faults.to_string()));
-        }
+fn check_plugin(role: PluginRole, used: &PluginUse, catalogue: &Catalogue) -> Vec<Fault> {
+    let library = match catalogue.load(&used.plugin) {
+        Ok(library) => library,
+        Err(error) => return vec![used.fault(error.to_string())],
+    };
+    let descriptor = library.descriptor();
+    let needed = match role {
+        PluginRole::Scanner => Kind::Scanner,
+        PluginRole::Flattening => Kind::Flattening,
+        PluginRole::Comparison => Kind::Comparison,
+    };
+    if descriptor.kind != needed {
+        let (found, needed) = (descriptor.kind.name(), needed.name());
+        return vec![used.fault(format!("{} is a {found}, a {needed} is needed here", used.plugin))];
     }
+    check_options(&used.plugin, &used.options, &descriptor.options).err().into_iter().flatten().collect()
 }

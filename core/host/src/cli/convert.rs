@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::scan_source::{self, READ_LIMIT};
 use super::{CliError, Common, scan};
-use crate::scan_file;
+use platen_formats::ScanFile;
 
 #[derive(Debug, Args)]
 #[command(
@@ -30,9 +30,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     scan::check_output(output)?;
     let scanner = scan_source::open(&common.catalogue(), input, command.cloud)?;
     let what = format!("converting {}", input.display());
-    let written = scan_file::write(output, |sink| {
-        scan_source::follow(&scanner, READ_LIMIT, None, &what, sink)
-            .map_err(|e| CliError::Failed(format!("{}: {e}", input.display())))
-    })?;
+    let file = ScanFile::create(output)?;
+    let written = scan_source::follow(&scanner, READ_LIMIT, None, &what, Some(input))?.write(file)?;
     scan::say(common, output, &written)
 }

@@ -1,4 +1,4 @@
-//! `platen demo`: a simulated press bends a plate, the host measures it, all over real sockets and libraries.
+//! `platen demo`: a simulated press bends a plate and the host measures it, over real sockets and plugin libraries.
 
 mod files;
 
@@ -11,19 +11,19 @@ use platen_model::Verdict;
 use platen_plant::PlantFile;
 use tokio::sync::{mpsc, watch};
 
-use super::cell::{Cell, Taken};
+use super::cell::{AcceptedResult, Cell};
 use super::run::{runtime, stop_signal};
 use super::{CliError, Common, output};
 use crate::progress;
 use crate::run::{self, StrokeReport, Watcher};
 
-/// A demo that takes longer than this is stuck.
+/// Longest time of a demo that is not stuck.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  platen demo\n\n\
-                        Nothing is faked but steel and light: platen-sim bends and serves Modbus, the simulated scanner casts rays,\n\
-                        the host measures with the plugin libraries beside the program and writes back.")]
+                        Only steel and light are simulated: platen-sim bends the plate and serves Modbus, the simulated scanner casts rays,\n\
+                        the host measures with the plugin libraries beside the program and writes the results to the press.")]
 pub(super) struct Command {
     /// Folder for the results; an earlier demo there is replaced
     #[arg(long, value_name = "DIR", default_value = "platen-demo")]
@@ -74,9 +74,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     })?;
     ended?;
     progress::done();
-    let taken = cell.taken()?;
+    let accepted = cell.accepted_results()?;
     let after_stop = cell.registers()?;
-    summary(common, command, &reports, &taken, registers, after_stop, start.elapsed())
+    summary(common, command, &reports, &accepted, registers, after_stop, start.elapsed())
 }
 
 fn progress(report: &StrokeReport) {
@@ -88,7 +88,7 @@ fn progress(report: &StrokeReport) {
     progress::phase(&format!("{what}: {text}; the press bends"));
 }
 
-/// Largest gap under a template, millimetres, and its uncertainty.
+/// Returns the largest gap under a template and its uncertainty, millimetres.
 fn gap_mm(report: &StrokeReport) -> Option<(f64, f64)> {
     let record = report.result.as_ref().ok()?;
     let templates = record.reference_lines.iter().flat_map(|line| &line.templates);
@@ -99,7 +99,7 @@ fn summary(
     common: &Common,
     command: &Command,
     reports: &[StrokeReport],
-    taken: &[Taken],
+    accepted: &[AcceptedResult],
     registers: Option<Vec<u16>>,
     after_stop: Vec<u16>,
     elapsed: Duration,
@@ -121,7 +121,7 @@ fn summary(
     let mut documents = Vec::new();
     let mut before = None;
     for report in reports {
-        let seen = taken.iter().find(|t| t.is(report.key.stroke, report.key.session, report.key.attempt));
+        let timed = accepted.iter().find(|t| t.is(report.key.stroke, report.key.session, report.key.attempt));
         let gap = gap_mm(report);
         let number = |value: Option<f64>| value.map(|v| format!("{v:.0}")).unwrap_or_default();
         let length =
@@ -132,18 +132,18 @@ fn summary(
         let verdict = record.map_or(Verdict::NotMeasured, |r| r.verdict).words();
         rows.push(vec![
             if report.baseline { "blank".to_owned() } else { report.key.stroke.to_string() },
-            number(seen.map(|t| t.accepted_ms)),
+            number(timed.map(|t| t.accepted_ms)),
             number(scan_ms),
             number(evaluation_ms),
-            number(seen.map(|t| t.result_ms)),
+            number(timed.map(|t| t.result_ms)),
             length(before),
             length(gap),
             verdict.to_owned(),
         ]);
         documents.push(serde_json::json!({
             "stroke": report.key.stroke, "baseline": report.baseline, "verdict": verdict,
-            "trigger_to_busy_ms": seen.map(|t| t.accepted_ms), "scan_ms": scan_ms, "evaluation_ms": evaluation_ms,
-            "stroke_to_result_ms": seen.map(|t| t.result_ms),
+            "trigger_to_busy_ms": timed.map(|t| t.accepted_ms), "scan_ms": scan_ms, "evaluation_ms": evaluation_ms,
+            "stroke_to_result_ms": timed.map(|t| t.result_ms),
             "gap_before_mm": before.map(|(g, _)| g), "gap_after_mm": gap.map(|(g, _)| g), "folder": report.folder,
         }));
         before = gap.or(before);
@@ -163,7 +163,7 @@ fn summary(
         }))?;
     } else {
         output::table(&rows)?;
-        let plate = if passed { "the plate has its shape" } else { "the plate has not its shape" };
+        let plate = if passed { "the plate is in tolerance" } else { "the plate is not in tolerance" };
         let words = if correct {
             "the press holds the last stroke's result"
         } else {

@@ -1,4 +1,4 @@
-//! `platen history`: what is on record.
+//! `platen history`: queries of the record; all of them only read.
 
 mod compare;
 mod export;
@@ -25,7 +25,7 @@ use platen_report::plate_report::{self, ReportError};
                         platen history export config/plant-north.toml --out strokes.parquet\n  \
                         platen history report config/plant-north.toml 12\n\n\
                         A stroke is named by its run id (1042) or as plate:stroke (12:3, 12:blank); plates have the numbers of the list.\n\
-                        All of it only reads, also while a host runs.")]
+                        All verbs only read and may run beside a host.")]
 pub(super) struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -33,37 +33,37 @@ pub(super) struct Command {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// One line for each stroke, oldest first
+    /// List strokes, oldest first, one line each
     List {
         /// Plant file
         plant: PathBuf,
-        /// Strokes of this plate only, by its number in the history
+        /// Only strokes of this plate, by its number in the history
         #[arg(long)]
         plate: Option<u32>,
-        /// So many of the newest
+        /// Number of strokes, the newest
         #[arg(long, default_value_t = 50)]
         newest: u32,
     },
-    /// Everything on record about one stroke
+    /// Show the whole record of one stroke
     Show {
         /// Plant file
         plant: PathBuf,
         /// Run id, as in the list and in the press's registers, or plate:stroke
         run: RunRef,
     },
-    /// What differs from one stroke to another, of the same plate or of two
+    /// Compare two strokes, of the same plate or of two
     Compare(compare::Command),
-    /// The sequence of a plate as numbers: bends, overshoot, re-hits, energy left
+    /// Print the bending sequence of a plate: bends, overshoot, re-hits, energy left
     Sequence(sequence::Command),
-    /// All strokes as a table for other programs
+    /// Export all strokes as a table, CSV or Parquet
     Export(export::Command),
-    /// The report of one plate, HTML that prints on A4
+    /// Write the report of one plate as HTML that prints on A4
     Report {
         /// Plant file
         plant: PathBuf,
         /// The plate's number in the history
         plate: u32,
-        /// Folder for plate-N.html instead of the plant's output folder
+        /// Folder for plate-N.html, instead of the plant's output folder
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -112,12 +112,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// The plant and its history for reading.
+/// Loads the plant file and opens its history for reading.
 fn open(plant: &std::path::Path) -> Result<(PlantFile, Archive), CliError> {
     let plant = PlantFile::load(plant)?;
     let archive = Archive::open(&plant.output.history)?;
     Ok((plant, archive))
 }
+
 fn verdict(stroke: &Stroke) -> String {
     match (stroke.verdict, &stroke.reason) {
         (Some(verdict), Some(reason)) => format!("{} ({reason})", verdict.as_str()),

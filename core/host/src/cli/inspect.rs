@@ -2,7 +2,6 @@
 
 mod picture;
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -11,9 +10,8 @@ use platen_scan::{Column, ScanHeader, State};
 
 use super::scan_source::{self, READ_LIMIT};
 use super::{CliError, Common, output};
-use crate::scan_file::ScanFileError;
 use picture::RangePicture;
-use platen_engine::plugin::ScanEvent;
+use platen_formats::WriteError;
 
 #[derive(Debug, Args)]
 #[command(
@@ -61,26 +59,20 @@ impl Counts {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     if let Some(picture) = command.picture.as_ref().filter(|picture| picture.exists()) {
-        return Err(ScanFileError::Exists(picture.clone()).into());
+        return Err(WriteError::Exists(picture.clone()).into());
     }
     let scanner = scan_source::open(&common.catalogue(), &command.scan, command.cloud)?;
-    let (mut header, mut picture) = (ScanHeader::default(), RangePicture::default());
     let mut counts = Counts { nearest_m: f64::INFINITY, ..Counts::default() };
     let what = format!("reading {}", command.scan.display());
-    let end = scan_source::follow(&scanner, READ_LIMIT, None, &what, &mut |event| {
-        match event {
-            ScanEvent::Begin(begun) => {
-                picture = RangePicture::new(&begun);
-                header = begun;
-            }
-            ScanEvent::Column(column) => {
-                counts.add(&column);
-                picture.add(&column);
-            }
-        }
-        ControlFlow::Continue(())
-    });
-    end.map_err(|e| CliError::Failed(format!("{}: {e}", command.scan.display())))?;
+    let mut scan = scan_source::follow(&scanner, READ_LIMIT, None, &what, Some(&command.scan))?;
+    let header = scan.header().clone();
+    let mut picture = RangePicture::new(&header);
+    for column in &mut scan {
+        let column = column?;
+        counts.add(&column);
+        picture.add(&column);
+    }
+    scan.finish()?;
     if let Some(path) = &command.picture {
         picture.write(path).map_err(|e| {
             CliError::Failed(format!(

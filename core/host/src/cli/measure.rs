@@ -1,4 +1,4 @@
-//! `platen measure`: one scan file to a measured plate.
+//! `platen measure`: measures the plate in one scan file, against earlier scans where they are given.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -32,10 +32,10 @@ pub(super) struct Command {
     scan: PathBuf,
     #[command(flatten)]
     setup: Setup,
-    /// Scan of the same plate at the stroke before
+    /// Scan of the same plate after the previous stroke
     #[arg(long, value_name = "SCAN")]
     before: Option<PathBuf>,
-    /// Scan of the same plate before the first stroke: its outline is what (u, v) of all scans then refer to
+    /// Scan of the same plate before the first stroke; (u, v) of all scans then refer to its outline
     #[arg(long, value_name = "SCAN")]
     baseline: Option<PathBuf>,
     /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)
@@ -50,12 +50,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let catalogue = common.catalogue();
     let (plant, plate) = command.setup.load()?;
     let calibration = plant.calibration.as_ref().and_then(|wanted| {
-        // Whether the scanner was warm, a file does not tell.
-        let found = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
-        found.map_err(|why| tracing::warn!("{why}; only noise is in the uncertainties")).ok()
+        // A file has no record of the scanner's warm-up: it counts as warm.
+        let calibration = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
+        calibration.map_err(|why| tracing::warn!("{why}; only noise is in the uncertainties")).ok()
     });
     let mut rig = Pipeline::of(&plant, &catalogue)?;
-    // In the order in which they were taken: which corner is (0, 0) goes on from one to the next.
+    // In the order in which they were taken: the corner (0, 0) is carried from one to the next.
     let mut measure = |scan: &Path, last: Option<&Surface>, baseline: Baseline<'_>| {
         measure_file(&catalogue, &mut rig, scan, &plate, last, baseline)
     };
@@ -107,7 +107,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Measures one scan file with the file driver; `last` is the plate at the scan before.
+/// Measures one scan file through the driver `faro-file`; `last` is the plate's surface in the previous scan.
 pub(super) fn measure_file(
     catalogue: &Catalogue,
     rig: &mut Pipeline,

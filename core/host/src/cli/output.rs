@@ -1,4 +1,4 @@
-//! Writing to the terminal.
+//! Output of the verbs: lines, JSON and tables on stdout, errors on stderr.
 
 use std::io::Write as _;
 
@@ -33,7 +33,7 @@ pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Prints one error to stderr.
+/// Prints one error line to stderr.
 pub fn error(text: &str) {
     // Nowhere is left to report a failing stderr.
     let _ = writeln!(std::io::stderr(), "platen: {text}");

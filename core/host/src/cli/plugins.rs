@@ -1,4 +1,4 @@
-//! `platen plugins`: what is installed.
+//! `platen plugins`: the installed plugins and their options.
 
 use std::process::ExitCode;
 
@@ -19,9 +19,9 @@ pub(super) struct Command {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// One line for every library file in the plugin folders
+    /// List every library file in the plugin folders
     List,
-    /// What a plugin does and its options
+    /// Describe a plugin and its options
     Describe {
         /// Name as in plant files
         name: String,
@@ -94,7 +94,7 @@ fn type_name(option: &OptionDecl) -> &'static str {
     }
 }
 
-/// Type, unit, range and default in one line.
+/// Returns type, unit, range and default of an option in one line.
 fn rules(option: &OptionDecl) -> String {
     let mut rules = match option.choices.as_slice() {
         [] => type_name(option).to_owned(),

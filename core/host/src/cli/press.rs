@@ -1,6 +1,6 @@
-//! `platen press`: the register map in force, what stands in the registers, and trials of link and handshake.
+//! `platen press`: register map, contents of the registers, and tests of link and handshake.
 //!
-//! All but `test`, `write-test` and `soak` only read, and `soak` has a simulated press of its own.
+//! `test` and `write-test` write to the press, `soak` to a simulated press of its own; all other verbs only read.
 
 mod line;
 mod recording;
@@ -18,15 +18,16 @@ use platen_plant::PlantFile;
 use platen_plant::press::{Press, Role};
 use platen_press::{Client, LinkError, ModbusLink, alarms_csv, map_csv, map_markdown, map_page};
 
+use super::bench::{self, SoakArguments};
 use super::{CliError, Common, output};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples, in the order of a first day:\n  \
-                        platen press check plant.toml             what the host will ask and write; no connection\n  \
+                        platen press check plant.toml             what the host reads and writes; no connection\n  \
                         platen press map plant.toml > map.md      for the programmer of the press\n  \
-                        platen press ping plant.toml              is it there, how fast\n  \
+                        platen press ping plant.toml              does it answer, how fast\n  \
                         platen press scan-unit plant.toml 1..10   which unit ids answer\n  \
-                        platen press dump plant.toml              what stands in the registers; watch: what changes\n  \
+                        platen press dump plant.toml              contents of the registers; watch: their changes\n  \
                         platen press probe-order plant.toml --at 120 --expect -12.5\n  \
                         platen press write-test plant.toml --i-know\n  \
                         platen press test plant.toml --strokes 5  the handshake, step by step, with simulated results\n  \
@@ -39,60 +40,70 @@ pub(super) struct Command {
     verb: Verb,
 }
 
+impl Command {
+    /// The arguments of `soak`, where that is the verb.
+    pub(super) fn soak(&self) -> Option<&SoakArguments> {
+        match &self.verb {
+            Verb::Soak(arguments) => Some(arguments),
+            _ => None,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// Markdown with the reference program
     Md,
     /// Comma-separated values
     Csv,
-    /// The alarm table for the screen of the press, CSV
+    /// Alarm table for the screen of the press, CSV
     Alarms,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Tongue {
+enum AlarmLanguage {
     /// English
     En,
     /// Japanese
     Ja,
 }
 
-impl From<Tongue> for Language {
-    fn from(tongue: Tongue) -> Self {
-        match tongue {
-            Tongue::En => Self::En,
-            Tongue::Ja => Self::Ja,
+impl From<AlarmLanguage> for Language {
+    fn from(language: AlarmLanguage) -> Self {
+        match language {
+            AlarmLanguage::En => Self::En,
+            AlarmLanguage::Ja => Self::Ja,
         }
     }
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// What the host will read and write, and the time it takes; no connection
+    /// List what the host reads and writes, and the time it takes; no connection
     Check {
         /// Plant file
         plant: PathBuf,
     },
-    /// The register map of a plant file, for the programmer of the press
+    /// Print the register map of a plant file, for the programmer of the press
     Map {
         /// Plant file
         plant: PathBuf,
-        /// What to print
+        /// Format
         #[arg(long, value_enum, default_value = "md")]
         format: Format,
         /// Language of the alarm table
         #[arg(long, value_enum, default_value = "en")]
-        language: Tongue,
+        language: AlarmLanguage,
     },
-    /// Connect, read one register many times, tell the round trips
+    /// Connect, read one register many times and print the round-trip times
     Ping {
         /// Plant file
         plant: PathBuf,
-        /// How many reads
+        /// Number of reads
         #[arg(short = 'n', long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
         count: u32,
     },
-    /// Which unit ids answer at this address; slow, reads one register of each
+    /// Find the unit ids that answer at this address, by one read each; slow
     ScanUnit {
         /// Plant file
         plant: PathBuf,
@@ -100,89 +111,88 @@ enum Verb {
         #[arg(value_parser = line::units, default_value = "1..10")]
         units: line::Units,
     },
-    /// What stands in both blocks now, or in any registers
+    /// Read both blocks now, or any registers
     Dump {
         /// Plant file
         plant: PathBuf,
         /// Words with their addresses instead of named fields
         #[arg(long)]
         raw: bool,
-        /// Any holding registers, zero-based, e.g. 0..200; those that the press refuses are left out
+        /// Holding registers to read instead, zero-based, e.g. 0..200; those that the press refuses are left out
         #[arg(long, value_parser = registers::range)]
         range: Option<registers::Range>,
     },
-    /// Fields as they change, until Ctrl-C
+    /// Print fields as they change, until Ctrl-C
     Watch {
         /// Plant file
         plant: PathBuf,
     },
-    /// In which order and at which address a known 32-bit number stands
+    /// Find address and word order of a known 32-bit number
     ProbeOrder {
         /// Plant file
         plant: PathBuf,
-        /// Zero-based address of the first of both registers
+        /// Zero-based address of the first of its two registers
         #[arg(long)]
         at: u16,
-        /// The number that the press shows there
+        /// Number that the press shows
         #[arg(long, allow_negative_numbers = true)]
         expect: f64,
     },
-    /// The handshake at the real press with results marked as simulated: each step with its limit
+    /// Test the handshake at the real press with results marked as simulated, each step against its limit
     Test {
         /// Plant file
         plant: PathBuf,
-        /// How many strokes to make at the press
+        /// Number of strokes to make at the press
         #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
         strokes: u32,
-        /// Give up when no stroke comes for so long
+        /// Longest wait for a stroke
         #[arg(long, value_name = "SECONDS", default_value_t = 300)]
         patience_s: u64,
     },
-    /// Writes a pattern into each figure of the host's block for comparison with the press's screen
+    /// Write a pattern into each figure of the host's block, for comparison with the press's screen
     WriteTest {
         /// Plant file
         plant: PathBuf,
-        /// The press is safe and nobody relies on its registers now
+        /// Confirm that the press is safe and nobody relies on its registers now
         #[arg(long, required = true)]
         i_know: bool,
     },
-    /// Both blocks as they change into a file, until Ctrl-C
+    /// Record both blocks as they change into a file, until Ctrl-C
     Record {
         /// Plant file
         plant: PathBuf,
         /// File to write, JSON lines
         file: PathBuf,
-        /// End after so long
+        /// End after this time
         #[arg(long, value_name = "SECONDS")]
         for_s: Option<u64>,
     },
-    /// Plays a recording to the handshake: which strokes it takes now, and whether that is what the host did then
+    /// Replay a recording to the handshake and compare the accepted strokes with the recorded host's
     Replay {
         /// Plant file
         plant: PathBuf,
-        /// A file of `record`
+        /// File written by `record`
         file: PathBuf,
     },
-    /// Strokes without end against a simulated press with a bad line: nothing wrong, doubled or lost
-    #[command(disable_help_flag = true)]
-    Soak(super::bench::Arguments),
-    /// Clears the latched faults of the running host
+    /// Run many strokes against a simulated press on a faulty line: none wrong, doubled or lost
+    Soak(SoakArguments),
+    /// Clear the latched faults of the running host
     Reset {
         /// Plant file of the host
         plant: PathBuf,
     },
 }
 
-/// Why a verb failed, by who must act.
+/// Failure of a verb, by who must act.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// The plant file, the command line or the system.
+    /// Plant file, command line or system.
     #[error(transparent)]
     Cli(#[from] CliError),
-    /// The press does not answer, or not as it should.
+    /// No answer of the press, or a wrong one.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The press answers, but the handshake does not work.
+    /// A handshake that does not work over a link that does.
     #[error("{0}")]
     Handshake(String),
 }
@@ -224,7 +234,10 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     report(common, dispatch(common, &command.verb))
 }
 
-/// Prints a failure as JSON where JSON is asked for, and passes it on.
+/// Prints a failure as JSON with `--json`, and returns it.
+///
+/// # Errors
+/// The failure, or a closed output.
 pub fn report(common: &Common, done: Result<ExitCode, Failure>) -> Result<ExitCode, CliError> {
     if let (true, Err(failure)) = (common.json, &done) {
         let (error, cause) = (failure.to_string(), failure.cause());
@@ -247,13 +260,13 @@ fn dispatch(common: &Common, verb: &Verb) -> Result<ExitCode, Failure> {
         Verb::Test { plant, strokes, patience_s } => {
             return trial::run(common, load(plant)?, *strokes, std::time::Duration::from_secs(*patience_s));
         }
-        // clap has seen to `--i-know`.
+        // clap requires `--i-know`.
         Verb::WriteTest { plant, i_know: _ } => return write_test::run(common, &load(plant)?),
         Verb::Record { plant, file, for_s } => {
             recording::record(common, &load(plant)?, file, for_s.map(std::time::Duration::from_secs))?;
         }
         Verb::Replay { plant, file } => return recording::replay(common, &load(plant)?, file),
-        Verb::Soak(arguments) => return Ok(super::bench::run(common, "soak", arguments)?),
+        Verb::Soak(_) => return Ok(bench::start()?),
         Verb::Reset { plant } => return reset::run(common, &PlantFile::load(plant).map_err(CliError::from)?),
     }
     Ok(ExitCode::SUCCESS)
@@ -264,7 +277,7 @@ fn load(plant: &Path) -> Result<Press, CliError> {
     PlantFile::load(plant)?.press.ok_or_else(missing)
 }
 
-fn map(common: &Common, press: &Press, format: Format, language: Tongue) -> Result<(), CliError> {
+fn map(common: &Common, press: &Press, format: Format, language: AlarmLanguage) -> Result<(), CliError> {
     match format {
         Format::Md | Format::Csv if common.json => output::json(&map_page(press)),
         Format::Alarms if common.json => output::json(&alarms(language.into())),
@@ -274,7 +287,7 @@ fn map(common: &Common, press: &Press, format: Format, language: Tongue) -> Resu
     }
 }
 
-/// The alarm table as data.
+/// Returns the alarm table as JSON.
 fn alarms(language: Language) -> Vec<serde_json::Value> {
     let row = |code: &Code| {
         let alarm = code.alarm();
@@ -286,11 +299,11 @@ fn alarms(language: Language) -> Vec<serde_json::Value> {
     Code::ALL.iter().map(row).collect()
 }
 
-/// Someone who asks the press; not connected yet.
+/// Returns a client of the press, not yet connected.
 fn client(press: &Press) -> Result<Client<ModbusLink>, CliError> {
     if press.role == Role::Server {
         return Err(CliError::Usage(
-            "this press asks the host (role = \"server\"): there is nothing to read from; run the host, or \
+            "this press is the client (role = \"server\"): there is no server to read from; run the host, or \
              platen press test"
                 .into(),
         ));

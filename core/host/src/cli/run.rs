@@ -1,4 +1,4 @@
-//! `platen run`: the host.
+//! `platen run`: serves a press until SIGTERM or Ctrl-C.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,7 +35,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let (reports, mut strokes) = mpsc::unbounded_channel();
         let printer = tokio::spawn(async move {
             while let Some(report) = strokes.recv().await {
-                // Whoever read the output has gone; the press goes on.
+                // A closed output does not stop the press.
                 let _ = print(&report, json);
             }
         });
@@ -48,12 +48,18 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// The runtime of the press side: polling needs little, but must not wait for a scan.
+/// Builds the runtime of the press side: two workers, so that polling does not wait for a scan.
+///
+/// # Errors
+/// The system gives no threads.
 pub fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
 }
 
-/// Turns true on SIGTERM and Ctrl-C.
+/// Returns a signal that turns true on SIGTERM and Ctrl-C.
+///
+/// # Errors
+/// The signals cannot be caught.
 pub fn stop_signal() -> Result<watch::Receiver<bool>, CliError> {
     use tokio::signal::unix::{SignalKind, signal};
     let (stop, stopped) = watch::channel(false);
@@ -80,7 +86,7 @@ impl From<HostError> for CliError {
     }
 }
 
-/// One line for each stroke.
+/// Prints one stroke as a line.
 fn print(report: &StrokeReport, json: bool) -> Result<(), CliError> {
     if json {
         let (verdict, why) = match &report.result {

@@ -10,8 +10,8 @@ use platen_scan::Window;
 
 use super::{CliError, Common, output, scan_source};
 use crate::progress;
-use crate::scan_file::{self, Format, ScanFileError, Written};
 use platen_engine::pipeline;
+use platen_formats::{Format, ScanFile, WriteError, Written};
 
 /// Longest scan: a full dome takes many minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(7200);
@@ -37,10 +37,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let scanner = pipeline::scanner(&plant, &common.catalogue())?;
     progress::phase("connecting to the scanner");
     scanner.instance().open(OPEN_LIMIT)?;
-    let written = scan_file::write(&command.output, |sink| {
-        scan_source::follow(&scanner, SCAN_LIMIT, command.window.as_ref(), "scanning", sink)
-            .map_err(CliError::from)
-    })?;
+    let (file, window) = (ScanFile::create(&command.output)?, command.window.as_ref());
+    let written = scan_source::follow(&scanner, SCAN_LIMIT, window, "scanning", None)?.write(file)?;
     say(common, &command.output, &written)
 }
 
@@ -65,7 +63,7 @@ fn window(text: &str) -> Result<Window, String> {
 pub(super) fn check_output(path: &Path) -> Result<(), CliError> {
     Format::of(path)?;
     if path.exists() {
-        return Err(ScanFileError::Exists(path.to_path_buf()).into());
+        return Err(WriteError::Exists(path.to_path_buf()).into());
     }
     Ok(())
 }

@@ -1,23 +1,23 @@
-//! Where `measure`, `inspect`, `convert` and `scan` get their scans from.
+//! Scans of `measure`, `inspect`, `convert` and `scan`: from a file by the driver `faro-file`, or from the plant's scanner.
 
 use std::path::Path;
 use std::time::Duration;
 
+use platen_formats::{ScanFile, Written};
 use platen_plant::Value;
-use platen_scan::{ScanEnd, Window};
+use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
 use super::CliError;
 use crate::progress;
-use crate::scan_file::Sink;
 use platen_engine::pipeline;
-use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ScanEvent, Scanner};
+use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, RunningScan, Scanner};
 
-/// A file of the finest full dome takes minutes to read.
+/// Longest time to read a file: minutes for the finest full dome.
 pub(super) const READ_LIMIT: Duration = Duration::from_secs(1800);
-/// Columns between two looks at the progress.
+/// Columns between two displays of the progress.
 const SHOW_EVERY: u32 = 32;
 
-/// The file driver, set to one file and, where it holds several scans, to one of them, counted from 1.
+/// Opens the file driver for one file; `cloud` chooses one of several scans, from 1.
 pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Result<Scanner, CliError> {
     let file = ("file", Value::Path(std::path::absolute(scan)?));
     let cloud = cloud.map(|cloud| ("cloud", Value::Int(i64::from(cloud))));
@@ -27,33 +27,78 @@ pub(super) fn open(catalogue: &Catalogue, scan: &Path, cloud: Option<u32>) -> Re
     Ok(scanner)
 }
 
-/// Scans, shows how far it is, and stops on Ctrl-C.
-pub(super) fn follow(
-    scanner: &Scanner,
-    limit: Duration,
-    window: Option<&Window>,
-    what: &str,
-    sink: &mut Sink<'_>,
-) -> Result<ScanEnd, PluginError> {
-    let job = JobSpec { cancel: interrupt(), ..JobSpec::untriggered(limit) };
-    let (mut columns, mut expected) = (0_u32, 0);
-    progress::phase(what);
-    let end = scanner.scan(job, window, &mut |event| {
-        match &event {
-            ScanEvent::Begin(header) => expected = header.n_columns,
-            ScanEvent::Column(_) => columns += 1,
-        }
-        if columns % SHOW_EVERY == 1 {
-            progress::share(what, f64::from(columns) / f64::from(expected.max(1)));
-        }
-        sink(event)
-    });
-    progress::done();
-    end
+/// A scan in progress, shown on the terminal until it is dropped.
+pub(super) struct ShownScan<'a> {
+    scan: RunningScan<'a>,
+    what: &'a str,
+    file: Option<&'a Path>,
+    columns: u32,
 }
 
-/// A token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread for
-/// that, Ctrl-C ends the program at once.
+/// Starts a scan that is shown as `what` and stops on Ctrl-C. Its errors begin with `file`.
+pub(super) fn follow<'a>(
+    scanner: &'a Scanner,
+    limit: Duration,
+    window: Option<&Window>,
+    what: &'a str,
+    file: Option<&'a Path>,
+) -> Result<ShownScan<'a>, CliError> {
+    let job = JobSpec { cancel: interrupt(), ..JobSpec::untriggered(limit) };
+    progress::phase(what);
+    let scan = scanner.start(job, window).inspect_err(|_| progress::done()).map_err(|e| failed(file, e))?;
+    Ok(ShownScan { scan, what, file, columns: 0 })
+}
+
+impl ShownScan<'_> {
+    /// Returns the header of the scan.
+    pub(super) fn header(&self) -> &ScanHeader {
+        self.scan.header()
+    }
+
+    /// Ends the scan.
+    pub(super) fn finish(mut self) -> Result<ScanEnd, CliError> {
+        self.scan.finish().map_err(|e| failed(self.file, e))
+    }
+
+    /// Writes the scan to a new file.
+    pub(super) fn write(mut self, mut file: ScanFile) -> Result<Written, CliError> {
+        let mut writer = file.writer(self.header())?;
+        for column in &mut self {
+            writer.push(&column?)?;
+        }
+        let written = writer.finish(&self.finish()?)?;
+        Ok(file.persist(written)?)
+    }
+}
+
+impl Iterator for ShownScan<'_> {
+    type Item = Result<Column, CliError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let column = self.scan.next()?.map_err(|e| failed(self.file, e));
+        self.columns += 1;
+        if self.columns % SHOW_EVERY == 1 {
+            let expected = self.header().n_columns.max(1);
+            progress::share(self.what, f64::from(self.columns) / f64::from(expected));
+        }
+        Some(column)
+    }
+}
+
+impl Drop for ShownScan<'_> {
+    fn drop(&mut self) {
+        progress::done();
+    }
+}
+
+fn failed(file: Option<&Path>, error: PluginError) -> CliError {
+    CliError::Failed(
+        file.map(|file| format!("{}: ", file.display())).unwrap_or_default() + &error.to_string(),
+    )
+}
+
+/// Returns a token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread
+/// for that, Ctrl-C ends the program at once.
 fn interrupt() -> CancelToken {
     let token = CancelToken::default();
     let cancelled = token.clone();

@@ -1,4 +1,4 @@
-//! What `measure` and `verify` take besides a scan: the plate in it, and the plant that measures it.
+//! Arguments of `measure` and `verify` besides the scan: plate file, plant file and overrides.
 
 use std::path::PathBuf;
 
@@ -12,19 +12,19 @@ pub(super) struct Setup {
     /// Plate file: size, target, markers, lines, templates
     #[arg(long, value_name = "PLATE.toml")]
     pub(super) plate: PathBuf,
-    /// Plant file: frame, flattening, comparisons; without it, defaults
+    /// Plant file: frame, flattening, comparisons; defaults without it
     #[arg(long, value_name = "PLANT.toml")]
     plant: Option<PathBuf>,
-    /// Flattening plugin to use instead of the plant file's
+    /// Flattening plugin, instead of the one in the plant file
     #[arg(long, value_name = "NAME")]
     flattening: Option<String>,
-    /// Rough direction of growing u in the scanner frame, instead of the plant file's
+    /// Rough direction of increasing u in the scanner frame, instead of the one in the plant file
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = direction)]
     u_axis: Option<[f64; 3]>,
 }
 
 impl Setup {
-    /// Both files, the plant's with what the command line says instead.
+    /// Loads both files and applies the overrides of the command line.
     pub(super) fn load(&self) -> Result<(PlantFile, PlateFile), CliError> {
         let plate = PlateFile::load(&self.plate)?;
         let mut plant = self.plant.as_deref().map_or_else(|| Ok(PlantFile::default()), PlantFile::load)?;

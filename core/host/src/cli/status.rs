@@ -1,4 +1,4 @@
-//! `platen status`: how a running host stands.
+//! `platen status`: the state of a running host, from the status file in its output folder.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,7 +9,7 @@ use platen_plant::PlantFile;
 use super::{CliError, Common, output};
 use crate::run::StatusRecord;
 
-/// A host that has not written for so long is not running, or hangs.
+/// Age of the status beyond which the host is not running, or hangs, seconds.
 const STALE_S: f64 = 5.0;
 
 #[derive(Debug, Args)]
@@ -19,7 +19,7 @@ const STALE_S: f64 = 5.0;
 pub(super) struct Command {
     /// Plant file of the host
     plant: PathBuf,
-    /// Print the figures as Prometheus reads them, for a textfile collector
+    /// Print the figures in the Prometheus text format, for a textfile collector
     #[arg(long, conflicts_with = "json")]
     prometheus: bool,
 }
@@ -39,7 +39,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     } else {
         let alive = if running { "running" } else { "not running" };
         output::line(&format!(
-            "{}: host {alive} (pid {}, said so {age_s:.0} s ago), {}",
+            "{}: host {alive} (pid {}, status {age_s:.0} s old), {}",
             status.press, status.pid, status.state
         ))?;
         for (what, text) in

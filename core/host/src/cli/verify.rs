@@ -1,4 +1,4 @@
-//! `platen verify`: dark discs painted on a plate against the markers that its plate file places there.
+//! `platen verify`: offsets of dark discs painted on a plate from the markers of its plate file.
 
 mod picture;
 
@@ -22,23 +22,23 @@ use platen_shape::{Measured, Scanned};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \
                         platen verify scan.e57 --plate painted.toml --limit-mm 1.5 --picture verify.svg\n\n\
-                        Paint dark discs of 30 to 60 mm on the plate, best before it is bent, and write their middles as [[marker]] into \
-                        the plate file. Each disc is looked for by its intensity near its virtual marker. The exit code is 1 when \
+                        Paint dark discs of 30 to 60 mm on the plate, best before it is bent, and write their centres as [[marker]] into \
+                        the plate file. Each disc is searched by its intensity near its virtual marker. The exit code is 1 when \
                         one is farther away than the limit or is not found.\n\n\
-                        A disc is known to the rim that its cells show: 0.9 mm (95 %) for 40 mm at 5 mm between cells, 0.35 mm at \
-                        2.5 mm. What is wanted better takes a finer scan or larger discs.")]
+                        The centre of a disc of 40 mm is found to 0.9 mm (95 %) at 5 mm between cells and to 0.35 mm at 2.5 mm. \
+                        Scan finer or paint larger discs for less.")]
 pub(super) struct Command {
     /// Scan file: structured E57, PTX, XYZ with row and column, XYB
     scan: PathBuf,
     #[command(flatten)]
     setup: Setup,
-    /// How far from its marker a disc is looked for
+    /// Radius round a marker in which its disc is searched
     #[arg(long, value_name = "MM", default_value_t = 80.0, value_parser = length)]
     within_mm: f64,
-    /// Largest distance of a disc from its marker
+    /// Largest accepted distance of a disc from its marker
     #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = length)]
     limit_mm: f64,
-    /// Picture of the virtual lines and markers over the intensities, as the scanner sees them
+    /// Draw the virtual lines and markers over the scan's intensities, from the scanner's place
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
 }
@@ -46,12 +46,12 @@ pub(super) struct Command {
 /// Radius in standard deviations of the circle that holds 95 % of errors in a plane: sqrt(-2 ln 0.05).
 const IN_PLANE: f64 = 2.448;
 
-/// What was found.
+/// Offsets of all discs, and whether they are within the limit.
 #[derive(Debug, Serialize)]
-struct Found {
+struct Summary {
     plate: String,
     markers: Vec<MarkerRecord>,
-    /// Of the discs that were found; null when none was.
+    /// Mean over the discs found; null without any.
     mean_mm: Option<f64>,
     std_mm: Option<f64>,
     max_mm: Option<f64>,
@@ -59,19 +59,19 @@ struct Found {
     within_limit: bool,
 }
 
-/// One marker and its disc.
+/// Marker and its disc.
 #[derive(Debug, Serialize)]
 struct MarkerRecord {
     name: String,
     u_mm: f64,
     v_mm: f64,
-    /// Disc minus marker along u and v; null when it was not found.
+    /// Disc minus marker along u and v; null where no disc was found.
     off_u_mm: Option<f64>,
     off_v_mm: Option<f64>,
     distance_mm: Option<f64>,
-    /// What the cells' spacing leaves open of the disc's own place: 95 % of discs lie nearer.
+    /// Uncertainty of the disc's own centre from the spacing of the cells, radius of 95 %.
     known_to_mm: Option<f64>,
-    /// Dark cells of the disc, or why there is none.
+    /// Number of dark cells, or the reason why no disc was found.
     says: String,
 }
 
@@ -90,22 +90,22 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None, Baseline::None)?;
     progress::done();
 
-    let discs = look(command, &plate, &scanned, &measured);
+    let discs = detect(command, &plate, &scanned, &measured);
     if let Some(file) = &command.picture {
         let drawn = picture::draw(&scanned.patch, &measured.measurement, &plate, &discs);
         let drawn = drawn.map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
         output_folder::replace(file, drawn.as_bytes())?;
     }
-    let found = record(command, &plate, &discs);
+    let summary = summarize(command, &plate, &discs);
     if common.json {
-        output::json(&found)?
+        output::json(&summary)?
     } else {
-        print(&found)?
+        print(&summary)?
     }
-    Ok(if found.within_limit { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    Ok(if summary.within_limit { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-fn look(
+fn detect(
     command: &Command,
     plate: &PlateFile,
     scanned: &Scanned,
@@ -116,7 +116,7 @@ fn look(
     plate.markers.iter().map(|marker| detect_marker(&scanned.patch, surface, marker.at, reach)).collect()
 }
 
-fn record(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, NoMarker>]) -> Found {
+fn summarize(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, NoMarker>]) -> Summary {
     let markers: Vec<MarkerRecord> = plate
         .markers
         .iter()
@@ -142,7 +142,7 @@ fn record(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, 
         .filter(|_| n > 1.0)
         .map(|mean| (distances.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt());
     let max = distances.iter().copied().reduce(f64::max);
-    Found {
+    Summary {
         plate: plate.plate.id.clone(),
         within_limit: distances.len() == markers.len() && max.is_some_and(|max| max <= command.limit_mm),
         markers,
@@ -153,12 +153,12 @@ fn record(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, 
     }
 }
 
-fn print(found: &Found) -> Result<(), CliError> {
+fn print(summary: &Summary) -> Result<(), CliError> {
     let head = ["marker", "u mm", "v mm", "off along u", "along v", "distance mm", "known to mm", "disc"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     let number =
         |value: Option<f64>, digits: usize| value.map(|v| format!("{v:.digits$}")).unwrap_or_default();
-    for marker in &found.markers {
+    for marker in &summary.markers {
         rows.push(vec![
             marker.name.clone(),
             format!("{:.0}", marker.u_mm),
@@ -171,19 +171,19 @@ fn print(found: &Found) -> Result<(), CliError> {
         ]);
     }
     output::table(&rows)?;
-    let there = found.markers.iter().filter(|marker| marker.distance_mm.is_some()).count();
+    let n_found = summary.markers.iter().filter(|marker| marker.distance_mm.is_some()).count();
     output::line(&format!(
-        "{there} of {} discs found: mean {} mm, std {} mm, largest {} mm, limit {:.1} mm: {}",
-        found.markers.len(),
-        number(found.mean_mm, 2),
-        number(found.std_mm, 2),
-        number(found.max_mm, 2),
-        found.limit_mm,
-        if found.within_limit { "within" } else { "outside" }
+        "{n_found} of {} discs found: mean {} mm, std {} mm, largest {} mm, limit {:.1} mm: {}",
+        summary.markers.len(),
+        number(summary.mean_mm, 2),
+        number(summary.std_mm, 2),
+        number(summary.max_mm, 2),
+        summary.limit_mm,
+        if summary.within_limit { "within" } else { "outside" }
     ))
 }
 
 fn length(text: &str) -> Result<f64, String> {
-    let found = text.parse::<f64>().ok().filter(|mm| mm.is_finite() && *mm > 0.0);
-    found.ok_or_else(|| "give a length in millimetres, above 0".to_owned())
+    let length = text.parse::<f64>().ok().filter(|mm| mm.is_finite() && *mm > 0.0);
+    length.ok_or_else(|| "give a length in millimetres, above 0".to_owned())
 }

@@ -1,11 +1,8 @@
 //! Mapping of the comparisons' findings to the figures in the press's registers.
 
-use platen_model::Measure;
-use platen_model::{Code, Figures, Measurement, Timestamp, Verdict};
-use platen_plant::PlateFile;
-
 use platen_engine::plugin::PluginError;
-use platen_model::Report;
+use platen_model::{Figures, Measure, Measurement, Report, Timestamp, Verdict};
+use platen_plant::PlateFile;
 use platen_shape::Measured;
 
 /// Returns the result for the press. A figure that no comparison gave is absent, and its register holds the invalid value.
@@ -41,13 +38,7 @@ pub(super) fn measurement(
             .filter(|value| value.is_finite())
     };
     figures.stations = plate.stations.iter().map(station).collect();
-    Measurement {
-        verdict,
-        reason: (verdict == Verdict::NotMeasured).then_some(Code::EvaluationFailed),
-        figures,
-        scanned_at: timestamp(scanned_at),
-        warning: None,
-    }
+    Measurement { judgement: verdict.into(), figures, scanned_at: timestamp(scanned_at), warning: None }
 }
 
 fn timestamp(at: jiff::Timestamp) -> Option<Timestamp> {

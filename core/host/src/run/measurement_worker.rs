@@ -9,28 +9,25 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use platen_engine::calibration::{self, Calibration};
+use platen_engine::pipeline::{self, Pipeline};
+use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
+use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
 use platen_history::History;
-use platen_model::Measure;
-use platen_model::{Code, Measurement, StrokeData, StrokeKey};
+use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey};
 use platen_plant::press::Press;
 use platen_plant::{PlantFile, PlateFile};
 use platen_press::Answer;
+use platen_report::result::{Context, ResultRecord};
+use platen_report::{history_view, output_folder, plate_report};
 use platen_scan::Window;
-use platen_shape::{PlateSpec, Surface};
+use platen_shape::{PlateSpec, Scanned, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
 use super::{Watcher, figures};
-use platen_engine::pipeline::{self, Pipeline};
-use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
-use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
-use platen_engine::{calibration, calibration::Calibration};
-use platen_model::Report;
-use platen_report::result::{Context, ResultRecord};
-use platen_report::{history_view, output_folder, plate_report};
-use platen_shape::Scanned;
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -387,7 +384,7 @@ impl MeasurementWorker {
         let task = Calibration::task(
             calibration.as_ref(),
             &stroke.plate,
-            history_view::moved(supports, &stroke.plate),
+            history_view::supports_changed(supports, &stroke.plate),
         );
         let reports = stroke::compare(&self.pipeline, &task, surfaces);
         let compare = comparing.elapsed();
@@ -468,7 +465,7 @@ fn refusal(error: &NotMeasured) -> (Code, String, bool) {
     let hung = matches!(error, NotMeasured::Scanner(PluginError::Hangs { .. }));
     let code = match error {
         NotMeasured::Scanner(PluginError::Stopped { .. }) => Code::ScanTimeout,
-        NotMeasured::Scanner(_) | NotMeasured::Column(_) | NotMeasured::NoHeader => Code::ScanFailed,
+        NotMeasured::Scanner(_) | NotMeasured::Column(_) => Code::ScanFailed,
         NotMeasured::Plate(_) => Code::PlateNotFound,
         NotMeasured::Askew { .. } | NotMeasured::Turned(_) => Code::PlateTurned,
         NotMeasured::Outline(_) | NotMeasured::Blank(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,

@@ -1,9 +1,8 @@
 //! Previous scans of the active plate, from the history and the result folders.
 
 use platen_history::{Archive, Error, Stroke};
-use platen_shape::{Blank, Surface};
-
 use platen_report::{history_view, output_folder};
+use platen_shape::{Blank, Surface};
 
 /// An earlier scan of the plate.
 #[derive(Debug)]
@@ -46,6 +45,6 @@ fn load(found: Result<Option<Stroke>, Error>) -> Option<Earlier> {
     let surface = output_folder::surface_beside(&document)
         .inspect_err(|why| tracing::warn!("{why}; this stroke is compared without it"))
         .ok()?;
-    let kept = history_view::kept(&document);
-    Some(Earlier { surface, blank: kept.blank(), supports: kept.supports, plate_rot: data.plate_rot })
+    let earlier = history_view::read_document(&document);
+    Some(Earlier { surface, blank: earlier.blank(), supports: earlier.supports, plate_rot: data.plate_rot })
 }

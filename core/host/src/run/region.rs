@@ -5,9 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use platen_plant::ScanWindow;
 use platen_scan::{Window, wrap_azimuth};
 use platen_shape::outline::Outline;
-use platen_shape::{RegionOfInterest, Vec3};
-
-use platen_shape::Scanned;
+use platen_shape::{RegionOfInterest, Scanned, Vec3};
 
 /// Margin round the last stroke's plate, metres: its edges rise by some centimetres a stroke, and a press feeds it by a few
 /// decimetres. A plate that moved farther is scanned again in the base window.

@@ -10,12 +10,12 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
+use platen_engine::stroke::ScanBuffer;
+use platen_formats::{ScanFile, WriteError};
 use platen_plant::plant::{KeepScans, Output};
+use platen_scan::{Column, ScanEnd, ScanHeader};
 
 use super::disk;
-use crate::scan_file::{self, ScanFileError};
-use platen_engine::plugin::ScanEvent;
-use platen_engine::stroke::ScanBuffer;
 
 /// Name of a scan in a result's folder.
 const NAME: &str = "scan.e57";
@@ -113,17 +113,19 @@ fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>) {
 fn write(folder: &Path, buffer: ScanBuffer) -> Result<(), String> {
     let (header, columns, end) = buffer.finish()?;
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
-    let cells: usize = columns.iter().map(platen_scan::Column::len).sum();
+    let cells: usize = columns.iter().map(Column::len).sum();
     let needed = cells as u64 * CELL_BYTES;
     check_room(needed, disk::free(folder).map_err(|e| e.to_string())?)?;
-    let written = scan_file::write(&folder.join(NAME), |sink| {
-        let columns = columns.into_iter().map(ScanEvent::Column);
-        let mut events = std::iter::once(ScanEvent::Begin(header)).chain(columns);
-        // The writer remembers why it stopped.
-        let _ = events.try_for_each(sink);
-        Ok::<_, ScanFileError>(end)
-    });
-    written.map(|_| ()).map_err(|e| e.to_string())
+    save(&folder.join(NAME), &header, columns, &end).map_err(|e| e.to_string())
+}
+
+/// Writes a scan; each column is freed once it is written.
+fn save(path: &Path, header: &ScanHeader, columns: Vec<Column>, end: &ScanEnd) -> Result<(), WriteError> {
+    let mut file = ScanFile::create(path)?;
+    let mut writer = file.writer(header)?;
+    columns.into_iter().try_for_each(|column| writer.push(&column))?;
+    let written = writer.finish(end)?;
+    file.persist(written).map(drop)
 }
 
 /// Refuses a scan of `needed` bytes that would take of the [`RESERVE`].
@@ -164,6 +166,8 @@ fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Res
 fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTime) -> bool {
     let old = |limit| now.duration_since(modified).is_ok_and(|age| age > limit);
     let half = name.strip_prefix(NAME).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
+    // `scan.e57.<process>.<random>.part`
+    let half = half.map(|half| half.split_once('.').map_or(half, |(process, _)| process));
     match half {
         Some(process) => process.parse() != Ok(std::process::id()) && process.parse::<u32>().is_ok(),
         None => name == NAME && age.is_some_and(old),

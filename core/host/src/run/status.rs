@@ -9,11 +9,11 @@ use std::time::Duration;
 use platen_model::{Code, Language};
 use platen_plant::press::Press;
 use platen_press::{Answer, Durations, Status};
+use platen_report::output_folder;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
 use super::disk;
-use platen_report::output_folder;
 
 /// The newest alarm, set by the dispatcher.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;

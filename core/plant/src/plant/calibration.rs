@@ -1,4 +1,4 @@
-//! `[calibration]`: what `platen calibrate` found about the scanner, and how long that holds.
+//! `[calibration]`: file written by `platen calibrate`, and its validity.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -6,14 +6,14 @@ use std::time::Duration;
 use crate::document::Reported;
 use crate::{TomlTable, Unit};
 
-/// Where the calibration stands and when it holds.
+/// Calibration file and its validity.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CalibrationUse {
-    /// The file that `platen calibrate` writes.
+    /// File that `platen calibrate` writes.
     pub file: PathBuf,
-    /// A calibration older than this is not valid any more; `None`: it never ages.
+    /// Age beyond which the calibration is invalid; `None` for no limit.
     pub max_age: Option<Duration>,
-    /// The scanner is cold until it has been in reach for this long.
+    /// Time for which the scanner must have been in reach before it counts as warm.
     pub warm_up: Duration,
 }
 
@@ -27,7 +27,7 @@ impl CalibrationUse {
     }
 }
 
-/// A time as a text with its unit, or in `unit` where it names none.
+/// Reads a time: a text with its unit, or in `unit` without one.
 fn time<'d>(table: &mut TomlTable<'d>, key: &str, unit: Unit) -> crate::TomlKey<'d, Duration> {
     table.string(key).try_map(|text| {
         let value = unit.read(&text)?;

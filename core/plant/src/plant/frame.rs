@@ -1,20 +1,20 @@
-//! `[frame]`: how the scanner stands to the press and the plate.
+//! `[frame]`: position of the scanner relative to press and plate.
 
 use crate::TomlTable;
 use crate::document::Reported;
 
-/// Rows of a rotation may be written with few digits: this far from orthonormal is still meant as one. Three digits.
+/// Largest deviation from orthonormal of a rotation written with three digits.
 const ROTATION_SLACK: f64 = 2e-3;
 
-/// How the scanner stands to the press and the plate.
+/// Position of the scanner relative to press and plate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
-    /// Where a point of the scanner frame is in the press's. The press turns plates about its z, by which `plate_rot` carries
-    /// (0, 0) from stroke to stroke.
+    /// Transform from the scanner frame to the press frame. The press turns plates about its z; `plate_rot` carries (0, 0) from
+    /// stroke to stroke by it.
     pub press_from_scanner: RigidTransform,
     /// Rough direction of growing u, scanner frame, any length; decides which corner is (0, 0).
     pub u_axis: Option<[f64; 3]>,
-    /// Where the plate can be.
+    /// Box that contains the plate.
     pub region_of_interest: Option<RegionOfInterest>,
 }
 
@@ -65,11 +65,15 @@ impl RegionOfInterest {
         let document = table.document();
         table.finish();
         let (min, max) = (min?, max?);
-        if let Some(axis) = (0..3).find(|&axis| min[axis] >= max.value[axis]) {
-            let name = ["x", "y", "z"][axis];
-            let message = format!("{name} is {}, must be above the {} of min_mm", max.value[axis], min[axis]);
-            return Err(document.fault(&max.place, message));
+        let mut ordered = Ok(());
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let (min, above) = (min[axis], max.value[axis]);
+            if min >= above {
+                let message = format!("{name} is {above}, must be above the {min} of min_mm");
+                ordered = Err(document.fault(&max.place, message));
+            }
         }
+        ordered?;
         Ok(Self { min: min.map(metres), max: max.value.map(metres) })
     }
 }
@@ -85,7 +89,7 @@ impl RigidTransform {
     }
 }
 
-/// The rotation nearest in its first row, then its second (Gram-Schmidt).
+/// Returns the rotation by Gram-Schmidt orthonormalisation of the rows.
 fn orthonormal(rows: [[f64; 3]; 3]) -> Result<[[f64; 3]; 3], String> {
     let [x, y, z] = rows;
     for (i, j) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)] {

@@ -1,4 +1,4 @@
-//! `[output]`: where results go and how long raw scans stay.
+//! `[output]`: folder of results and storage time of raw scans.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -8,21 +8,21 @@ use crate::node::NodeKind;
 use crate::table::number;
 use crate::{TomlTable, Unit};
 
-/// Raw scans are some tens of megabytes each: a month of strokes fits a usual disk.
+/// Default storage time. Raw scans are some tens of megabytes each: a month of strokes fits a usual disk.
 const KEEP_SCANS: Duration = Duration::from_secs(30 * 86_400);
 
-/// Where results go.
+/// Destination of results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Output {
     /// Folder that gets one folder per measurement.
     pub folder: PathBuf,
     /// The history's database file.
     pub history: PathBuf,
-    /// How long raw scans stay.
+    /// Storage time of raw scans.
     pub keep_scans: KeepScans,
 }
 
-/// How long raw scans stay.
+/// Storage time of raw scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeepScans {
     /// For ever.

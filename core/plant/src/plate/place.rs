@@ -6,7 +6,7 @@ use super::{metres, millimetres};
 use crate::document::Reported;
 use crate::{Place, TomlTable};
 
-/// The plate's original rectangle, metres.
+/// Original rectangle of the plate, metres.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rectangle {
     pub(super) width: f64,
@@ -14,14 +14,14 @@ pub(super) struct Rectangle {
 }
 
 impl Rectangle {
-    /// Length of the straight line through the middle in the direction `angle` (from u towards v), metres.
+    /// Returns the length of the straight line through the middle in the direction `angle` (from u towards v), metres.
     pub(super) fn through_middle(&self, angle: f64) -> f64 {
         let along = |extent: f64, share: f64| if share == 0.0 { f64::INFINITY } else { extent / share.abs() };
         along(self.width, angle.cos()).min(along(self.height, angle.sin()))
     }
 }
 
-/// A point in millimetres on the plate, its edge included; metres.
+/// Reads a point of the plate, edges included; returns metres.
 pub(super) fn point(
     table: &mut TomlTable<'_>,
     key: &str,
@@ -51,13 +51,13 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// The table's name, which no table before it has.
+    /// Reads the table's name, which no table before it may have.
     pub(super) fn take(&mut self, table: &mut TomlTable<'_>) -> Result<String, Reported> {
         let name = table.name("name").located().required()?;
         self.claim(table, name.value, name.place)
     }
 
-    /// Notes that `name` is taken at `place`.
+    /// Records that `name` is taken at `place`.
     pub(super) fn claim(
         &mut self,
         table: &TomlTable<'_>,

@@ -1,4 +1,4 @@
-//! The target: the shape that the plate is bent toward, each shape with its own keys.
+//! `[target]`: the shape that the plate is bent toward, each shape with its own keys.
 
 use std::f64::consts::TAU;
 
@@ -28,13 +28,19 @@ const SHAPES: &[(&str, Word)] = &[
 ];
 
 pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Target, Reported> {
-    // Without the shape nobody knows which keys belong here: only this one is reported.
-    let word = table.choice("shape", SHAPES).required()?;
-    let shape = shape_of(word, &mut table, plate);
+    let word = table.choice("shape", SHAPES).required();
+    let shape = word.and_then(|word| shape_of(word, &mut table, plate));
+    if let Err(reported) = word {
+        // A target of unknown shape may have the keys of every shape.
+        table.excuse_missing(reported);
+        for (_, word) in SHAPES {
+            let _ = shape_of(*word, &mut table, plate);
+        }
+    }
     let mut target =
         Target { shape: TargetShape::Flat, radius_of: RadiusOf::Inside, scanned_face: Facing::Inside };
     let mut faces = Ok(());
-    if !matches!(word, Word::Flat) {
+    if !matches!(word, Ok(Word::Flat)) {
         let radius_of = table.choice(
             "radius_of",
             &[("inside", RadiusOf::Inside), ("outside", RadiusOf::Outside), ("mid", RadiusOf::Mid)],
@@ -48,6 +54,7 @@ pub(super) fn read(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result
     faces?;
     Ok(Target { shape: shape?, ..target })
 }
+
 fn shape_of(
     word: Word,
     table: &mut TomlTable<'_>,
@@ -78,7 +85,7 @@ fn shape_of(
     }
 }
 
-/// Direction of the straight lines. Required: no direction is the usual one.
+/// Reads the direction of the straight lines, which has no default.
 fn axis(table: &mut TomlTable<'_>) -> Result<f64, Reported> {
     table.number("axis_deg").in_range(-180.0..=180.0).map(f64::to_radians).required()
 }
@@ -87,7 +94,7 @@ fn radius(table: &mut TomlTable<'_>, key: &str, plate: Option<Rectangle>) -> Res
     table.number(key).check(|mm| reaches(*mm, *mm, plate)).map(metres).required()
 }
 
-/// A radius is above zero and does not roll the plate's shorter side into more than a full turn.
+/// Refuses a radius of zero or less, or one that rolls the plate's shorter side into more than a full turn.
 fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), String> {
     if radius_mm <= 0.0 {
         let advice = if found == 0.0 { "" } else { "; scanned_face says which way the plate bends" };
@@ -104,7 +111,7 @@ fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), S
     Ok(())
 }
 
-/// A cone's radius cannot change by more than the length of its straight line.
+/// Refuses a cone whose radius changes by more than the length of its straight line.
 fn slopes(
     document: &Document,
     axis: f64,

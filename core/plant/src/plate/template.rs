@@ -1,4 +1,4 @@
-//! Templates: boards laid on reference lines, with the rules of the trade as presets.
+//! `[[template]]`: templates on reference lines, with rules of the trade as presets.
 
 use platen_model::{Centre, ReferenceLine, Seat, Template};
 
@@ -8,21 +8,21 @@ use crate::document::Reported;
 use crate::key::Located;
 use crate::{Document, TomlTable, nearest};
 
-/// A rule of the trade: what a template takes from it unless the file says otherwise.
+/// Rule of the trade: default length, limit and source of a template.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Preset {
-    /// Its name in the file.
-    pub name: &'static str,
-    /// Length of the board, millimetres.
-    pub chord_mm: f64,
+struct Preset {
+    /// Name in the file.
+    name: &'static str,
+    /// Length of the template, millimetres.
+    chord_mm: f64,
     /// Largest gap, millimetres.
-    pub limit_mm: f64,
-    /// Where the rule comes from, how sure that is, and what it is for.
-    pub source: &'static str,
+    limit_mm: f64,
+    /// Origin of the rule, its reliability and its use.
+    source: &'static str,
 }
 
-/// The presets. Only rules whose numbers are known stand here; others belong in the plate file with their own `source`.
-pub const PRESETS: &[Preset] = &[
+/// Presets. Only rules whose numbers are known are listed; others belong in the plate file with their own `source`.
+const PRESETS: &[Preset] = &[
     Preset {
         name: "spherical-petal",
         chord_mm: 2000.0,
@@ -55,7 +55,7 @@ pub(super) fn read(
     let preset = table.choice("preset", &presets).located().optional();
     let line =
         table.name("line").located().required().and_then(|name| on_line(table.document(), &name, lines));
-    let (chord, limit) = board(&mut table, &preset);
+    let (chord, limit) = measures(&mut table, &preset);
     let centre = centre(&mut table);
     let seat = table
         .choice("seat", &[("gravity", Seat::Gravity), ("balanced", Seat::Balanced), ("held", Seat::Held)])
@@ -84,7 +84,7 @@ pub(super) fn read(
 }
 
 impl Preset {
-    /// The source of a board of these measures: a rule that was changed is no longer the rule.
+    /// Returns the source of a template of these measures; a changed rule is marked as changed.
     fn source_for(&self, chord_mm: f64, limit_mm: f64) -> String {
         if (chord_mm, limit_mm) == (self.chord_mm, self.limit_mm) {
             return self.source.to_owned();
@@ -93,8 +93,8 @@ impl Preset {
     }
 }
 
-/// Length and limit of the board, millimetres, from the file or from its preset.
-fn board(
+/// Reads length and limit, millimetres, from the file or its preset.
+fn measures(
     table: &mut TomlTable<'_>,
     preset: &Result<Option<Located<Preset>>, Reported>,
 ) -> (Result<Located<f64>, Reported>, Result<f64, Reported>) {
@@ -110,14 +110,14 @@ fn board(
     }
 }
 
-/// The name given, or one from the place in the file: the second template is T2.
+/// Reads the name; the default follows from the place in the file: the second template is T2.
 fn name(table: &mut TomlTable<'_>, names: &mut Names) -> Result<String, Reported> {
     let default = Located { value: format!("T{}", names.number), place: table.place().clone() };
     let name = table.name("name").located().or(default)?;
     names.claim(table, name.value, name.place)
 }
 
-/// The line called `name`; lines that are faulty themselves are not reported again.
+/// Returns the line called `name`; a faulty line is not reported again.
 fn on_line<'a>(
     document: &Document,
     name: &Located<String>,
@@ -140,7 +140,7 @@ fn on_line<'a>(
     Err(document.absent(&name.place, format!("no reference line is called {:?}{advice}", name.value)))
 }
 
-/// `centre_mm`: a number along the line, or "worst".
+/// Reads `centre_mm`: a number along the line, or "worst".
 fn centre(table: &mut TomlTable<'_>) -> Result<Option<Located<Centre>>, Reported> {
     let centre = table.node("centre_mm").try_map(|node| match (&node.kind, crate::table::number(node)) {
         (_, Some(mm)) => Ok(Centre::At(metres(mm))),
@@ -150,18 +150,18 @@ fn centre(table: &mut TomlTable<'_>) -> Result<Option<Located<Centre>>, Reported
     centre.located().optional()
 }
 
-/// The board is no longer than its line.
+/// Refuses a template longer than its line.
 fn fits(document: &Document, line: &ReferenceLine, chord: &Located<f64>) -> Result<(), Reported> {
     let length = millimetres(line.length());
     if chord.value <= length {
         return Ok(());
     }
     let message =
-        format!("a board of {} mm is longer than its line {:?} of {length} mm", chord.value, line.name);
+        format!("a template of {} mm is longer than its line {:?} of {length} mm", chord.value, line.name);
     Err(document.fault(&chord.place, message))
 }
 
-/// The middle of a board whose both ends lie on its line.
+/// Returns the centre of a template whose ends both lie on its line.
 fn stays_on(
     document: &Document,
     line: &ReferenceLine,
@@ -175,7 +175,7 @@ fn stays_on(
         return Ok(centre.value);
     }
     let message = format!(
-        "found {at}, where the board of {chord_mm} mm hangs over an end of {:?}, {length} mm long; allowed {first} to {last}",
+        "found {at}, where the template of {chord_mm} mm hangs over an end of {:?}, {length} mm long; allowed {first} to {last}",
         line.name
     );
     Err(document.fault(&centre.place, message))

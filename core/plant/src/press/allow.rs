@@ -1,19 +1,19 @@
-//! The only registers that may ever be written.
+//! Allow-list of registers that may be written.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::Block;
 
-/// Holding registers that may be written, and how often.
+/// Allow-list of holding registers, with the largest rate of writes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WriteAllow {
     ranges: Vec<RangeInclusive<u16>>,
-    /// Most write requests in a second.
+    /// Largest number of write requests in a second.
     pub max_writes_per_s: u32,
 }
 
-/// A write that the allow-list refuses.
+/// Write that the allow-list refuses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refused {
     /// First register of the request.
@@ -27,7 +27,7 @@ impl WriteAllow {
     /// more than a press makes, far less than its controller can take.
     pub const MAX_WRITES_PER_S: u32 = 50;
 
-    /// These registers, at the default rate. Neighbouring and overlapping ranges become one.
+    /// Allows these registers at the default rate. Neighbouring and overlapping ranges become one.
     pub fn new(ranges: impl IntoIterator<Item = RangeInclusive<u16>>) -> Self {
         let mut sorted: Vec<_> = ranges.into_iter().filter(|range| !range.is_empty()).collect();
         sorted.sort_by_key(|range| *range.start());
@@ -43,12 +43,12 @@ impl WriteAllow {
         Self { ranges, max_writes_per_s: Self::MAX_WRITES_PER_S }
     }
 
-    /// The registers of a block.
+    /// Allows the registers of a block.
     pub fn block(block: &Block) -> Self {
         Self::new((block.count > 0).then(|| block.start..=block.start.saturating_add(block.count - 1)))
     }
 
-    /// Whether one request may write `count` registers from `start` on.
+    /// Checks that one request may write `count` registers from `start` on.
     ///
     /// # Errors
     /// [`Refused`] when a register lies outside, when there is none, or when the request crosses the last address.
@@ -59,7 +59,7 @@ impl WriteAllow {
         if inside { Ok(()) } else { Err(refused) }
     }
 
-    /// The ranges, sorted and apart.
+    /// Returns the ranges, sorted and disjoint.
     pub fn ranges(&self) -> &[RangeInclusive<u16>] {
         &self.ranges
     }

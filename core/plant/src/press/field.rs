@@ -1,8 +1,8 @@
-//! One field of a register map: where it stands, how its words are read, and what its number means.
+//! Field of a register map: place, type of its words, scale and unit.
 
 use crate::Unit;
 
-/// How the words of a field are read.
+/// Type of a field's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegisterType {
     /// One bit of a register.
@@ -25,7 +25,7 @@ pub enum RegisterType {
 }
 
 impl RegisterType {
-    /// Registers of one value.
+    /// Returns the number of registers of one value.
     pub fn registers(self) -> u16 {
         match self {
             Self::Bool | Self::U16 | Self::I16 => 1,
@@ -34,7 +34,7 @@ impl RegisterType {
         }
     }
 
-    /// The name in the plant file; the length of a text stands beside it.
+    /// Returns the name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -47,7 +47,7 @@ impl RegisterType {
         }
     }
 
-    /// Smallest and largest raw number; `None` for bits and text.
+    /// Returns the smallest and largest raw number; `None` for bits and text.
     pub fn range(self) -> Option<(f64, f64)> {
         match self {
             Self::Bool | Self::Ascii { .. } => None,
@@ -75,10 +75,10 @@ pub enum WordOrder {
 }
 
 impl WordOrder {
-    /// All four.
+    /// All orders.
     pub const ALL: [Self; 4] = [Self::Abcd, Self::Cdab, Self::Badc, Self::Dcba];
 
-    /// The name in the plant file.
+    /// Returns the name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Abcd => "ABCD",
@@ -87,26 +87,21 @@ impl WordOrder {
             Self::Dcba => "DCBA",
         }
     }
-
-    /// The order of this name, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|order| order.name() == name)
-    }
 }
 
-/// Where a field stands.
+/// Place of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RegisterPlace {
-    /// From this register of its block on.
+    /// Offset of the first register in its block.
     Register(u16),
-    /// One bit (0 the lowest) of this register of its block.
+    /// Offset of a register in its block and a bit of it, 0 the lowest.
     Bit(u16, u8),
-    /// In no register: the press always means this number, in the field's unit.
+    /// No register: a fixed number, in the field's unit.
     Constant(f64),
 }
 
 impl RegisterPlace {
-    /// First register in the block, `None` for a constant.
+    /// Returns the offset of the first register, `None` for a constant.
     pub fn offset(self) -> Option<u16> {
         match self {
             Self::Register(offset) | Self::Bit(offset, _) => Some(offset),
@@ -115,16 +110,14 @@ impl RegisterPlace {
     }
 }
 
-/// One field of a register map.
-///
-/// The number a field means is `raw * scale` in `unit`.
+/// Field of a register map. Its number is `raw * scale` in `unit`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegisterField {
-    /// Where it stands.
+    /// Place.
     pub place: RegisterPlace,
-    /// How its words are read.
+    /// Type of its words.
     pub kind: RegisterType,
-    /// Values one after the other; 1 but for lists.
+    /// Number of consecutive values; 1 except for lists.
     pub count: u16,
     /// Order of the words of a 32-bit value.
     pub order: WordOrder,
@@ -132,24 +125,24 @@ pub struct RegisterField {
     pub scale: f64,
     /// Unit of the scaled number.
     pub unit: Unit,
-    /// Raw value (the bits, whatever the kind) that means "no value".
+    /// Raw bits that mean "no value".
     pub invalid: Option<u32>,
-    /// The only raw number that is right.
+    /// Required raw number.
     pub expect: Option<i64>,
-    /// Least plausible number, in `unit`; below it the value counts as missing.
+    /// Smallest plausible number, in `unit`; below it the value counts as missing.
     pub min: Option<f64>,
-    /// Greatest plausible number, in `unit`; above it the value counts as missing.
+    /// Largest plausible number, in `unit`; above it the value counts as missing.
     pub max: Option<f64>,
-    /// A bit that means yes when it is 0.
+    /// Inverted bit: 0 means yes.
     pub active_low: bool,
-    /// Equal reads in a row before a bit's change counts.
+    /// Number of equal reads before a change of a bit counts.
     pub debounce_reads: u8,
-    /// The figure in an output field, when it is not the field's own.
+    /// Figure in an output field, if not the field's own.
     pub from: Option<platen_model::Measure>,
 }
 
 impl RegisterField {
-    /// A field of one register or more, at `offset` of its block: scale 1, no unit, no limits.
+    /// Makes a field at `offset` of its block: scale 1, no unit, no limits.
     pub fn register(offset: u16, kind: RegisterType) -> Self {
         Self {
             place: RegisterPlace::Register(offset),
@@ -168,22 +161,22 @@ impl RegisterField {
         }
     }
 
-    /// One bit of the register at `offset`.
+    /// Makes a field of one bit of the register at `offset`.
     pub fn bit(offset: u16, bit: u8) -> Self {
         Self { place: RegisterPlace::Bit(offset, bit), ..Self::register(offset, RegisterType::Bool) }
     }
 
-    /// The same field with a scale and a unit.
+    /// Returns the field with a scale and a unit.
     pub fn scaled(self, scale: f64, unit: Unit) -> Self {
         Self { scale, unit, ..self }
     }
 
-    /// The same field with a raw value that means "no value".
+    /// Returns the field with raw bits that mean "no value".
     pub fn invalid(self, raw: u32) -> Self {
         Self { invalid: Some(raw), ..self }
     }
 
-    /// Registers it takes in its block; 0 for a constant.
+    /// Returns the number of registers in its block; 0 for a constant.
     pub fn registers(&self) -> u16 {
         match self.place {
             RegisterPlace::Constant(_) => 0,

@@ -1,13 +1,13 @@
-//! How the press is reached, and how patient the host is with it.
+//! Connection to the press and its time limits.
 
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The way to the press and its time limits.
+/// Connection to the press and its time limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
-    /// What the words travel over.
+    /// Transport.
     pub transport: Transport,
     /// Modbus unit id; gateways need the real one.
     pub unit: u8,
@@ -27,7 +27,7 @@ pub struct Link {
     pub backoff_max: Duration,
 }
 
-/// What the words travel over.
+/// Transport of Modbus frames.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Transport {
     /// Modbus TCP.
@@ -38,18 +38,18 @@ pub enum Transport {
     RtuOverTcp(Socket, Quiet),
 }
 
-/// A TCP address: the press's when the host is the client, the one to listen on when it is the server.
+/// TCP address: that of the press if the host is the client, the one to listen on if it is the server.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Socket {
     /// Name or address.
     pub host: String,
     /// Port.
     pub port: u16,
-    /// Server role only: who may connect; empty admits loopback only.
+    /// Server role only: addresses that may connect; empty admits loopback only.
     pub peers: Vec<IpAddr>,
 }
 
-/// A serial port.
+/// Serial port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Serial {
     /// Device file; a name in `/dev/serial/by-id` survives replugging.
@@ -60,10 +60,10 @@ pub struct Serial {
     pub parity: Parity,
     /// Stop bits, 1 or 2.
     pub stop_bits: u8,
-    /// The adapter hears what it sends: strip it.
+    /// The adapter receives its own requests, which are removed from the answers.
     pub echo: bool,
-    /// The kernel's driver of the port switches the direction of a two-wire RS-485 line by RTS. Most adapters do it by
-    /// themselves and need nothing.
+    /// The kernel's driver of the port switches the direction of a two-wire RS-485 line by RTS. Most adapters switch it
+    /// themselves.
     pub rs485: bool,
 }
 
@@ -79,40 +79,36 @@ pub enum Parity {
     None,
 }
 
-/// How long a serial line must be silent after a fault before the next request.
+/// Silence required on a serial line after a fault, before the next request.
 ///
-/// RTU frames have no transaction number: an answer that comes late is taken for the next one, without any error.
-/// Longer than the longest answer time of the press.
+/// RTU frames have no transaction number, so a late answer would be taken for the next one. Must exceed the longest answer
+/// time of the press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quiet(pub Duration);
 
 impl Link {
-    /// Modbus TCP to `host:port` with default time limits.
+    /// Makes a Modbus TCP link to `host:port` with default time limits.
     pub fn tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
-        let socket = Socket { host: host.into(), port, peers: Vec::new() };
-        Self::with_defaults(
-            Transport::Tcp(socket),
-            unit,
-            Duration::from_millis(300),
-            Duration::from_millis(20),
-        )
+        Self::new(Transport::Tcp(Socket::new(host, port)), unit)
     }
 
-    /// Modbus RTU on a serial port; the response time follows from the line's speed.
+    /// Makes a Modbus RTU link on a serial port; the response time follows from the line's speed.
     pub fn rtu(serial: Serial, unit: u8) -> Self {
-        let response = serial.response_timeout();
-        let quiet = Quiet(response.mul_f64(1.5));
-        Self::with_defaults(Transport::Rtu(serial, quiet), unit, response, Duration::from_millis(100))
+        Self::new(Transport::rtu(serial), unit)
     }
 
-    /// Modbus RTU frames over TCP to a gateway.
+    /// Makes a link of Modbus RTU frames over TCP to a gateway.
     pub fn rtu_over_tcp(host: impl Into<String>, port: u16, unit: u8) -> Self {
-        let socket = Socket { host: host.into(), port, peers: Vec::new() };
-        let transport = Transport::RtuOverTcp(socket, Quiet(Duration::from_millis(750)));
-        Self::with_defaults(transport, unit, Duration::from_millis(500), Duration::from_millis(100))
+        Self::new(Transport::rtu_over_tcp(Socket::new(host, port)), unit)
     }
 
-    fn with_defaults(transport: Transport, unit: u8, response_timeout: Duration, poll: Duration) -> Self {
+    /// Makes a link with the default time limits of its transport.
+    pub(super) fn new(transport: Transport, unit: u8) -> Self {
+        let (response_timeout, poll_ms) = match &transport {
+            Transport::Tcp(_) => (Duration::from_millis(300), 20),
+            Transport::Rtu(serial, _) => (serial.response_timeout(), 100),
+            Transport::RtuOverTcp(..) => (Duration::from_millis(500), 100),
+        };
         Self {
             transport,
             unit,
@@ -120,18 +116,18 @@ impl Link {
             response_timeout,
             pause_after_connect: Duration::ZERO,
             pause_between_requests: Duration::ZERO,
-            poll,
+            poll: Duration::from_millis(poll_ms),
             backoff_min: Duration::from_millis(100),
             backoff_max: Duration::from_secs(1),
         }
     }
 
-    /// Whether requests and answers share a slow line: then each poll reads as little as it can.
+    /// Returns whether requests and answers share a slow line, on which each poll reads as little as possible.
     pub fn is_serial(&self) -> bool {
         !matches!(self.transport, Transport::Tcp(_))
     }
 
-    /// The silence that must follow a fault; `None` where transaction numbers make it needless.
+    /// Returns the silence required after a fault; `None` for frames with transaction numbers.
     pub fn quiet(&self) -> Option<Duration> {
         match &self.transport {
             Transport::Tcp(_) => None,
@@ -140,19 +136,37 @@ impl Link {
     }
 }
 
+impl Transport {
+    pub(super) fn rtu(serial: Serial) -> Self {
+        let quiet = Quiet(serial.response_timeout().mul_f64(1.5));
+        Self::Rtu(serial, quiet)
+    }
+
+    pub(super) fn rtu_over_tcp(socket: Socket) -> Self {
+        Self::RtuOverTcp(socket, Quiet(Duration::from_millis(750)))
+    }
+}
+
+impl Socket {
+    /// Makes an address that only loopback may connect to.
+    pub(super) fn new(host: impl Into<String>, port: u16) -> Self {
+        Self { host: host.into(), port, peers: Vec::new() }
+    }
+}
+
 impl Serial {
-    /// A port with the Modbus defaults: even parity, one stop bit.
+    /// Makes a port with the Modbus defaults: even parity, one stop bit.
     pub fn new(device: impl Into<PathBuf>, baud: u32) -> Self {
         Self { device: device.into(), baud, parity: Parity::Even, stop_bits: 1, echo: false, rs485: false }
     }
 
-    /// Line time of `bytes` characters of 11 bits.
+    /// Returns the line time of `bytes` characters of 11 bits.
     pub fn line_time(&self, bytes: u32) -> Duration {
         Duration::from_secs_f64(f64::from(bytes) * 11.0 / f64::from(self.baud.max(1)))
     }
 
-    /// Three times the line time of the longest exchange (60 registers written, 139 bytes) and 60 ms for the press
-    /// to think and the adapter to buffer.
+    /// Returns the default response time limit: three times the line time of the longest exchange (60 registers written, 139 bytes) and 60 ms for the press
+    /// to answer and the adapter to buffer.
     pub fn response_timeout(&self) -> Duration {
         self.line_time(139) * 3 + Duration::from_millis(60)
     }

@@ -1,10 +1,10 @@
-//! A register map: two blocks of registers and what stands in them.
+//! Register map: two blocks of registers and their fields.
 
 use std::collections::BTreeMap;
 
 use super::{Input, Output, RegisterField};
 
-/// The Modbus kinds of register that a block can be read from.
+/// Modbus kind of a block's registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RegisterTable {
     /// Holding registers: read by function 3, written by function 16.
@@ -15,7 +15,7 @@ pub enum RegisterTable {
 }
 
 impl RegisterTable {
-    /// The name in the plant file.
+    /// Returns the name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Holding => "holding",
@@ -24,25 +24,25 @@ impl RegisterTable {
     }
 }
 
-/// Consecutive registers that travel in one transaction.
+/// Consecutive registers of one transaction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     /// Kind of the registers.
     pub table: RegisterTable,
     /// Address of the first, zero-based, as on the wire.
     pub start: u16,
-    /// How many.
+    /// Number of registers.
     pub count: u16,
 }
 
 impl Block {
-    /// Addresses of the block; `u32` because the end may lie behind the last address.
+    /// Returns the addresses of the block; `u32` because the end may lie behind the last address.
     pub fn addresses(&self) -> std::ops::Range<u32> {
         u32::from(self.start)..u32::from(self.start) + u32::from(self.count)
     }
 }
 
-/// How addresses are counted in the plant file.
+/// Base of addresses in the plant file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AddressBase {
     /// As on the wire, from 0.
@@ -57,7 +57,7 @@ pub enum AddressBase {
 }
 
 impl AddressBase {
-    /// The number that the plant file has for the first register of `table`.
+    /// Returns the number of the first register of `table`.
     pub fn first(self, table: RegisterTable) -> u32 {
         match (self, table) {
             (Self::Zero, _) => 0,
@@ -70,7 +70,7 @@ impl AddressBase {
     }
 }
 
-/// How much of a handshake the press can do.
+/// Extent of the handshake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Profile {
     /// Stroke numbers, sessions and both heartbeats: the built-in map of version 1.
@@ -83,7 +83,7 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// The name in the plant file.
+    /// Returns the name in the plant file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pph1 => "pph-1",
@@ -93,7 +93,7 @@ impl Profile {
     }
 }
 
-/// The stroke counter of the press.
+/// Stroke counter of the press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counter {
     /// Largest number; the next one is `first`.
@@ -103,7 +103,7 @@ pub struct Counter {
 }
 
 impl Counter {
-    /// How many strokes lie between two numbers, `to` included: 1 for neighbours, 0 for the same.
+    /// Returns the number of strokes from one number to another: 1 for neighbours, 0 for the same.
     pub fn distance(&self, from: u16, to: u16) -> u32 {
         let period = u32::from(self.wrap) - u32::from(self.first) + 1;
         (u32::from(to) + period - u32::from(from) % period) % period
@@ -116,44 +116,44 @@ impl Default for Counter {
     }
 }
 
-/// What stands where in the registers of a press.
+/// Register map of a press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegisterMap {
-    /// How much of a handshake the press can do.
+    /// Extent of the handshake.
     pub profile: Profile,
-    /// How addresses are counted where people read them.
+    /// Base of addresses in the plant file and on the map's page.
     pub address_base: AddressBase,
     /// Registers that the host reads.
     pub read: Block,
     /// Registers that the host writes.
     pub write: Block,
-    /// What the press tells the host; a field that is not here does not exist on this press.
+    /// Fields from the press to the host; others do not exist on this press.
     pub inputs: BTreeMap<Input, RegisterField>,
-    /// What the host tells the press.
+    /// Fields from the host to the press.
     pub outputs: BTreeMap<Output, RegisterField>,
-    /// The stroke counter of the press.
+    /// Stroke counter of the press.
     pub counter: Counter,
 }
 
 impl RegisterMap {
-    /// The field of an input, if this press has it.
+    /// Returns the field of an input, if the press has it.
     pub fn input(&self, input: Input) -> Option<&RegisterField> {
         self.inputs.get(&input)
     }
 
-    /// The field of an output, if this press has it.
+    /// Returns the field of an output, if the press has it.
     pub fn output(&self, output: Output) -> Option<&RegisterField> {
         self.outputs.get(&output)
     }
 
-    /// Whether strokes have numbers of the press's own. Without them a stroke is a rising trigger, the host
-    /// counts, and a missed stroke cannot be noticed.
+    /// Returns whether the press numbers its strokes. Without numbers a stroke is a rising trigger, the host counts, and a
+    /// missed stroke cannot be detected.
     pub fn counts_strokes(&self) -> bool {
         self.inputs.contains_key(&Input::StrokeId)
     }
 
-    /// Registers from the start of the read block that hold what every poll needs: the whole handshake but the
-    /// press's data. On a serial line only these are read until something happens.
+    /// Returns the number of registers from the start of the read block that every poll requires: the handshake without the
+    /// press's data. On a serial line only these are read until the trigger.
     pub fn fast_count(&self) -> u16 {
         const FAST: [Input; 14] = [
             Input::MapVersion,

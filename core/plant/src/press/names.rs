@@ -1,12 +1,12 @@
-//! The names of everything that can stand in a register, and of every figure that a measurement yields.
+//! Names of the fields of a register map, with dimension and meaning.
 //!
-//! Code asks for [`Input::StrokeId`], never for register 3: where it stands is the plant file's matter.
+//! Code refers to [`Input::StrokeId`], never to register 3; the plant file decides the place.
 
 use platen_model::Measure;
 
 use crate::Dimension;
 
-/// One enum with a name and a meaning per variant, from one list.
+/// Declares an enum with a name, a dimension and a meaning per variant.
 macro_rules! names {
     ($(#[$outer:meta])* $kind:ident { $($variant:ident $name:literal $dimension:ident $meaning:literal)* }) => {
         $(#[$outer])*
@@ -14,25 +14,25 @@ macro_rules! names {
         pub enum $kind { $(#[doc = $meaning] $variant,)* }
 
         impl $kind {
-            /// All of them, in the order of the register map's page.
+            /// All fields, in the order of the register map's page.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The name in the plant file, in the log and on the map's page.
+            /// Returns the name in the plant file, in the log and on the map's page.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// What it means, in one line.
+            /// Returns the meaning in one line.
             pub fn meaning(self) -> &'static str {
                 match self { $(Self::$variant => $meaning,)* }
             }
 
-            /// What its number measures, which decides the units it may have.
+            /// Returns the dimension, which decides the units allowed.
             pub fn dimension(self) -> Dimension {
                 match self { $(Self::$variant => Dimension::$dimension,)* }
             }
 
-            /// The one of this name, if there is one.
+            /// Returns the field of this name.
             pub fn from_name(name: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|it| it.name() == name)
             }
@@ -60,11 +60,11 @@ macro_rules! names {
 }
 
 names! {
-    /// What the press tells the host.
+    /// Field from the press to the host.
     Input {
         MapVersion "map_version" Count "version of this map; the host stays off line when it differs"
         Heartbeat "heartbeat" Count "counts up while the press controller runs"
-        Enable "enable" Switch "the press wants strokes measured"
+        Enable "enable" Switch "strokes are to be measured"
         Trigger "trigger" Switch "a stroke is done and waits to be measured"
         Ack "ack" Switch "the result has been read"
         Abort "abort" Switch "give up the scan that is running"
@@ -98,23 +98,23 @@ names! {
 }
 
 names! {
-    /// What the host tells the press.
+    /// Field from the host to the press.
     Output {
         MapVersion "map_version" Count "version of this map"
         Heartbeat "heartbeat" Count "counts up while the host runs; frozen for 2 s: ignore every result"
         StatusReady "status_ready" Switch "a stroke will be accepted"
         StatusBusy "status_busy" Switch "a stroke is being measured"
         StatusResultValid "status_result_valid" Switch "the result registers hold the result of the stroke that was accepted"
-        StatusPass "status_pass" Switch "the plate has its target shape"
-        StatusFail "status_fail" Switch "the plate has not its target shape yet"
-        StatusError "status_error" Switch "something is wrong; error_code, where there is one, tells what"
-        StatusWarning "status_warning" Switch "something needs a look; warning_code, where there is one, tells what"
+        StatusPass "status_pass" Switch "the plate is in tolerance"
+        StatusFail "status_fail" Switch "the plate is not in tolerance"
+        StatusError "status_error" Switch "an error is present; error_code, where there is one, gives the reason"
+        StatusWarning "status_warning" Switch "a warning is present; warning_code, where there is one, gives the reason"
         StatusScanDone "status_scan_done" Switch "the scan is taken, the plate may move"
         StatusMissedStroke "status_missed_stroke" Switch "a stroke was not measured because it came too early; until error_reset"
         StatusSimulated "status_simulated" Switch "the result is simulated: never use it"
         StatusStorageDegraded "status_storage_degraded" Switch "results are not being recorded"
         StatusCalibrationInvalid "status_calibration_invalid" Switch "the scanner's calibration is not valid"
-        StatusNotMeasured "status_not_measured" Switch "this stroke could not be measured; error_code, where there is one, tells why"
+        StatusNotMeasured "status_not_measured" Switch "this stroke could not be measured; error_code, where there is one, gives the reason"
         StatusCannotTell "status_cannot_tell" Switch "measured, but too uncertain to judge: neither pass nor fail"
         AckStrokeId "ack_stroke_id" Count "the stroke that was accepted: echo of stroke_id"
         ResultStrokeId "result_stroke_id" Count "the stroke that the result belongs to"
@@ -163,13 +163,13 @@ pub(crate) fn dimension_of(measure: Measure) -> Option<Dimension> {
 }
 
 impl Output {
-    /// Whether it is a bit of the status.
+    /// Returns whether it is a bit of the status.
     pub fn is_status(self) -> bool {
         self.dimension() == Dimension::Switch
     }
 
-    /// The figure that stands in this field unless the plant file says otherwise (`from`); `None` for fields of
-    /// the handshake and for the stations, which are a list.
+    /// Returns the figure in this field by default (the key `from` replaces it); `None` for fields of the handshake and for the
+    /// stations, which are a list.
     pub fn measure(self) -> Option<Measure> {
         Some(match self {
             Self::DevMax => Measure::DeviationMax,

@@ -8,11 +8,12 @@ mod map;
 use std::time::Duration;
 
 use super::{
-    Mode, NoAck, OnInterrupted, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts, WriteAllow,
+    AddressBase, Mode, NoAck, OnInterrupted, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts,
+    WriteAllow,
 };
 use crate::document::Reported;
 use crate::{Located, TomlTable};
-use map::{LocatedMap, read_map};
+use map::{LocatedMap, parse_range, read_base, read_map};
 
 /// One day: no time limit of a press is longer.
 const DAY_MS: i64 = 86_400_000;
@@ -29,35 +30,38 @@ impl Press {
         let profiles = [Profile::Pph1, Profile::Word, Profile::Bits].map(|profile| (profile.name(), profile));
         let profile = table.choice("profile", &profiles).or(Profile::default());
         let link = table.table("link").required().and_then(link::read);
-        let map = match profile {
-            Ok(profile) => table.section("map").and_then(|table| read_map(table, profile)),
-            Err(reported) => table.table("map").optional().and(Err(reported)),
+        // With an unknown profile the fields are read as changes of the default map; their conflicts wait.
+        let (base, map) = match table.section("map") {
+            Ok(mut table) => {
+                let base = read_base(&mut table);
+                (base, profile.and(read_map(table, profile.unwrap_or_default(), base)))
+            }
+            Err(reported) => (Err(reported), Err(reported)),
         };
-        let write = match &map {
-            Ok(map) => table.section("write").and_then(|table| read_write(table, map)),
-            Err(reported) => table.table("write").optional().and(Err(*reported)),
-        };
+        let write = table.section("write").and_then(|table| read_write(table, base, &map));
         let timeouts = table.section("timeouts").and_then(read_timeouts);
         let policy = table.section("policy").and_then(read_policy);
         table.finish();
 
+        let served = match (&role, &link) {
+            (Ok(Some(Located { value: Role::Server, place })), Ok((link, transport_place)))
+                if link.is_serial() =>
+            {
+                let message = "the host serves Modbus TCP only, but link.type is not tcp";
+                Err(document.fault(transport_place.as_ref().unwrap_or(place), message))
+            }
+            _ => Ok(()),
+        };
         let (map, write) = (map?, write?);
         check::map(document, &map, &write)?;
-        let role = role?;
-        let (link, transport_place) = link?;
-        if let Some(Located { value: Role::Server, place }) = &role
-            && link.is_serial()
-        {
-            let message = "the host serves Modbus TCP only, but link.type is not tcp";
-            let at = transport_place.as_ref().unwrap_or(place);
-            return Err(document.fault(at, message));
-        }
+        served?;
+        let (link, _) = link?;
         let mut timeouts = timeouts?;
         timeouts.heartbeat_in = map.heartbeat_in.unwrap_or(timeouts.heartbeat_in);
         Ok(Self {
             name: name?,
             press_id: press_id?,
-            role: role.map_or(Role::default(), |role| role.value),
+            role: role?.map_or(Role::default(), |role| role.value),
             mode: mode?,
             link,
             write,
@@ -110,22 +114,27 @@ fn read_policy(mut table: TomlTable<'_>) -> Result<Policy, Reported> {
     })
 }
 
-/// `[press.write]`; addresses as the map counts them.
-fn read_write(mut table: TomlTable<'_>, map: &LocatedMap) -> Result<WriteAllow, Reported> {
+/// Reads `[press.write]`; addresses as the map counts them.
+fn read_write(
+    mut table: TomlTable<'_>,
+    base: Result<AddressBase, Reported>,
+    map: &Result<LocatedMap, Reported>,
+) -> Result<WriteAllow, Reported> {
     let document = table.document();
     let allow = table.strings("allow").optional();
     let rate = table.integer("max_writes_per_s").in_range(1..=10_000).optional();
     table.finish();
-    let mut write = match allow? {
-        None => WriteAllow::block(&map.map.write),
+    let allow = match allow? {
+        None => map.as_ref().map(|map| WriteAllow::block(&map.map.write)).map_err(|reported| *reported),
         Some(texts) => {
-            let ranges = texts.iter().map(|text| {
-                let range = map.range(&text.value);
-                range.map_err(|message| document.fault(&text.place, message))
-            });
-            WriteAllow::new(ranges.collect::<Result<Vec<_>, _>>()?)
+            let range = |text: &Located<String>| {
+                parse_range(&text.value, base?).map_err(|message| document.fault(&text.place, message))
+            };
+            let ranges: Vec<_> = texts.iter().map(range).collect();
+            ranges.into_iter().collect::<Result<Vec<_>, _>>().map(WriteAllow::new)
         }
     };
+    let mut write = allow?;
     if let Some(rate) = rate? {
         write.max_writes_per_s = rate.unsigned_abs() as u32;
     }

@@ -1,4 +1,4 @@
-//! The registers of the host: what it wants them to be, and their words.
+//! Register image of the host: typed values, encoded to the words of the write block.
 
 use crc::{CRC_16_MODBUS, Crc};
 use platen_plant::press::{Output, RegisterField, RegisterMap, RegisterPlace};
@@ -8,14 +8,14 @@ use crate::{Code, Figures, Publication, Verdict};
 
 const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 
-/// What the host wants its registers to say. The heartbeat is not in it: it beats by itself.
+/// Desired content of the host's registers, without the heartbeat, which is added when the words are encoded.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HostImage {
     /// A stroke will be accepted.
     pub ready: bool,
     /// A stroke is being measured.
     pub busy: bool,
-    /// [`result`](Self::result) may be used.
+    /// [`result`](Self::result) is valid.
     pub valid: bool,
     /// The scan is taken, the plate may move.
     pub scan_done: bool,
@@ -35,9 +35,9 @@ pub struct HostImage {
     pub session: u16,
     /// Attempt of that stroke.
     pub attempt: u16,
-    /// What is wrong.
+    /// Content of `error_code`.
     pub error: Option<Code>,
-    /// What to look at.
+    /// Content of `warning_code`.
     pub warning: Option<Code>,
     /// Count of published results.
     pub result_seq: u16,
@@ -51,7 +51,7 @@ pub struct HostImage {
 
 impl HostImage {
     fn verdict(&self) -> Option<Verdict> {
-        self.result.as_ref().filter(|_| self.valid).map(|result| result.measurement.verdict)
+        self.result.as_ref().filter(|_| self.valid).map(|result| result.measurement.verdict())
     }
 
     fn switch(&self, output: Output) -> Option<bool> {
@@ -74,7 +74,7 @@ impl HostImage {
         })
     }
 
-    /// The number of a handshake field; `None` for switches and figures.
+    /// Returns the number of a handshake field; `None` for switches and figures.
     fn count(&self, output: Output, heartbeat: u16) -> Option<u32> {
         let code = |code: Option<Code>| u32::from(code.map_or(0, Code::number));
         let result = self.result.as_ref();
@@ -100,7 +100,7 @@ impl HostImage {
         })
     }
 
-    /// The words of the write block. Reserved registers are 0.
+    /// Encodes the write block. Reserved registers are 0.
     pub fn encode(&self, map: &RegisterMap, heartbeat: u16) -> Vec<u16> {
         let mut block = vec![0; usize::from(map.write.count)];
         for (&output, field) in &map.outputs {
@@ -160,7 +160,7 @@ pub fn saturates(map: &RegisterMap, figures: &Figures) -> bool {
     })
 }
 
-/// The figure in one value of a field; `None` where there is none and in fields of the handshake.
+/// Returns the figure of one value of a field; `None` without one and in fields of the handshake.
 fn figure(figures: &Figures, output: Output, field: &RegisterField, index: usize) -> Option<f64> {
     match field.from.or(output.measure()) {
         Some(measure) => figures.values.get(&measure).copied(),
@@ -169,7 +169,7 @@ fn figure(figures: &Figures, output: Output, field: &RegisterField, index: usize
     }
 }
 
-/// CRC-16/MODBUS over the block's fields, high byte first, in the order of their registers, but for those that change
+/// Returns the CRC-16/MODBUS over the block's fields, high byte first, in the order of their registers, except those that change
 /// with every beat or step (map version, heartbeat, status, host state) and the closing words (tail, the CRC itself).
 /// In the built-in map these are the registers 3-51 and 55-61.
 fn checksum(map: &RegisterMap, block: &[u16]) -> u16 {
@@ -196,7 +196,7 @@ fn checksum(map: &RegisterMap, block: &[u16]) -> u16 {
     digest.finalize()
 }
 
-/// Every field of a write block as read back, by name, as a person reads it: for `dump` and `watch`.
+/// Returns every field of a write block as read back, by name, formatted for people (`dump` and `watch`).
 pub fn describe_outputs(map: &RegisterMap, block: &[u16]) -> Vec<(Output, String)> {
     let show = |(&output, field): (&Output, &RegisterField)| {
         let value = |index: u16| {
@@ -240,8 +240,7 @@ mod tests {
             seq: 7,
             recipe_id: Some(17),
             measurement: Measurement {
-                verdict: Verdict::Fail,
-                reason: None,
+                judgement: Verdict::Fail.into(),
                 figures: Figures { values: values.into(), stations: vec![Some(0.001), None, Some(-0.002)] },
                 scanned_at: Some(Timestamp { unix_s: 1_700_000_000, ms: 250 }),
                 warning: None,
@@ -300,10 +299,10 @@ mod tests {
 
     #[test]
     fn no_verdict_bit_without_a_valid_result() {
-        let bits = |verdict, valid| {
+        let bits = |verdict: Verdict, valid| {
             let mut image = HostImage { valid, ..image() };
             if let Some(result) = &mut image.result {
-                result.measurement.verdict = verdict;
+                result.measurement.judgement = verdict.into();
             }
             image.encode(&RegisterMap::pph1(), 0)[2] & 0b11_0000_0001_1100
         };

@@ -1,4 +1,4 @@
-//! The registers of the press as a typed image.
+//! Register image of the press: typed values, decoded from the words of the read block.
 
 use platen_plant::Unit;
 use platen_plant::press::{Input, Profile, RegisterField, RegisterMap, RegisterPlace, RegisterType};
@@ -6,7 +6,7 @@ use platen_plant::press::{Input, Profile, RegisterField, RegisterMap, RegisterPl
 use super::words;
 use crate::{StrokeData, Timestamp};
 
-/// What the press says in one read of its block.
+/// Content of the press's registers at one read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressImage {
     /// Heartbeat; `None` where the press has none.
@@ -17,7 +17,7 @@ pub struct PressImage {
     pub trigger: bool,
     /// The result has been read.
     pub ack: bool,
-    /// Give up the scan that is running.
+    /// Abort the running scan.
     pub abort: bool,
     /// Clear latched errors.
     pub error_reset: bool,
@@ -33,40 +33,40 @@ pub struct PressImage {
     pub session_id: u16,
     /// Count of rescan requests for this stroke.
     pub attempt: u16,
-    /// What it says about the stroke; complete only when the whole block was read.
+    /// Data about the stroke; complete only when the whole block was read.
     pub data: StrokeData,
-    /// An expected value that is another one.
+    /// A register with another value than the expected one.
     pub wrong: Option<Wrong>,
 }
 
-/// A register that must have one value and has another: the wrong press, or the wrong map.
+/// A register with another value than the one expected: wrong press or wrong map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wrong {
-    /// Which field.
+    /// Field.
     pub input: Input,
-    /// What stands there.
+    /// Value found.
     pub found: i64,
-    /// What must stand there.
+    /// Value expected.
     pub expected: i64,
 }
 
-/// The press was writing its block while it was read: its copy of the stroke number differs.
+/// Torn read: the press was writing its block; `stroke_id` and `stroke_id_tail` differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Torn {
     /// The stroke number.
     pub head: u16,
-    /// Its copy.
+    /// `stroke_id_tail`.
     pub tail: u16,
 }
 
-/// Reads fields of one map from the words of its read block.
+/// Decoder of the fields of one map.
 struct Reader<'a> {
     map: &'a RegisterMap,
     words: &'a [u16],
 }
 
 impl Reader<'_> {
-    /// Registers of one field, if the press has it and they were read.
+    /// Returns the registers of one field, if the map has it and they were read.
     fn registers(&self, field: &RegisterField) -> Option<&[u16]> {
         let start = usize::from(field.place.offset()?);
         self.words.get(start..start + usize::from(field.registers()))
@@ -78,7 +78,7 @@ impl Reader<'_> {
         Some((field, words::bits(field.kind, field.order, words)?))
     }
 
-    /// A number in the inside unit.
+    /// Returns a number in the inside unit.
     fn number(&self, input: Input) -> Option<f64> {
         let field = self.map.input(input)?;
         if let RegisterPlace::Constant(number) = field.place {
@@ -131,7 +131,7 @@ impl Reader<'_> {
         })
     }
 
-    /// A number of which 0 says that the press has none: no stroke is made without force, ram or die, on no plate.
+    /// Returns a number for which 0 means "none": no stroke has zero force, ram depth, die or thickness.
     fn told(&self, input: Input) -> Option<f64> {
         self.number(input).filter(|value| *value != 0.0)
     }
@@ -162,16 +162,16 @@ impl Reader<'_> {
 }
 
 impl PressImage {
-    /// Reads the registers of press `press_id`: `words` are the read block, or its first part, in which case what lies
-    /// behind is missing.
+    /// Decodes the registers of press `press_id`; `words` are the read block or its first part, in which case later fields
+    /// are absent.
     ///
     /// A press without an `enable` or `clear_to_scan` always gives both. One that counts no strokes and has no `ack`
     /// acknowledges by dropping its trigger.
     ///
-    /// What marks another press or another map does not change while a press writes: it is told before all else.
+    /// The fields that identify press and map do not change while a press writes: they are checked first.
     ///
     /// # Errors
-    /// [`Torn`] when the press was writing meanwhile: read again.
+    /// [`Torn`], when the press was writing: read again.
     pub fn decode(map: &RegisterMap, press_id: u16, words: &[u16]) -> Result<Self, Torn> {
         let reader = Reader { map, words };
         let stroke_id = reader.count(Input::StrokeId).unwrap_or(0);
@@ -201,7 +201,7 @@ impl PressImage {
     }
 }
 
-/// Every field that was read, by name, as a person reads it: for `dump` and `watch`.
+/// Returns every field that was read, by name, formatted for people (`dump` and `watch`).
 pub fn describe_inputs(map: &RegisterMap, words: &[u16]) -> Vec<(Input, String)> {
     let reader = Reader { map, words };
     let show = |(&input, field): (&Input, &RegisterField)| {
@@ -217,7 +217,7 @@ pub fn describe_inputs(map: &RegisterMap, words: &[u16]) -> Vec<(Input, String)>
     map.inputs.iter().map(show).collect()
 }
 
-/// A number of the inside unit in the field's own unit, with the digits that its scale has.
+/// Formats a number of the inside unit in the field's unit, with the digits of its scale.
 pub(super) fn show_number(field: &RegisterField, number: f64) -> String {
     let digits = if field.kind == RegisterType::F32 {
         3

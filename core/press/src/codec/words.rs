@@ -2,7 +2,7 @@
 
 use platen_plant::press::{RegisterField, RegisterType, WordOrder};
 
-/// The bits of the 32-bit value in two registers.
+/// Returns the bits of the 32-bit value in two registers.
 fn join(order: WordOrder, words: [u16; 2]) -> u32 {
     let [first, second] = match order {
         WordOrder::Abcd => words,
@@ -13,7 +13,7 @@ fn join(order: WordOrder, words: [u16; 2]) -> u32 {
     u32::from(first) << 16 | u32::from(second)
 }
 
-/// The two registers of a 32-bit value.
+/// Returns the two registers of a 32-bit value.
 fn split(order: WordOrder, bits: u32) -> [u16; 2] {
     let words = [(bits >> 16) as u16, bits as u16];
     match order {
@@ -24,7 +24,7 @@ fn split(order: WordOrder, bits: u32) -> [u16; 2] {
     }
 }
 
-/// The bits of one value: `words` are its registers. Empty for texts.
+/// Returns the bits of one value in `words`; `None` for texts.
 pub(crate) fn bits(kind: RegisterType, order: WordOrder, words: &[u16]) -> Option<u32> {
     match (kind.registers(), words) {
         (1, &[word]) => Some(u32::from(word)),
@@ -35,12 +35,12 @@ pub(crate) fn bits(kind: RegisterType, order: WordOrder, words: &[u16]) -> Optio
     }
 }
 
-/// The registers of the bits of one value.
+/// Returns the registers of the bits of one value.
 pub(super) fn registers(kind: RegisterType, order: WordOrder, bits: u32) -> Vec<u16> {
     if kind.registers() == 2 { split(order, bits).to_vec() } else { vec![bits as u16] }
 }
 
-/// The raw number that the bits of one value mean.
+/// Returns the raw number of the bits of one value.
 pub(crate) fn raw_number(kind: RegisterType, bits: u32) -> f64 {
     match kind {
         RegisterType::Bool | RegisterType::U16 | RegisterType::Ascii { .. } => f64::from(bits as u16),
@@ -61,7 +61,7 @@ fn raw_bits(kind: RegisterType, raw: f64) -> u32 {
     }
 }
 
-/// The bits that mean "no value": the field's own, else the value farthest from every plausible one.
+/// Returns the bits for "no value": those of the field, else the value farthest from every plausible one.
 pub(super) fn invalid_bits(field: &RegisterField) -> u32 {
     field.invalid.unwrap_or(match field.kind {
         RegisterType::Bool | RegisterType::Ascii { .. } => 0,
@@ -73,8 +73,8 @@ pub(super) fn invalid_bits(field: &RegisterField) -> u32 {
     })
 }
 
-/// The bits of a number of the inside unit, and whether it had to be cut to what the field can hold. It is cut at the
-/// same magnitude on both sides (an i16 at -32767 and 32767) and never becomes the invalid value.
+/// Returns the bits of a number of the inside unit, and whether it was clamped to the range of the field. The range is
+/// symmetric (an i16: -32767 to 32767) and excludes the invalid value.
 pub(super) fn number_bits(field: &RegisterField, number: Option<f64>) -> (u32, bool) {
     let invalid = invalid_bits(field);
     let (Some(number), Some((low, high))) = (number.filter(|n| n.is_finite()), field.kind.range()) else {
@@ -93,14 +93,14 @@ pub(super) fn number_bits(field: &RegisterField, number: Option<f64>) -> (u32, b
     (bits, held != raw)
 }
 
-/// The bits of a count of the handshake: every value is one, none means "no value".
+/// Returns the bits of a count of the handshake, for which every value is valid.
 pub(super) fn count_bits(field: &RegisterField, count: u32) -> u32 {
     let (low, high) = field.kind.range().unwrap_or((0.0, 0.0));
     raw_bits(field.kind, f64::from(count).clamp(low, high))
 }
 
-/// The number, in the inside unit, that the bits of a field mean. `None` when they mean "no value", are no number, or
-/// lie outside the field's limits.
+/// Returns the number of the bits of a field, inside unit; `None` for "no value", NaN, and values outside the field's
+/// limits.
 pub(super) fn number(field: &RegisterField, bits: u32) -> Option<f64> {
     if field.invalid == Some(bits) {
         return None;
@@ -112,7 +112,7 @@ pub(super) fn number(field: &RegisterField, bits: u32) -> Option<f64> {
     plausible.then(|| scaled * field.unit.factor())
 }
 
-/// The text in `words`, up to the first zero byte, without blanks at its end. `None` when empty or not ASCII.
+/// Returns the text in `words` up to the first zero byte, without trailing blanks; `None` when empty or not ASCII.
 pub(super) fn text(words: &[u16]) -> Option<String> {
     let bytes: Vec<u8> =
         words.iter().flat_map(|word| word.to_be_bytes()).take_while(|&byte| byte != 0).collect();

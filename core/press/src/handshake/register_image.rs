@@ -109,7 +109,7 @@ impl Handshake {
         let fault = if let LinkState::Fault(code) = self.link { Some(code) } else { None };
         let obstacle = self.obstacle().filter(|code| code.alarm().severity == Severity::Error);
         let missed = self.missed && self.config.policy.on_missed_stroke != OnMissed::Warn;
-        let unmeasured = result.and_then(|result| result.measurement.reason);
+        let unmeasured = result.and_then(|result| result.measurement.reason());
         let urgent = fault.or(unmeasured.filter(|_| valid)).or(obstacle);
         urgent.or(unmeasured).or(missed.then_some(Code::MissedStroke))
     }

@@ -117,7 +117,7 @@ impl Handshake {
         }
         let press = self.press.as_ref().filter(|_| self.link == LinkState::Online);
         let asks = |bit: fn(&PressImage) -> bool| press.is_some_and(bit);
-        let failed = active.outcome.as_ref().filter(|_| !active.acquired).and_then(|outcome| outcome.reason);
+        let failed = active.outcome.as_ref().filter(|_| !active.acquired).and_then(Measurement::reason);
         let overdue = now.saturating_sub(active.since) >= self.scan_limit();
         let unstored = active.journaled == Some(false) && self.storage_stops() && !scanning;
         failed
@@ -169,7 +169,7 @@ impl Handshake {
             self.effects.push(Effect::Cancel(key));
         }
         let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
-        let measured = outcome.verdict != Verdict::NotMeasured;
+        let measured = outcome.verdict() != Verdict::NotMeasured;
         self.finish(outcome, Work::Publish, now);
         if measured { Transition::StrokeMeasured } else { Transition::StrokeNotMeasured }
     }
@@ -177,7 +177,7 @@ impl Handshake {
     /// Makes the result final and journals it; it is written once that is done.
     pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
         let Some(active) = &mut self.active else { return };
-        if let Some(code) = measurement.reason {
+        if let Some(code) = measurement.reason() {
             self.effects.push(Effect::Alarm(code));
         } else {
             active.add_times(&mut measurement.figures, now);

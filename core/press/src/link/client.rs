@@ -1,4 +1,4 @@
-//! The one user of a link: time limits, checks, the allow-list, and what was counted on the way.
+//! The client of a link: time limits, checks of the answers, the allow-list of writes, and counters.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -8,31 +8,31 @@ use tokio::time::{Instant, sleep_until, timeout};
 
 use super::{Link, LinkError, Request, Response};
 
-/// What happened on a link since the start.
+/// Counters of a link since the start.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Requests sent.
     pub requests: u64,
     /// Write requests sent.
     pub writes: u64,
-    /// Writes that were never sent because the allow-list or the mode forbids them.
+    /// Writes not sent because the allow-list or the mode forbids them.
     pub writes_refused: u64,
-    /// Connections built.
+    /// Connections established.
     pub connects: u64,
     /// Connections dropped because of an error, a timeout or a wrong answer.
     pub poisoned: u64,
     /// Requests without an answer in time.
     pub timeouts: u64,
-    /// Refusals by Modbus exception code.
+    /// Exceptions by code.
     pub exceptions: BTreeMap<u8, u64>,
-    /// Round trips by time: up to 1, 2, 5, 10, 20, 50, 100, 200, 500 ms, and longer.
+    /// Histogram of round trips: up to 1, 2, 5, 10, 20, 50, 100, 200, 500 ms, and longer.
     pub round_trips: [u64; 10],
 }
 
 /// Upper limits of the classes of [`Counts::round_trips`] in milliseconds.
 pub const ROUND_TRIP_LIMITS_MS: [u64; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 
-/// Asks one press over one link.
+/// Client of one press over one link.
 #[derive(Debug)]
 pub struct Client<L> {
     link: L,
@@ -48,9 +48,9 @@ pub struct Client<L> {
 }
 
 impl<L: Link> Client<L> {
-    /// A client for the press that the plant file describes.
+    /// Returns a client for the press of the plant file.
     pub fn new(link: L, press: &Press) -> Self {
-        // Draining a serial line until it is quiet is part of connecting.
+        // Connecting includes draining a serial line until it is silent.
         let drain = press.link.quiet().map_or(Duration::ZERO, |_| super::DRAIN_MAX);
         Self {
             link,
@@ -66,22 +66,22 @@ impl<L: Link> Client<L> {
         }
     }
 
-    /// Where the link leads.
+    /// Returns the address of the peer.
     pub fn peer(&self) -> String {
         self.link.peer()
     }
 
-    /// What happened so far.
+    /// Returns the counters.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Whether there is a connection that no error has poisoned.
+    /// Whether a connection exists that no error has invalidated.
     pub fn connected(&self) -> bool {
         self.connected
     }
 
-    /// Builds a connection.
+    /// Connects.
     ///
     /// # Errors
     /// [`LinkError::Connect`] or [`LinkError::ConnectTimeout`].
@@ -115,8 +115,8 @@ impl<L: Link> Client<L> {
     /// Reads the first `count` registers of a block.
     ///
     /// # Errors
-    /// Any [`LinkError`] but those of connecting and [`LinkError::Refused`]. Only after an exception is the connection
-    /// still there.
+    /// Any [`LinkError`] except those of connecting and [`LinkError::Refused`]. The connection persists only after an
+    /// exception.
     pub async fn read(&mut self, block: &Block, count: u16) -> Result<Vec<u16>, LinkError> {
         let request = Request::Read { table: block.table, start: block.start, count };
         match self.exchange(&request).await? {
@@ -125,10 +125,10 @@ impl<L: Link> Client<L> {
         }
     }
 
-    /// Writes holding registers: the only function of this program that does.
+    /// Writes holding registers (function 16): the only function of this program that does.
     ///
-    /// Returns when the press has echoed the address and the number of registers. An error other than a refusal or an
-    /// exception leaves open whether the write was done: it must be harmless to do it again.
+    /// Returns when the press has echoed address and quantity. After an error other than a refusal or an exception it is
+    /// unknown whether the write was executed: every write must be idempotent.
     ///
     /// # Errors
     /// [`LinkError::Refused`] outside the allow-list and in modes that never write; else as for [`read`](Self::read).
@@ -148,7 +148,7 @@ impl<L: Link> Client<L> {
         }
     }
 
-    /// Asks the press's controller who made it: maker, product, revision. Few controllers answer.
+    /// Reads the device identification of the press's controller: vendor, product, revision. Few controllers answer.
     ///
     /// # Errors
     /// As for [`read`](Self::read).
@@ -159,14 +159,14 @@ impl<L: Link> Client<L> {
         }
     }
 
-    /// One request and its answer within the time limit. Everything but an answer drops the connection.
+    /// Transfers one request and its answer within the time limit. Any other outcome drops the connection.
     async fn exchange(&mut self, request: &Request) -> Result<Response, LinkError> {
         if let Some(moment) = self.not_before {
             sleep_until(moment).await;
         }
         self.counts.requests += 1;
         let (sent, limit) = (Instant::now(), self.response_timeout);
-        // Should this future be dropped while it waits, the connection counts as gone.
+        // If this future is dropped while it waits, the connection is invalid.
         let was_connected = std::mem::replace(&mut self.connected, false);
         let answer = timeout(limit, self.link.call(request)).await;
         self.not_before = Some(Instant::now() + self.pause_between_requests);

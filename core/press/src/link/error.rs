@@ -1,4 +1,4 @@
-//! What can go wrong between host and press, and what follows from it.
+//! Errors between host and press, and the consequence of each Modbus exception.
 
 use std::time::Duration;
 
@@ -7,61 +7,61 @@ use platen_plant::press::Refused;
 use super::{Request, TransportError};
 use crate::Code;
 
-/// Why a request to the press failed.
+/// Reason why a request to the press failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// No connection could be built.
+    /// Connecting failed.
     #[error("press {peer}: no connection: {source}; check that it is on, and host and port in [press.link]")]
     Connect {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// Why.
+        /// Error of the transport.
         source: TransportError,
     },
-    /// No connection could be built in time.
+    /// Connecting took too long.
     #[error("press {peer}: no connection in {} ms; check that it is on, and host and port in [press.link]", limit.as_millis())]
     ConnectTimeout {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// The limit.
+        /// Time limit.
         limit: Duration,
     },
-    /// No answer came in time. The connection is dropped; a write may have been done.
+    /// No answer in time. The connection is dropped; a write may have been executed.
     #[error("press {peer}: no answer to {request} in {} ms; check the cable or response_timeout_ms", limit.as_millis())]
     Timeout {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// What was asked.
+        /// The request.
         request: Request,
-        /// The limit.
+        /// Time limit.
         limit: Duration,
     },
-    /// The connection failed. It is dropped; a write may have been done.
+    /// The connection failed and is dropped; a write may have been executed.
     #[error("press {peer}: {request} failed: {source}; connecting again")]
     Broken {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// What was asked.
+        /// The request.
         request: Request,
-        /// Why.
+        /// Error of the transport.
         source: TransportError,
     },
-    /// The answer is not one to this request. The connection is dropped.
+    /// The answer does not fit the request. The connection is dropped.
     #[error("press {peer}: wrong answer to {request}: {answer}; connecting again")]
     Mismatch {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// What was asked.
+        /// The request.
         request: Request,
-        /// What came.
+        /// The answer.
         answer: String,
     },
-    /// The press refused. The connection stays.
+    /// The press answered with an exception. The connection persists.
     #[error("press {peer}: {request} refused with exception {code:02X} ({}); {}", exception_name(*code), exception_remedy(*code))]
     Exception {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// What was asked.
+        /// The request.
         request: Request,
         /// Modbus exception code.
         code: u8,
@@ -70,9 +70,9 @@ pub enum LinkError {
     #[error("press {peer}: writing holding registers {}..={} refused: not in [press.write] allow; nothing was sent",
         refused.start, u32::from(refused.start) + u32::from(refused.count.max(1)) - 1)]
     Refused {
-        /// Where.
+        /// Address of the press.
         peer: String,
-        /// What was to be written.
+        /// The write.
         refused: Refused,
     },
 }
@@ -101,25 +101,25 @@ fn exception_remedy(code: u8) -> &'static str {
     }
 }
 
-/// What follows from an exception.
+/// Consequence of an exception.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Consequence {
-    /// Ask again after a pause; after so many in a row it is a fault.
+    /// Repeat after a pause; a fault after a number of exceptions in a row.
     Retry {
-        /// Refusals in a row that are borne.
+        /// Exceptions in a row before the fault.
         limit: u32,
-        /// Wait before the next request.
+        /// Pause before the next request.
         pause: Duration,
-        /// The fault it becomes.
+        /// The fault.
         fault: Code,
     },
     /// A fault at once.
     Fault(Code),
-    /// The gateway answers, the press behind it does not: off line, without dropping the gateway's connection.
+    /// The gateway answers, the press behind it does not: off line, with the connection to the gateway kept.
     UnitLost,
 }
 
-/// What follows from a Modbus exception (Modbus Application Protocol V1.1b3, section 7).
+/// Returns the consequence of a Modbus exception (MODBUS Application Protocol V1.1b3, section 7).
 pub fn consequence(exception: u8) -> Consequence {
     match exception {
         0x01 => Consequence::Fault(Code::IllegalFunction),

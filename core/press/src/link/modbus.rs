@@ -1,4 +1,4 @@
-//! Modbus over tokio-modbus: one task per connection owns it.
+//! Modbus client on tokio-modbus; each connection is owned by a task of its own.
 
 use platen_plant::press::{self, Quiet, RegisterTable, Transport};
 use tokio::sync::{mpsc, oneshot};
@@ -20,8 +20,8 @@ pub struct ModbusLink {
     connection: Option<Connection>,
 }
 
-/// A connection, owned by a task of its own: a panic in the protocol library ends the task, not the handshake, and
-/// an answer that nobody waits for any more dies with it.
+/// A connection, owned by a task of its own: a panic in the protocol library ends the task and not the handshake, and
+/// late answers end with the task.
 #[derive(Debug)]
 struct Connection {
     calls: mpsc::Sender<Call>,
@@ -35,7 +35,7 @@ impl Drop for Connection {
 }
 
 impl ModbusLink {
-    /// A link as the plant file describes it; not connected yet.
+    /// Returns the link of the plant file, not connected yet.
     pub fn new(link: &press::Link) -> Self {
         Self { transport: link.transport.clone(), unit: Slave(link.unit), connection: None }
     }
@@ -82,7 +82,7 @@ impl Link for ModbusLink {
     }
 }
 
-/// Serves calls until the first failure.
+/// Executes calls until the first failure.
 async fn own(mut context: Context, mut calls: mpsc::Receiver<Call>) {
     while let Some((request, reply)) = calls.recv().await {
         let answer = call(&mut context, request).await;
@@ -93,8 +93,8 @@ async fn own(mut context: Context, mut calls: mpsc::Receiver<Call>) {
     }
 }
 
-/// One exchange. The library's read and write helpers check quantity and echo with debug assertions only, so they
-/// are not used; [`Client`](super::Client) checks.
+/// Executes one request. The library's read and write helpers check quantity and echo by debug assertions only and are
+/// not used; [`Client`](super::Client) checks.
 async fn call(context: &mut Context, request: Request) -> Result<Response, TransportError> {
     use tokio_modbus::{Request as Wire, Response as WireResponse};
     let wire = match request {

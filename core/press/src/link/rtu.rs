@@ -1,7 +1,7 @@
-//! RTU frames on a serial port or through a serial-to-Ethernet gateway.
+//! RTU framing on a serial port or through a serial-to-Ethernet gateway (MODBUS over Serial Line V1.02).
 //!
-//! RTU has no transaction numbers: an answer that comes after its time limit would be taken for the next one. So a
-//! new connection starts by listening until the line has been silent longer than the press ever takes to answer.
+//! RTU has no transaction identifier: an answer after its time limit would be taken for the next one. A new connection
+//! therefore drains the line until it has been silent for longer than the press takes to answer.
 
 use std::collections::VecDeque;
 use std::io;
@@ -16,7 +16,7 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, ReadBuf};
 use tokio::time::timeout;
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
-/// Longest listening for silence; a line that is never silent is not usable.
+/// Longest drain; a line that is never silent is unusable.
 pub(super) const DRAIN_MAX: Duration = Duration::from_secs(3);
 
 /// Opens a serial port for Modbus RTU.
@@ -30,12 +30,12 @@ pub(super) fn open(serial: &Serial) -> io::Result<SerialStream> {
         if serial.stop_bits == 2 { tokio_serial::StopBits::Two } else { tokio_serial::StopBits::One };
     let port =
         tokio_serial::new(serial.device.to_string_lossy(), serial.baud).parity(parity).stop_bits(stop_bits);
-    // Held until the port is open: what a port was told may be lost when nobody has it open.
+    // Held until the port is open: settings may be lost while no process has the port open.
     let _told = serial.rs485.then(|| switch_direction(&serial.device)).transpose()?;
     port.open_native_async().map_err(io::Error::from)
 }
 
-/// Lets the port's driver switch the direction of a two-wire line: RTS is high while it sends (Linux, `TIOCSRS485`,
+/// Enables RS-485 direction control by the port's driver: RTS is high while it sends (Linux, `TIOCSRS485`,
 /// Documentation/driver-api/serial/serial-rs485.rst).
 fn switch_direction(device: &Path) -> io::Result<serial2::SerialPort> {
     let port = serial2::SerialPort::open(device, serial2::KeepSettings)?;
@@ -50,7 +50,7 @@ fn switch_direction(device: &Path) -> io::Result<serial2::SerialPort> {
     Ok(port)
 }
 
-/// Throws away what arrives until nothing has arrived for `quiet`.
+/// Discards input until the line has been silent for `quiet`.
 pub(super) async fn drain(stream: &mut (impl AsyncRead + Unpin), quiet: Duration) -> io::Result<()> {
     let silence = async {
         let mut scrap = [0; 256];
@@ -68,7 +68,7 @@ pub(super) async fn drain(stream: &mut (impl AsyncRead + Unpin), quiet: Duration
         .unwrap_or_else(|_| Err(io::Error::other("the line is never quiet; is there a second master on it?")))
 }
 
-/// A stream that hears itself: what was written comes back first and is taken out.
+/// Stream with local echo: written bytes return first and are removed.
 #[derive(Debug)]
 pub(super) struct EchoFree<S> {
     stream: S,

@@ -7,7 +7,7 @@ use platen_plant::press::Socket;
 use socket2::{SockRef, TcpKeepalive};
 use tokio::net::TcpStream;
 
-/// Connects without a time limit of its own; small packets leave at once, a dead peer is noticed when idle.
+/// Connects, without a time limit of its own; TCP_NODELAY and keep-alive are set.
 pub(super) async fn connect(socket: &Socket) -> io::Result<TcpStream> {
     let stream = TcpStream::connect((socket.host.as_str(), socket.port)).await?;
     stream.set_nodelay(true)?;

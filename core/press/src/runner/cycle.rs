@@ -1,4 +1,5 @@
-//! The loop: poll, step, write; and what becomes of errors and effects.
+//! The cycle of the press side: poll, step of the handshake, reconciliation of the registers, execution of effects; pauses
+//! between connections grow exponentially with jitter.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
@@ -12,15 +13,15 @@ use crate::handshake::{Effect, Event, Handshake, LinkState, Transition, Work};
 use crate::reconcile::Reconciler;
 use crate::{Client, Code, Consequence, Link, LinkError, PressImage, Torn, Verdict, consequence, saturates};
 
-/// Time between two reads of the host's own block, on a fast link and on a serial line.
+/// Period of the read-back of the host's own block, on a fast link and on a serial line.
 const READ_BACK: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(1)];
-/// Longest time between two looks at the timers of the handshake.
+/// Longest time between two checks of the handshake's timers.
 const TICK: Duration = Duration::from_millis(100);
-/// Reads in a row that find the press writing before people are told.
+/// Torn reads in a row before the alarm.
 const TORN_LIMIT: u32 = 50;
-/// Time between two reports of how things stand.
+/// Period of the status.
 const STATUS: Duration = Duration::from_millis(200);
-/// How long a press that asks may still read the safe registers.
+/// Time for a press in the client role to read the safe registers.
 const FAREWELL: Duration = Duration::from_millis(500);
 /// Attempts to write the safe registers at the end.
 const LAST_WRITES: u32 = 3;
@@ -39,14 +40,14 @@ pub(super) struct Runner<L> {
     pub(super) last_press: Option<PressImage>,
 }
 
-/// When what is due.
+/// Due times.
 pub(super) struct Clock {
     started: Instant,
     next_connect: Instant,
-    /// Wait before the next try to connect but one; zero after a connection that worked.
+    /// Back-off after the next attempt to connect; zero after a connection that worked.
     backoff: Duration,
     connected: Instant,
-    /// Since when the press has not been in step.
+    /// Start of the present loss of synchronisation.
     lost: Option<Instant>,
     delivered: Instant,
     next_poll: Instant,
@@ -55,7 +56,7 @@ pub(super) struct Clock {
     polled: Instant,
     triggered: Instant,
     busy_untold: bool,
-    /// Since when a result waits for the press.
+    /// Time since when a result waits for the press.
     result_since: Option<Instant>,
     next_status: Instant,
 }
@@ -82,7 +83,7 @@ impl Clock {
     }
 }
 
-/// Refusals and torn reads in a row.
+/// Exceptions and torn reads in a row.
 #[derive(Default)]
 pub(super) struct Faults {
     exceptions: u32,
@@ -116,7 +117,7 @@ impl<L: Link> Runner<L> {
         matches!(self.handshake.state().link, LinkState::Stopped { .. })
     }
 
-    /// Everything that is due now: a connection, a poll, a look at the own block, a write.
+    /// Executes all that is due: connection, poll, read-back of the own block, write.
     async fn exchange(&mut self) -> Result<(), LinkError> {
         let now = Instant::now();
         if !self.client.connected() || self.faults.unit_lost {
@@ -148,7 +149,7 @@ impl<L: Link> Runner<L> {
         Ok(())
     }
 
-    /// Reads the press: its fast part while nothing happens on a slow line, else everything.
+    /// Reads the press: only its fast part while nothing happens on a slow line, else the whole block.
     async fn poll(&mut self) -> Result<(), LinkError> {
         let block = self.press.map.read;
         let online = self.handshake.state().link == LinkState::Online;
@@ -193,7 +194,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// Reads the host's own block: does another host write there, has the press lost it?
+    /// Reads the host's own block back, to detect a second host and a block that the press has lost.
     async fn read_back(&mut self) -> Result<(), LinkError> {
         let block = self.press.map.write;
         let words = self.client.read(&block, block.count).await?;
@@ -221,7 +222,7 @@ impl<L: Link> Runner<L> {
         Ok(())
     }
 
-    /// After a stop: nothing that stands in the registers may still look alive.
+    /// Writes the safe registers after a stop: no ready, busy or valid remains.
     async fn write_safe_registers(&mut self) {
         let image = self.handshake.image().clone();
         for _ in 0..LAST_WRITES {
@@ -235,7 +236,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// What an error of the link means for the handshake.
+    /// Maps an error of the link to an event of the handshake.
     fn fail(&mut self, error: &LinkError) {
         tracing::debug!(%error, "link");
         match error {
@@ -286,8 +287,8 @@ impl<L: Link> Runner<L> {
         self.back_off();
     }
 
-    /// The pause before the next connection: none after a connection that worked for a while, then doubled each time,
-    /// a quarter more or less by chance, for two hosts that lost the same press shall not come back in step.
+    /// Returns the pause before the next connection: exponential back-off from zero after a connection that worked, with a
+    /// jitter of a quarter, so that two hosts that lost the same press do not reconnect at the same time.
     fn back_off(&mut self) {
         let (least, most) = (self.press.link.backoff_min, self.press.link.backoff_max);
         let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
@@ -304,8 +305,8 @@ impl<L: Link> Runner<L> {
         tick.min(self.clock.next_poll)
     }
 
-    /// Waits for the next thing: an answer of the host, of the journal, or the time. What they change in the registers
-    /// is written at once.
+    /// Waits for the next event: an answer of the host, a completion of the journal, or a timer. Changes of the registers are
+    /// written at once.
     async fn wait(&mut self, until: Instant) {
         tokio::select! {
             biased;
@@ -374,7 +375,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// Nobody listens any more when the host has dropped its end; that stops the handshake by itself.
+    /// A host that has dropped its end stops the handshake by that.
     fn order(&self, order: Order) {
         let _ = self.side.orders.send(order);
     }
@@ -403,7 +404,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// In step with the press: the next loss is a new one.
+    /// Marks the press as synchronised: the next loss is a new one.
     fn arrived(&mut self) {
         self.clock.backoff = Duration::ZERO;
         self.faults.unreachable_told = false;
@@ -412,18 +413,18 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// The log line of a stroke.
+    /// Logs one line for a stroke.
     fn delivered(&mut self) {
         let Some(result) = &self.handshake.image().result else { return };
         let stroke_to_result = self.clock.triggered.elapsed();
         self.clock.delivered = Instant::now();
         self.metrics.stroke_to_result.add(stroke_to_result);
-        match result.measurement.verdict {
+        match result.measurement.verdict() {
             Verdict::NotMeasured => self.metrics.not_measured += 1,
             Verdict::Pass | Verdict::Fail | Verdict::CannotTell => self.metrics.measured += 1,
         }
         tracing::info!(
-            stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict,
+            stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict(),
             trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_millis()),
             stroke_to_result_ms = stroke_to_result.as_millis(),
             waited_ms = self.clock.result_since.map(|since| since.elapsed().as_millis()),
@@ -433,7 +434,7 @@ impl<L: Link> Runner<L> {
         );
     }
 
-    /// At every change of state, else a few times a second.
+    /// Publishes the status at every change of state, else a few times a second.
     fn publish_status(&mut self) {
         let now = Instant::now();
         if now < self.clock.next_status && self.side.status.borrow().state == self.handshake.state() {

@@ -1,4 +1,4 @@
-//! The journal beside the loop: a slow disk must not stop the heartbeat.
+//! The journal on a thread of its own: a slow disk must not stop the heartbeat.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use tokio::time::Instant;
 
 use crate::{Journal, Recalled, Record, Stage, StrokeKey};
 
-/// What became of a record.
+/// Completion of a record.
 #[derive(Debug)]
 pub(super) struct Done {
     pub(super) key: StrokeKey,
@@ -17,7 +17,7 @@ pub(super) struct Done {
     pub(super) took: Duration,
 }
 
-/// The way to the journal: records are written in the order in which they are sent.
+/// Queue to the journal: records are written in the order in which they are sent.
 #[derive(Debug)]
 pub(super) struct Recorder {
     records: mpsc::UnboundedSender<Record>,
@@ -25,7 +25,7 @@ pub(super) struct Recorder {
     task: JoinHandle<()>,
 }
 
-/// Reads the journal and gets ready to write it. The error is `None` when the journal panicked.
+/// Reads the journal and starts its thread. The error is `None` when the journal panicked.
 pub(super) async fn start<J: Journal>(mut journal: J) -> Result<(Recorder, Recalled), Option<J::Error>> {
     let read = spawn_blocking(move || (journal.recall(), journal)).await;
     let (recalled, journal) = read.map_err(|_| None)?;
@@ -47,13 +47,13 @@ async fn write<J: Journal>(
         let Ok((result, back)) = written else { return };
         journal = back;
         let error = result.err().map(|error| error.to_string());
-        // Nobody may be left to hear it when the host ends.
+        // The receiver may be gone when the host ends.
         let _ = tell.send(Done { key, stage, error, took: asked.elapsed() });
     }
 }
 
 impl Recorder {
-    /// Asks for a record; [`done`](Self::done) tells when it would survive a power cut.
+    /// Queues a record; [`done`](Self::done) receives its completion when it would survive a power cut.
     ///
     /// # Errors
     /// The record, when the journal has panicked.
@@ -61,7 +61,7 @@ impl Recorder {
         self.records.send(record).map_err(|refused| refused.0)
     }
 
-    /// Waits until everything asked for is written.
+    /// Waits until all records are written.
     pub(super) async fn finish(self) {
         drop(self.records);
         if self.task.await.is_err() {

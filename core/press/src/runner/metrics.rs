@@ -1,20 +1,20 @@
-//! What happened to strokes since the start.
+//! Counters and durations of the strokes since the start.
 
 use std::time::Duration;
 
-/// The latest durations of one kind, for percentiles.
+/// Ring buffer of the latest durations of one kind, for percentiles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Durations {
     latest: std::collections::VecDeque<Duration>,
-    /// How many there were since the start.
+    /// Number since the start.
     pub count: u64,
 }
 
 impl Durations {
-    /// How many are kept.
+    /// Number kept.
     pub const KEPT: usize = 1000;
 
-    /// Adds one.
+    /// Adds a duration.
     pub fn add(&mut self, duration: Duration) {
         if self.latest.len() == Self::KEPT {
             self.latest.pop_front();
@@ -23,12 +23,12 @@ impl Durations {
         self.count += 1;
     }
 
-    /// The latest one.
+    /// Returns the latest duration.
     pub fn last(&self) -> Option<Duration> {
         self.latest.back().copied()
     }
 
-    /// The duration that `percent` of the latest ones do not exceed (nearest rank); `None` when there are none.
+    /// Returns the percentile of the latest durations by nearest rank; `None` without any.
     pub fn percentile(&self, percent: f64) -> Option<Duration> {
         let mut sorted: Vec<_> = self.latest.iter().copied().collect();
         sorted.sort_unstable();
@@ -37,12 +37,12 @@ impl Durations {
     }
 }
 
-/// What happened to strokes since the start.
+/// Counters of the strokes since the start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
     /// Strokes accepted, every attempt.
     pub strokes: u64,
-    /// Results published, but for those without a measurement.
+    /// Results published with a measurement.
     pub measured: u64,
     /// Results published without a measurement.
     pub not_measured: u64,
@@ -50,9 +50,9 @@ pub struct Metrics {
     pub missed: u64,
     /// Results that the press did not acknowledge in time.
     pub ack_timeouts: u64,
-    /// Reads of the press's block while it was being written.
+    /// Torn reads of the press's block.
     pub torn_reads: u64,
-    /// Reads of the host's own block that found it changed by the press.
+    /// Read-backs of the host's own block that found it changed by the press.
     pub rewrites: u64,
     /// From the poll that saw the trigger to the echo of busy.
     pub trigger_to_busy: Durations,
@@ -60,13 +60,13 @@ pub struct Metrics {
     pub stroke_to_result: Durations,
     /// From the echo of the result to the poll that saw the press's acknowledge.
     pub result_to_ack: Durations,
-    /// From asking for a record of the journal until it would survive a power cut.
+    /// From queueing a record of the journal until it would survive a power cut.
     pub journal: Durations,
-    /// Records that the journal could not take.
+    /// Records that the journal could not store.
     pub journal_failed: u64,
-    /// How long the result in hand has been waiting for the press; `None` when none waits.
+    /// Time that the present result has waited for the press; `None` when none waits.
     pub result_waits: Option<Duration>,
-    /// Time without being in step with the press, the present loss apart.
+    /// Time out of synchronisation with the press, without the present loss.
     pub link_down: Duration,
 }
 

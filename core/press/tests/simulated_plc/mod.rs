@@ -120,8 +120,7 @@ impl Journal for Memory {
 pub fn measurement(key: StrokeKey) -> Measurement {
     let figure = f64::from(key.stroke % 30_000) * 1e-5;
     Measurement {
-        verdict: if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail },
-        reason: None,
+        judgement: (if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail }).into(),
         figures: Figures { values: [(Measure::DeviationMax, figure)].into(), stations: Vec::new() },
         scanned_at: None,
         warning: None,

@@ -1,19 +1,19 @@
-//! The plate's mesh as a legacy VTK file, the one form in which ParaView shows fields and tools read them everywhere.
+//! Legacy VTK file of the plate's mesh with its fields, which ParaView and other viewers read.
 //!
-//! "VTK File Formats" (The VTK User's Guide, "Simple Legacy Formats"): a text head before each array, arrays big-endian.
-//! Binary, because VTK's reader of text stops at a number that is none, and nodes without data are NaN here.
+//! Source: The VTK User's Guide, "VTK File Formats", "Simple Legacy Formats": a text head before each array, arrays
+//! big-endian. Binary, because VTK's text reader stops at NaN, the value of nodes without data.
 
 use std::fmt::Write as _;
 
 use super::PlateTable;
 use platen_model::units::mm;
 
-/// VTK's number of a triangle.
+/// Cell type of a triangle in VTK.
 const TRIANGLE: u32 = 5;
 
 impl PlateTable {
-    /// As a triangle mesh with fields, legacy VTK, binary. Positions in metres; a field's name has its unit; NaN where nothing
-    /// is known. Triangles as in [`ply`](Self::ply).
+    /// Writes a triangle mesh as binary legacy VTK: positions in metres, fields with the unit in their name, NaN without
+    /// data. Triangles as in [`ply`](Self::ply).
     pub fn vtk(&self) -> Vec<u8> {
         let triangles = self.triangles();
         let mut file = File::default();

@@ -1,31 +1,33 @@
-//! The colours of the maps and of the verdicts.
+//! Colours of maps, drawings and verdicts.
+//!
+//! Diverging colour map in OKLab (B. Ottosson, 2020), a space in which equal distances are equal perceived differences.
 
 use plotters::style::RGBColor;
 
 use platen_model::Verdict;
 
-/// Text and frames.
+/// Colour of text and frames.
 pub(super) const INK: RGBColor = RGBColor(26, 28, 31);
-/// Ticks, hatching, what stands back.
+/// Colour of ticks, hatching and notes.
 pub(super) const PALE: RGBColor = RGBColor(110, 114, 120);
-/// The steel of a section.
+/// Fill of the plate in a section.
 pub(super) const STEEL: RGBColor = RGBColor(150, 158, 168);
-/// The wood of a board.
+/// Fill of a template in a section.
 pub(super) const WOOD: RGBColor = RGBColor(226, 196, 150);
-/// The edge of a board.
+/// Edge of a template.
 pub(super) const WOOD_EDGE: RGBColor = RGBColor(138, 98, 46);
-/// Nothing to see.
+/// Background.
 pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
 
-/// Lightness, chroma along the branch: gray, the most vivid, the darkest.
+/// Lightness and chroma along a branch: gray, most vivid, darkest.
 const PATH: [[f64; 2]; 3] = [[0.89, 0.0], [0.68, 0.115], [0.42, 0.125]];
-/// Hue of the low and of the high branch, degrees: blue and orange, told apart in every common colour blindness.
+/// Hues of the negative and the positive branch, degrees: blue and orange, distinct in every common colour blindness.
 const HUES: [f64; 2] = [255.0, 45.0];
 
-/// The colour of -1 to 1: blue through neutral gray to orange.
+/// Returns the colour of a position from -1 to 1: blue through neutral gray to orange.
 ///
-/// Equal steps in position are equal distances in OKLab (B. Ottosson, 2020), a space in which equal distances look
-/// alike; both branches pass the same lightness and chroma, so neither looks stronger than the other.
+/// Equal steps in position are equal distances in OKLab; both branches pass the same lightness and chroma, so that neither
+/// looks stronger.
 pub(super) fn diverging(position: f64) -> RGBColor {
     let length = |from: [f64; 2], to: [f64; 2]| (to[0] - from[0]).hypot(to[1] - from[1]);
     let (first, second) = (length(PATH[0], PATH[1]), length(PATH[1], PATH[2]));
@@ -40,7 +42,7 @@ pub(super) fn diverging(position: f64) -> RGBColor {
     srgb([lightness, chroma * cos, chroma * sin])
 }
 
-/// From OKLab to the screen's colours; the matrices are those of its definition.
+/// Converts OKLab to sRGB, with the matrices of its definition.
 fn srgb([lightness, a, b]: [f64; 3]) -> RGBColor {
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
     let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
@@ -59,12 +61,12 @@ fn srgb([lightness, a, b]: [f64; 3]) -> RGBColor {
     RGBColor(byte(r), byte(g), byte(b))
 }
 
-/// What is read on this colour of the map: dark or white.
+/// Returns the colour of text on a position of the map: dark or white.
 pub(super) fn text_on(position: f64) -> RGBColor {
     if position.abs() > 0.45 { PAPER } else { INK }
 }
 
-/// The colour behind a verdict's words; they alone say all.
+/// Returns the colour behind a verdict's words, which never stands without them.
 pub(super) fn verdict(verdict: Verdict) -> RGBColor {
     match verdict {
         Verdict::Pass => RGBColor(22, 110, 90),

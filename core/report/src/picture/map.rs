@@ -1,68 +1,68 @@
-//! A field over the plate's own rectangle.
+//! Map of a field over the plate's rectangle (u, v).
 
 use platen_model::Verdict;
 
+use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE};
-use super::page::{At, Page, Text, draw};
 use super::scale::{Scale, nice_ceiling};
 use super::shades::{self, Shades};
-use super::{Caption, PictureError, Yardstick};
+use super::{Caption, PictureError, PictureScale};
 use crate::result::PlateRecord;
 use platen_model::{Field, NodeState};
 
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: u32 = 1200;
 const PLATE: (f64, f64) = (810.0, 760.0);
-/// Where the plate's upper left corner lies.
+/// Upper left corner of the plate, pixels.
 const LEFT: f64 = 110.0;
 const TOP: f64 = 128.0;
-/// Below the plate: ticks and their title.
+/// Height below the plate for ticks and their title, pixels.
 const BELOW: f64 = 92.0;
-/// Least height of the plate, for the legend beside it.
+/// Least height of the plate for the legend beside it, pixels.
 const LEAST_HEIGHT: f64 = 420.0;
-/// Side of the squares that the field is drawn with, pixels.
+/// Side of the squares of which the map consists, pixels.
 const SQUARE: f64 = 4.0;
-/// Numbers written on the plate, along u and v.
-const CODES: [usize; 2] = [5, 4];
+/// Parts of the plate with their mean written on them, along u and v.
+const PARTS: [usize; 2] = [5, 4];
 
-/// A map of one field over the plate.
+/// Draws one field over the plate.
 ///
 /// # Errors
-/// When the drawing library fails.
+/// The drawing library fails.
 pub fn map(
     field: &Field,
     plate: &PlateRecord,
     caption: &Caption<'_>,
-    yardstick: &Yardstick,
+    picture_scale: &PictureScale,
 ) -> Result<String, PictureError> {
     let largest = (0..field.state.len())
         .filter(|&node| field.state[node] != NodeState::Unseen)
         .map(|node| field.values[node].abs())
         .fold(0.0, f64::max);
-    let (what, scale) = yardstick.field(&field.name, &field.unit, largest);
+    let (title, scale) = picture_scale.field(&field.name, &field.unit, largest);
     let by_width = PLATE.0 / plate.width_mm;
     let pixel_per_mm = by_width.min(PLATE.1 / plate.height_mm);
-    let sheet = Sheet { plate, pixel_per_mm, scale };
+    let layout = Layout { plate, pixel_per_mm, scale };
     let height = (plate.height_mm * pixel_per_mm).max(LEAST_HEIGHT) + TOP + BELOW;
-    draw((WIDTH, height as u32), |page| {
-        page.head(caption, &what)?;
-        let squares = [plate.width_mm, plate.height_mm].map(|mm| sheet.squares(mm));
-        let corners = [sheet.at(0.0, plate.height_mm), sheet.at(plate.width_mm, 0.0)];
-        Shades::of(field, &sheet.scale, squares).paint(page, corners[0], corners[1])?;
-        sheet.axes(page)?;
-        codes(field, &sheet, page, caption.verdict == Verdict::Pass)?;
-        sheet.legend(page, field)
+    draw((WIDTH, height as u32), |canvas| {
+        canvas.head(caption, &title)?;
+        let squares = [plate.width_mm, plate.height_mm].map(|mm| layout.squares(mm));
+        let corners = [layout.at(0.0, plate.height_mm), layout.at(plate.width_mm, 0.0)];
+        Shades::of(field, &layout.scale, squares).paint(canvas, corners[0], corners[1])?;
+        layout.axes(canvas)?;
+        part_means(field, &layout, canvas, caption.verdict == Verdict::Pass)?;
+        layout.legend(canvas, field)
     })
 }
 
-/// Where everything lies.
-struct Sheet<'a> {
+/// Positions in the picture.
+struct Layout<'a> {
     plate: &'a PlateRecord,
     pixel_per_mm: f64,
     scale: Scale,
 }
 
-impl Sheet<'_> {
+impl Layout<'_> {
     fn at(&self, u_mm: f64, v_mm: f64) -> At {
         (LEFT + u_mm * self.pixel_per_mm, TOP + (self.plate.height_mm - v_mm) * self.pixel_per_mm)
     }
@@ -71,38 +71,38 @@ impl Sheet<'_> {
         ((mm * self.pixel_per_mm / SQUARE).round() as usize).max(1)
     }
 
-    fn axes(&self, page: &Page<'_>) -> Result<(), PictureError> {
+    fn axes(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let (w, h) = (self.plate.width_mm, self.plate.height_mm);
-        page.frame(self.at(0.0, h), self.at(w, 0.0), INK, 3)?;
+        canvas.frame(self.at(0.0, h), self.at(w, 0.0), INK, 3)?;
         let step = nice_ceiling(w.max(h) / 7.0);
         let tick = Text::new(22.0).coloured(INK);
         for k in 1..=(w / step) as u32 {
             let (x, y) = self.at(f64::from(k) * step, 0.0);
-            page.line(&[(x, y), (x, y + 8.0)], INK, 2)?;
-            page.text(&format!("{}", f64::from(k) * step), (x, y + 24.0), tick.centred())?;
+            canvas.line(&[(x, y), (x, y + 8.0)], INK, 2)?;
+            canvas.text(&format!("{}", f64::from(k) * step), (x, y + 24.0), tick.centred())?;
         }
         for k in 1..=(h / step) as u32 {
             let (x, y) = self.at(0.0, f64::from(k) * step);
-            page.line(&[(x, y), (x - 8.0, y)], INK, 2)?;
-            page.text(&format!("{}", f64::from(k) * step), (x - 14.0, y), tick.right())?;
+            canvas.line(&[(x, y), (x - 8.0, y)], INK, 2)?;
+            canvas.text(&format!("{}", f64::from(k) * step), (x - 14.0, y), tick.right())?;
         }
         let (x, y) = self.at(w, 0.0);
-        page.text("u, mm \u{2192}", (x, y + 56.0), tick.right())?;
+        canvas.text("u, mm \u{2192}", (x, y + 56.0), tick.right())?;
         let (x, y) = self.at(0.0, h);
-        page.text("v, mm \u{2191}", (x - 14.0, y - 16.0), tick.right())?;
-        self.corner(page)?;
-        self.press(page)
+        canvas.text("v, mm \u{2191}", (x - 14.0, y - 16.0), tick.right())?;
+        self.corner(canvas)?;
+        self.press(canvas)
     }
 
-    /// The corner where u and v begin, as it is marked on the plate.
-    fn corner(&self, page: &Page<'_>) -> Result<(), PictureError> {
+    /// Draws the mark of the corner (0, 0).
+    fn corner(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let (x, y) = self.at(0.0, 0.0);
-        page.area(&[(x, y), (x + 34.0, y), (x, y - 34.0)], INK)?;
-        page.text("(0, 0)", (x - 14.0, y + 24.0), Text::new(22.0).bold().right())
+        canvas.area(&[(x, y), (x + 34.0, y), (x, y - 34.0)], INK)?;
+        canvas.text("(0, 0)", (x - 14.0, y + 24.0), Text::new(22.0).bold().right())
     }
 
-    /// A bar along the side that faces the press.
-    fn press(&self, page: &Page<'_>) -> Result<(), PictureError> {
+    /// Draws a bar along the edge that faces the press.
+    fn press(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         const BAR: f64 = 12.0;
         let (w, h) = (self.plate.width_mm, self.plate.height_mm);
         let (from, to, label) = match self.plate.press_side {
@@ -125,118 +125,123 @@ impl Sheet<'_> {
                 ((a, y0), (b, y1), (0.5 * (a + b), y0 - 26.0))
             }
         };
-        page.fill(from, to, INK)?;
-        page.text("press", label, Text::new(22.0).bold().centred())
+        canvas.fill(from, to, INK)?;
+        canvas.text("press", label, Text::new(22.0).bold().centred())
     }
 
-    fn legend(&self, page: &Page<'_>, field: &Field) -> Result<(), PictureError> {
+    fn legend(&self, canvas: &Canvas<'_>, field: &Field) -> Result<(), PictureError> {
         let (left, wide) = (LEFT + PLATE.0 + 44.0, 46.0);
         let steps = shades::count(&self.scale);
         let (top, tall) = (TOP + 64.0, LEAST_HEIGHT - 130.0);
         let y = |position: f64| top + (1.0 - position) / 2.0 * tall;
         for shade in -steps..steps {
             let position = (f64::from(shade) + 0.5) / f64::from(steps);
-            let colour = shades::colour_of(shades::shade_of(self.scale.turn(position), steps), steps);
+            let colour = shades::colour_of(shades::shade_of(self.scale.of_colour(position), steps), steps);
             let (low, high) = (f64::from(shade) / f64::from(steps), f64::from(shade + 1) / f64::from(steps));
-            page.fill((left, y(high)), (left + wide, y(low) + shades::OVERLAP), colour)?;
+            canvas.fill((left, y(high)), (left + wide, y(low) + shades::OVERLAP), colour)?;
         }
-        page.frame((left, top), (left + wide, top + tall), INK, 2)?;
+        canvas.frame((left, top), (left + wide, top + tall), INK, 2)?;
         let text = Text::new(22.0);
         let n = self.scale.anchors.len() as f64;
         let ends = self.scale.anchors.iter().enumerate().map(|(k, value)| ((k + 1) as f64 / n, *value));
         let both = ends.flat_map(|(position, value)| [(position, value), (-position, -value)]);
         for (position, value) in both.chain([(0.0, 0.0)]) {
-            page.line(&[(left + wide, y(position)), (left + wide + 8.0, y(position))], INK, 2)?;
-            page.text(&self.scale.number(value), (left + wide + 14.0, y(position)), text)?;
+            canvas.line(&[(left + wide, y(position)), (left + wide + 8.0, y(position))], INK, 2)?;
+            canvas.text(&self.scale.number(value), (left + wide + 14.0, y(position)), text)?;
         }
-        page.text(self.scale.unit, (left, TOP + 10.0), text.bold())?;
+        canvas.text(self.scale.unit, (left, TOP + 10.0), text.bold())?;
         let [less, more] = self.scale.words.unwrap_or(["", ""]);
-        page.text(more, (left, top - 22.0), text.bold())?;
-        page.text(less, (left, top + tall + 20.0), text.bold())?;
-        self.keys(page, field, (left, top + tall + 58.0))
+        canvas.text(more, (left, top - 22.0), text.bold())?;
+        canvas.text(less, (left, top + tall + 20.0), text.bold())?;
+        self.keys(canvas, field, (left, top + tall + 58.0))
     }
 
-    /// What gray and hatching mean, where the map has them, and the numbers on it.
-    fn keys(&self, page: &Page<'_>, field: &Field, (left, mut y): At) -> Result<(), PictureError> {
+    /// Draws the keys of gray and hatching, where the map has them, and of the numbers.
+    fn keys(&self, canvas: &Canvas<'_>, field: &Field, (left, mut y): At) -> Result<(), PictureError> {
         let has = |state: NodeState| field.state.contains(&state);
         let side = 26.0;
         if has(NodeState::Unchanged) {
-            page.fill((left, y - side / 2.0), (left + side, y + side / 2.0), colour::diverging(0.0))?;
-            page.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
+            canvas.fill((left, y - side / 2.0), (left + side, y + side / 2.0), colour::diverging(0.0))?;
+            canvas.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
             let word = if self.scale.words.is_some() { "enough" } else { "no change" };
-            page.text(word, (left + side + 10.0, y), Text::new(22.0))?;
+            canvas.text(word, (left + side + 10.0, y), Text::new(22.0))?;
             y += 36.0;
         }
         if has(NodeState::Unseen) {
             for k in 0..3 {
                 let s = 6.0 + 10.0 * f64::from(k);
-                page.line(&[(left, y - side / 2.0 + s), (left + s, y - side / 2.0)], PALE, 2)?;
+                canvas.line(&[(left, y - side / 2.0 + s), (left + s, y - side / 2.0)], PALE, 2)?;
             }
-            page.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
-            page.text("no data", (left + side + 10.0, y), Text::new(22.0))?;
+            canvas.frame((left, y - side / 2.0), (left + side, y + side / 2.0), INK, 1)?;
+            canvas.text("no data", (left + side + 10.0, y), Text::new(22.0))?;
             y += 36.0;
         }
-        page.text("numbers: means", (left, y), Text::new(22.0))
+        canvas.text("numbers: means", (left, y), Text::new(22.0))
     }
 }
 
-/// One of the parts that the plate is divided into for numbers.
+/// Part of the plate with its mean.
 struct Part {
     column: usize,
     row: usize,
-    /// In the legend's unit.
+    /// Mean in the legend's unit.
     mean: f64,
-    /// Shade under its number.
+    /// Position of the shade under its number.
     beneath: f64,
 }
 
-/// The field's mean over each part of the plate, in digits. Unless the plate is done, the part that is farthest from it is
-/// framed and named: what passes under its boards may still be a little off beyond their ends, and asks for nothing.
-fn codes(field: &Field, sheet: &Sheet<'_>, page: &Page<'_>, done: bool) -> Result<(), PictureError> {
-    let (w, h) = (sheet.plate.width_mm / CODES[0] as f64, sheet.plate.height_mm / CODES[1] as f64);
+/// Writes the field's mean on each part of the plate. Unless the plate passed, the worst part is framed and named; a plate
+/// that passed under its templates may deviate beyond their ends, which requires no action.
+fn part_means(
+    field: &Field,
+    layout: &Layout<'_>,
+    canvas: &Canvas<'_>,
+    done: bool,
+) -> Result<(), PictureError> {
+    let (w, h) = (layout.plate.width_mm / PARTS[0] as f64, layout.plate.height_mm / PARTS[1] as f64);
     let part = |k: usize| {
-        let (column, row) = (k % CODES[0], k / CODES[0]);
-        let beneath = shade_at(field, &sheet.scale, (column as f64 + 0.5, row as f64 + 0.5))?;
-        let mean = mean(field, column, row)? * sheet.scale.factor;
+        let (column, row) = (k % PARTS[0], k / PARTS[0]);
+        let beneath = shade_at(field, &layout.scale, (column as f64 + 0.5, row as f64 + 0.5))?;
+        let mean = mean(field, column, row)? * layout.scale.factor;
         Some(Part { column, row, mean, beneath })
     };
-    let parts: Vec<Part> = (0..CODES[0] * CODES[1]).filter_map(part).collect();
+    let parts: Vec<Part> = (0..PARTS[0] * PARTS[1]).filter_map(part).collect();
     let digits = Text::new(27.0).bold().centred();
     for part in &parts {
-        let at = sheet.at((part.column as f64 + 0.5) * w, (part.row as f64 + 0.5) * h);
-        page.text(&sheet.scale.number(part.mean), at, digits.coloured(colour::text_on(part.beneath)))?;
+        let at = layout.at((part.column as f64 + 0.5) * w, (part.row as f64 + 0.5) * h);
+        canvas.text(&layout.scale.number(part.mean), at, digits.coloured(colour::text_on(part.beneath)))?;
     }
-    let Some(words) = sheet.scale.words.filter(|_| !done) else { return Ok(()) };
+    let Some(words) = layout.scale.words.filter(|_| !done) else { return Ok(()) };
     let worst = parts.iter().max_by(|a, b| a.mean.abs().total_cmp(&b.mean.abs()));
-    let Some(worst) = worst.filter(|part| part.mean.abs() > sheet.scale.anchors[0]) else { return Ok(()) };
-    let inset = 3.0 / sheet.pixel_per_mm;
+    let Some(worst) = worst.filter(|part| part.mean.abs() > layout.scale.anchors[0]) else { return Ok(()) };
+    let inset = 3.0 / layout.pixel_per_mm;
     let (i, k) = (worst.column as f64, worst.row as f64);
     let (from, to) =
-        (sheet.at(i * w + inset, (k + 1.0) * h - inset), sheet.at((i + 1.0) * w - inset, k * h + inset));
-    page.frame(from, to, INK, 4)?;
-    // At the part's lower side, where the shade may be another than under its number.
-    let (below, row) = ((0.5 * (from.0 + to.0), to.1 - 20.0), k + (inset + 20.0 / sheet.pixel_per_mm) / h);
-    let beneath = shade_at(field, &sheet.scale, (i + 0.5, row)).unwrap_or(worst.beneath);
+        (layout.at(i * w + inset, (k + 1.0) * h - inset), layout.at((i + 1.0) * w - inset, k * h + inset));
+    canvas.frame(from, to, INK, 4)?;
+    // At the part's lower side, where the shade may differ from that under its number.
+    let (below, row) = ((0.5 * (from.0 + to.0), to.1 - 20.0), k + (inset + 20.0 / layout.pixel_per_mm) / h);
+    let beneath = shade_at(field, &layout.scale, (i + 0.5, row)).unwrap_or(worst.beneath);
     let look = Text::new(22.0).bold().centred().coloured(colour::text_on(beneath));
-    page.text(words[usize::from(worst.mean > 0.0)], below, look)
+    canvas.text(words[usize::from(worst.mean > 0.0)], below, look)
 }
 
-/// The shade at a place given in parts of the plate along u and v; `None` where nothing was seen.
+/// Returns the position of the shade at a place given in parts of the plate along u and v; `None` where unseen.
 fn shade_at(field: &Field, scale: &Scale, (column, row): (f64, f64)) -> Option<f64> {
-    match field.sample(column / CODES[0] as f64, row / CODES[1] as f64, 0) {
+    match field.sample(column / PARTS[0] as f64, row / PARTS[1] as f64, 0) {
         (NodeState::Seen, value) => Some(scale.position(value * scale.factor)),
         (NodeState::Unchanged, _) => Some(0.0),
         (NodeState::Unseen, _) => None,
     }
 }
 
-/// Mean over the known nodes of a part of the plate; `None` when fewer than half were seen, or most show no change.
+/// Returns the mean over the seen nodes of a part of the plate; `None` when fewer than half were seen, or most are unchanged.
 fn mean(field: &Field, i: usize, k: usize) -> Option<f64> {
     let [n_u, n_v] = field.nodes;
     let range = |part: usize, parts: usize, n: usize| part * n / parts..(part + 1) * n / parts;
     let (mut all, mut seen, mut gray, mut sum) = (0, 0, 0, 0.0);
-    for row in range(k, CODES[1], n_v) {
-        for column in range(i, CODES[0], n_u) {
+    for row in range(k, PARTS[1], n_v) {
+        for column in range(i, PARTS[0], n_u) {
             let node = row * n_u + column;
             all += 1;
             if field.state[node] != NodeState::Unseen {
@@ -274,8 +279,8 @@ mod tests {
     fn drawn(field: &Field) -> String {
         let plate = PlateRecord { width_mm: 3000.0, height_mm: 2500.0, ..PlateRecord::default() };
         let caption = Caption { plate: "A<7>", stroke: Some(7), verdict: Verdict::Fail };
-        let yardstick = Yardstick { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
-        map(field, &plate, &caption, &yardstick).unwrap()
+        let picture_scale = PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
+        map(field, &plate, &caption, &picture_scale).unwrap()
     }
 
     /// The part of the picture that is the legend's numbers.
@@ -306,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_part_is_told_in_words_and_only_beyond_the_limit() {
+    fn the_worst_part_is_named_in_words_and_only_beyond_the_limit() {
         let per_mm = 0.006 / 3.0;
         let much = drawn(&field("curvature_deficit", "1/m", |u, _| 40.0 * per_mm * u, false));
         assert!(much.matches("bend more").count() == 2, "legend and plate");

@@ -1,4 +1,7 @@
-//! What colours and heights mean.
+//! Scales of colours and heights, fixed for a plate by its plate file.
+//!
+//! Gaps have a ladder of 1, 2, 5, 10, 20 and 50 times the limit, at equal steps of colour or height. Curvatures are shown as
+//! the gap that they open under a template of chord c: g = delta kappa c^2 / 8.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,70 +10,70 @@ use platen_plant::PlateFile;
 
 use platen_model::units::{metres, mm};
 
-/// Limit of a board where the plate file has none, millimetres, and its chord: the trade's 3 mm on 2 m.
+/// Limit and chord of a template where the plate file has none, millimetres: the trade's 3 mm on 2 m.
 const USUAL: [f64; 2] = [3.0, 2000.0];
 
-/// Steps of a ladder in limits: fine where a plate is nearly done, reaching to where it begins.
+/// Steps of the ladder in limits: fine near the limit, coarse towards the unbent plate.
 const LADDER: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 
 /// Steps of an even scale.
 const EVEN: usize = 4;
 
-/// What the scales of a plate's pictures follow from: its plate file alone, so that no stroke changes them.
+/// Parameters of the scales of a plate's pictures. They follow from its plate file alone, so that no stroke changes them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Yardstick {
-    /// Smallest limit of the plate's boards, millimetres.
+pub struct PictureScale {
+    /// Smallest limit of the plate's templates, millimetres.
     pub limit_mm: f64,
-    /// Length of the first board, millimetres.
+    /// Chord of the first template, millimetres.
     pub chord_mm: f64,
     /// Strongest curvature of the target, 1/m.
     pub bend_per_m: f64,
 }
 
-impl Default for Yardstick {
-    /// That of a plate without boards and target.
+impl Default for PictureScale {
+    /// Returns the parameters of a plate without templates and target.
     fn default() -> Self {
         let [limit_mm, chord_mm] = USUAL;
         Self { limit_mm, chord_mm, bend_per_m: 10.0 * per_m(limit_mm, chord_mm) }
     }
 }
 
-impl Yardstick {
-    /// The yardstick of a plate.
+impl PictureScale {
+    /// Returns the parameters of a plate.
     pub fn of(plate: &PlateFile) -> Self {
         let limits = plate.templates.iter().map(|template| mm(template.limit));
         let limit_mm = limits.filter(|limit| *limit > 0.0).min_by(f64::total_cmp).unwrap_or(USUAL[0]);
         let chord_mm = plate.templates.first().map_or(USUAL[1], |template| mm(template.chord));
         let radius = plate.target.as_ref().and_then(smallest_radius);
-        let by_board = 10.0 * per_m(limit_mm, chord_mm);
-        Self { limit_mm, chord_mm, bend_per_m: radius.map_or(by_board, |radius| 1.0 / radius) }
+        let by_template = 10.0 * per_m(limit_mm, chord_mm);
+        Self { limit_mm, chord_mm, bend_per_m: radius.map_or(by_template, |radius| 1.0 / radius) }
     }
 
-    /// Curvature that makes a gap as large as the limit under the board, 1/m.
+    /// Returns the curvature that opens a gap of the limit under the template, 1/m.
     pub fn tolerance_per_m(&self) -> f64 {
         per_m(self.limit_mm, self.chord_mm)
     }
 
-    /// The ladder of gaps.
+    /// Returns the ladder of gaps.
     pub(super) fn gaps(&self) -> Scale {
         let anchors = LADDER.map(|step| step * self.limit_mm).to_vec();
-        Scale { anchors, unit: "mm", factor: 1000.0, turned: false, words: None, locked: true }
+        Scale { anchors, unit: "mm", factor: 1000.0, inverted: false, words: None, locked: true }
     }
 
-    /// What a field shows, in words, and its scale.
+    /// Returns title and scale of a field; `largest` is its largest value, for fields without a scale of the plate.
     pub(super) fn field(&self, name: &str, unit: &str, largest: f64) -> (String, Scale) {
-        let board = format!("as the gap it makes under a {:.0} mm board", self.chord_mm);
+        let template = format!("as the gap it makes under a {:.0} mm template", self.chord_mm);
         // Gap to curvature: delta kappa = 8 g / c^2.
         let as_gap = Scale { factor: 1.0 / per_m(1.0, self.chord_mm), ..self.gaps() };
         match name {
             "curvature_deficit" => (
-                format!("Still to bend, {board}"),
-                Scale { turned: true, words: Some(["bent too far", "bend more"]), ..as_gap },
+                format!("Still to bend, {template}"),
+                Scale { inverted: true, words: Some(["bent too far", "bend more"]), ..as_gap },
             ),
-            "curvature_change" => (format!("Bent by this stroke, {board}"), as_gap),
+            "curvature_change" => (format!("Bent by this stroke, {template}"), as_gap),
             "deviation" => ("Deviation from the target, + towards the scanner".into(), self.gaps()),
             "displacement_normal" => {
-                ("Moved since the scan before, + towards the scanner".into(), self.gaps())
+                ("Moved since the previous scan, + towards the scanner".into(), self.gaps())
             }
             _ if unit == "m" => (name.replace('_', " "), self.gaps()),
             _ if unit == "1/m" => (curvature_words(name), Scale::even(1.5 * self.bend_per_m, "1/m", true)),
@@ -85,7 +88,7 @@ impl Yardstick {
     }
 }
 
-/// Curvature that opens a gap under a board, 1/m.
+/// Returns the curvature that opens a gap under a template, 8 g / c^2, 1/m.
 fn per_m(gap_mm: f64, chord_mm: f64) -> f64 {
     8.0 * metres(gap_mm) / metres(chord_mm).powi(2)
 }
@@ -111,20 +114,20 @@ fn curvature_words(name: &str) -> String {
     format!("{what}, + towards the scanner")
 }
 
-/// Values at equal steps of colour or height, the same on both sides of zero.
+/// Symmetric scale: values at equal steps of colour or height.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
-    /// Ascending, above zero, in the unit shown.
+    /// Ascending positive values in the unit shown.
     pub(super) anchors: Vec<f64>,
     /// Unit shown.
     pub(super) unit: &'static str,
-    /// From the field's unit to the one shown.
+    /// Factor from the field's unit to the one shown.
     pub(super) factor: f64,
     /// The positive side is blue.
-    pub(super) turned: bool,
-    /// What the negative and the positive side ask for.
+    pub(super) inverted: bool,
+    /// Names of the negative and the positive side.
     pub(super) words: Option<[&'static str; 2]>,
-    /// The same for every stroke of the plate.
+    /// Whether it is the same for every stroke of the plate.
     pub(super) locked: bool,
 }
 
@@ -132,10 +135,10 @@ impl Scale {
     fn even(full: f64, unit: &'static str, locked: bool) -> Self {
         let full = nice_ceiling(full.max(1e-12));
         let anchors = (1..=EVEN).map(|k| full * k as f64 / EVEN as f64).collect();
-        Self { anchors, unit, factor: 1.0, turned: false, words: None, locked }
+        Self { anchors, unit, factor: 1.0, inverted: false, words: None, locked }
     }
 
-    /// Where a value in the unit shown lies, -1 to 1; what lies beyond the scale is at its end.
+    /// Returns the position of a value in the unit shown, -1 to 1; values beyond the scale are at its ends.
     pub(super) fn position(&self, value: f64) -> f64 {
         let size = value.abs();
         let above = self.anchors.iter().take_while(|anchor| **anchor <= size).count();
@@ -145,17 +148,17 @@ impl Scale {
         value.signum() * steps / self.anchors.len() as f64
     }
 
-    /// The same, as a colour's place: blue is negative.
+    /// Returns the position of its colour, negative for blue.
     pub(super) fn colour_position(&self, value: f64) -> f64 {
-        self.turn(self.position(value))
+        self.of_colour(self.position(value))
     }
 
-    /// From a place on the scale to the colour's place.
-    pub(super) fn turn(&self, position: f64) -> f64 {
-        if self.turned { -position } else { position }
+    /// Converts a position on the scale to that of its colour.
+    pub(super) fn of_colour(&self, position: f64) -> f64 {
+        if self.inverted { -position } else { position }
     }
 
-    /// A number with its sign as it stands on a map.
+    /// Formats a number with its sign.
     pub(super) fn number(&self, value: f64) -> String {
         if self.unit == "mm" {
             return super::signed_mm(value);
@@ -169,7 +172,7 @@ impl Scale {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, not below `value`.
+/// Returns the least of 1, 2 and 5 times a power of ten that is not below `value`.
 pub(super) fn nice_ceiling(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0, 10.0]
@@ -183,7 +186,8 @@ pub(super) fn nice_ceiling(value: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const YARDSTICK: Yardstick = Yardstick { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 1.0 / 9.0 };
+    const PICTURE_SCALE: PictureScale =
+        PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 1.0 / 9.0 };
 
     #[test]
     fn scales_end_on_round_numbers() {
@@ -195,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_ladder_is_symmetric_and_rises_evenly_from_limit_to_limit() {
-        let scale = YARDSTICK.gaps();
+        let scale = PICTURE_SCALE.gaps();
         for (value, steps) in
             [(0.0, 0.0), (1.5, 0.5), (3.0, 1.0), (4.5, 1.5), (6.0, 2.0), (150.0, 6.0), (900.0, 6.0)]
         {
@@ -208,15 +212,18 @@ mod tests {
     fn the_scale_is_that_of_the_plate_whatever_the_stroke_holds() {
         for name in ["deviation", "displacement_normal", "curvature_deficit", "kappa_u"] {
             let unit = if name.starts_with('d') { "m" } else { "1/m" };
-            assert_eq!(YARDSTICK.field(name, unit, 1e-3).1, YARDSTICK.field(name, unit, 1e3).1);
-            assert!(YARDSTICK.field(name, unit, 1.0).1.locked);
+            assert_eq!(PICTURE_SCALE.field(name, unit, 1e-3).1, PICTURE_SCALE.field(name, unit, 1e3).1);
+            assert!(PICTURE_SCALE.field(name, unit, 1.0).1.locked);
         }
-        assert!(!YARDSTICK.field("somebody_elses", "K", 1.0).1.locked, "and says so where it is not");
+        assert!(
+            !PICTURE_SCALE.field("somebody_elses", "K", 1.0).1.locked,
+            "and the title names it where it is not"
+        );
     }
 
     #[test]
-    fn missing_curvature_is_shown_as_the_gap_under_the_board_blue_where_more_is_wanted() {
-        let (_, scale) = YARDSTICK.field("curvature_deficit", "1/m", 1.0);
+    fn missing_curvature_is_shown_as_the_gap_under_the_template_blue_where_more_is_wanted() {
+        let (_, scale) = PICTURE_SCALE.field("curvature_deficit", "1/m", 1.0);
         // 3 mm on 2 m is 0.006 1/m.
         assert!((0.006 * scale.factor - 3.0).abs() < 1e-9);
         assert!(scale.colour_position(3.0) < 0.0 && scale.colour_position(-3.0) > 0.0);

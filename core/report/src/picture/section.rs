@@ -1,57 +1,57 @@
-//! The plate under one board: profile and board above, the gap below.
+//! Section of the plate under one template: profile and template above, the gap below.
 
 use plotters::style::RGBColor;
 
+use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE, STEEL, WOOD, WOOD_EDGE};
-use super::page::{At, Page, Text, draw};
 use super::scale::nice_ceiling;
-use super::{Caption, PictureError, Yardstick, with_uncertainty};
+use super::{Caption, PictureError, PictureScale, with_uncertainty};
 use crate::result::{LineRecord, TemplateRecord};
 
 const SIZE: (u32, u32) = (1200, 760);
 const LEFT: f64 = 110.0;
 const RIGHT: f64 = 1070.0;
-/// From where to where the profile and the gap reach, pixels from above.
+/// Vertical extent of profile and gap, pixels from above.
 const PROFILE: [f64; 2] = [200.0, 400.0];
 const GAP: [f64; 2] = [470.0, 660.0];
-/// The board's own height and the plate's, as drawn.
-const BOARD: f64 = 44.0;
+/// Drawn heights of template and plate, pixels.
+const TEMPLATE: f64 = 44.0;
 const PLATE: f64 = 20.0;
 
-/// The section of the plate under a board.
+/// Draws the section of the plate under a template.
 ///
 /// # Errors
-/// When the drawing library fails.
+/// The drawing library fails.
 pub fn section(
     line: &LineRecord,
     template: &TemplateRecord,
     caption: &Caption<'_>,
-    yardstick: &Yardstick,
+    picture_scale: &PictureScale,
 ) -> Result<String, PictureError> {
-    draw(SIZE, |page| {
+    draw(SIZE, |canvas| {
         let caption = Caption { verdict: template.verdict, ..*caption };
         let seat = serde_json::to_value(template.seat).ok();
         let seat = seat.as_ref().and_then(|seat| seat.as_str()).unwrap_or_default();
         let rocks = if template.rocks { ", it rocks" } else { "" };
-        page.head(
+        canvas.head(
             &caption,
             &format!(
-                "Board {} of {:.0} mm on line {}, seat {seat}{rocks}",
+                "Template {} of {:.0} mm on line {}, seat {seat}{rocks}",
                 template.name, template.chord_mm, line.name
             ),
         )?;
-        page.text(&template.says, (24.0, 126.0), Text::new(26.0).bold())?;
-        let sheet = Sheet { line, template, top_mm: top_of_gaps(template, yardstick) };
-        sheet.profile(page)?;
-        sheet.gap(page)
+        canvas.text(&template.says, (24.0, 126.0), Text::new(26.0).bold())?;
+        let layout = Layout { line, template, top_mm: top_of_gaps(template, picture_scale) };
+        layout.profile(canvas)?;
+        layout.gap(canvas)
     })
 }
 
-/// The first step of the plate's ladder that holds the gap and the limit with room above.
-fn top_of_gaps(template: &TemplateRecord, yardstick: &Yardstick) -> f64 {
+/// Returns the first step of the plate's ladder above gap and limit, with a margin.
+fn top_of_gaps(template: &TemplateRecord, picture_scale: &PictureScale) -> f64 {
     let most = template.gap_mm.iter().fold(template.limit_mm, |most, gap| most.max(gap.abs()));
     let wanted = 1.1 * (most + template.uncertainty_mm);
-    yardstick
+    picture_scale
         .gaps()
         .anchors
         .into_iter()
@@ -59,14 +59,14 @@ fn top_of_gaps(template: &TemplateRecord, yardstick: &Yardstick) -> f64 {
         .unwrap_or_else(|| nice_ceiling(wanted))
 }
 
-struct Sheet<'a> {
+struct Layout<'a> {
     line: &'a LineRecord,
     template: &'a TemplateRecord,
     top_mm: f64,
 }
 
-impl Sheet<'_> {
-    /// Pixel of a share of the board's length.
+impl Layout<'_> {
+    /// Returns the pixel of a share of the template's length.
     fn x(&self, share: f64) -> f64 {
         LEFT + (RIGHT - LEFT) * share
     }
@@ -75,7 +75,7 @@ impl Sheet<'_> {
         sample as f64 / (self.template.gap_mm.len().max(2) - 1) as f64
     }
 
-    /// How far along the board a place of the plate lies, 0 to 1.
+    /// Returns the position of a place of the plate along the template, 0 to 1.
     fn along(&self, [u, v]: [f64; 2]) -> Option<f64> {
         let (first, last) = (self.line.points.first()?, self.line.points.last()?);
         let (du, dv) = (last.u_mm - first.u_mm, last.v_mm - first.v_mm);
@@ -84,12 +84,12 @@ impl Sheet<'_> {
         share.is_finite().then_some(share.clamp(0.0, 1.0))
     }
 
-    /// The sample nearest to a share of the board.
+    /// Returns the sample nearest to a share of the template.
     fn sample(&self, share: f64) -> usize {
         (share * (self.template.gap_mm.len().max(1) - 1) as f64).round() as usize
     }
 
-    /// The colour of an open gap: that of what is to be done about it.
+    /// Returns the colour of the gap: that of the required bend in the maps.
     fn open(&self) -> RGBColor {
         match self.template.sense {
             0 => colour::diverging(0.0),
@@ -97,16 +97,16 @@ impl Sheet<'_> {
         }
     }
 
-    fn profile(&self, page: &Page<'_>) -> Result<(), PictureError> {
+    fn profile(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let Self { template, .. } = self;
         let (heights, gaps) = (&template.height_mm, &template.gap_mm);
         let edge: Vec<f64> = heights.iter().zip(gaps).map(|(height, gap)| height + gap).collect();
         let all = || heights.iter().chain(&edge).copied();
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         if heights.len() < 2 || heights.len() != gaps.len() || !(high - low).is_finite() {
-            return page.text("no profile", (LEFT, PROFILE[0]), Text::new(22.0));
+            return canvas.text("no profile", (LEFT, PROFILE[0]), Text::new(22.0));
         }
-        let room = PROFILE[1] - PROFILE[0] - BOARD - PLATE;
+        let room = PROFILE[1] - PROFILE[0] - TEMPLATE - PLATE;
         let pixel_per_mm = room / (high - low).max(self.top_mm);
         let y = |mm: f64| PROFILE[1] - PLATE - (mm - low) * pixel_per_mm;
         let along = |values: &[f64]| -> Vec<At> {
@@ -116,25 +116,25 @@ impl Sheet<'_> {
         let closed = |points: &[At], other: Vec<At>| -> Vec<At> {
             points.iter().copied().chain(other.into_iter().rev()).collect()
         };
-        let top = y(high) - BOARD;
-        page.area(&closed(&edge, vec![(LEFT, top), (RIGHT, top)]), WOOD)?;
-        page.area(&closed(&edge, face.clone()), self.open())?;
+        let top = y(high) - TEMPLATE;
+        canvas.area(&closed(&edge, vec![(LEFT, top), (RIGHT, top)]), WOOD)?;
+        canvas.area(&closed(&edge, face.clone()), self.open())?;
         let below = face.iter().map(|(x, y)| (*x, y + PLATE)).collect();
-        page.area(&closed(&face, below), STEEL)?;
-        page.line(&edge, WOOD_EDGE, 3)?;
-        page.line(&face, INK, 3)?;
-        self.unseen(page, |k| [y(heights[k]), y(heights[k]) + PLATE])?;
+        canvas.area(&closed(&face, below), STEEL)?;
+        canvas.line(&edge, WOOD_EDGE, 3)?;
+        canvas.line(&face, INK, 3)?;
+        self.unseen(canvas, |k| [y(heights[k]), y(heights[k]) + PLATE])?;
         for share in template.contacts_mm.iter().filter_map(|contact| self.along(*contact)) {
             let (x, y) = (self.x(share), y(heights[self.sample(share)]));
-            page.area(&[(x, y + 2.0), (x - 12.0, y + 24.0), (x + 12.0, y + 24.0)], INK)?;
+            canvas.area(&[(x, y + 2.0), (x - 12.0, y + 24.0), (x + 12.0, y + 24.0)], INK)?;
         }
-        page.text("board", (LEFT + 12.0, top + 20.0), Text::new(20.0).coloured(WOOD_EDGE))?;
+        canvas.text("template", (LEFT + 12.0, top + 20.0), Text::new(20.0).coloured(WOOD_EDGE))?;
         let scale = pixel_per_mm / ((RIGHT - LEFT) / template.chord_mm);
         let note = format!("heights {scale:.0} times enlarged; triangles: contacts");
-        page.text(&note, (RIGHT, PROFILE[1] + 26.0), Text::new(20.0).coloured(PALE).right())
+        canvas.text(&note, (RIGHT, PROFILE[1] + 26.0), Text::new(20.0).coloured(PALE).right())
     }
 
-    fn gap(&self, page: &Page<'_>) -> Result<(), PictureError> {
+    fn gap(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let Self { template, top_mm, .. } = self;
         let low_mm = if template.gap_mm.iter().any(|gap| *gap < -1e-3) { -top_mm } else { 0.0 };
         let y =
@@ -144,18 +144,18 @@ impl Sheet<'_> {
             gaps.map(|(k, gap)| (self.x(self.share(k)), y(gap + offset))).collect()
         };
         let (upper, lower) = (band(template.uncertainty_mm), band(-template.uncertainty_mm));
-        page.area(&upper.into_iter().chain(lower.into_iter().rev()).collect::<Vec<_>>(), self.open())?;
-        page.line(&band(0.0), INK, 4)?;
-        self.unseen(page, |k| [y(template.gap_mm[k]) - 10.0, y(template.gap_mm[k]) + 10.0])?;
-        self.axes(page, &y, low_mm)?;
+        canvas.area(&upper.into_iter().chain(lower.into_iter().rev()).collect::<Vec<_>>(), self.open())?;
+        canvas.line(&band(0.0), INK, 4)?;
+        self.unseen(canvas, |k| [y(template.gap_mm[k]) - 10.0, y(template.gap_mm[k]) + 10.0])?;
+        self.axes(canvas, &y, low_mm)?;
         let text = Text::new(22.0);
-        page.dashed((LEFT, y(template.limit_mm)), (RIGHT, y(template.limit_mm)), INK, 2)?;
+        canvas.dashed((LEFT, y(template.limit_mm)), (RIGHT, y(template.limit_mm)), INK, 2)?;
         let limit = format!("limit {:.1}", template.limit_mm);
-        page.text(&limit, (RIGHT + 10.0, y(template.limit_mm)), text.bold())?;
+        canvas.text(&limit, (RIGHT + 10.0, y(template.limit_mm)), text.bold())?;
         let Some(at) = self.along(template.max_gap_at_mm) else { return Ok(()) };
         let gap = template.gap_mm.get(self.sample(at)).copied().unwrap_or(template.max_gap_mm);
         let (x, height) = (self.x(at), y(gap));
-        page.ring((x, height), 10, INK, 4)?;
+        canvas.ring((x, height), 10, INK, 4)?;
         let words = format!("{} mm", with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm)));
         let look = Text::new(30.0).bold();
         let above = height - 32.0;
@@ -164,38 +164,38 @@ impl Sheet<'_> {
         let above = if (above - limit).abs() > 22.0 { above } else { limit - 30.0 };
         let above = if above > GAP[0] - 20.0 { above } else { height + 34.0 };
         match at {
-            at if at < 0.2 => page.text(&words, (x + 16.0, above), look),
-            at if at > 0.8 => page.text(&words, (x - 16.0, above), look.right()),
-            _ => page.text(&words, (x, above), look.centred()),
+            at if at < 0.2 => canvas.text(&words, (x + 16.0, above), look),
+            at if at > 0.8 => canvas.text(&words, (x - 16.0, above), look.right()),
+            _ => canvas.text(&words, (x, above), look.centred()),
         }
     }
 
-    fn axes(&self, page: &Page<'_>, y: &dyn Fn(f64) -> f64, low_mm: f64) -> Result<(), PictureError> {
+    fn axes(&self, canvas: &Canvas<'_>, y: &dyn Fn(f64) -> f64, low_mm: f64) -> Result<(), PictureError> {
         let text = Text::new(22.0);
-        page.line(&[(LEFT, GAP[0]), (LEFT, GAP[1])], INK, 2)?;
-        page.line(&[(LEFT, y(0.0)), (RIGHT, y(0.0))], INK, 2)?;
+        canvas.line(&[(LEFT, GAP[0]), (LEFT, GAP[1])], INK, 2)?;
+        canvas.line(&[(LEFT, y(0.0)), (RIGHT, y(0.0))], INK, 2)?;
         for mm in [low_mm, 0.0, 0.5 * self.top_mm, self.top_mm] {
-            page.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-            page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
+            canvas.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
+            canvas.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
         }
-        page.text("gap, mm", (LEFT - 86.0, GAP[0] - 30.0), text)?;
+        canvas.text("gap, mm", (LEFT - 86.0, GAP[0] - 30.0), text)?;
         let (start, chord) = (self.template.start_mm, self.template.chord_mm);
         let step = nice_ceiling(chord / 6.0);
         let first = (start / step).ceil() as i64;
         let last = ((start + chord) / step).floor() as i64;
         for k in first..=last {
             let x = self.x((k as f64 * step - start) / chord);
-            page.line(&[(x, GAP[1]), (x, GAP[1] + 8.0)], INK, 2)?;
-            page.text(&format!("{}", k as f64 * step), (x, GAP[1] + 24.0), text.centred())?;
+            canvas.line(&[(x, GAP[1]), (x, GAP[1] + 8.0)], INK, 2)?;
+            canvas.text(&format!("{}", k as f64 * step), (x, GAP[1] + 24.0), text.centred())?;
         }
-        page.text("along the line, mm \u{2192}", (RIGHT, GAP[1] + 58.0), text.right())
+        canvas.text("along the line, mm \u{2192}", (RIGHT, GAP[1] + 58.0), text.right())
     }
 
-    /// Hatches where the plate was not seen.
-    fn unseen(&self, page: &Page<'_>, span: impl Fn(usize) -> [f64; 2]) -> Result<(), PictureError> {
+    /// Hatches the unseen parts.
+    fn unseen(&self, canvas: &Canvas<'_>, span: impl Fn(usize) -> [f64; 2]) -> Result<(), PictureError> {
         for k in (0..self.template.seen.len()).filter(|&k| !self.template.seen[k]) {
             let ([from, to], x) = (span(k), self.x(self.share(k)));
-            page.line(&[(x - 5.0, to), (x + 5.0, from)], PALE, 3)?;
+            canvas.line(&[(x - 5.0, to), (x + 5.0, from)], PALE, 3)?;
         }
         Ok(())
     }
@@ -235,12 +235,12 @@ mod tests {
         let points = vec![point(0.0), point(3000.0)];
         let line = LineRecord { name: "R1".into(), points, templates: Vec::new() };
         let caption = Caption { plate: "A", stroke: None, verdict: Verdict::Pass };
-        let yardstick = Yardstick { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
-        section(&line, template, &caption, &yardstick).unwrap()
+        let picture_scale = PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
+        section(&line, template, &caption, &picture_scale).unwrap()
     }
 
     #[test]
-    fn it_tells_gap_uncertainty_limit_verdict_and_what_to_do() {
+    fn it_shows_gap_uncertainty_limit_verdict_and_sentence() {
         let svg = drawn(&template(vec![4.1, 2.0, 0.0, 2.0, 4.0], vec![true; 5]));
         for text in ["4.1 \u{b1} 0.2 mm", "limit 3.0", "FAIL", "not bent enough", "T&lt;1&gt;"] {
             assert!(svg.contains(text), "{text}");

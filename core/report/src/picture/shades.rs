@@ -1,39 +1,39 @@
-//! A field as few rectangles of few colours, and hatching where nothing was seen.
+//! Rasterised field: few rectangles of few colours, and hatching where unseen.
 
 use std::collections::BTreeMap;
 
 use plotters::style::RGBColor;
 
 use super::PictureError;
+use super::canvas::{At, Canvas};
 use super::colour::{self, PALE, PAPER};
-use super::page::{At, Page};
 use super::scale::Scale;
 use platen_model::{Field, NodeState};
 
-/// Shades from one anchor of the scale to the next.
+/// Number of shades from one anchor of the scale to the next.
 const PER_STEP: i32 = 4;
 /// Distance of the hatching's lines, squares.
 const HATCH: usize = 4;
-/// Neighbouring rectangles overlap by this much, so that no seam shows between them, pixels.
+/// Overlap of neighbouring rectangles, so that no seam shows, pixels.
 pub(super) const OVERLAP: f64 = 0.5;
 
-/// Shades on each side of zero.
+/// Returns the number of shades on each side of zero.
 pub(super) fn count(scale: &Scale) -> i32 {
     PER_STEP * scale.anchors.len() as i32
 }
 
-/// The colour of a shade, `n` on each side of zero.
+/// Returns the colour of a shade, `n` on each side of zero.
 pub(super) fn colour_of(shade: i32, n: i32) -> RGBColor {
     colour::diverging(f64::from(shade) / f64::from(n))
 }
 
-/// The shade of a position: away from zero, so that only zero's own shade is neutral.
+/// Returns the shade of a position, rounded away from zero: only zero is neutral.
 pub(super) fn shade_of(position: f64, n: i32) -> i32 {
     let size = (position.abs() * f64::from(n)).ceil().min(f64::from(n)) as i32;
     if position < 0.0 { -size } else { size }
 }
 
-/// The field as squares of few shades, v outer from the top, u inner; `None` where nothing was seen.
+/// Raster of shades, v outer from the top, u inner; `None` where unseen.
 pub(super) struct Shades {
     n_x: usize,
     n_y: usize,
@@ -45,7 +45,7 @@ pub(super) struct Shades {
 type Run = (usize, usize, Option<i32>);
 
 impl Shades {
-    /// A field of one component in `n_x` times `n_y` squares.
+    /// Rasterises a field of one component into `n_x` times `n_y` squares.
     pub(super) fn of(field: &Field, scale: &Scale, [n_x, n_y]: [usize; 2]) -> Self {
         let n_shades = count(scale);
         let shade = |x: usize, y: usize| {
@@ -64,7 +64,7 @@ impl Shades {
     /// Draws between the upper left and the lower right corner.
     pub(super) fn paint(
         &self,
-        page: &Page<'_>,
+        canvas: &Canvas<'_>,
         (left, top): At,
         (right, bottom): At,
     ) -> Result<(), PictureError> {
@@ -75,16 +75,16 @@ impl Shades {
                 Some(shade) => colour_of(shade, self.n_shades),
                 None => PAPER,
             };
-            page.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
+            canvas.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
         }
         for [from, to] in self.hatching() {
             let corner = |[column, row]: [usize; 2]| (x(column), y(row));
-            page.line(&[corner(from), corner(to)], PALE, 2)?;
+            canvas.line(&[corner(from), corner(to)], PALE, 2)?;
         }
         Ok(())
     }
 
-    /// Rectangles as large as they come, in a fixed order: runs (from, to, shade) with the rows that repeat them.
+    /// Returns maximal rectangles in a fixed order: runs (from, to, shade) with the rows that repeat them.
     fn rectangles(&self) -> Vec<(Run, [usize; 2])> {
         let mut done = Vec::new();
         let mut open: BTreeMap<Run, usize> = BTreeMap::new();
@@ -104,7 +104,7 @@ impl Shades {
         done
     }
 
-    /// Pieces of the diagonals that lie where nothing was seen, as corners of squares (column, row).
+    /// Returns the unseen pieces of the diagonals, as corners of squares (column, row).
     fn hatching(&self) -> Vec<[[usize; 2]; 2]> {
         let mut lines = Vec::new();
         let unseen = |x: usize, y: usize| self.shade[y * self.n_x + x].is_none();

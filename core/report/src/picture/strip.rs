@@ -1,10 +1,10 @@
-//! The strokes of a plate so far: worst gap with its uncertainty against the limit.
+//! Strip of a plate's strokes so far: worst gap with its uncertainty against the limit.
 
 use platen_model::Verdict;
 
+use super::canvas::{Canvas, Text, draw};
 use super::colour::{self, INK, PALE, PAPER};
-use super::page::{Page, Text, draw};
-use super::{Caption, PictureError, Yardstick, with_uncertainty};
+use super::{Caption, PictureError, PictureScale, with_uncertainty};
 
 const SIZE: (u32, u32) = (1200, 560);
 const LEFT: f64 = 110.0;
@@ -12,71 +12,75 @@ const RIGHT: f64 = 1160.0;
 const TOP: f64 = 130.0;
 const BOTTOM: f64 = 470.0;
 
-/// One stroke of the strip.
+/// Stroke of the strip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StripPoint {
-    /// What stands below it, e.g. the stroke's number.
+    /// Label below it, e.g. the stroke's number.
     pub label: String,
-    /// Worst gap, where one is known.
+    /// Worst gap, `None` without a measurement.
     pub gap_mm: Option<f64>,
     /// Its expanded uncertainty (95 %).
     pub uncertainty_mm: Option<f64>,
     /// -1 not bent enough, 0 within, 1 bent too far.
     pub sense: i8,
-    /// Judgement.
+    /// Verdict.
     pub verdict: Verdict,
 }
 
-/// The strip of the strokes so far, oldest first.
+/// Draws the strip of the strokes so far, oldest first.
 ///
 /// # Errors
-/// When the drawing library fails.
+/// The drawing library fails.
 pub fn strip(
     points: &[StripPoint],
     caption: &Caption<'_>,
-    yardstick: &Yardstick,
+    picture_scale: &PictureScale,
 ) -> Result<String, PictureError> {
-    let scale = yardstick.gaps();
+    let scale = picture_scale.gaps();
     let y = |mm: f64| BOTTOM - scale.position(mm.max(0.0)) * (BOTTOM - TOP);
-    // A few strokes do not spread over the whole width.
+    // Few strokes keep their distance and do not fill the width.
     let step = (RIGHT - LEFT) / points.len().max(12) as f64;
     let x = |k: usize| LEFT + (k as f64 + 0.5) * step;
-    draw(SIZE, |page| {
-        page.head(caption, "Worst gap under a board, mm, stroke by stroke")?;
-        page.fill((LEFT, y(yardstick.limit_mm)), (RIGHT, BOTTOM), colour::diverging(0.0))?;
-        axes(page, &y, yardstick)?;
+    draw(SIZE, |canvas| {
+        canvas.head(caption, "Worst gap under a template, mm, stroke by stroke")?;
+        canvas.fill((LEFT, y(picture_scale.limit_mm)), (RIGHT, BOTTOM), colour::diverging(0.0))?;
+        axes(canvas, &y, picture_scale)?;
         let known = |k: usize| points[k].gap_mm.map(|gap| (x(k), y(gap)));
         for k in 1..points.len() {
             if let (Some(from), Some(to)) = (known(k - 1), known(k)) {
-                page.line(&[from, to], PALE, 2)?;
+                canvas.line(&[from, to], PALE, 2)?;
             }
         }
         for (k, point) in points.iter().enumerate() {
-            draw_point(page, point, x(k), &y, k + 1 == points.len())?;
+            draw_point(canvas, point, x(k), &y, k + 1 == points.len())?;
             // Labels stay apart however many strokes there are.
             let every = (34.0 / step).ceil() as usize;
             if (points.len() - 1 - k).is_multiple_of(every) {
-                page.text(&point.label, (x(k), BOTTOM + 24.0), Text::new(22.0).centred())?;
+                canvas.text(&point.label, (x(k), BOTTOM + 24.0), Text::new(22.0).centred())?;
             }
         }
-        page.text("stroke \u{2192}", (RIGHT, BOTTOM + 58.0), Text::new(22.0).right())
+        canvas.text("stroke \u{2192}", (RIGHT, BOTTOM + 58.0), Text::new(22.0).right())
     })
 }
 
-fn axes(page: &Page<'_>, y: &dyn Fn(f64) -> f64, yardstick: &Yardstick) -> Result<(), PictureError> {
+fn axes(
+    canvas: &Canvas<'_>,
+    y: &dyn Fn(f64) -> f64,
+    picture_scale: &PictureScale,
+) -> Result<(), PictureError> {
     let text = Text::new(22.0);
-    page.line(&[(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], INK, 2)?;
-    for mm in std::iter::once(0.0).chain(yardstick.gaps().anchors) {
-        page.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-        page.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
+    canvas.line(&[(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], INK, 2)?;
+    for mm in std::iter::once(0.0).chain(picture_scale.gaps().anchors) {
+        canvas.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
+        canvas.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
     }
-    let limit = y(yardstick.limit_mm);
-    page.dashed((LEFT, limit), (RIGHT, limit), INK, 2)?;
-    page.text("limit", (RIGHT - 8.0, limit - 15.0), text.bold().right())
+    let limit = y(picture_scale.limit_mm);
+    canvas.dashed((LEFT, limit), (RIGHT, limit), INK, 2)?;
+    canvas.text("limit", (RIGHT - 8.0, limit - 15.0), text.bold().right())
 }
 
 fn draw_point(
-    page: &Page<'_>,
+    canvas: &Canvas<'_>,
     point: &StripPoint,
     x: f64,
     y: &dyn Fn(f64) -> f64,
@@ -84,14 +88,14 @@ fn draw_point(
 ) -> Result<(), PictureError> {
     let Some(gap) = point.gap_mm else {
         let (cross, at) = (9.0, BOTTOM - 18.0);
-        page.line(&[(x - cross, at - cross), (x + cross, at + cross)], INK, 4)?;
-        return page.line(&[(x - cross, at + cross), (x + cross, at - cross)], INK, 4);
+        canvas.line(&[(x - cross, at - cross), (x + cross, at + cross)], INK, 4)?;
+        return canvas.line(&[(x - cross, at + cross), (x + cross, at - cross)], INK, 4);
     };
     if let Some(uncertainty) = point.uncertainty_mm {
         let (high, low) = (y(gap + uncertainty), y(gap - uncertainty));
-        page.line(&[(x, high), (x, low)], INK, 3)?;
+        canvas.line(&[(x, high), (x, low)], INK, 3)?;
         for end in [high, low] {
-            page.line(&[(x - 8.0, end), (x + 8.0, end)], INK, 3)?;
+            canvas.line(&[(x - 8.0, end), (x + 8.0, end)], INK, 3)?;
         }
     }
     let colour = match (point.verdict, point.sense) {
@@ -99,15 +103,15 @@ fn draw_point(
         (_, 0) => PAPER,
         (_, sense) => colour::diverging(0.75 * f64::from(sense)),
     };
-    page.dot((x, y(gap)), 11, colour)?;
-    page.ring((x, y(gap)), 11, INK, 3)?;
+    canvas.dot((x, y(gap)), 11, colour)?;
+    canvas.ring((x, y(gap)), 11, INK, 3)?;
     if !newest {
         return Ok(());
     }
     let words = format!("{} mm, {}", with_uncertainty(gap, point.uncertainty_mm), point.verdict.words());
-    // Gaps fall: the upper right corner stays free.
-    page.ring((x, y(gap)), 17, INK, 3)?;
-    page.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())
+    // Gaps decrease: the upper right corner stays free.
+    canvas.ring((x, y(gap)), 17, INK, 3)?;
+    canvas.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())
 }
 
 #[cfg(test)]
@@ -120,11 +124,11 @@ mod tests {
 
     fn drawn(points: &[StripPoint]) -> String {
         let caption = Caption { plate: "A", stroke: Some(2), verdict: Verdict::Pass };
-        strip(points, &caption, &Yardstick { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 }).unwrap()
+        strip(points, &caption, &PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 }).unwrap()
     }
 
     #[test]
-    fn it_tells_the_newest_gap_and_keeps_its_scale() {
+    fn it_shows_the_newest_gap_and_keeps_its_scale() {
         let few = drawn(&[point(1, Some(60.0), Verdict::Fail), point(2, Some(2.2), Verdict::Pass)]);
         assert!(few.contains("2.2 \u{b1} 0.2 mm, pass"));
         let small = drawn(&[point(1, Some(0.5), Verdict::Pass)]);

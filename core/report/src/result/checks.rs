@@ -1,37 +1,37 @@
-//! Shape checks in the units of the shop.
+//! Dimension checks of the result document, in millimetres and degrees.
 
 use serde::{Deserialize, Serialize};
 
 use platen_model::units::mm;
 use platen_shape::{Check, EXPANDED, EdgeCheck, ShapeChecks};
 
-/// What tape, square and sight line would show.
+/// Dimension checks, as by tape, square and sight line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ShapeChecksRecord {
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeRecord; 4],
-    /// Straight from (0,0) to (W,H) and from (W,0) to (0,H).
+    /// Diagonals from (0,0) to (W,H) and from (W,0) to (0,H), straight.
     pub diagonals_mm: [CheckRecord; 2],
-    /// The first diagonal less the second.
+    /// First diagonal minus the second.
     pub diagonal_difference_mm: CheckRecord,
     /// Inner angles in the plate's surface, corners (0,0), (W,0), (W,H), (0,H).
     pub angles_deg: [CheckRecord; 4],
-    /// Looking along u and along v: how far the far edge is turned clockwise against the near one.
+    /// Twist along u and along v: turn of the far edge against the near one, clockwise positive.
     pub twist_deg: [CheckRecord; 2],
 }
 
-/// One edge.
+/// Lengths of one edge.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct EdgeRecord {
-    /// A tape along the edge of the scanned face.
+    /// Arc length along the edge of the scanned face, as by tape.
     pub face_mm: CheckRecord,
-    /// The same on the mid-surface, to be held against the cut size.
+    /// Arc length on the mid-surface, to be compared with the cut size.
     pub mid_mm: CheckRecord,
-    /// Straight from corner to corner.
+    /// Chord from corner to corner.
     pub chord_mm: CheckRecord,
 }
 
-/// A figure with its expanded uncertainty (95 %), in the unit of its name.
+/// Figure with its expanded uncertainty (95 %), in the unit of its name.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// Value.
@@ -58,7 +58,7 @@ impl ShapeChecksRecord {
         }
     }
 
-    /// Every check in words, in a fixed order: name, figure, unit.
+    /// Returns name, figure and unit of every check, in a fixed order.
     pub fn rows(&self) -> Vec<(String, CheckRecord, &'static str)> {
         let edges = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
         let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];

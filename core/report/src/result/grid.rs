@@ -1,4 +1,4 @@
-//! The grid of the record: curvature of S and the comparisons' fields at 21 x 21 places.
+//! Grid of the result document: curvature of S(u, v), positions and fields of the comparisons at 21 x 21 nodes.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,12 +8,12 @@ use platen_shape::measure::Measurement;
 use platen_model::units::mm;
 use platen_model::{Field, NodeState, Report};
 
-/// Places on an even grid over the plate; null where nothing is known.
+/// Even grid over the plate; null where unseen.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct GridRecord {
-    /// Places along u.
+    /// Nodes along u.
     pub nu: usize,
-    /// Places along v.
+    /// Nodes along v.
     pub nv: usize,
     /// Curvature along u of the mid-surface.
     pub kappa_u_per_m: Vec<Option<f64>>,
@@ -23,10 +23,10 @@ pub struct GridRecord {
     pub kappa_uv_per_m: Vec<Option<f64>>,
     /// On the scanned face, scanner frame.
     pub position_m: Vec<[f64; 3]>,
-    /// Displacement against the stroke before, when there is one.
+    /// Displacement since the previous stroke, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement_mm: Option<Vec<Option<[f64; 3]>>>,
-    /// Measured minus target along the target's normal, when there is a target.
+    /// Measured minus target along the target's normal, where there is a target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deviation_mm: Option<Vec<Option<f64>>>,
     /// Whether the displacement is below the level of detection.
@@ -60,7 +60,7 @@ impl GridRecord {
     }
 }
 
-/// The field at the places of the grid: its own nearest nodes, which are the same where it divides evenly.
+/// Samples a field at the nodes of the grid by its nearest nodes, which coincide where the grids divide evenly.
 fn nodes<T>(field: &Field, value: impl Fn(&[f64], NodeState) -> T) -> Vec<Option<T>> {
     let nearest = |k: usize, n: usize, along: usize| (k * (along - 1) + (n - 1) / 2) / (n - 1);
     let at = |i_u: usize, i_v: usize| {

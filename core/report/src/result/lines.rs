@@ -1,4 +1,4 @@
-//! Reference lines and the boards that lie on them.
+//! Reference lines of the result document and the templates on them.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,18 +11,18 @@ use platen_shape::measure::Measurement;
 use platen_model::Report;
 use platen_model::units::{mm, mm_pair};
 
-/// One reference line.
+/// Reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LineRecord {
     /// Name.
     pub name: String,
-    /// Every 50 mm.
+    /// Points every 50 mm.
     pub points: Vec<PointRecord>,
-    /// Boards on it.
+    /// Templates on it.
     pub templates: Vec<TemplateRecord>,
 }
 
-/// One point of a line.
+/// Point of a reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PointRecord {
     /// Along u.
@@ -31,34 +31,34 @@ pub struct PointRecord {
     pub v_mm: f64,
     /// On the scanned face, scanner frame.
     pub position_m: [f64; 3],
-    /// False where the surface was bridged.
+    /// False where the surface is interpolated across unseen area.
     pub seen: bool,
 }
 
-/// How one board lies.
+/// Template laid on a reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TemplateRecord {
     /// Name.
     pub name: String,
-    /// Seat that was judged.
+    /// Seat of the verdict.
     pub seat: Seat,
-    /// The board rocks.
+    /// Whether the template rocks.
     pub rocks: bool,
     /// Largest gap.
     pub max_gap_mm: f64,
-    /// Expanded (95 %).
+    /// Its expanded uncertainty (95 %).
     pub uncertainty_mm: f64,
-    /// Where it is.
+    /// Its place (u, v).
     pub max_gap_at_mm: [f64; 2],
-    /// Where the board touches.
+    /// Places (u, v) of contact.
     pub contacts_mm: Vec<[f64; 2]>,
-    /// Place of the board's first end along the line.
+    /// Position of the template's first end along the line.
     pub start_mm: f64,
-    /// Length of the board.
+    /// Chord of the template.
     pub chord_mm: f64,
-    /// At equal steps from the board's first end to its last.
+    /// Gaps at equal steps from the template's first end to its last.
     pub gap_mm: Vec<f64>,
-    /// Height of the face at these steps over the straight line between the board's ends on it, towards the scanner.
+    /// Height of the face at these steps over the straight line between the template's ends on it, towards the scanner.
     pub height_mm: Vec<f64>,
     /// Whether the plate was seen at these steps.
     pub seen: Vec<bool>,
@@ -66,7 +66,7 @@ pub struct TemplateRecord {
     pub limit_mm: f64,
     /// -1 not bent enough, 0 within, 1 bent too far.
     pub sense: i8,
-    /// Judgement.
+    /// Verdict of the template.
     pub verdict: Verdict,
     /// Sentence for the operator.
     pub says: String,
@@ -125,7 +125,7 @@ fn template(
     }
 }
 
-/// The places on the plate of a board's gaps.
+/// Returns the places (u, v) of a template's gaps.
 fn places(finding: &TemplateFinding, line: &platen_model::ReferenceLine, chord: f64) -> Vec<[f64; 2]> {
     let length = line.length();
     let last = finding.gap.len().saturating_sub(1).max(1) as f64;
@@ -134,7 +134,7 @@ fn places(finding: &TemplateFinding, line: &platen_model::ReferenceLine, chord: 
     (0..finding.gap.len()).map(|k| on_line(at(k))).collect()
 }
 
-/// Heights of the face over the straight line from the first place to the last, millimetres.
+/// Returns the heights of the face over the straight line from the first place to the last, millimetres.
 fn heights(surface: &Surface, places: &[[f64; 2]]) -> Vec<f64> {
     let [Some(first), Some(last), Some(middle)] =
         [places.first(), places.last(), places.get(places.len() / 2)]

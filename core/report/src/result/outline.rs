@@ -1,4 +1,4 @@
-//! The outline that the plate's (u, v) refer to.
+//! Outline to which the plate's (u, v) refer.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,39 +6,39 @@ use platen_shape::Blank;
 
 use platen_model::units::{metres, mm, mm_pair};
 
-/// Where the four edges lie in (u, v), and how that is known.
+/// Edges of the plate in (u, v), and their source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutlineRecord {
-    /// How it is known.
+    /// Source of the outline.
     pub from: OutlineSource,
     /// Mean length of the edges along u, corner to corner.
     pub width_mm: f64,
-    /// Of those along v.
+    /// Mean length of the edges along v.
     pub height_mm: f64,
-    /// The diagonal from (0,0) less the one from (W,0).
+    /// Diagonal from (0,0) minus the one from (W,0).
     pub diagonal_difference_mm: f64,
-    /// How far the middle of each edge v = 0, u = W, v = H, u = 0 lies outside the straight line between its corners; negative: inside.
+    /// Bow of the edges v = 0, u = W, v = H, u = 0: distance of the middle from the chord, positive outwards.
     pub bows_mm: [f64; 4],
     /// Corners (0,0), (W,0), (W,H), (0,H) in (u, v).
     pub corners_mm: [[f64; 2]; 4],
-    /// One sigma of each corner, along the edge that leaves it counter-clockwise and along the one that arrives.
+    /// Standard deviation of each corner along the outgoing and along the incoming edge, counter-clockwise.
     pub corner_sigma_mm: [[f64; 2]; 4],
-    /// One sigma across each edge.
+    /// Standard deviation across each edge.
     pub edge_sigma_mm: [f64; 4],
 }
 
-/// How an outline is known.
+/// Source of an outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutlineSource {
-    /// The rectangle of the plate file.
+    /// Rectangle of the plate file.
     Nominal,
-    /// A scan of the blank.
+    /// Scan of the blank.
     Baseline,
 }
 
 impl OutlineRecord {
-    /// The blank's, or without one the rectangle as ordered, metres.
+    /// Records the outline of a blank, or without one the rectangle as ordered, metres.
     pub fn new(blank: Option<&Blank>, [width, height]: [f64; 2]) -> Self {
         let ordered = Blank::rectangle(width, height);
         let from = if blank.is_some() { OutlineSource::Baseline } else { OutlineSource::Nominal };
@@ -56,7 +56,7 @@ impl OutlineRecord {
         }
     }
 
-    /// The blank, when a scan of it told its outline: the same as was written down, to the last bit.
+    /// Returns the blank, if its outline is from a scan, equal to the recorded one to the last bit.
     pub fn blank(&self) -> Option<Blank> {
         let blank = Blank {
             corners: self.corners_mm.map(|corner| corner.map(metres)),
@@ -67,7 +67,7 @@ impl OutlineRecord {
         (self.from == OutlineSource::Baseline).then(|| blank.rounded())
     }
 
-    /// For people, one line.
+    /// Describes the outline in one line.
     pub fn words(&self) -> String {
         match self.from {
             OutlineSource::Nominal => {

@@ -1,4 +1,4 @@
-//! The plate as its file had it: what a later reader needs to understand the figures.
+//! Plate file at the time of a measurement, as far as the figures depend on it.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,10 +6,10 @@ use platen_model::{Facing, RadiusOf, Target, TargetShape};
 use platen_plant::PlateFile;
 use platen_shape::{Surface, Vec3};
 
-use crate::picture::Yardstick;
+use crate::picture::PictureScale;
 use platen_model::units::mm;
 
-/// The plate as its file had it at this stroke.
+/// Plate file at a stroke.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlateRecord {
     /// Extent along u.
@@ -18,17 +18,17 @@ pub struct PlateRecord {
     pub height_mm: f64,
     /// Thickness.
     pub thickness_mm: f64,
-    /// What it is to become, in words; null where the file names no target.
+    /// Target in words; null where the file has none.
     pub target: Option<String>,
-    /// What the scales of its pictures follow from.
-    pub scale: Yardstick,
-    /// The edge that faces the press, as a direction in (u, v): `[0, -1]` is the edge v = 0. Null where the plant file
-    /// does not place the press, or places it under the plate.
+    /// Parameters of the scales of its pictures.
+    pub scale: PictureScale,
+    /// Edge that faces the press, as a direction in (u, v): `[0, -1]` is the edge v = 0. Null where the plant file does not
+    /// place the press, or places it under the plate.
     pub press_side: Option<[i8; 2]>,
 }
 
 impl PlateRecord {
-    /// What the file says, and where the press stands to the measured plate.
+    /// Records a plate file, and the side of the press relative to the measured plate.
     pub fn new(file: &PlateFile, surface: &Surface, press: Option<Vec3>) -> Self {
         let plate = &file.plate;
         Self {
@@ -36,13 +36,13 @@ impl PlateRecord {
             height_mm: mm(plate.height),
             thickness_mm: mm(plate.thickness),
             target: file.target.as_ref().map(words),
-            scale: Yardstick::of(file),
+            scale: PictureScale::of(file),
             press_side: press.and_then(|press| press_side(surface, press)),
         }
     }
 }
 
-/// The edge on the press's side: the one beyond which the press's origin lies, farthest where it is beyond two.
+/// Returns the edge beyond which the press's origin lies, the farther one of two.
 fn press_side(surface: &Surface, press: Vec3) -> Option<[i8; 2]> {
     let (w, h) = (surface.width(), surface.height());
     let at = surface.derivatives(0.5 * w, 0.5 * h);

@@ -1,12 +1,11 @@
-//! What a scan of the blank tells of its outline.
+//! Baseline: the outline of the blank from a scan of it, by development into the plane and a rigid least-squares fit.
 //!
-//! Flat or a little curved, the blank is laid flat ([`lay_flat`]); each of its edges is then the parabola of least squares, and
-//! where two of them meet is a corner. Shorter waves than a bow, which every scan shows of an edge, are its own error of some tenths of a
-//! millimetre.
+//! Flat or slightly curved, the blank is developed ([`lay_flat`]); a parabola is fitted to each of its edges, and adjacent ones
+//! are intersected in the corners. Waves shorter than a bow are an error of the scan, some tenths of a millimetre.
 //!
-//! (u, v) are then metric on the real plate: the rectangle as ordered lies on it so that its corners are off those of the blank
-//! with no mean shift and no turn. Both corners of an edge share in what it is too long, as they do without a baseline; and four
-//! corners tell the place and turn of the plate better than one of them and its edge.
+//! (u, v) are then metric on the real plate. The nominal rectangle is fitted to the blank's corners by least squares (rigid):
+//! a plate cut 4 mm too long overhangs by 2 mm on each side, as without a baseline. A blank that is already curved in two
+//! directions gives no outline; the error states the strain.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,15 +14,15 @@ use crate::measure::N_VERTICES;
 use crate::mesh::{DiskMesh, MeshError, SmoothFace};
 use crate::{Blank, Outline, Patch, PlateSpec};
 
-/// A corner or an edge further from its place as ordered than this, metres, is not cut badly but mistaken, or another plate's.
-/// S reads on beyond its rectangle by as much without harm.
+/// A corner or an edge further from its place as ordered than this, metres, is taken as mistaken, or another plate's, not as badly cut.
+/// S extends beyond its rectangle by as much without loss.
 const MOST_OFF: f64 = 0.02;
-/// More strain than this in a plate laid flat, and the law of the material, which nobody knows once it was pressed, decides where its
-/// outline was: on a sphere of 80 m radius (4 x 3 m, strain 3.6e-5) it is right to 0.02 mm for steel that was bent elastically, and
+/// With more strain than this in the developed plate, the outline depends on the law of the material, which is unknown once it was
+/// pressed: on a sphere of 80 m radius (4 x 3 m, strain 3.6e-5) it is right to 0.02 mm for steel that was bent elastically, and
 /// off by up to 0.45 mm for fibres that kept their length one way.
 const MOST_STRAIN: f64 = 5e-5;
 
-/// Why a scan tells no outline of the blank.
+/// Reason why a scan gives no outline of the blank.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BlankError {
     /// No mesh.
@@ -35,9 +34,9 @@ pub enum BlankError {
         /// Why not.
         reason: String,
     },
-    /// It is curved two ways.
+    /// It is curved in two directions.
     #[error(
-        "the blank is curved two ways: laid flat it keeps a strain of {strain:.1e}, {MOST_STRAIN:.0e} at most; scan it before it \
+        "the blank is curved in two directions: laid flat it keeps a strain of {strain:.1e}, {MOST_STRAIN:.0e} at most; scan it before it \
          is pressed"
     )]
     Curved {
@@ -59,7 +58,7 @@ pub enum BlankError {
 }
 
 impl Blank {
-    /// The outline of the blank in a scan of it.
+    /// Measures the outline of the blank in a scan of it.
     ///
     /// # Errors
     /// [`BlankError`].
@@ -69,7 +68,7 @@ impl Blank {
         Self::of_mesh(&mesh)
     }
 
-    /// The outline of a mesh laid flat.
+    /// Measures the outline of a mesh by developing it.
     ///
     /// # Errors
     /// [`BlankError`].
@@ -88,10 +87,10 @@ impl Blank {
         let corners = [0, 1, 2, 3].map(|k| curves[(k + 3) % 4].meets(&curves[k]));
         let ordered = Self::rectangle(mesh.width, mesh.height);
         let blank = Self {
-            corners: laid_on(corners, ordered.corners),
+            corners: registered(corners, ordered.corners),
             bows: curves.each_ref().map(Curve::bow),
             corner_sigma: mesh.corner_sigma,
-            // What an edge does besides bowing is not known either.
+            // Deviations of an edge from its parabola are uncertainty too.
             edge_sigma: [0, 1, 2, 3].map(|edge| mesh.edge_sigma[edge].max(curves[edge].rms)),
         };
         let blank = blank.rounded();
@@ -105,7 +104,7 @@ impl Blank {
         Ok(blank)
     }
 
-    /// How far a corner or an edge lies from its place on the rectangle, at most.
+    /// Returns the largest distance of a corner or an edge from its place on the rectangle.
     fn off(&self, ordered: &Self) -> f64 {
         let corners = self.corners.iter().zip(ordered.corners).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
         corners.chain(self.bows.map(f64::abs)).fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
@@ -158,7 +157,7 @@ impl Curve {
         ([self.middle[0] + t * h + out * k, self.middle[1] + t * k - out * h], [h + slope * k, k - slope * h])
     }
 
-    /// Where its end meets the beginning of the next edge: Newton's method, edges are nearly straight.
+    /// Intersects its end with the beginning of the next edge by Newton's method; edges are nearly straight.
     fn meets(&self, next: &Self) -> [f64; 2] {
         const STEPS: usize = 4;
         let (mut s, mut t) = (1.0, -1.0);
@@ -178,8 +177,8 @@ impl Curve {
     }
 }
 
-/// The corners moved and turned, as one, to where they are off the ordered ones by least squares.
-fn laid_on(corners: [[f64; 2]; 4], ordered: [[f64; 2]; 4]) -> [[f64; 2]; 4] {
+/// Moves and turns the corners, as one, to the ordered ones by least squares.
+fn registered(corners: [[f64; 2]; 4], ordered: [[f64; 2]; 4]) -> [[f64; 2]; 4] {
     let middle = |of: &[[f64; 2]; 4]| [0, 1].map(|c| 0.25 * of.iter().map(|p| p[c]).sum::<f64>());
     let (from, to) = (middle(&corners), middle(&ordered));
     let (mut dot, mut cross) = (0.0, 0.0);

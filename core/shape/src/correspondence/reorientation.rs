@@ -1,13 +1,13 @@
-//! Whether a plate came back turned between two scans.
+//! Reorientation test: whether a plate was put back turned between two scans, by comparing curvature maps under all symmetries
+//! of the rectangle.
 //!
-//! Which corner is (0, 0) goes on from the scan before by direction: the edge along which u grew is the one that still
-//! runs that way. A plate that was lifted and put back turned by half a turn (a square one by a quarter), or with its other face
-//! up, is then named wrongly, and its shape tells: under the right names only what the stroke bent differs from the
-//! scan before.
+//! The corner (0, 0) follows from the scan before by direction: the edge along which u grew is the one that still runs that
+//! way. A plate that was put back turned by half a turn (a square one by a quarter), or with its other face up, then has the
+//! wrong corner names; under the right ones only what the stroke bent differs from the scan before.
 //!
-//! Curvature is compared, which needs no alignment. As long as strokes only add bends, the names that the direction gives
-//! cannot lose by chance: what another naming leaves unexplained is at least what the stroke bent. A plate that looks
-//! the same either way (flat, a whole cylinder) cannot be told, and nothing differs then but the names.
+//! Curvature needs no alignment. As long as strokes only add bends, the names given by direction cannot lose by chance:
+//! another naming leaves at least what the stroke bent. Limit: a plate that looks the same either way (flat, a whole cylinder)
+//! cannot be tested; then nothing but the names differs.
 
 use nalgebra::Matrix2;
 
@@ -31,7 +31,7 @@ const SHARE: f64 = 0.5;
 /// Sides that differ by less than this may be taken for each other: as much as a cut blank may differ from its file.
 const SQUARE: f64 = 0.01;
 
-/// How a plate came back.
+/// Kind of turn between two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reorientation {
     /// A quarter turn either way; square plates only.
@@ -52,7 +52,7 @@ impl std::fmt::Display for Reorientation {
     }
 }
 
-/// The turn under which `now` is the plate of the scan before, where the names it has do not fit and those do.
+/// Returns the turn under which `now` is the plate of the scan before, if that fits and the given orientation does not.
 #[must_use]
 pub fn reorientation(now: &Surface, before: &Surface) -> Option<Reorientation> {
     let left = |names: &Matrix2<f64>| unexplained(now, before, names);
@@ -74,8 +74,8 @@ pub fn reorientation(now: &Surface, before: &Surface) -> Option<Reorientation> {
     })
 }
 
-/// Share of the plate whose curvature differs when a place of `now`, counted from the middle, is taken for `names` times
-/// it in the scan before. Names that mirror see the other face, on which every curvature has the other sign.
+/// Returns the share of the plate whose curvature differs when a place of `now`, counted from the middle, is taken for `names` times
+/// it in the scan before. Under names that mirror, the other face is seen, on which every curvature has the other sign.
 fn unexplained(now: &Surface, before: &Surface, names: &Matrix2<f64>) -> f64 {
     let side = names.determinant();
     let along = |k: usize| (1.0 - 2.0 * MARGIN) * (2.0 * (k as f64 + 0.5) / PLACES as f64 - 1.0);
@@ -119,8 +119,7 @@ mod tests {
 
     const SIDE: f64 = 2.0;
 
-    /// A plate of 2 m by `height`, bent along u by bands of 0.03 rad round the places given; `names` say which material place
-    /// is scanned as (u, v), counted from the middle, and mirrored ones show the other face.
+    /// A plate of 2 m by `height`, bent along u by bands of 0.03 rad round the places given; `names` map (u, v) to the material place scanned there, counted from the middle, and mirrored ones show the other face.
     fn plate(height: f64, bands: &[f64], names: Matrix2<f64>, seed: u64) -> Surface {
         let n = 2000_usize;
         let h = SIDE / n as f64;
@@ -171,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn every_turn_of_a_bent_plate_is_told() {
+    fn every_turn_of_a_bent_plate_is_detected() {
         let (then, now) = (&[0.4, 0.7][..], &[0.4, 0.7, 1.0][..]);
         for (height, m, expected) in [
             (1.5, [-1.0, 0.0, 0.0, -1.0], Reorientation::Half),

@@ -1,5 +1,4 @@
-//! Directions by the sines and cosines of their angles: kept per row and per column, they spare every cell its
-//! trigonometry.
+//! Directions of beams by the sines and cosines of their angles, kept per row and per column: no trigonometry per cell.
 
 use crate::Vec3;
 
@@ -19,7 +18,7 @@ impl AngleSinCos {
         Self { sin, cos }
     }
 
-    /// The angle turned further by `angle`, radians.
+    /// Returns the sum with another angle, radians.
     #[inline]
     pub(super) fn by(self, angle: f64) -> Self {
         let by = if angle.abs() < SMALL {
@@ -34,7 +33,7 @@ impl AngleSinCos {
     }
 }
 
-/// A direction from the scanner.
+/// Direction of a beam from the scanner.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BeamDirection {
     pub(super) azimuth: AngleSinCos,
@@ -42,14 +41,14 @@ pub(super) struct BeamDirection {
 }
 
 impl BeamDirection {
-    /// Unit vector, scanner frame.
+    /// Returns the unit vector, scanner frame.
     #[inline]
     pub(super) fn unit(&self) -> Vec3 {
         let Self { azimuth, elevation } = self;
         Vec3::new(elevation.cos * azimuth.cos, elevation.cos * azimuth.sin, elevation.sin)
     }
 
-    /// Unit normal, towards the scanner, of a surface that is seen in this direction: `inverse` is its inverse range,
+    /// Returns the unit normal, towards the scanner, of a surface that is seen in this direction: `inverse` is its inverse range,
     /// `by_azimuth` and `by_elevation` the derivatives of that by the angles. `None` on a surface without normal.
     ///
     /// On the plane n . x = h the inverse range along the unit direction d is n . d / h: the normal is the gradient of

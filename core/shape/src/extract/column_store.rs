@@ -1,4 +1,4 @@
-//! The columns that have arrived, as far as the plate may lie in them.
+//! Store of the columns that have arrived; cells that cannot belong to the plate are dropped to bound the memory.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use platen_scan::{Column, ScanHeader, State, wrap_azimuth};
 
 use super::connected_components::{Components, Run};
 
-/// Cells that are kept around those of a component, to tell what lies beside it.
+/// Cells kept around those of a component: its surroundings.
 pub(super) const MARGIN: u32 = 4;
 
 /// One cell as kept: 16 bytes.
@@ -35,7 +35,7 @@ impl Segment {
     }
 }
 
-/// What is kept of a column.
+/// A stored column.
 #[derive(Debug, Clone)]
 pub(super) struct StoredColumn {
     /// Its runs, by row.
@@ -45,7 +45,7 @@ pub(super) struct StoredColumn {
 }
 
 impl StoredColumn {
-    /// Range of a cell that is part of a run of this column and has not been dropped.
+    /// Returns the range of a cell that is part of a run of this column and has not been dropped.
     pub(super) fn range(&self, row: u32) -> f32 {
         let holding = self.segments.iter().rev().find(|s| s.first_row <= row);
         holding.and_then(|s| s.cells.get((row - s.first_row) as usize)).map_or(0.0, |cell| cell.range_m)
@@ -73,7 +73,7 @@ impl StoredColumn {
     }
 }
 
-/// Copies a column into cells. `inside` says of a row and a range whether the sample is in the region of interest.
+/// Copies a column into cells. `inside`: whether a sample, by row and range, is in the region of interest.
 pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32, f32) -> bool) -> Vec<Cell> {
     let azimuth = header.azimuth_start + header.azimuth_step * f64::from(column.index);
     let angles = column.azimuth.iter().zip(&column.elevation);
@@ -99,7 +99,7 @@ pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32
     cells.collect()
 }
 
-/// All columns, with the bookkeeping of what can be dropped.
+/// All columns, and the count of cells after which droppable ones are looked for.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ColumnStore {
     kept: Vec<Option<StoredColumn>>,

@@ -1,4 +1,5 @@
-//! Which components may be the plate, and the work on those that have ended while columns still arrive.
+//! Candidate components by size, and early evaluation of those that have ended while columns still arrive: most of the work is
+//! done before the last column.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +18,7 @@ const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
 /// at, every piece of furniture in a dome would hold memory until the end.
 const CLOSED_PART: f64 = 0.3;
 
-/// What is known of a component before the last column has come.
+/// A component evaluated before the last column has come.
 #[derive(Debug, Clone)]
 pub(super) struct Completed {
     pub(super) surface: SegmentedComponent,
@@ -26,7 +27,7 @@ pub(super) struct Completed {
 }
 
 impl Extractor {
-    /// Looks at the components that ended so many columns before `newest` that nothing more joins them: most of the
+    /// Evaluates the components that ended so many columns before `newest` that nothing more joins them: most of the
     /// work on the plate is done before the last column comes, as long as columns come in order.
     pub(super) fn look_at_closed(&mut self, newest: u32) {
         if newest != self.in_order || self.check().is_err() {
@@ -47,7 +48,7 @@ impl Extractor {
         }
     }
 
-    /// The face of a surface that has the plate's size by itself, worked out as if it were chosen.
+    /// Returns the face of a component that has the plate's size by itself, evaluated as if it were chosen.
     fn plate_of(&self, surface: &SegmentedComponent) -> Option<(u32, Result<Patch, Refusal>)> {
         let pieces = self.pieces(std::slice::from_ref(surface), 0);
         let candidates = plate_selection::candidates(&pieces);
@@ -83,7 +84,8 @@ impl Extractor {
         spread.width() <= NEAR_SIZE.1 * self.spec.width.hypot(self.spec.height)
     }
 
-    /// Components that may hold a piece of the plate, by their first cell: those of about its size, and larger ones.
+    /// Returns the components that may contain a piece of the plate, by their first cell: those of about its size, and larger
+    /// ones.
     pub(super) fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
         let mut roots = Vec::new();
         for index in 0..self.columns.len() {

@@ -1,9 +1,9 @@
-//! The continuity criterion of the paper (3.1, eq. 1 and 2), without trigonometry per cell.
+//! Continuity criterion between lattice neighbours (Masuda et al., 3.1, eq. 1 and 2), without trigonometry per cell.
 
 use platen_scan::ScanHeader;
 
 /// 1 / (2 cos 0.4 pi): neighbours on one surface seen at an incidence below 0.4 pi (72 degrees) lie nearer to
-/// each other than this factor times the sum of their ranges times the angle between them (paper, eq. 1).
+/// each other than this factor times the sum of their ranges times the angle between them (Masuda et al., eq. 1).
 const FACTOR: f64 = 1.618_033_988_749_895;
 
 /// The same at 82 degrees: a strongly bent plate is seen so along the line of beam. Down a column two cells are joined
@@ -18,7 +18,7 @@ const LEAST_PART_OF_ROW_STEP: f64 = 0.25;
 /// The criterion between two beams a fixed angle t apart.
 ///
 /// With ranges a and b the squared distance is (a - b)^2 + a b 2 (1 - cos t), the squared bound
-/// (1.62 d)^2 (a + b)^2, where d is t itself (the paper prints |p1| + |p2| on the left of eq. 2, a misprint).
+/// (1.62 d)^2 (a + b)^2, where d is t itself (eq. 2 is printed with |p1| + |p2| on the left, a misprint).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Link {
     chord: f32,
@@ -30,7 +30,7 @@ impl Link {
         Self { chord: (2.0 * (1.0 - angle.cos())) as f32, bound: bound.powi(2) as f32 }
     }
 
-    /// True when samples at ranges `a` and `b` (metres) are on one surface.
+    /// Returns true when samples at ranges `a` and `b` (metres) are on one surface.
     #[inline]
     pub(super) fn joins(self, a: f32, b: f32) -> bool {
         let difference = a - b;
@@ -66,7 +66,7 @@ impl Continuity {
         }
     }
 
-    /// True when two consecutive ranges down a column are on one surface; `beyond` gives the ones before and behind them.
+    /// Returns true when two consecutive ranges down a column are on one surface; `beyond` gives the ones before and behind them.
     #[inline]
     pub(super) fn joins_down(
         &self,

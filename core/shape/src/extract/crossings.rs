@@ -1,4 +1,7 @@
-//! Where rows and columns of the lattice leave the face.
+//! Boundary crossings: where rows and columns of the lattice leave the face, and what lies beyond.
+//!
+//! In: the cells of the face, mixed pixels, noise. Out: per crossing the last point inside and the first outside, mixed pixels
+//! between them, and the range beyond against the face's continuation (`local_quadric`); observations for the outline.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +11,21 @@ use super::patch::{Beyond, Crossing};
 use super::range_noise::Noise;
 use super::window::Window;
 
-/// How far along a row or a column the face may go on behind a gap, cells.
+/// Widest gap along a row or a column behind which the face may go on, cells.
 const WIDEST_GAP: usize = 48;
 
-/// How far beyond the face the local fit places cells. A row that runs along an edge meets many mixed pixels
-/// before it is off the plate; the first of them say enough.
+/// Cells beyond the face at which the local fit is evaluated. A row that runs along an edge meets many mixed pixels
+/// before it is off the plate; the first of them suffice.
 const FAR: usize = 12;
 
-/// How far beyond the face a range is compared with its continuation, cells.
+/// Cells beyond the face up to which a range is compared with its continuation, cells.
 const FIT_FAR: usize = 3;
 
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
 const FRONT_BOUND: f64 = 4.0;
 
-/// All crossings of the cells of `face`, by cell, in the order up, down, back, next. `number` gives the place of a cell
-/// of the face among the samples. Also the length over which the region of interest cuts the face, metres.
+/// Returns all crossings of the cells of `face`, by cell, in the order up, down, back, next. `number` gives the place of a cell
+/// of the face among the samples. Also returns the length over which the region of interest cuts the face, metres.
 pub(super) fn find(
     window: &Window,
     noise: &Noise,
@@ -66,14 +69,14 @@ pub(super) fn find(
     (crossings, cut)
 }
 
-/// What lies beyond the last cell of the face on a row or a column.
+/// End of the face on a row or a column.
 #[derive(Debug, Clone, Copy)]
 enum End {
     /// The first sound cell, so many steps away.
     Sound(usize),
     /// Mixed pixels only, the last so many steps away.
     Mixed(usize),
-    /// Nothing came back.
+    /// No return.
     Nothing,
 }
 
@@ -92,7 +95,7 @@ impl Scene<'_> {
             .then_some(column * self.window.n_rows + row)
     }
 
-    /// `None` where the face goes on behind a gap of cells without return, of mixed ones or of such that are not told.
+    /// Returns the end of the face; `None` where it goes on behind a gap of cells without return, mixed or unclassified ones.
     fn end_of_face(&self, index: usize, step: (isize, isize)) -> Option<End> {
         let mut last_mixed = None;
         for far in 1..=WIDEST_GAP {
@@ -109,7 +112,7 @@ impl Scene<'_> {
         Some(last_mixed.map_or(End::Nothing, End::Mixed))
     }
 
-    /// The crossing, and whether the face goes on beyond the region of interest.
+    /// Measures a crossing; also returns whether the face goes on beyond the region of interest.
     fn crossing(
         &self,
         fit: &LocalQuadric,
@@ -162,7 +165,7 @@ impl Scene<'_> {
         Some((crossing, cut))
     }
 
-    /// Range of the cell `at` behind the face's continuation `far` steps from `index`.
+    /// Returns the range of the cell `at` behind the face's continuation `far` steps from `index`.
     fn excess(
         &self,
         fit: &LocalQuadric,
@@ -177,7 +180,7 @@ impl Scene<'_> {
         Some(f64::from(self.window.cells[at].range_m) - predicted.range)
     }
 
-    /// Where the face meets a side face: its ranges fall behind the face's continuation in proportion to the way
+    /// Locates where the face meets a side face: its ranges fall behind the face's continuation in proportion to the way
     /// from the common edge. Needs three sound cells in a row that do so.
     fn crease(
         &self,

@@ -1,4 +1,4 @@
-//! How far a set of points spreads, from a fixed set of directions.
+//! Lower bound of the diameter of a point set: its widths along 13 fixed directions.
 
 /// Directions to the faces, edges and corners of a cube: no direction is further than 28 degrees from one of them.
 const DIRECTIONS: [[f64; 3]; 13] = [
@@ -17,7 +17,7 @@ const DIRECTIONS: [[f64; 3]; 13] = [
     [1.0, -1.0, -1.0],
 ];
 
-/// Smallest and largest coordinate along each direction.
+/// Smallest and largest coordinate of a point set along each direction.
 #[derive(Debug, Clone)]
 pub(super) struct WidthBound([(f64, f64); 13]);
 
@@ -35,7 +35,7 @@ impl WidthBound {
         }
     }
 
-    /// Largest width, a lower bound of the diameter.
+    /// Returns the largest width, a lower bound of the diameter.
     pub(super) fn width(&self) -> f64 {
         let widths = self
             .0

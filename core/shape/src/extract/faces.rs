@@ -1,4 +1,5 @@
-//! Faces of a component: region growing on the normals of its low-pass copy.
+//! Smooth faces of a component: connected components of the cells around which the normal of the low-pass copy does not turn
+//! (Masuda et al., 3.1, region growing on normals).
 
 use super::connected_components::{NO_LABEL, label_components};
 use super::smoothed_normals::{Normal, cos_between};
@@ -41,7 +42,7 @@ pub(super) fn find_faces(window: &Window, normals: &[Normal], slope_reach: usize
     (label, faces)
 }
 
-/// Cells that have a normal and around which it does not turn. Margins of the window never are.
+/// Marks the cells that have a normal and around which it does not turn. Margins of the window are not marked.
 fn flat(window: &Window, normals: &[Normal], stride: usize) -> Vec<bool> {
     let cos_turn = MAX_TURN.cos();
     let reach = stride * window.n_rows;
@@ -57,7 +58,7 @@ fn flat(window: &Window, normals: &[Normal], stride: usize) -> Vec<bool> {
     flat
 }
 
-/// Area of the surface that a cell stands for.
+/// Returns the area of the surface that a cell stands for.
 fn area(window: &Window, column: usize, row: usize, normal: &Normal) -> f64 {
     let beam = window.nominal(column, row);
     let cos_incidence = -beam.unit().dot(&Vec3::from(normal.map(f64::from))).min(-0.05);

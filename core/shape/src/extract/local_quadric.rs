@@ -1,14 +1,15 @@
-//! The face around a few cells as a quadratic function over its tangent plane.
+//! Local quadric: least-squares quadratic function over the tangent plane of the face around a few cells, and its
+//! intersection with a beam by Newton's method.
 //!
 //! In space, not over the lattice: a bent plate is a quadratic there however obliquely it is seen and however far apart
 //! its samples are, while the range along a row grows without bound towards the horizon of a bend. Noise along the
 //! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+use platen_numerics::simd::dispatch_simd;
 
 use super::window::Window;
 use crate::Vec3;
-use platen_numerics::simd::dispatch_simd;
 
 /// Cells on a side of the square that shares one fit.
 pub(super) const TILE: usize = 4;
@@ -205,7 +206,7 @@ impl LocalQuadric {
         Some(Self { centre, along, up, coefficients, normal_matrix })
     }
 
-    /// The face, or its continuation, in the direction (`column`, `row`) in lattice coordinates of the window.
+    /// Intersects the face, or its continuation, with the beam in the direction (`column`, `row`) in lattice coordinates of the window.
     ///
     /// `None` where the continuation does not meet the beam.
     pub(super) fn at(&self, window: &Window, column: f64, row: f64) -> Option<OnFace> {
@@ -236,14 +237,14 @@ impl LocalQuadric {
         Some(OnFace { range, point: beam * range, normal: normal.normalize(), at })
     }
 
-    /// Variance of the range there, in units of that of a sample.
+    /// Returns the variance of the range there (leverage), in units of that of a sample.
     pub(super) fn leverage(&self, place: &OnFace) -> f64 {
         let f = basis(place.at);
         f.dot(&self.normal_matrix.solve(&f))
     }
 }
 
-/// The plane through points about their centre, which is their origin: two axes at right angles, each over the mean spacing of points
+/// Fits the plane through points about their centre, which is their origin: two axes at right angles, each over the mean spacing of points
 /// along it, and the unit normal towards the scanner. `None` when the points lie on a line.
 #[inline(always)]
 fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {

@@ -1,4 +1,5 @@
-//! Mixed pixels: beams that straddle an edge float between the plate and what lies behind it.
+//! Mixed pixels by second differences of the inverse range: beams that straddle an edge return a range between that of the
+//! plate and that of what lies behind it. Own; Masuda et al. do not treat them.
 
 use super::range_noise::Noise;
 use super::window::Window;
@@ -7,19 +8,19 @@ use super::window::Window;
 /// difference, and is only lost when none of those that explain it holds.
 const BOUND: f32 = 5.0;
 
-/// What the neighbours of a cell say of it.
+/// Class of a cell by its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Pixel {
-    /// No return, or too few neighbours to tell.
+    /// No return, or too few neighbours.
     #[default]
     Unknown,
     /// Part of a surface along its row and along its column.
     Sound,
-    /// Part of none.
+    /// Part of no surface.
     Mixed,
 }
 
-/// Tells the mixed pixels: cells whose range, along the row or along the column, departs by more than the noise allows
+/// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
 /// from the straight continuation of the two cells on either side and from the middle between its neighbours.
 ///
 /// Straight means in inverse range, so that no limit of the incidence enters.
@@ -45,7 +46,7 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
     pixels
 }
 
-/// The cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
+/// Classifies a cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
 #[inline]
 fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
     let q = [

@@ -1,9 +1,9 @@
-//! Pieces of faces, joined across what hides a strip of the plate.
+//! Faces joined across an occlusion: curve continuation on the lattice lines that cross both.
 //!
-//! A chain or the ram in front of the plate can cut its face into components. Two pieces are one face when, on most rows
-//! or columns that hold both, the surface leaves the one and enters the other as one smooth curve, and what stands
-//! between them is nearer than both or was not measured. So are the parts of a face on both sides of the seam of the
-//! scanner's faces, where warm-up columns are left out.
+//! A chain or the ram in front of the plate can cut its face into several components. Two pieces are one face when, on most
+//! rows or columns that contain both, one smooth curve leads from the one to the other, and what stands between them is nearer
+//! than both or was not measured. The same holds for the two sides of the seam of the scanner's faces, where warm-up columns
+//! are left out. Own; Masuda et al. assume an unobstructed plate.
 
 use super::faces::Face;
 use super::smoothed_normals::Normal;
@@ -21,7 +21,7 @@ const AGREEING: f64 = 0.6;
 const LEAST_RADIUS: f64 = 2.0;
 const ANGLE_NOISE: f64 = 0.06;
 
-/// How far beside the curve an end may lie, metres: the scanner's two faces disagree by millimetres, and where the
+/// Largest distance of an end from the curve, metres: the scanner's two faces disagree by millimetres, and where the
 /// columns left out at their seam are few, this and the noise of a single sample turn the chord far more than
 /// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far above.
 const STEP: f64 = 3e-3;
@@ -36,13 +36,13 @@ struct End {
     place: u32,
     point: Vec3,
     normal: Vec3,
-    /// What lies next to it is nearer, or was not measured.
+    /// The cell next to it is nearer, or was not measured.
     hidden: bool,
     /// Cells next to it that were not measured, up to [`INSET`].
     unmeasured: u32,
 }
 
-/// A face of a component, with its ends on all rows and columns.
+/// A face of one component, with its ends on all rows and columns.
 #[derive(Debug, Clone)]
 pub(super) struct FacePiece {
     /// Number of the surface that it is a face of.
@@ -80,7 +80,7 @@ impl FacePiece {
         Self { surface, label: face.label, area: face.area, n_cells: face.n_cells, outline, rows, columns }
     }
 
-    /// True when `other` continues this piece behind something nearer.
+    /// Returns true when `other` continues this piece behind something nearer.
     pub(super) fn continues_in(&self, other: &Self) -> bool {
         agree(&self.rows, &other.rows) || agree(&self.columns, &other.columns)
     }
@@ -107,7 +107,7 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: 
         let end = |place: usize, outward: isize| {
             let inner = place.saturating_add_signed(-outward * INSET as isize).clamp(low, high);
             let at = index(line, place);
-            // Something nearer, or nothing at all: columns that were left out, a patch without echo.
+            // A nearer object, or no return: columns that were left out, a patch without echo.
             let beside = (1..=INSET).filter_map(|far| place.checked_add_signed(outward * far as isize));
             let beside = beside.filter(|next| *next < n_places).map(|next| &window.cells[index(line, next)]);
             let near = window.cells[at].range_m - IN_FRONT;
@@ -122,7 +122,7 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: 
     Ends { first, ends: ends.collect() }
 }
 
-/// What hides the plate stands at least so far in front of it, metres.
+/// Least distance of an occluding object in front of the plate, metres.
 const IN_FRONT: f32 = 0.03;
 
 fn agree(a: &Ends, b: &Ends) -> bool {
@@ -144,7 +144,7 @@ fn agree(a: &Ends, b: &Ends) -> bool {
     together >= LEAST_LINES && agreeing as f64 >= AGREEING * together as f64
 }
 
-/// True when a curve of nearly constant curvature leads from one end to the other, which lies farther on their line:
+/// Returns true when a curve of nearly constant curvature leads from one end to the other, which lies farther on their line:
 /// the chord makes equal and opposite angles with the surface at both, as far as a small step between them lets it.
 fn one_curve(a: &End, b: &End) -> bool {
     let chord = b.point - a.point;

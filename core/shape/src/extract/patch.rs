@@ -1,4 +1,4 @@
-//! The samples on the plate's scanned face.
+//! Patch: the samples on the plate's scanned face and the crossings of its boundary, output of the extraction.
 
 use crate::Vec3;
 
@@ -17,20 +17,20 @@ pub struct Sample {
     pub intensity: u16,
 }
 
-/// What is seen next to a cell of the face along its row or column.
+/// Kind of object next to a cell of the face along its row or column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beyond {
-    /// Something farther away than the face would be if it went on: the plate ends here.
+    /// An object farther away than the face would be if it went on: the plate ends here.
     Behind,
     /// The plate's side face: it ends here too.
     SideFace,
-    /// Something nearer: it hides what lies behind it, the plate may go on.
+    /// A nearer object: it hides what lies behind it, the plate may go on.
     InFront,
     /// No return: the plate ends in front of nothing, or it is a patch without echo.
     Nothing,
 }
 
-/// Where a row or a column of the lattice leaves the face.
+/// Crossing of a row or a column of the lattice with the boundary of the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// The last cell inside, as an index into [`Patch::samples`].
@@ -53,7 +53,7 @@ pub struct Crossing {
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
     pub excess: f32,
-    /// What ends it.
+    /// Kind of object that ends it.
     pub beyond: Beyond,
 }
 

@@ -1,21 +1,22 @@
-//! Which face is the plate.
+//! Selection of the plate among the candidate faces, by area and by the sides of the smallest rectangle around each.
+//!
+//! Masuda et al. leave the selection open.
 
 use super::occlusion::FacePiece;
 use super::refusal::Refusal;
 use crate::{PlateSpec, Vec3};
 
-/// Area of the plate's visible face in parts of W x H: below, too much of it is hidden to be told apart; above, it
-/// is another plate. The face's own area differs from W x H by less than one part in a hundred.
+/// Area of the plate's visible face in parts of W x H: below, too much of it is hidden; above, it is another plate. The face's own area differs from W x H by less than one part in a hundred.
 const AREA: std::ops::Range<f64> = 0.5..1.1;
 
 /// Sides of the smallest rectangle around the face, in the plane, in parts of W and H. A plate bent to R 3 m over 5 m
 /// spans 0.89 of its length; something in front of an edge takes more.
 const SIDE: std::ops::Range<f64> = 0.82..1.06;
 
-/// The widest spacing of samples on the plate, metres, at which its corners are told to some millimetres.
+/// The widest spacing of samples on the plate, metres, at which its corners are located to some millimetres.
 const WIDEST_SPACING: f64 = 0.025;
 
-/// A face of this part of W x H is worth a complaint about its size.
+/// A face from this part of W x H on is reported as one of another size.
 const NOTABLE: f64 = 0.15;
 
 /// Pieces that form one face.
@@ -41,7 +42,7 @@ impl Candidate {
         Self { pieces: members, area, spacing, centre, sides: smallest_rectangle(&points, centre) }
     }
 
-    /// True when area and sides are those of the plate.
+    /// Returns true when area and sides are those of the plate.
     pub(super) fn fits(&self, spec: &PlateSpec) -> bool {
         let expected = sides(spec);
         AREA.contains(&(self.area / (spec.width * spec.height)))
@@ -68,10 +69,10 @@ pub(super) fn candidates(pieces: &[FacePiece]) -> Vec<Candidate> {
     (0..pieces.len()).map(members).filter(|m| !m.is_empty()).map(|m| Candidate::of(pieces, m)).collect()
 }
 
-/// The one candidate that fits the plate. `step` is the angle between beams, radians.
+/// Selects the one candidate that fits the plate. `step` is the angle between beams, radians.
 ///
 /// # Errors
-/// Why none or several do, or that its samples lie too far apart.
+/// [`Refusal`] when none or several do, or its samples lie too far apart.
 pub(super) fn select<'a>(
     candidates: &'a [Candidate],
     spec: &PlateSpec,
@@ -121,7 +122,7 @@ fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
     }
 }
 
-/// Sides, longer first, of the smallest rectangle around points in their principal plane.
+/// Returns the sides, longer first, of the smallest rectangle around points in their principal plane.
 fn smallest_rectangle(points: &[Vec3], centre: Vec3) -> [f64; 2] {
     let covariance =
         points.iter().map(|p| (p - centre) * (p - centre).transpose()).sum::<nalgebra::Matrix3<f64>>();

@@ -1,4 +1,4 @@
-//! Range noise, estimated from the scan itself.
+//! Range noise from the scan itself: median absolute third difference of the inverse range, block by block.
 //!
 //! Third differences of the inverse range down a column vanish on every smooth surface at any incidence; what
 //! is left is noise. Its median absolute value, block by block, is a robust standard deviation: heavy tails, mixed
@@ -12,7 +12,7 @@ const BLOCK: (usize, usize) = (16, 32);
 /// A block with fewer differences takes the pooled value.
 const LEAST_COUNT: usize = 64;
 
-/// No scanner measures better, metres; a simulated one without noise would leave no room for a plate's curvature.
+/// Lower bound of the estimate, metres; a simulated one without noise would leave no room for a plate's curvature.
 const LEAST: f32 = 1e-4;
 
 /// Median of |x| of a normal variable of unit variance.
@@ -32,7 +32,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Estimates from the cells where `usable` holds. Without any, it is the least.
+    /// Estimates the noise from the usable cells; without any, it is the lower bound.
     pub(super) fn estimate(window: &Window, usable: &[bool]) -> Self {
         let (n_columns, n_rows) = (window.n_columns, window.n_rows);
         let blocks_down = n_rows.div_ceil(BLOCK.1);
@@ -60,12 +60,12 @@ impl Noise {
         Self { pooled, block, blocks_down, n_rows }
     }
 
-    /// Standard deviation at a cell, metres.
+    /// Returns the standard deviation at a cell, metres.
     pub(super) fn at(&self, index: usize) -> f32 {
         self.of(index / self.n_rows, index % self.n_rows)
     }
 
-    /// The same by column and row.
+    /// Returns the same by column and row.
     #[inline]
     pub(super) fn of(&self, column: usize, row: usize) -> f32 {
         self.block[column / BLOCK.0 * self.blocks_down + row / BLOCK.1]

@@ -1,8 +1,8 @@
-//! Why a scan yields no plate.
+//! Errors of the extraction.
 
 use crate::Vec3;
 
-/// Why no plate was taken from a scan. One sentence: what was found, against what was expected, what to do.
+/// Reason why no plate was found in a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// The header describes no lattice.
@@ -42,7 +42,7 @@ pub enum Refusal {
     },
     /// A face of another size.
     #[error(
-        "the face at ({:.1}, {:.1}, {:.1}) m measures about {:.0} x {:.0} mm, the plate file says {:.0} x {:.0} mm; \
+        "the face at ({:.1}, {:.1}, {:.1}) m measures about {:.0} x {:.0} mm, {:.0} x {:.0} mm in the plate file; \
          check the recipe",
         .at.x, .at.y, .at.z, .found_mm[0], .found_mm[1], .expected_mm[0], .expected_mm[1]
     )]
@@ -61,7 +61,7 @@ pub enum Refusal {
         .first.x, .first.y, .first.z, .second.x, .second.y, .second.z
     )]
     SeveralPlates {
-        /// How many.
+        /// Number of them.
         count: usize,
         /// Middle of one, metres.
         first: Vec3,

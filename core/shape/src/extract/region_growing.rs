@@ -1,8 +1,8 @@
-//! The cells of the chosen face, to the cell.
+//! The chosen face to the cell: erosion, then region growing by the raw ranges.
 //!
-//! Normals of the low-pass copy tell faces apart but not where one ends: they turn over a few cells, and where a side
-//! face is only a few cells wide the region runs over onto it. So the region is worn down first, and then grown again
-//! cell by cell as far as the raw ranges continue the surface.
+//! Normals of the low-pass copy separate faces but do not locate where one ends: they turn over a few cells, and where a side
+//! face is only a few cells wide the region extends onto it. So the region is eroded first, and then grown cell by cell as
+//! far as the raw ranges continue the surface (`local_quadric`). Own; Masuda et al. keep the region of the normals.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,7 +12,7 @@ use super::range_noise::Noise;
 use super::smoothed_normals::{Normal, cos_between};
 use super::window::Window;
 
-/// Cells by which the region is worn down beyond the reach of slopes: half of the widest bridge to a side face.
+/// Cells by which the region is eroded beyond the reach of slopes: half of the widest bridge to a side face.
 const WEAR: usize = 1;
 
 /// Largest residual of a cell of the face, in standard deviations of its prediction.
@@ -24,15 +24,15 @@ const UNTRUSTED_RINGS: usize = 1;
 /// Cosine of 72 degrees: a normal of the low-pass copy that differs by more is that of a side face, whatever the range.
 const COS_OTHER_FACE: f32 = 0.3;
 
-/// A fit that knows a place worse than this, as a variance in that of a sample, is no excuse for a residual.
+/// Upper bound of the leverage (variance of a prediction in that of a sample) counted in the bound of a residual.
 const MOST_LEVERAGE: f64 = 0.5;
 
-/// Wears `region` down and keeps its largest connected part: the core of the face. `slope_reach` is that of the normals
-/// by which the region was told.
+/// Erodes `region` and keeps its largest connected component: the core of the face. `slope_reach` is that of the normals that
+/// the region was found by.
 pub(super) fn erode(window: &Window, region: &[bool], slope_reach: usize) -> Vec<bool> {
     let near_edge = widen(&obstacles(window, region), window.n_rows, slope_reach + WEAR);
     let core: Vec<bool> = region.iter().zip(&near_edge).map(|(region, near)| *region && !*near).collect();
-    largest_part(&core, window.n_rows)
+    largest_component(&core, window.n_rows)
 }
 
 /// Valid cells outside of the region, but for specks inside of it.
@@ -65,7 +65,7 @@ fn widen(mask: &[bool], n_rows: usize, by: usize) -> Vec<bool> {
     along(&along(mask, 1), n_rows)
 }
 
-fn largest_part(mask: &[bool], n_rows: usize) -> Vec<bool> {
+fn largest_component(mask: &[bool], n_rows: usize) -> Vec<bool> {
     let (label, n) = label_components(mask, n_rows);
     let mut sizes = vec![0_usize; n];
     label.iter().filter(|label| **label != NO_LABEL).for_each(|label| sizes[*label as usize] += 1);
@@ -74,7 +74,7 @@ fn largest_part(mask: &[bool], n_rows: usize) -> Vec<bool> {
     label.iter().map(|label| Some(*label) == largest).collect()
 }
 
-/// The four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each other.
+/// Returns the four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each other.
 fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize> {
     [at.checked_sub(n_rows), at.checked_sub(1), Some(at + 1), Some(at + n_rows)]
         .into_iter()
@@ -85,7 +85,7 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
 /// A cell is judged when it first touches the face, by a quadratic fit to the face around it, and again when it touches
-/// it elsewhere if the fit did not know its place and yet refused it. The last rings have no part in the fit: a side
+/// it elsewhere if it was rejected by a fit of high leverage. The last rings have no part in the fit: a side
 /// face whose first cells lie within the noise must not bend it. And no cell may have the normal of another face than
 /// the cell of the core from which it was reached.
 pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {
@@ -132,20 +132,20 @@ pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec
     face
 }
 
-/// True when a cell has the normal of another face than a cell of the core; cells beyond the component have none.
+/// Returns true when a cell has the normal of another face than a cell of the core; cells beyond the component have none.
 fn is_other_face(normals: &[Normal], cell: usize, core: usize) -> bool {
     cos_between(&normals[cell], &normals[core]).is_some_and(|cos| cos < COS_OTHER_FACE)
 }
 
-/// What a fit says of cells.
+/// Result of testing cells against a fit.
 struct Judgement {
-    /// Those to which it continues.
+    /// Cells that continue the face.
     continuing: Vec<usize>,
-    /// Those that it refuses without knowing their place.
+    /// Cells rejected where the prediction itself is uncertain: to be tested again.
     open: Vec<usize>,
 }
 
-/// The cells that a fit continues to: each within its noise, and all together within theirs, since a side face whose
+/// Tests which cells continue a fit: each within its noise, and all together within theirs, since a side face whose
 /// first row is within the noise is not so as a row.
 fn judge(window: &Window, noise: &Noise, fit: &LocalQuadric, cells: &[usize]) -> Judgement {
     let residuals = cells.iter().filter_map(|&cell| {

@@ -1,4 +1,4 @@
-//! All that is computed of one component, in order.
+//! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
 
 use super::continuity::Continuity;
 use super::faces::{self, Face};
@@ -8,7 +8,7 @@ use super::range_noise::Noise;
 use super::smoothed_normals::{self, Normal};
 use super::window::Window;
 
-/// A component with its noise, mixed pixels, slope_reach, normals and faces.
+/// A component with its noise, mixed pixels, normals and faces.
 #[derive(Debug, Clone)]
 pub(super) struct SegmentedComponent {
     /// The component, or the first of several.
@@ -36,13 +36,13 @@ impl SegmentedComponent {
         Self { root, window, noise, pixels, slope_reach, normals, labels, faces }
     }
 
-    /// Faces of at least `least` square metres. `number` is the surface's own, for [`FacePiece::surface`].
+    /// Returns the faces of at least `least` square metres. `number` is the surface's own, for [`FacePiece::surface`].
     pub(super) fn pieces(&self, number: usize, least: f64) -> impl Iterator<Item = FacePiece> {
         let notable = self.faces.iter().filter(move |face| face.area >= least);
         notable.map(move |face| FacePiece::new(number, &self.window, &self.labels, face, &self.normals))
     }
 
-    /// Mean distance of neighbouring beams, across them, metres.
+    /// Returns the mean distance of neighbouring beams, across them, metres.
     pub(super) fn spacing(&self) -> f64 {
         let own = self.window.own.iter().zip(&self.window.cells).filter(|(own, _)| **own);
         let (n, sum) = own.fold((0, 0.0), |(n, sum), (_, cell)| (n + 1, sum + f64::from(cell.range_m)));
@@ -50,7 +50,7 @@ impl SegmentedComponent {
         sum / f64::from(n.max(1)) * (header.azimuth_step * header.elevation_step).sqrt()
     }
 
-    /// The cells of a face as cells of another window that holds this one.
+    /// Returns the cells of a face as cells of another window that holds this one.
     pub(super) fn region(&self, label: u32, into: &Window) -> Vec<bool> {
         let mut region = vec![false; into.cells.len()];
         let columns = (self.window.first_column - into.first_column) as usize;

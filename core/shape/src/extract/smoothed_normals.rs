@@ -1,15 +1,16 @@
-//! A low-pass copy of the inverse range and the normals it gives.
+//! Normals of a low-pass copy of the inverse range, by Taubin's filter (Masuda et al., 3.1).
 //!
-//! Taubin's filter (A signal processing approach to fair surface design, 1995; reference 7 of the paper): steps
+//! Taubin, "A signal processing approach to fair surface design" (1995), reference 7 of Masuda et al.: steps
 //! of diffusion with a positive and a slightly larger negative factor in turn. Filtering the inverse range and
 //! not the positions moves samples along their beams only and leaves planes where they are. The copy serves the
 //! normals and nothing else.
 
 use std::ops::Range;
 
+use platen_numerics::simd::dispatch_simd;
+
 use super::continuity::Continuity;
 use super::window::Window;
-use platen_numerics::simd::dispatch_simd;
 
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];
@@ -17,7 +18,7 @@ const FACTORS: [f32; 2] = [0.5, -0.53];
 /// Pairs of half steps. Ten bring the noise of a slope down to a quarter (flat, unit lattice).
 const PAIRS: usize = 10;
 
-/// Smoothed inverse ranges of the cells where `usable` holds; those of the others are left as they are.
+/// Returns the smoothed inverse ranges of the cells where `usable` holds; those of the others are left as they are.
 pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity) -> Vec<f32> {
     let n_rows = window.n_rows;
     // The first and the last column are margin and stay as they are.
@@ -126,7 +127,7 @@ impl Links {
 const NOISE_PER_CELL: f32 = 0.1;
 const MOST_CELLS: usize = 4;
 
-/// Cells on each side over which slopes are taken, so that noise turns normals by a few degrees at most.
+/// Returns the cells on each side over which slopes are taken, so that noise turns normals by a few degrees at most.
 pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
     let (sum, n) = window
         .inverse
@@ -142,14 +143,14 @@ pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
 /// A unit normal, zero where there is none.
 pub(super) type Normal = [f32; 3];
 
-/// Cosine of the angle between two normals, where there are both.
+/// Returns the cosine of the angle between two normals, where there are both.
 #[inline]
 pub(super) fn cos_between(a: &Normal, b: &Normal) -> Option<f32> {
     let both = *a != Normal::default() && *b != Normal::default();
     both.then(|| a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 }
 
-/// Unit normals towards the scanner, zero where a cell is not usable or has no neighbour. Slopes are taken over
+/// Returns unit normals towards the scanner, zero where a cell is not usable or has no neighbour. Slopes are taken over
 /// `reach` cells on each side, where there are as many.
 pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool], reach: usize) -> Vec<Normal> {
     let n_rows = window.n_rows;

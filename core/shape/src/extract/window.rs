@@ -1,4 +1,4 @@
-//! A component of the lattice and what lies right around it, as a dense grid.
+//! Window: one component of the lattice and its margin as a dense grid.
 
 use std::ops::Range;
 
@@ -35,7 +35,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The window around components, given by their roots.
+    /// Builds the window around components, given by their roots.
     pub(super) fn of(
         roots: &[u32],
         regions: &mut Components,
@@ -86,7 +86,7 @@ impl Window {
         window
     }
 
-    /// Makes invalid the first columns of each face of the scan.
+    /// Invalidates the first columns of each face of the scan.
     pub(super) fn leave_out(&mut self, columns: u32) {
         for start in [Some(0), self.header.seam_column].into_iter().flatten() {
             let from = start.saturating_sub(self.first_column) as usize;
@@ -137,13 +137,13 @@ impl Window {
         columns.map(move |column| (column, rows(&self.spans[column])))
     }
 
-    /// Nominal direction of a cell.
+    /// Returns the nominal direction of a cell.
     #[inline]
     pub(super) fn nominal(&self, column: usize, row: usize) -> BeamDirection {
         BeamDirection { azimuth: self.azimuths[column], elevation: self.elevations[row] }
     }
 
-    /// Direction of a place in or near the window, in cells and parts of cells, on the nominal lattice.
+    /// Returns the direction of a place in or near the window, in cells and parts of cells, on the nominal lattice.
     pub(super) fn beam_at(&self, column: f64, row: f64) -> BeamDirection {
         let nearest = |x: f64, n: usize| ((x + 0.5).max(0.0) as usize).min(n - 1);
         let (i, k) = (nearest(column, self.n_columns), nearest(row, self.n_rows));
@@ -153,7 +153,7 @@ impl Window {
         }
     }
 
-    /// True direction of a cell in cells and parts of cells, as (column, row).
+    /// Returns the true direction of a cell in cells and parts of cells, as (column, row).
     #[inline]
     pub(super) fn place(&self, column: usize, row: usize) -> (f64, f64) {
         let cell = &self.cells[column * self.n_rows + row];
@@ -163,7 +163,7 @@ impl Window {
         )
     }
 
-    /// The same of a cell by its index.
+    /// Returns the same of a cell by its index.
     pub(super) fn place_of(&self, index: usize) -> (f64, f64) {
         self.place(index / self.n_rows, index % self.n_rows)
     }

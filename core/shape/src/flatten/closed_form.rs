@@ -5,7 +5,7 @@ use crate::{Blank, Vec3};
 use platen_numerics::random::Random;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
-/// A plate's mesh that knows where each of its vertices lies on the plate.
+/// A plate's mesh with the known material coordinates of its vertices.
 #[derive(Debug, Clone)]
 pub struct ClosedForm {
     /// Material coordinates per vertex, metres.

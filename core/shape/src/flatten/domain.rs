@@ -1,4 +1,4 @@
-//! The mesh against its rectangle: what can be flattened at all.
+//! Domain of the flattenings: test of a mesh against its rectangle, and index helpers.
 
 use crate::mesh::DiskMesh;
 
@@ -9,7 +9,7 @@ const MIN_HEIGHT: f64 = 1e-6;
 /// size.
 const MAX_LENGTH_MISFIT: f64 = 0.1;
 
-/// Why a disk cannot be flattened onto its rectangle.
+/// Reason why a disk cannot be flattened onto its rectangle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnfitMesh {
     /// A triangle has no area in space.
@@ -43,7 +43,7 @@ pub enum UnfitMesh {
 }
 
 impl UnfitMesh {
-    /// What to do about it.
+    /// Returns advice to the operator.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::EdgeLength { .. } => {
@@ -54,7 +54,7 @@ impl UnfitMesh {
     }
 }
 
-/// Checks what a flattening needs beyond a disk: triangles with area, in space and on the rectangle, and edges about as
+/// Checks the requirements of a flattening beyond a disk: triangles with area, in space and on the rectangle, and edges about as
 /// long as the rectangle's sides.
 ///
 /// # Errors
@@ -83,7 +83,7 @@ pub fn check_fit(mesh: &DiskMesh) -> Result<(), UnfitMesh> {
     Ok(())
 }
 
-/// Per vertex the edges it lies on: bit k is set for edge k. A corner lies on two, an interior vertex on none.
+/// Returns per vertex the edges it lies on: bit k is set for edge k. A corner lies on two, an interior vertex on none.
 pub fn edges_of_vertices(mesh: &DiskMesh) -> Vec<u8> {
     let mut edges = vec![0; mesh.vertices.len()];
     for edge in 0..4 {
@@ -94,7 +94,7 @@ pub fn edges_of_vertices(mesh: &DiskMesh) -> Vec<u8> {
     edges
 }
 
-/// A rough plane picture of the mesh, to order eliminations by: the vertices along the plate's mean u and v.
+/// Projects the vertices along the plate's mean u and v: a rough plane picture to order eliminations by.
 pub fn plane_picture(mesh: &DiskMesh) -> Vec<[f64; 2]> {
     let corner = mesh.corners.map(|at| mesh.vertices[mesh.boundary[at as usize] as usize]);
     let u = corner[1] - corner[0] + corner[2] - corner[3];
@@ -103,7 +103,7 @@ pub fn plane_picture(mesh: &DiskMesh) -> Vec<[f64; 2]> {
     mesh.vertices.iter().map(|p| [p.dot(&u), p.dot(&v)]).collect()
 }
 
-/// The number of each interior vertex among the interior ones, and those vertices.
+/// Numbers the interior vertices; returns the number of each vertex among them, and those vertices.
 pub fn interior(mesh: &DiskMesh) -> (Vec<Option<u32>>, Vec<u32>) {
     let edges = edges_of_vertices(mesh);
     let inner: Vec<u32> = (0..edges.len() as u32).filter(|&v| edges[v as usize] == 0).collect();
@@ -114,13 +114,13 @@ pub fn interior(mesh: &DiskMesh) -> (Vec<Option<u32>>, Vec<u32>) {
     (node_of, inner)
 }
 
-/// The first triangle that lies turned over or without area in the chart `uv`.
+/// Returns the first triangle that lies turned over or without area in the chart `uv`.
 pub fn first_turned(triangles: &[[u32; 3]], uv: &[[f64; 2]]) -> Option<usize> {
     let upright = |t: &[u32; 3]| signed_area(t.map(|v| uv[v as usize])) > 0.0;
     triangles.iter().position(|t| !upright(t))
 }
 
-/// Area of a plane triangle, positive counter-clockwise.
+/// Returns the area of a plane triangle, positive counter-clockwise.
 #[inline]
 pub fn signed_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
     0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

@@ -1,10 +1,11 @@
-//! Maps with the boundary fixed: minimise sum k_ij |p_i - p_j|^2 over the interior vertices.
+//! Maps with a fixed boundary: minimum of sum k_ij |p_i - p_j|^2 over the interior vertices (Masuda et al., 4.3, eq. 4).
+
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 use super::domain::{interior, plane_picture};
 use crate::mesh::DiskMesh;
-use platen_numerics::sparse::{Graph, SparseError, Spd};
 
-/// Cotangents of the three angles of every triangle of the mesh, at its corners in their order.
+/// Returns the cotangents of the three angles of every triangle of the mesh, at its corners in their order.
 pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
     let of_triangle = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
@@ -14,10 +15,10 @@ pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
     mesh.triangles.iter().map(of_triangle).collect()
 }
 
-/// The map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at its places; metres.
+/// Computes the map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at its places; metres.
 ///
 /// `weights` has three numbers per triangle, one per corner; k_ij is the sum over the one or two triangles at the edge
-/// ij of the number at the corner opposite to it. Cotangents give the harmonic map (paper, equation 4), ones Tutte's.
+/// ij of the number at the corner opposite to it. Cotangents give the harmonic map (Masuda et al., eq. 4), ones Tutte's.
 /// Cost: one sparse Cholesky factorisation, two right-hand sides.
 ///
 /// # Errors

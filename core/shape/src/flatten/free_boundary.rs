@@ -1,4 +1,4 @@
-//! The plane shape that a curved plate was cut as: least membrane energy with free edges.
+//! Development of a curved plate with free edges: minimum of the membrane energy by Newton steps with a constant stiffness.
 //!
 //! The unknowns are the plane places x of the vertices; with G a triangle's metric in space and M = [x1 - x0, x2 - x0],
 //! E = (M^-T G M^-1 - I) / 2 is its Green strain. Moving the places by d changes E by -(grad d + grad d') / 2 as long
@@ -8,14 +8,15 @@
 //! sum over triangles of A e(d) : D : e(h) = sum of A E : D : e(h)   for all h,   e(d) = (grad d + grad d') / 2
 //! ```
 //!
-//! A developable plate has a place without any strain, and that is found, whatever the law: to second order of the mesh's
+//! A developable plate has a development without strain, which is found whatever the law: to second order of the mesh's
 //! sides, 10 um on 5 m at R 5 m. On double curvature the law matters: what another one does to the outline is of the order of the
 //! strain that is left, times the plate's size.
+
+use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 use super::domain::{first_turned, plane_picture, signed_area};
 use super::fixed_boundary::{cotangents, fixed_boundary};
 use crate::mesh::DiskMesh;
-use platen_numerics::sparse::{Graph, SparseError, Spd};
 
 /// Poisson's ratio of steel.
 const POISSON: f64 = 0.3;
@@ -35,7 +36,7 @@ pub struct LaidFlat {
     pub strain: f64,
 }
 
-/// Lays the mesh flat, its edges free; `None` when it folds over on the way.
+/// Develops the mesh into the plane, its edges free; `None` when it folds over on the way.
 ///
 /// Cost: two sparse Cholesky factorisations.
 ///
@@ -85,7 +86,7 @@ pub fn lay_flat(mesh: &DiskMesh) -> Result<Option<LaidFlat>, SparseError> {
     Ok(None)
 }
 
-/// The stiffness of the flat plate at the places `uv`, held in its place at two corners.
+/// Assembles and factors the stiffness of the flat plate at the places `uv`, held in its place at two corners.
 fn stiffness(mesh: &DiskMesh, uv: &[[f64; 2]], [origin, on_axis]: [u32; 2]) -> Result<Spd<2>, SparseError> {
     let nodes: Vec<_> = (0..uv.len() as u32).map(Some).collect();
     let graph = Graph::of_elements(&mesh.triangles, &nodes, uv.len());
@@ -102,7 +103,7 @@ fn stiffness(mesh: &DiskMesh, uv: &[[f64; 2]], [origin, on_axis]: [u32; 2]) -> R
     Ok(spd)
 }
 
-/// The block of two hat gradients in linear plane stress, per area, Young's modulus 1.
+/// Returns the block of two hat gradients in linear plane stress, per area, Young's modulus 1.
 #[must_use]
 pub fn plane_stress(a: [f64; 2], b: [f64; 2], poisson: f64) -> [[f64; 2]; 2] {
     let young = 1.0 / (1.0 - poisson * poisson);

@@ -1,4 +1,5 @@
-//! How far a plate is from its target as a whole: what is left to bend, and what is bent beyond.
+//! Elastic bending energy between the measured and the target's curvature: one figure for what is left to bend, and the share
+//! of the plate that is bent beyond its target.
 
 use crate::{Surface, TargetSurface};
 
@@ -9,13 +10,13 @@ const POISSON: f64 = 0.3;
 /// Places along each side over which is summed: 40 to 60 mm on the trade's plates, finer than a bend band.
 const SIDE: usize = 81;
 
-/// How far a plate is from its target as a whole.
+/// Bending energy and shares of a measured plate against its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BendingEnergy {
     /// Energy that would bend the plate elastically from the measured to the target's curvature, joules:
     /// U = D/2 int (dku + dkv)^2 - 2 (1 - nu) (dku dkv - dkuv^2) dA, D = E t^3 / 12 (1 - nu^2)
     /// (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, strain energy in pure bending of plates).
-    /// BendingEnergy is plastic: as a measure of what is left, this counts missing and surplus curvature alike, by their squares.
+    /// Forming is plastic: as a measure of what is left, this counts missing and surplus curvature alike, by their squares.
     pub energy: f64,
     /// Share of the seen area that is bent beyond the target by more than the tolerance given.
     pub beyond_share: f64,
@@ -24,7 +25,7 @@ pub struct BendingEnergy {
 }
 
 impl BendingEnergy {
-    /// The figures of a measured plate. `tolerance` is the curvature by which a place may exceed the target's, 1/m.
+    /// Computes the figures of a measured plate. `tolerance` is the curvature by which a place may exceed the target's, 1/m.
     /// `None` when nothing was seen.
     #[must_use]
     pub fn new(surface: &Surface, target: &TargetSurface, tolerance: f64) -> Option<Self> {
@@ -78,7 +79,7 @@ mod tests {
                 mask.mark(u, v);
             }
         }
-        // Points without noise tell nothing of how much to smooth.
+        // REML needs noise: the penalty is given.
         let penalty = platen_numerics::reml::Penalty { u: 1e-6, v: 1e-6 };
         Surface::new(fit.solve_with(penalty).unwrap(), T, mask)
     }
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_seen_is_in_no_figure() {
+    fn unseen_parts_are_in_no_figure() {
         let half = BendingEnergy::new(&bent(0.0, Mask::unseen(W, H, 0.05)), &target(10.0), 0.006).unwrap();
         let whole = BendingEnergy::new(&bent(0.0, whole()), &target(10.0), 0.006).unwrap();
         assert!((half.seen_share - 0.5).abs() < 0.02, "{half:?}");

@@ -1,14 +1,14 @@
-//! What a scanner's errors are beyond the noise that a fit knows of: estimators for calibrations.
+//! Calibration of a scanner: estimators of the errors that are not in the covariance of a fit.
 //!
-//! Errors that go together over decimetres (range bias, lattice, pose) do not average out in a fit and are not in its
-//! covariance. Scans of a plate that stayed as it was differ by more than their stated deviations: the excess, pooled over the plate
-//! and over pairs, is the correlated part of the level of detection. What repeats in every scan cancels in such pairs; it shows
-//! on an artefact of known shape only, as gaps under boards that ought to fit.
+//! Errors correlated over decimetres (range bias, lattice, pose) do not average out in a fit. Scans of an unchanged plate
+//! differ by more than their stated deviations: the excess, pooled over the plate and over pairs, is the correlated part of the
+//! level of detection. Errors that repeat in every scan cancel in such pairs; they show only on an artefact of known shape, as
+//! gaps under templates that ought to fit.
 
-use crate::target::Placement;
+use crate::target_surface::Placement;
 use crate::{EXPANDED, Surface, TargetSurface};
 
-/// Differences that ought to be zero, with what was stated of them.
+/// Differences whose true value is zero, pooled with their stated variances.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pooled {
     shown: f64,
@@ -24,14 +24,14 @@ impl Pooled {
         self.n += 1;
     }
 
-    /// One sigma of what the differences show beyond what was stated, 0 where they show less.
+    /// Returns the standard deviation of the differences in excess of the stated ones, 0 where there is none.
     #[must_use]
     pub fn excess(&self) -> f64 {
         ((self.shown - self.stated).max(0.0) / self.n.max(1) as f64).sqrt()
     }
 }
 
-/// A gap that ought to be zero, metres.
+/// A gap whose true value is zero, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArtefactGap {
     /// As measured, signed.
@@ -43,9 +43,9 @@ pub struct ArtefactGap {
 /// Share of the gaps that their expanded uncertainty is to cover.
 const COVERED: f64 = 0.95;
 
-/// The systematic error, one sigma, with which the expanded uncertainty covers 95 % of the gaps. A scanner's range error
-/// swings: under boards of half a wave it shows twice, under those of a whole one not at all, and gaps scatter far less like normal
-/// errors than their root mean square says.
+/// Returns the systematic error, one sigma, with which the expanded uncertainty covers 95 % of the gaps. A scanner's range error
+/// is periodic: under templates of half a wave it shows twice, under those of a whole one not at all, and gaps scatter far less like normal
+/// errors than their root mean square suggests.
 #[must_use]
 pub fn covering(gaps: &[ArtefactGap]) -> f64 {
     let mut lacking: Vec<f64> =
@@ -55,15 +55,15 @@ pub fn covering(gaps: &[ArtefactGap]) -> f64 {
     last.checked_sub(1).map_or(0.0, |last| lacking[last])
 }
 
-/// Lines in each direction, and boards on each.
-const BOARDS: usize = 9;
+/// Lines in each direction, and templates on each.
+const TEMPLATES: usize = 9;
 
 /// Places along each side that the artefact is fitted by.
 const PLACES: usize = 41;
 
-/// Gaps in the middle of boards of length `chord`, balanced on their ends, on an artefact that has its target's shape: they ought
+/// Returns the gaps in the middle of templates of length `chord`, balanced on their ends, on an artefact that has its target's shape: they ought
 /// to be zero. `sigma_correlated` is that of a pair of scans, of which a single one has its share, as in a template's own
-/// uncertainty. Boards lie along u and along v all over the plate, where it was seen.
+/// uncertainty. Templates lie along u and along v all over the plate, where it was seen.
 #[must_use]
 pub fn artefact_gaps(
     artefact: &Surface,
@@ -77,12 +77,12 @@ pub fn artefact_gaps(
     let places = (0..PLACES * PLACES).map(at).map(|[x, y]| [w * x, h * y]).filter(|place| seen(*place));
     let placement = Placement::best(artefact, shape, places);
 
-    let between = |k: usize, from: f64, to: f64| from + (to - from) * (k as f64 + 0.5) / BOARDS as f64;
+    let between = |k: usize, from: f64, to: f64| from + (to - from) * (k as f64 + 0.5) / TEMPLATES as f64;
     let mut gaps = Vec::new();
     for (length, across, along_u) in [(w, h, true), (h, w, false)] {
-        for k in (0..BOARDS * BOARDS).filter(|_| chord <= length) {
-            let centre = between(k % BOARDS, 0.5 * chord, length - 0.5 * chord);
-            let line = between(k / BOARDS, 0.0, across);
+        for k in (0..TEMPLATES * TEMPLATES).filter(|_| chord <= length) {
+            let centre = between(k % TEMPLATES, 0.5 * chord, length - 0.5 * chord);
+            let line = between(k / TEMPLATES, 0.0, across);
             let place = |s: f64| if along_u { [s, line] } else { [line, s] };
             let terms = [(centre - 0.5 * chord, 0.5), (centre, -1.0), (centre + 0.5 * chord, 0.5)]
                 .map(|(s, w)| (place(s), w));
@@ -123,7 +123,7 @@ mod tests {
         let sigma = covering(&gaps);
         let covered = |g: &&ArtefactGap| g.gap <= EXPANDED * g.sigma.hypot(sigma) * (1.0 + 1e-12);
         assert_eq!(gaps.iter().filter(covered).count(), 95);
-        // What noise explains is no systematic error.
+        // Gaps explained by noise are no systematic error.
         assert_eq!(covering(&gaps[..19]), 0.0);
         assert_eq!(covering(&[]), 0.0);
     }

@@ -1,7 +1,7 @@
-//! What the shop measures with tape, square and sight line: edge lengths, diagonals, corner angles, twist.
+//! Dimension checks as done with tape, square and sight line: edge lengths, diagonals, corner angles, twist.
 //!
-//! From the outline as it was seen, not from the rectangle it is mapped to: a cut blank is a few millimetres off its
-//! order, and these figures show it. Standard deviations follow from those of the corners, in the surface from the
+//! From the measured outline, not from the rectangle it is mapped to: they show by how many millimetres a cut blank differs
+//! from its order. Standard deviations follow from those of the corners, in the surface from the
 //! outline and across it from the fit; errors of different corners count as independent.
 
 use crate::outline::{Corner, EdgeCurve};
@@ -11,7 +11,7 @@ use crate::{Outline, Surface, Vec3};
 /// that fit the edges there.
 const ARM: f64 = 1.0;
 
-/// The shop's figures of one plate. Edges in the order v = 0, u = W, v = H, u = 0; corners (0,0), (W,0), (W,H), (0,H).
+/// Dimension checks of one plate. Edges in the order v = 0, u = W, v = H, u = 0; corners (0,0), (W,0), (W,H), (0,H).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeChecks {
     /// The four edges.
@@ -27,7 +27,7 @@ pub struct ShapeChecks {
     pub twist: [Check; 2],
 }
 
-/// A figure and how well it is known.
+/// A figure and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
     /// Metres or radians.
@@ -50,7 +50,7 @@ pub struct EdgeCheck {
 }
 
 impl ShapeChecks {
-    /// The figures of an outline; the surface tells normals and thickness.
+    /// Computes the figures of an outline; the surface gives normals and thickness.
     #[must_use]
     pub fn new(outline: &Outline, surface: &Surface) -> Self {
         let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
@@ -105,7 +105,7 @@ impl ShapeChecks {
 /// Places of the corners in shares of the plate's sides.
 const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
-/// A corner with what its place is known to.
+/// A corner with the uncertainty of its place.
 struct Known {
     at: Vec3,
     /// Unit directions of the leaving edge, of the arriving edge, of the normal.
@@ -145,7 +145,7 @@ fn arc(curve: &EdgeCurve, normal: &dyn Fn(f64) -> Vec3, depth: f64) -> f64 {
     below.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
 }
 
-/// How an edge leaves a corner, in the plane that touches the plate there.
+/// Direction in which an edge leaves a corner, in the plane that touches the plate there.
 struct Arm {
     /// The line of least squares through the edge's points within a square's arm; zero where there are none.
     direction: Vec3,

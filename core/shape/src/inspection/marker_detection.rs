@@ -1,8 +1,8 @@
-//! Dark discs painted on the plate, found by their intensity (paper, marker experiment).
+//! Marker detection: dark discs painted on the plate, located by their intensity (Masuda et al., marker experiment).
 //!
 //! Every beam near the expected place is taken to where it meets the fitted surface there, so that noise of the range
-//! does not move a disc; the disc's middle is that of the circle whose rim parts dark cells from bright ones best. How well
-//! it is known is a matter of the cells' size against the disc's: a cell tells the rim to its own width.
+//! does not move a disc; the disc's middle is that of the circle whose rim parts dark cells from bright ones best. Its
+//! uncertainty follows from the size of the cells against the disc's: a cell locates the rim to its own width.
 
 use nalgebra::Matrix3;
 
@@ -21,7 +21,7 @@ const RIVAL: f64 = 0.5;
 /// A disc's longest spread is at most this many times its shortest.
 const ROUND: f64 = 2.0;
 
-/// A disc and where it lies against the expected place.
+/// A detected disc and its offset from the expected place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectedMarker {
     /// Middle, on the scanned face, metres, scanner frame.
@@ -36,7 +36,7 @@ pub struct DetectedMarker {
     pub contrast: f64,
 }
 
-/// Why there is no disc.
+/// Reason why no disc was detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoMarker {
     /// The place was not seen.
@@ -57,7 +57,7 @@ struct Cell {
     intensity: f64,
 }
 
-/// The disc that is expected at (u, v), within `reach` metres of there.
+/// Detects the disc that is expected at (u, v), within `reach` metres of there.
 ///
 /// # Errors
 /// [`NoMarker`].
@@ -166,7 +166,7 @@ impl Circle {
                 right += row * (darkness - expected);
             }
             let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return self };
-            // A step beyond the blur leaves what the slopes know of.
+            // Beyond the blur the slopes are not valid.
             let step = step * (blur / step.norm().max(blur));
             self.centre = [self.centre[0] + step.x, self.centre[1] + step.y];
             self.radius += step.z;

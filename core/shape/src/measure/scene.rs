@@ -1,6 +1,7 @@
 //! Exact plates before the scanner: samples and outline with noise, and what a measurement got wrong.
 
 use nalgebra::{Matrix3, Rotation3};
+use platen_numerics::random::Random;
 
 use super::{Measurement, measure};
 use crate::flatten::{cotangents, fixed_boundary};
@@ -9,7 +10,6 @@ use crate::{
     Chart, Corner, DiskMesh, EdgeCurve, Flatten, FlattenError, HeightField, Outline, Patch, PlateSpec,
     Sample, Vec3,
 };
-use platen_numerics::random::Random;
 
 /// The paper's harmonic map.
 pub(super) struct Harmonic;
@@ -28,7 +28,7 @@ pub(super) struct Scene {
     pub(super) mid: Box<dyn Fn([f64; 2]) -> [f64; 3]>,
     pub(super) size: [f64; 2],
     pub(super) thickness: f64,
-    /// How far inside the mid-surface's edge the face ends.
+    /// Distance from the mid-surface's edge inwards to that of the face.
     pub(super) inset: f64,
     /// Turn about the vertical, radians.
     pub(super) yaw: f64,
@@ -223,7 +223,7 @@ impl Mean {
 }
 
 impl Errors {
-    /// What `measured` got wrong on a 50 mm grid; hidden parts and their surroundings do not count.
+    /// Errors of `measured` on a 50 mm grid; hidden parts and their surroundings do not count.
     pub(super) fn of(measured: &Measurement, scene: &Scene) -> Self {
         let (placed, surface, [w, h]) = (scene.placed(), &measured.surface, scene.size);
         let [mut inside, mut edge, mut bend, mut ratio] = [(); 4].map(|()| Mean::default());

@@ -11,7 +11,8 @@ fn errors(name: &str, scene: &Scene) -> Errors {
     errors
 }
 
-/// Bounds: markers, normal distance inside and near an edge (mm), curvature (1/m).
+/// Bounds, at about twice what is found: markers, normal distance inside and near an edge (mm), curvature (1/m). Markers move
+/// with the edges, whose noise is that of a few hundred crossings; curvature errors are the smoothing of bends.
 fn check(name: &str, scene: &Scene, [markers, inside, edge, curvature]: [f64; 4]) {
     let e = errors(name, scene);
     assert!(
@@ -22,25 +23,25 @@ fn check(name: &str, scene: &Scene, [markers, inside, edge, curvature]: [f64; 4]
 
 #[test]
 fn plates_of_constant_curvature_are_met() {
-    check("cylinder", &Scene::new(cylinder(9.0, 1.2), [3.0, 2.5]), [0.2, 0.01, 0.02, 1.5e-4]);
-    check("convex", &Scene::new(cylinder(-5.0, 0.3), [4.0, 2.5]), [0.2, 0.01, 0.02, 3e-4]);
-    check("cone", &Scene::new(cone([-7.0, 1.0], 0.6), [3.0, 2.0]), [0.2, 0.01, 0.02, 3e-4]);
+    check("cylinder", &Scene::new(cylinder(9.0, 1.2), [3.0, 2.5]), [0.2, 0.0045, 0.008, 7e-5]);
+    check("convex", &Scene::new(cylinder(-5.0, 0.3), [4.0, 2.5]), [0.18, 0.0065, 0.014, 2.5e-4]);
+    check("cone", &Scene::new(cone([-7.0, 1.0], 0.6), [3.0, 2.0]), [0.18, 0.0075, 0.0165, 2.6e-4]);
     // The harmonic map is wrong on a sphere: the markers lie elsewhere within the surface, which itself is met.
     let sphere = sphere_of_fibres(11.0, [3.0, 2.5]);
-    check("sphere", &Scene::new(sphere, [3.0, 2.5]), [0.8, 0.01, 0.02, 3e-4]);
+    check("sphere", &Scene::new(sphere, [3.0, 2.5]), [0.8, 0.0066, 0.0115, 1.9e-4]);
 }
 
 #[test]
 fn at_four_times_the_noise_too() {
     let noisy = |mid: Scene| Scene { sigma: 2e-3, ..mid };
-    check("cylinder", &noisy(Scene::new(cylinder(9.0, 1.2), [3.0, 2.5])), [0.6, 0.03, 0.06, 3e-4]);
-    check("cone", &noisy(Scene::new(cone([-7.0, 1.0], 0.6), [3.0, 2.0])), [0.6, 0.03, 0.06, 6e-4]);
+    check("cylinder", &noisy(Scene::new(cylinder(9.0, 1.2), [3.0, 2.5])), [0.6, 0.015, 0.025, 1.2e-4]);
+    check("cone", &noisy(Scene::new(cone([-7.0, 1.0], 0.6), [3.0, 2.0])), [0.6, 0.023, 0.041, 5.2e-4]);
 }
 
 #[test]
 fn a_half_bent_thick_plate_keeps_its_material_points() {
     let scene = Scene { thickness: 0.04, ..Scene::new(half_bent(5.0, 2.5), [5.0, 2.5]) };
-    check("half bent", &scene, [0.2, 0.02, 0.04, 4e-3]);
+    check("half bent", &scene, [0.2, 0.013, 0.0205, 3.8e-3]);
 }
 
 #[test]
@@ -53,13 +54,13 @@ fn a_plate_bent_along_the_line_of_sight_is_met() {
     let incidence =
         (-placed.face(0.05, 1.25).normalize()).dot(&placed.mid_derivatives(0.05, 1.25).normal()).acos();
     assert!((80.0..84.0).contains(&incidence.to_degrees()), "{}", incidence.to_degrees());
-    check("along sight", &scene, [0.3, 0.02, 0.04, 5e-4]);
+    check("along sight", &scene, [0.13, 0.0066, 0.014, 4.2e-4]);
 }
 
 #[test]
 fn wild_samples_move_nothing() {
     let scene = Scene { wild: 0.02, ..Scene::new(cylinder(7.0, 0.4), [3.0, 2.5]) };
-    check("wild", &scene, [0.2, 0.006, 0.015, 1.5e-4]);
+    check("wild", &scene, [0.2, 0.006, 0.01, 1.3e-4]);
 }
 
 #[test]
@@ -69,7 +70,7 @@ fn holes_are_bridged_and_marked() {
     let measured = scene.measure();
     let e = Errors::of(&measured, &scene);
     println!("hole: {e:?}");
-    assert!(e.markers < 0.2 && e.inside < 0.01 && e.edge < 0.02, "{e:?}");
+    assert!(e.markers < 0.2 && e.inside < 0.006 && e.edge < 0.01, "{e:?}");
     let mask = measured.surface.mask();
     assert!(!mask.seen(1.25, 1.0) && !mask.seen(1.05, 1.15) && mask.seen(0.9, 1.0) && mask.seen(1.25, 1.3));
     let hidden = 0.5 * 0.4 / (3.0 * 2.5);
@@ -86,13 +87,13 @@ fn an_edge_behind_a_person_is_bridged() {
     let scene =
         Scene { hidden: Some([[1.2, -1.0], [1.7, 0.5]]), ..Scene::new(cylinder(7.0, 0.4), [3.0, 2.5]) };
     let e = errors("person", &scene);
-    assert!(e.markers < 0.4 && e.inside < 0.01 && e.edge < 0.03 && e.curvature < 3e-4, "{e:?}");
+    assert!(e.markers < 0.2 && e.inside < 0.006 && e.edge < 0.0105 && e.curvature < 1.4e-4, "{e:?}");
 }
 
 #[test]
 fn a_bevelled_plate_is_mapped_by_its_mid_surface_edges() {
     let scene = Scene { inset: 0.0115, thickness: 0.04, ..Scene::new(cylinder(6.0, 0.3), [3.0, 2.5]) };
-    check("bevelled", &scene, [0.2, 0.01, 0.03, 3e-4]);
+    check("bevelled", &scene, [0.2, 0.0065, 0.014, 2.6e-4]);
 }
 
 #[test]

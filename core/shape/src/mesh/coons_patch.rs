@@ -1,10 +1,12 @@
-//! The surface spanned by the four edge curves: the first picture of the plate's face, and its coordinates.
+//! Coons patch of the four edge curves (Coons 1967): first approximation of the plate's face, and its coordinates (a, b).
+//!
+//! The edges are smoothing splines through their ends (Masuda et al., 3.2, fit B-spline curves to the edges).
 
 use nalgebra::{DMatrix, DVector};
-
-use crate::{EdgeCurve, Outline, Vec3};
 use platen_numerics::tensor_spline::{TensorSpline, approximate_curve};
 use platen_numerics::uniform_knots::UniformKnots;
+
+use crate::{EdgeCurve, Outline, Vec3};
 
 /// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
 /// surface. Detail across the surface (narrow bends) is added later, from the samples inside.
@@ -16,7 +18,7 @@ const BRIDGED: f64 = 0.01;
 /// The corners are fixed by this weight.
 const CORNER: f64 = 1e6;
 
-/// A smooth curve over [0, 1].
+/// An edge as a smooth curve over [0, 1].
 struct Edge {
     axis: UniformKnots,
     control: DMatrix<f64>,
@@ -70,7 +72,7 @@ impl Edge {
     }
 }
 
-/// The Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum reproduces every
+/// Spans the Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum reproduces every
 /// surface of second order, however it is bent or turned. With an inset the outline lies that far inside of the
 /// rectangle, and the patch goes on beyond it.
 pub(crate) fn coons_patch(

@@ -1,4 +1,4 @@
-//! A triangulated disk with four corners: the type that every flattening may rely on.
+//! Disk mesh: a checked triangulated disk with four corners, input of every flattening.
 
 use std::ops::Deref;
 
@@ -6,7 +6,7 @@ use super::error::{MeshError, malformed, not_a_disk};
 use super::topology::check_topology;
 use crate::Vec3;
 
-/// What a [`DiskMesh`] is made of: plain data, unchecked.
+/// Data of a [`DiskMesh`], unchecked.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DiskParts {
     /// Points of the mid-surface, metres, scanner frame.
@@ -54,13 +54,13 @@ impl DiskMesh {
         Ok(Self(parts))
     }
 
-    /// The parts, to be changed and checked again.
+    /// Returns the parts, to be changed and checked again.
     #[must_use]
     pub fn into_parts(self) -> DiskParts {
         self.0
     }
 
-    /// Positions in `boundary` of edge `k`'s vertices from corner k to corner k + 1, both included.
+    /// Returns the positions in `boundary` of edge `k`'s vertices from corner k to corner k + 1, both included.
     ///
     /// The last edge ends in position 0, given as `boundary.len()`: take it modulo the length.
     #[must_use]

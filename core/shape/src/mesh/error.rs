@@ -1,6 +1,6 @@
-//! What can be wrong with a mesh.
+//! Errors of a mesh.
 
-/// Why a set of parts is no disk. Each is a fault of the program that made the parts.
+/// Reason why a set of parts is no disk.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// A length, index or number is outside what the type allows.

@@ -1,16 +1,18 @@
-//! The scanned face and the mid-surface as smooth surfaces over one pair of coordinates.
+//! The scanned face and the mid-surface as bicubic splines over one pair of coordinates.
 //!
 //! The edges span a Coons patch over the rectangle; its coordinates (a, b) are nearly those of the plate. From each place of
-//! it the sheet is met along the patch's normal: the edges' own noise across the surface drops out. Half the thickness
+//! it the height field of the outline is met along the patch's normal: the edges' own noise across the surface drops out. Half the thickness
 //! below the face, along its normal, lies the mid-surface, right up to its edges: cuts are square to it.
+
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coons_patch::coons_patch;
 use super::facets::Facets;
 use crate::outline::{SPAN, thinned};
-use crate::surface::{TensorSpline, UniformKnots};
 use crate::{Outline, Patch, PlateSpec, Vec3};
 
-/// Facets along a span of the first picture: 50 mm; it has no finer detail than its edges.
+/// Facets along a span of the Coons patch: 50 mm; it has no finer detail than its edges.
 const FACETS: usize = 2;
 
 /// The smooth scanned face and mid-surface over (a, b) in `[0, W] x [0, H]`.
@@ -20,14 +22,14 @@ pub struct SmoothFace {
     pub face: TensorSpline<3>,
     /// The mid-surface at the same (a, b): half the thickness below the face along its normal.
     pub mid: TensorSpline<3>,
-    /// Feet (a, b) of some of the samples, in lattice order.
+    /// Foot points (a, b) of some of the samples, in lattice order.
     pub(crate) places: Vec<[f64; 2]>,
     /// Observed over stated standard deviation of the samples.
     pub(crate) noise_scale: f64,
 }
 
 impl SmoothFace {
-    /// The face that `outline` encloses.
+    /// Fits the face that `outline` encloses.
     #[must_use]
     pub fn of(patch: &Patch, outline: &Outline, spec: &PlateSpec) -> Self {
         let axes = [spec.width, spec.height].map(|length| UniformKnots::of_length(length, SPAN));

@@ -1,10 +1,10 @@
-//! Whether triangles form a disk: a question of indices alone.
+//! Test whether triangles form a disk, by their indices alone: Euler characteristic, connectedness, boundary loop.
 
 use platen_numerics::union_find::UnionFind;
 
 use super::error::{MeshError, malformed, not_a_disk};
 
-/// One disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
+/// Checks that the triangles form one disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
 /// together through edges, and V - E + F = 1. Together these exclude pinched vertices and handles.
 pub(super) fn check_topology(
     triangles: &[[u32; 3]],
@@ -46,7 +46,7 @@ pub(super) fn check_topology(
     Ok(())
 }
 
-/// A triangle as one of its vertices sees it: counter-clockwise, the vertex, `next`, `last`.
+/// A triangle from one of its vertices: counter-clockwise, the vertex, `next`, `last`.
 #[derive(Clone, Copy, Default)]
 struct Side {
     next: u32,
@@ -84,7 +84,7 @@ impl Fans {
         &self.sides[self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize]
     }
 
-    /// Whether a triangle lies to the left of the edge from `a` to `b` and none to its right.
+    /// Returns whether a triangle lies to the left of the edge from `a` to `b` and none to its right.
     fn is_open(&self, a: u32, b: u32) -> bool {
         let fan = self.at(a);
         fan.iter().any(|side| side.next == b) && fan.iter().all(|side| side.last != b)

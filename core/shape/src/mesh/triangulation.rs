@@ -1,4 +1,4 @@
-//! About ten thousand vertices on the mid-surface, joined by Delaunay's criterion.
+//! Delaunay triangulation of about 10,000 vertices on the mid-surface (Masuda et al., 4.2).
 //!
 //! Vertices are chosen and joined in the coordinates (a, b) of the [`SmoothFace`], nearly those of the plate: there the
 //! boundary is the rectangle itself, exactly straight, so the convex hull is the plate and no slivers hang on its edges.
@@ -16,7 +16,8 @@ const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 impl SmoothFace {
-    /// The mid-surface as a mesh of about `n_vertices`, its boundary on the outline of `blank`, and the vertices' coordinates (a, b).
+    /// Meshes the mid-surface with about `n_vertices`, its boundary mapped to the outline of `blank`; also returns the vertices'
+    /// coordinates (a, b).
     ///
     /// # Errors
     /// [`MeshError::NotADisk`] when the vertices could not be joined.
@@ -54,7 +55,7 @@ impl SmoothFace {
         Ok((mesh, places))
     }
 
-    /// Coordinates (a, b) of the vertices of [`SmoothFace::mesh`] inside the boundary: one per cell of a grid.
+    /// Selects the coordinates (a, b) of the vertices of [`SmoothFace::mesh`] inside the boundary: one per cell of a grid.
     fn interior(&self, spec: &PlateSpec, n: [usize; 2]) -> Vec<[f64; 2]> {
         let size = [spec.width / n[0] as f64, spec.height / n[1] as f64];
         let middle = |cell: [usize; 2]| [0, 1].map(|d| (cell[d] as f64 + 0.5) * size[d]);
@@ -72,7 +73,7 @@ impl SmoothFace {
         chosen.into_iter().map(|(_, place)| place).collect()
     }
 
-    /// Arc length of the mid-surface's edges at the boundary vertices, and of whole edges.
+    /// Integrates the arc length of the mid-surface's edges at the boundary vertices, and of whole edges.
     fn arcs(&self, boundary: &[[f64; 2]], corners: [usize; 4]) -> (Vec<f64>, [f64; 4]) {
         let mut arc = Vec::with_capacity(boundary.len());
         let mut edge_length = [0.0; 4];
@@ -90,7 +91,7 @@ impl SmoothFace {
         (arc, edge_length)
     }
 
-    /// Length on the mid-surface of the straight piece of coordinates between two places.
+    /// Returns the length on the mid-surface of the straight piece of coordinates between two places.
     fn arc(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         let d = [to[0] - from[0], to[1] - from[1]];
         GAUSS
@@ -115,7 +116,7 @@ fn boundary(width: f64, height: f64, n: [usize; 2]) -> (Vec<[f64; 2]>, [usize; 4
     (places, [0, n[0], n[0] + n[1], 2 * n[0] + n[1]])
 }
 
-/// Delaunay triangles of the places, counter-clockwise.
+/// Returns the Delaunay triangles of the places, counter-clockwise.
 fn delaunay(places: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, MeshError> {
     let fault = |what: String| MeshError::NotADisk { what };
     let points = places.iter().map(|[a, b]| Point2::new(*a, *b)).collect();

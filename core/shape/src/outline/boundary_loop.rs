@@ -1,4 +1,7 @@
-//! The mesh of lattice neighbours and its boundary loop.
+//! Mesh of lattice neighbours and its longest boundary loop, by shortest paths (Masuda et al., 3.2).
+//!
+//! In: the cells of the face. Out: the loop as a cycle of cells, in whole lattice steps; later modules locate the edge
+//! between them. Gaps that something hides are filled first, so that a chain in front of the plate does not cut it.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -49,7 +52,7 @@ impl Grid {
         grid
     }
 
-    /// Place on a loop of each sample there or next to it: a cell that sticks out alone belongs to no triangle.
+    /// Maps samples on a loop or next to it to their place on it: a cell that sticks out alone belongs to no triangle.
     pub(super) fn places(&self, cells: &[Cell]) -> BTreeMap<u32, u32> {
         let n_rows = self.n_rows as isize;
         let beside = [-n_rows - 1, -n_rows, -n_rows + 1, -1, 1, n_rows - 1, n_rows, n_rows + 1];
@@ -67,7 +70,7 @@ impl Grid {
         around(&beside).into_iter().chain(around(&[0])).collect()
     }
 
-    /// Fills gaps along columns and rows, unless the plate is seen to end at one side of them.
+    /// Fills gaps along columns and rows, unless the plate ends visibly at one side of them.
     fn fill_hidden(&mut self, patch: &Patch, cell: impl Fn(&Sample) -> usize) {
         let mut ends: Vec<[bool; 4]> = vec![[false; 4]; patch.samples.len()];
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
@@ -96,7 +99,7 @@ impl Grid {
         }
     }
 
-    /// Lattice squares by their corner at the least column and row, the four cells of each as bits: itself, below, next
+    /// Returns the lattice squares by their corner at the least column and row, the four cells of each as bits: itself, below, next
     /// below, next. 0 where fewer than three are inside: no triangle covers the square.
     fn squares(&self) -> Vec<u8> {
         let (inside, n_rows) = (&self.inside, self.n_rows);
@@ -107,7 +110,7 @@ impl Grid {
         bits.map(|bits| if bits.count_ones() >= 3 { bits } else { 0 }).collect()
     }
 
-    /// Edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives two
+    /// Returns the edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives two
     /// triangles, one with three cells gives one.
     fn boundary_edges(&self) -> Vec<(Cell, Cell)> {
         let (n_rows, squares) = (self.n_rows, self.squares());
@@ -135,10 +138,10 @@ impl Grid {
         edges
     }
 
-    /// The longest boundary loop, as the paper finds it: the shortest way along the boundary from one end of a
-    /// boundary edge to the other, again and again until a loop is long enough.
+    /// Returns the first boundary loop of at least `enough` lattice steps, else the longest one.
     ///
-    /// `enough` in lattice steps. Where no loop is, the longest.
+    /// As Masuda et al., 3.2: the shortest path along the boundary from one end of a boundary edge to the other closes a
+    /// loop; repeated for edges that are on no loop yet.
     pub(super) fn longest_loop(&self, enough: f64) -> Vec<Cell> {
         let edges = self.boundary_edges();
         let mut neighbours: BTreeMap<Cell, Vec<(Cell, u32)>> = BTreeMap::new();
@@ -153,7 +156,7 @@ impl Grid {
             if used.contains(&(a, b)) {
                 continue;
             }
-            let Some((length, way)) = shortest_way(&neighbours, a, b) else { continue };
+            let Some((length, way)) = shortest_path(&neighbours, a, b) else { continue };
             for pair in way.windows(2) {
                 used.insert((pair[0].min(pair[1]), pair[0].max(pair[1])));
             }
@@ -182,8 +185,12 @@ fn side(step: [i8; 2]) -> usize {
     }
 }
 
-/// Dijkstra's shortest way from `a` to `b` that does not use the edge between them.
-fn shortest_way(neighbours: &BTreeMap<Cell, Vec<(Cell, u32)>>, a: Cell, b: Cell) -> Option<(u32, Vec<Cell>)> {
+/// Returns the shortest path (Dijkstra) from `a` to `b` that does not use the edge between them.
+fn shortest_path(
+    neighbours: &BTreeMap<Cell, Vec<(Cell, u32)>>,
+    a: Cell,
+    b: Cell,
+) -> Option<(u32, Vec<Cell>)> {
     let mut reached: BTreeMap<Cell, (u32, Cell)> = BTreeMap::from([(a, (0, a))]);
     let mut front = BinaryHeap::from([Reverse((0, a))]);
     while let Some(Reverse((length, at))) = front.pop() {

@@ -1,17 +1,20 @@
-//! The four corners, to the millimetre: where to look (k-th neighbour angle), straight lines near there (RANSAC), and
-//! their intersections (paper, 3.2).
+//! The four corners, to a millimetre: candidates by the angle to the k-th neighbours, straight lines on both sides by
+//! RANSAC (Fischler and Bolles 1981), intersections (Masuda et al., 3.2).
+//!
+//! In: places of the visible boundary in the mean plane. Out: four corners, the starting points of `edge`. Own: k scales with
+//! the lattice, and of more than four candidates those four are taken whose quadrilateral holds most of the loop.
 
 use nalgebra::Vector2;
+use platen_numerics::random::Random;
 
 use super::{OutlineError, SEED};
-use platen_numerics::random::Random;
 
 type Vec2 = Vector2<f64>;
 
-/// Angle to the k-th neighbours on both sides below which a corner is looked for, degrees (paper, 3.2).
+/// Angle to the k-th neighbours on both sides below which a place is a candidate, degrees (Masuda et al., 3.2).
 const CORNER_ANGLE: f64 = 150.0;
 
-/// The paper's k = 128 at 6.3 mm spans 0.8 m of a 4 m plate: this part of the shorter side.
+/// k = 128 of Masuda et al. at 6.3 mm spans 0.8 m of a 4 m plate: this part of the shorter side.
 const NEIGHBOUR_PART: f64 = 0.2;
 
 /// RANSAC: pairs tried per line, and the distance of a point that supports it, in lattice steps. A pair is that many
@@ -28,7 +31,7 @@ const LEVELLED: usize = 4;
 /// by a few degrees only.
 const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
 
-/// Coverage along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
+/// Seen along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
 const BULGE: f64 = 0.03;
 
 /// A corner in the plane, and the place on the loop where its two edges part.
@@ -62,7 +65,7 @@ pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 
     best_four(points, &candidates).ok_or(OutlineError::Corners { found: candidates.len() })
 }
 
-/// Four of the candidates, in their order, between which most of the loop lies along straight lines.
+/// Selects four candidates, in their order, between which most of the loop lies along straight lines.
 fn best_four(points: &[Vec2], candidates: &[Corner]) -> Option<[Corner; 4]> {
     let n = candidates.len();
     let mut best: Option<(usize, [Corner; 4])> = None;
@@ -83,7 +86,7 @@ fn best_four(points: &[Vec2], candidates: &[Corner]) -> Option<[Corner; 4]> {
     best.filter(|(support, _)| 4 * support > 3 * points.len()).map(|(_, four)| four)
 }
 
-/// Points near the side of the quadrilateral that the loop says they are on.
+/// Counts the points near their side of the quadrilateral.
 fn support(points: &[Vec2], corners: &[Corner; 4]) -> usize {
     let mut near = 0;
     for side in 0..4 {
@@ -125,7 +128,7 @@ impl<'a> Loop<'a> {
         self.points.len()
     }
 
-    /// The places where the loop turns left most sharply, one for each stretch that turns enough.
+    /// Returns the places where the loop turns left most sharply, one for each stretch that turns enough.
     fn sharpest_turns(&self, reach: f64) -> Vec<usize> {
         let limit = CORNER_ANGLE.to_radians();
         let angles: Vec<f64> = (0..self.n()).map(|at| self.angle(at, reach)).collect();
@@ -143,7 +146,7 @@ impl<'a> Loop<'a> {
         sharpest
     }
 
-    /// Angle at a point between the points `reach` before and behind it; a right turn counts as none.
+    /// Returns the angle at a point between the points `reach` before and behind it; a right turn counts as none.
     fn angle(&self, at: usize, reach: f64) -> f64 {
         let off =
             |count: usize, stride: usize| self.points[(at + count * stride) % self.n()] - self.points[at];
@@ -152,12 +155,12 @@ impl<'a> Loop<'a> {
         if after.perp(&before) <= 0.0 { std::f64::consts::PI } else { before.angle(&after) }
     }
 
-    /// Points from `at` backwards over `reach`, at least one.
+    /// Returns the points from `at` backwards over `reach`, at least one.
     fn before(&self, at: usize, reach: f64) -> Vec<Vec2> {
         (1..=self.n_before(at, reach)).map(|k| self.points[(at + self.n() - k) % self.n()]).collect()
     }
 
-    /// Points from `at` forwards over `reach`, at least one.
+    /// Returns the points from `at` forwards over `reach`, at least one.
     fn after(&self, at: usize, reach: f64) -> Vec<Vec2> {
         (1..=self.n_after(at, reach)).map(|k| self.points[(at + k) % self.n()]).collect()
     }
@@ -191,7 +194,7 @@ struct Line {
     direction: Vec2,
 }
 
-/// The line through most of the points (RANSAC, from pairs at least `apart`), then by least squares through those.
+/// Fits a line: the one through most of the points (RANSAC, from pairs at least `apart`), then least squares through those.
 fn line(points: &[Vec2], support: f64, apart: f64, random: &mut Random) -> Option<Line> {
     let off = |line: &Line, p: &Vec2| line.direction.perp(&(p - line.point)).abs();
     let mut best: Option<(usize, Line)> = None;

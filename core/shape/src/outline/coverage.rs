@@ -1,4 +1,4 @@
-//! Where along an edge it was seen.
+//! Coverage of an edge: the stretches along it where it was seen.
 
 /// An edge counts as seen where a crossing lies within so many lattice steps.
 const STEPS: f64 = 6.0;
@@ -8,25 +8,25 @@ const STEPS: f64 = 6.0;
 pub(super) struct Coverage {
     /// Sorted.
     places: Vec<f64>,
-    /// How far around a place the edge counts as seen, metres.
+    /// Distance around a place within which the edge counts as seen, metres.
     reach: f64,
 }
 
 impl Coverage {
-    /// `step` is the spacing of samples, metres.
+    /// Collects the places; `step` is the spacing of samples, metres.
     pub(super) fn new(places: impl Iterator<Item = f64>, step: f64) -> Self {
         let mut places: Vec<f64> = places.collect();
         places.sort_by(f64::total_cmp);
         Self { places, reach: STEPS * step }
     }
 
-    /// True when the edge was seen at a place along it.
+    /// Returns true when the edge was seen at a place along it.
     pub(super) fn at(&self, along: f64) -> bool {
         let next = self.places.partition_point(|place| *place < along - self.reach);
         self.places.get(next).is_some_and(|place| *place <= along + self.reach)
     }
 
-    /// Part of the edge between two places that was seen.
+    /// Returns the part of the edge between two places that was seen, 0 to 1.
     pub(super) fn share(&self, from: f64, to: f64) -> f64 {
         const PLACES: usize = 200;
         let place = |i: usize| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;

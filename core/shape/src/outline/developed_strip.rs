@@ -1,18 +1,18 @@
-//! The narrow strip of the face along an edge, rolled out into the plane.
+//! Development of the narrow strip of the face along an edge into the plane, by the geodesic curvature of a base curve.
 //!
-//! A base curve on the face, near the edge, is developed as it runs on the mid-surface below it: its turning within the
-//! surface is kept, the surface's own bending is not. In the plane a straight cut is straight however the plate is bent
-//! (on the face itself a bend band askew to the edge shifts it by half the thickness times the band's angle), so that a
-//! stiff curve can be fitted there to what the lattice says of the edge.
+//! In: projected crossings of one edge. Out: a map between the strip and the plane, in which `edge` fits a stiff curve. A base
+//! curve near the edge is fitted robustly (Tukey's biweight) and developed as it runs on the mid-surface below it: its
+//! geodesic curvature is kept, the surface's own bending is not. In the plane a straight cut is straight however the
+//! plate is bent; on the face itself a bend band askew to the edge shifts it by half the thickness times the band's angle.
 
 use nalgebra::Vector2;
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coverage::Coverage;
 use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
-use platen_numerics::uniform_knots::UniformKnots;
 
 /// Spacing of the base curve's points, metres.
 const SPACING: f64 = 0.005;
@@ -24,7 +24,7 @@ const OVERHANG: f64 = 0.06;
 const SPAN_ACROSS: f64 = 0.4;
 const SPAN_NORMAL: f64 = 0.1;
 
-/// Across: an edge seen along the mean normal has a curvature of at most about this, 1/m, over a length of, metres.
+/// Prior across the edge: seen along the mean normal has a curvature of at most about this, 1/m, over a length of, metres.
 const CURVATURE_ACROSS: (f64, f64) = (0.1, 0.5);
 
 /// Along the normal: the curvature of a plate changes by at most about this, 1/m^2 (0.8 1/m over a bend band of
@@ -37,7 +37,7 @@ const NORMAL_CHANGE: (f64, f64) = (8.0, 0.1);
 /// Crossings on a common curve, at least.
 const LEAST_WEIGHT: f64 = 8.0;
 
-/// Rounds of reweighting against what is no edge.
+/// Rounds of reweighting against crossings of other edges.
 const ROUNDS: usize = 8;
 
 /// One point of the base curve.
@@ -65,7 +65,7 @@ pub(super) struct DevelopedStrip {
 }
 
 impl DevelopedStrip {
-    /// The strip along the edge from `from` to `to`, through the crossings that lie on a common curve.
+    /// Develops the strip along the edge from `from` to `to`, through the crossings that lie on a common curve.
     ///
     /// `depth` is that of the mid-surface, metres.
     ///
@@ -115,7 +115,7 @@ impl DevelopedStrip {
                 NORMAL_CHANGE.1,
             );
             for ((p, n), w) in data.iter().zip(&weights) {
-                // A local fit knows its tilt to about its noise over its width of ten steps.
+                // The tilt of a local fit is uncertain by about its noise over its width of ten steps.
                 fit.add(p.x, k(n), w * (10.0 * step / noise).powi(2));
             }
             fit.solve().map(|(spline, _)| spline)
@@ -135,15 +135,15 @@ impl DevelopedStrip {
                 (point, (along * n_x.at(x) + inward * n_y.at(x) + up).normalize())
             })
             .collect();
-        Ok(Self { from, along, first: start, stations: roll_out(&points, depth), seen, length })
+        Ok(Self { from, along, first: start, stations: develop(&points, depth), seen, length })
     }
 
-    /// Why no edge can be told from the crossings of this strip.
+    /// Returns the error of a strip with too few crossings.
     pub(super) fn too_few(&self) -> OutlineError {
         too_few(&self.seen, self.length)
     }
 
-    /// A point near the edge, on the face, as (along, inwards) in the plane, metres.
+    /// Maps a point near the edge, on the face, to (along, inwards) in the plane, metres.
     pub(super) fn flatten(&self, point: Vec3) -> Vector2<f64> {
         let x = ((point - self.from).dot(&self.along) - self.first) / SPACING;
         let station = &self.stations[(x.round().max(0.0) as usize).min(self.stations.len() - 1)];
@@ -152,7 +152,7 @@ impl DevelopedStrip {
         station.flat + t * off.dot(&station.tangent) + n * off.dot(&station.inward)
     }
 
-    /// The point of the face at a place of the plane: the inverse of [`Self::flatten`] near the base curve.
+    /// Maps a place of the plane to the face: the inverse of [`Self::flatten`] near the base curve.
     pub(super) fn lift(&self, place: Vector2<f64>) -> Vec3 {
         let station = self.station(place);
         let off = place - station.flat;
@@ -160,24 +160,24 @@ impl DevelopedStrip {
         station.point + station.tangent * off.dot(&station.flat_tangent) + station.inward * off.dot(&n)
     }
 
-    /// The base curve in the plane.
+    /// Returns the base curve in the plane.
     pub(super) fn base(&self, along: f64) -> f64 {
         self.station(Vector2::new(along, 0.0)).flat.y
     }
 
-    /// Unit vector within the face across the edge, into the plate.
+    /// Returns the unit vector within the face across the edge, into the plate.
     pub(super) fn inward(&self, along: f64) -> Vec3 {
         self.station(Vector2::new(along, 0.0)).inward
     }
 
-    /// Unit normal of the face towards the scanner.
+    /// Returns the unit normal of the face towards the scanner.
     pub(super) fn normal(&self, along: f64) -> Vec3 {
         let station = self.station(Vector2::new(along, 0.0));
         station.tangent.cross(&station.inward)
     }
 
     fn station(&self, place: Vector2<f64>) -> &Station {
-        // The plane's first axis is the chord of the rolled-out base curve: places along it nearly are stations.
+        // The plane's first axis is the chord of the developed base curve: places along it nearly are stations.
         let at = self.stations.partition_point(|s| (place - s.flat).dot(&s.flat_tangent) > 0.0);
         let near = |i: usize| (place - self.stations[i].flat).norm_squared();
         let at = at.min(self.stations.len() - 1);
@@ -185,13 +185,13 @@ impl DevelopedStrip {
         &self.stations[at]
     }
 
-    /// First and last place along the plane's first axis.
+    /// Returns the first and the last place along the plane's first axis.
     pub(super) fn span(&self) -> (f64, f64) {
         (self.stations[0].flat.x, self.stations[self.stations.len() - 1].flat.x)
     }
 }
 
-/// The edge seen along the mean normal, and the weight (0 to 1) with which each crossing belongs to it.
+/// Fits the edge seen along the mean normal; also returns the weight (0 to 1) with which each crossing belongs to it.
 fn robust_across(axis: UniformKnots, data: &[(Vec3, Vec3)], step: f64) -> Option<(SplineCurve, Vec<f64>)> {
     let mut weights = vec![1.0; data.len()];
     let mut spread = 20.0 * step;
@@ -218,7 +218,7 @@ fn too_few(seen: &Coverage, length: f64) -> OutlineError {
 
 /// Develops the curve `depth` below one with the normals of its surface: the direction turns in the plane as it turns in
 /// the surface.
-fn roll_out(points: &[(Vec3, Vec3)], depth: f64) -> Vec<Station> {
+fn develop(points: &[(Vec3, Vec3)], depth: f64) -> Vec<Station> {
     let n = points.len();
     let on_face = |i: usize| points[i + 1].0 - points[i].0;
     let chord = |i: usize| on_face(i) - (points[i + 1].1 - points[i].1) * depth;

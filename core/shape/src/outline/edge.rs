@@ -1,55 +1,57 @@
-//! One edge in its rolled-out strip: a stiff curve through the brackets in which the lattice says it lies.
+//! One edge as the penalised spline of largest likelihood in its developed strip, by Newton's method.
 //!
-//! The likelihood of the curve is the product of those of its brackets. It is unbiased where the middle of a
-//! bracket is not: where the edge runs along a lattice row its brackets are all alike but for the few cells where it
-//! changes rows, and those few locate it. Where it changes none, it says so (`posterior`).
+//! In: projected crossings of one edge; out: the edge curve and its posterior. The likelihood of the curve is the product of
+//! the interval-censored likelihoods of its lattice lines (`edge_likelihood`), the prior a curvature like white noise. It is
+//! unbiased where the middle between two samples is not: along a lattice row all lines have the same interval but for the
+//! few cells where the edge changes rows, and those few locate it. Where it changes none, the posterior is sampled
+//! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn.
 
 use nalgebra::{Cholesky, Dyn, Vector2};
+use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
-use super::edge_likelihood::{self, BeamModel, EdgeLikelihood, Line};
+use super::edge_likelihood::{self, BeamModel, EdgeLikelihood, LatticeLine};
 use super::edge_posterior::Posterior;
 use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
-use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
-use platen_numerics::uniform_knots::UniformKnots;
 
 /// Span of the curve, metres.
 const SPAN: f64 = 0.25;
 
-/// A cut edge, rolled out, is straight but for the membrane strain of the plate and the bow and waviness of the cut:
+/// Prior: a cut edge, developed, is straight but for the membrane strain of the plate and the bow and waviness of the cut:
 /// curvature, 1/m, over a length, metres. Over 3 m that is a bow of 1 mm and, at twice its deviation, that of a sphere of R 11 m.
 const CURVATURE: (f64, f64) = (0.003, 0.3);
 
-/// What all lines of an edge share, metres: how square the cut is, the shape of the footprint. On the plates of a
-/// simulator of other make edges are 0.1 to 0.3 mm farther off than their lines' scatter tells.
+/// Standard deviation of errors that all lines of an edge share, metres: squareness of the cut, shape of the footprint. On
+/// plates of an independent simulator edges are 0.1 to 0.3 mm farther off than the scatter of their lines explains.
 const COMMON: f64 = 1e-4;
 
-/// Newton steps with widened brackets, and then at most, and the movement that ends them, metres.
+/// Newton steps with widened likelihoods, then further ones at most, and the movement that ends them, metres.
 const WIDENED_ROUNDS: i32 = 8;
 const ROUNDS: i32 = 32;
 const STILL: f64 = 1e-7;
 
-/// Columns and rows of the lattice from which on an edge that crosses them is dithered.
+/// Columns and rows of the lattice that an edge must cross to be dithered, that is, to lie at random between them.
 const DITHERED: u32 = 6;
 
-/// Rounds of fitting the curve and telling its footprint in turn.
+/// Rounds of fitting the curve and estimating its footprint in turn.
 const FOOTPRINT_ROUNDS: usize = 3;
 
 /// The crossings of an edge in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeData {
     strip: DevelopedStrip,
-    lines: Vec<Line>,
+    lines: Vec<LatticeLine>,
     dithered: bool,
     from: Vec3,
     to: Vec3,
 }
 
 impl EdgeData {
-    /// Rolls out the crossings along the edge from `from` to `to`.
+    /// Develops the crossings along the edge from `from` to `to`.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
@@ -60,24 +62,24 @@ impl EdgeData {
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let strip = DevelopedStrip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
-        let line = |crossing| Line::new(&strip, crossing, thickness, sampling.angle);
-        let lines: Vec<Line> = crossings.iter().map(line).collect();
+        let line = |crossing| LatticeLine::new(&strip, crossing, thickness, sampling.angle);
+        let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
         Ok(Self { strip, lines, dithered, from, to })
     }
 }
 
-/// Half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges. Of one that is
-/// not dithered all beams may be mixed or none: it counts only where no other edge tells.
+/// Estimates half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges. Along an
+/// edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
 pub(super) fn footprint(edges: &[EdgeData], sampling: Sampling) -> f64 {
     let any = edges.iter().any(|edge| edge.dithered);
     let telling = edges.iter().filter(|edge| edge.dithered || !any);
     edge_likelihood::footprint(telling.flat_map(|edge| &edge.lines), sampling.angle)
 }
 
-/// True when the edge, about at `base`, crosses so many columns and rows of the lattice that where it lies between them
-/// is as good as random.
-fn is_dithered(lines: &[Line], base: impl Fn(f64) -> f64, step: f64) -> bool {
+/// Returns true when the edge, about at `base`, crosses so many columns and rows of the lattice that its place between them
+/// is practically random.
+fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> bool {
     let on_it = lines.iter().filter(|l| l.is_near(base(l.along), step));
     let (low, high) = on_it.fold(([u32::MAX; 2], [0; 2]), |(low, high), l| {
         ([0, 1].map(|k| low[k].min(l.place[k])), [0, 1].map(|k| high[k].max(l.place[k])))
@@ -90,7 +92,7 @@ fn is_dithered(lines: &[Line], base: impl Fn(f64) -> f64, step: f64) -> bool {
 pub(super) struct Edge {
     strip: DevelopedStrip,
     posterior: Posterior,
-    /// Where crossings agree with it.
+    /// Coverage by the crossings that agree with it.
     pub(super) seen: Coverage,
     pub(super) from: f64,
     pub(super) to: f64,
@@ -108,8 +110,9 @@ impl Edge {
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
-        let brackets = |footprint: f64| lines.iter().map(move |l| l.bracket(BeamModel::of(footprint), noise));
-        let mut used: Vec<EdgeLikelihood> = brackets(footprint).collect();
+        let likelihoods =
+            |footprint: f64| lines.iter().map(move |l| l.likelihood(BeamModel::of(footprint), noise));
+        let mut used: Vec<EdgeLikelihood> = likelihoods(footprint).collect();
         let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         let mut own = footprint;
         for _ in 0..FOOTPRINT_ROUNDS {
@@ -121,7 +124,7 @@ impl Edge {
             if own == last {
                 break;
             }
-            used = brackets(own).collect();
+            used = likelihoods(own).collect();
             (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
         }
         let (from, to) = (strip.flatten(from).x, strip.flatten(to).x);
@@ -135,17 +138,17 @@ impl Edge {
         Ok(Self { strip, posterior, seen, from, to })
     }
 
-    /// The point of the edge at a distance along it.
+    /// Returns the point of the edge at a distance along it.
     pub(super) fn point(&self, along: f64) -> Vec3 {
         self.strip.lift(Vector2::new(along, self.posterior.curve.at(along)))
     }
 
-    /// Place along the edge nearest to a point.
+    /// Returns the place along the edge nearest to a point.
     pub(super) fn along(&self, point: Vec3) -> f64 {
         self.strip.flatten(point).x
     }
 
-    /// Length of the edge's parallel at a depth below the face, metres.
+    /// Returns the length of the edge's parallel at a depth below the face, metres.
     pub(super) fn length_below(&self, depth: f64) -> f64 {
         const PARTS: usize = 256;
         let at = |i: usize| {
@@ -155,32 +158,32 @@ impl Edge {
         (0..PARTS).map(|i| (at(i + 1) - at(i)).norm()).sum()
     }
 
-    /// Standard deviation across the edge, metres.
+    /// Returns the standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
         self.posterior.variance(along).sqrt().hypot(COMMON)
     }
 }
 
-/// The most likely curve, by Newton's method from the middles of the brackets: first a step for each of ever less widened ones,
-/// which pull from afar. It never goes on from the curve of another footprint: with 2 mm of noise that one may lie at a
-/// lesser maximum of the likelihood, 1 mm off, and the footprint that it tells would keep it there.
+/// Maximises the likelihood by Newton's method from the middles of the intervals: first one step for each of ever less widened
+/// likelihoods (continuation), which have a slope far from the edge. It never starts from the curve of another footprint:
+/// with 2 mm of noise that one may lie at a lesser maximum, 1 mm off, and the footprint estimated there would keep it.
 fn most_likely(
     prior: &CurveFit,
-    brackets: &[EdgeLikelihood],
+    lines: &[EdgeLikelihood],
     step: f64,
 ) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
-    for bracket in brackets {
-        let (to, weight) = bracket.middle(step);
-        normal.add(bracket.along, to, weight);
+    for line in lines {
+        let (to, weight) = line.middle(step);
+        normal.add(line.along, to, weight);
     }
     let (mut curve, _) = normal.solve()?;
     for round in 0..WIDENED_ROUNDS {
-        (curve, _) = pulled(prior, brackets, &curve, 2.0 * step * 0.5_f64.powi(round))?;
+        (curve, _) = newton_step(prior, lines, &curve, 2.0 * step * 0.5_f64.powi(round))?;
     }
     let mut rounds = 0;
     loop {
-        let (next, precision) = pulled(prior, brackets, &curve, 0.0)?;
+        let (next, precision) = newton_step(prior, lines, &curve, 0.0)?;
         rounds += 1;
         if next.distance(&curve) < STILL || rounds == ROUNDS {
             return Some((next, precision));
@@ -190,16 +193,16 @@ fn most_likely(
 }
 
 /// One Newton step of a curve.
-fn pulled(
+fn newton_step(
     prior: &CurveFit,
-    brackets: &[EdgeLikelihood],
+    lines: &[EdgeLikelihood],
     curve: &SplineCurve,
     least_soft: f64,
 ) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
     let mut normal = prior.clone();
-    for bracket in brackets {
-        let (to, weight) = bracket.pull(curve.at(bracket.along), least_soft);
-        normal.add(bracket.along, to, weight);
+    for line in lines {
+        let (to, weight) = line.newton_step(curve.at(line.along), least_soft);
+        normal.add(line.along, to, weight);
     }
     normal.solve()
 }

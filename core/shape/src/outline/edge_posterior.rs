@@ -1,22 +1,26 @@
-//! What the lines of an edge say of it together: its expected curve, and how well that is known.
+//! Posterior of an edge curve: mean and covariance.
+//!
+//! By Laplace's method (the normal distribution at the maximum) where the edge is dithered, that is, crosses many lines of the
+//! lattice. Along a lattice line the likelihood is flat between steep sides and Laplace's method fails: there the curve at four
+//! places, the footprint and the softness are integrated over by adaptive Metropolis.
 
 use nalgebra::{Cholesky, DMatrix, Dyn, SMatrix, SVector};
-
-use super::edge_likelihood::{BeamModel, FOOTPRINT_SPREAD, Line, SOFTNESS};
-use super::{SEED, Sampling};
 use platen_numerics::adaptive_metropolis::mean_and_covariance;
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
-/// Places of the edge that are free where its posterior is not normal: ends and thirds. Between them a stiff curve leaves
-/// two tenths of a millimetre open.
+use super::edge_likelihood::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
+use super::{SEED, Sampling};
+
+/// Free places of the edge where its posterior is sampled: ends and thirds. Between them the prior leaves two tenths of a
+/// millimetre undetermined.
 const PLACES: usize = 4;
 
-/// Those, the footprint and the softness, the latter as the logarithm of its part of that of a dithered edge, which also
-/// holds what the curve of such an edge does not follow. Its mean; the standard deviation is one.
+/// Dimensions sampled: those places, the footprint, and the logarithm of the softness relative to that of a dithered edge
+/// (which includes what the curve of such an edge does not follow), of this prior mean and standard deviation one.
 const FREE: usize = PLACES + 2;
 const LOG_SOFTNESS: f64 = -1.2;
 
-/// Weight with which the places are held, 1/m^2, while what they leave open is told: as stiff as the prior's own.
+/// Weight with which the places are held, 1/m^2, to find the prior given these places: as stiff as the prior's own.
 const HELD: f64 = 1e8;
 
 /// First steps: of places in parts of the lattice's spacing, of the others in standard deviations.
@@ -34,23 +38,21 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// About the most likely curve, as a normal distribution (Laplace's method): of an edge that crosses many lines
-    /// of the lattice.
+    /// Approximates the posterior by the normal distribution at its maximum (Laplace's method): for a dithered edge.
     pub(super) fn laplace(curve: SplineCurve, precision: &Cholesky<f64, Dyn>) -> Self {
         Self { curve, covariance: precision.inverse() }
     }
 
-    /// Of an edge along a line of the lattice, which lies anywhere between two of them: the product of its brackets is flat
-    /// between steep sides, its maximum may be anywhere within and its curvature there tells nothing of its width. And
-    /// where mixed pixels begin on it depends on the footprint as much as on the edge. So all that is free is
-    /// integrated over, by a Metropolis chain.
+    /// Samples the posterior by adaptive Metropolis: for an edge along a line of the lattice, which lies anywhere between two of
+    /// them. Its likelihood is flat between steep sides; the place of its maximum and the curvature there do not give its
+    /// width, and where mixed pixels begin depends on the footprint as much as on the edge.
     ///
     /// `curve` is a likely one, its ends the places of the edge's corners along it, `footprint` that of all edges,
-    /// radians. `None` when the prior leaves the curve open.
+    /// radians. `None` when the prior leaves the curve undetermined.
     pub(super) fn sampled(
         curve: &SplineCurve,
         prior: &CurveFit,
-        lines: &[Line],
+        lines: &[LatticeLine],
         [from, to]: [f64; 2],
         footprint: f64,
         sampling: Sampling,
@@ -58,8 +60,7 @@ impl Posterior {
         let Sampling { step, noise, .. } = sampling;
         let places: [_; PLACES] =
             std::array::from_fn(|k| curve.functional(from + (to - from) * k as f64 / (PLACES - 1) as f64));
-        // The stiffest curves through one of the places and zero at the others, and what they leave open: the prior
-        // under the condition that the places are known.
+        // The prior given the places: its mean as a linear map of the places, and its covariance.
         let mut held = prior.clone();
         for place in &places {
             held.hold(place, HELD);
@@ -71,7 +72,7 @@ impl Posterior {
         let between = factor.inverse() - &through * across.transpose();
         let parts: [SplineCurve; PLACES] =
             std::array::from_fn(|k| curve.with(through.column(k).into_owned()));
-        let at_lines: Vec<(&Line, f64, SVector<f64, PLACES>)> = lines
+        let at_lines: Vec<(&LatticeLine, f64, SVector<f64, PLACES>)> = lines
             .iter()
             .map(|l| (l, curve.at(l.along), SVector::from_fn(|k, _| parts[k].at(l.along))))
             .collect();
@@ -81,8 +82,8 @@ impl Posterior {
                 footprint: footprint * (1.0 + FOOTPRINT_SPREAD * free[PLACES]).max(0.0),
                 softness: SOFTNESS * (LOG_SOFTNESS + free[PLACES + 1]).exp(),
             };
-            let likelihood = |(line, at, parts): &(&Line, f64, SVector<f64, PLACES>)| {
-                line.bracket(beam, noise).likelihood(at + parts.dot(&by))
+            let likelihood = |(line, at, parts): &(&LatticeLine, f64, SVector<f64, PLACES>)| {
+                line.likelihood(beam, noise).value(at + parts.dot(&by))
             };
             let together = |lines: &[_]| lines.iter().map(likelihood).product::<f64>().ln();
             let bent = curve.moved(&(&through * by));
@@ -98,7 +99,7 @@ impl Posterior {
         Some(Self { curve: curve.moved(&(&through * mean)), covariance })
     }
 
-    /// Variance across the edge at a place along it.
+    /// Returns the variance across the edge at a place along it.
     pub(super) fn variance(&self, along: f64) -> f64 {
         let functional = self.curve.functional(along);
         functional.dot(&(&self.covariance * &functional))

@@ -1,8 +1,8 @@
-//! Why a face has no outline.
+//! Errors of the outline.
 
-use crate::surface::Undetermined;
+use platen_numerics::spline_fit::Undetermined;
 
-/// Why the outline of a plate's face could not be told.
+/// Reason why the outline of a plate's face could not be located.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OutlineError {
     /// The longest boundary loop is too short to be the plate's.
@@ -16,16 +16,16 @@ pub enum OutlineError {
         /// Millimetres.
         expected_mm: f64,
     },
-    /// There are not four corners that straight edges join.
-    #[error("{found} corners of the plate can be told, not four; clear what hides its corners")]
+    /// No four corners joined by straight edges.
+    #[error("{found} corners of the plate were found, 4 are needed; clear what hides its corners")]
     Corners {
         /// Corner candidates with straight edges on both sides.
         found: usize,
     },
     /// An edge is hidden.
     #[error(
-        "{seen_percent:.0} % of one edge of the plate is seen, too little to tell where it is; clear what hides it, or tilt it \
-         where it mirrors the beam"
+        "{seen_percent:.0} % of one edge of the plate is seen, too little to locate it; clear what hides it, or tilt it where it \
+         mirrors the beam"
     )]
     Edge {
         /// Part of the edge that was seen, percent.
@@ -34,7 +34,7 @@ pub enum OutlineError {
     /// The face has too few samples to be smoothed.
     #[error("outline: {0}; scan again with the plate in full view")]
     Face(#[from] Undetermined),
-    /// The hint does not tell the corners apart.
+    /// The hint does not distinguish the corners.
     #[error(
         "the u axis hint lies {angle_deg:.0} degrees from the nearest edge of the plate; turn it to within 35 degrees of \
          the edge along which u grows"
@@ -45,8 +45,8 @@ pub enum OutlineError {
     },
     /// A side comes out wrong where an edge beside it is hidden.
     #[error(
-        "{seen_percent:.0} % of one edge of the plate is seen, too little to tell the plate's {side}: it comes out at \
-         {found_mm:.0} mm, the plate file says {expected_mm:.0} mm; clear what hides it, or tilt it where it mirrors the beam"
+        "{seen_percent:.0} % of one edge of the plate is seen, too little to measure the plate's {side}: it comes out at \
+         {found_mm:.0} mm, {expected_mm:.0} mm in the plate file; clear what hides it, or tilt it where it mirrors the beam"
     )]
     Hidden {
         /// Part of the edge that was seen, percent.
@@ -60,7 +60,7 @@ pub enum OutlineError {
     },
     /// A side differs from the plate file.
     #[error(
-        "the plate's {side} measures {found_mm:.0} mm on its mid-surface, the plate file says {expected_mm:.0} mm; check \
+        "the plate's {side} measures {found_mm:.0} mm on its mid-surface, {expected_mm:.0} mm in the plate file; check \
          the recipe and the u axis hint"
     )]
     WrongSize {

@@ -1,16 +1,19 @@
-//! The scanned face smoothed as a whole: a height over the plate's mean plane.
+//! Height field: the scanned face as one bicubic spline over the plate's mean plane, by robust penalised least squares.
 //!
-//! Both what the outline and what the mesh need of the face follows from it. An edge is known by directions: between two beams,
-//! across a mixed one. Where it is in space follows from the range of the face there. That of the few cells about a crossing has half
-//! of a single beam's noise, and a beam that meets the face at 60 degrees from its normal carries it into the edge nearly twofold;
-//! that of the whole face has a thirtieth. One noisy sample moves nothing, and holes are bridged.
+//! Smoothing by REML, then one reweighting by Tukey's biweight. Used by the outline and the mesh. An edge is located by
+//! directions (between two beams, across a mixed one); its position in space follows from the range of the face there.
+//! The range from the few cells about a crossing has half of a single beam's noise, which a beam at 60 degrees from the
+//! normal carries into the edge nearly twofold; that of the height field has a thirtieth. Single outliers have no effect,
+//! and holes are bridged. Own; Masuda et al. use the raw samples.
 
 use nalgebra::Vector2;
+use platen_numerics::simd::dispatch_simd;
+use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
 
 use super::plane::Plane;
-use crate::surface::{FittedSpline, SplineFit, TensorSpline, Undetermined, UniformKnots};
 use crate::{Patch, Sample, Vec3};
-use platen_numerics::simd::dispatch_simd;
 
 /// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
 /// all samples.
@@ -22,7 +25,7 @@ const ENOUGH: usize = 30_000;
 /// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
 const CUT_OFF: f64 = 5.0;
 
-/// The cosine of the incidence never counts below this one: beyond 87 degrees a sample tells nothing.
+/// Least cosine of the incidence in weights: that of 87 degrees.
 const LEAST_COSINE: f64 = 0.05;
 
 /// Newton steps from a point near the face, at most; each squares an error of a few parts in a hundred, and one of less than
@@ -30,10 +33,10 @@ const LEAST_COSINE: f64 = 0.05;
 const STEPS: usize = 4;
 const STILL: f64 = 1e-8;
 
-/// A point that would move by more than this, metres, is none of the face.
+/// A point that would move by more than this, metres, does not belong to the face.
 const REACH: f64 = 0.5;
 
-/// The smooth scanned face.
+/// The smoothed scanned face, as a height over a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightField {
     plane: Plane,
@@ -43,7 +46,7 @@ pub struct HeightField {
     pub(crate) noise_scale: f64,
 }
 
-/// The samples of a height_field over its plane.
+/// Samples as heights over the plane.
 #[derive(Debug, Default)]
 struct Heights {
     places: Vec<[f64; 2]>,
@@ -78,7 +81,7 @@ impl HeightField {
         Ok(Self { plane, height: fitted.spline, noise_scale })
     }
 
-    /// The height_field of a plate by its corners.
+    /// Fits the samples of a plate given by its corners.
     #[cfg(test)]
     pub(crate) fn between(corners: [Vec3; 4], patch: &Patch) -> Result<Self, Undetermined> {
         let (along, across) = (corners[1] - corners[0], corners[3] - corners[0]);
@@ -86,14 +89,14 @@ impl HeightField {
         Self::fit(patch, plane.along(plane.direction(along)))
     }
 
-    /// Where the beam through `point` meets the height_field, and the unit normal there, towards the scanner. `None` where it
-    /// does not.
+    /// Intersects the beam through `point` with the face; also returns the unit normal there, towards the scanner. `None`
+    /// where they do not meet.
     pub(crate) fn meet(&self, point: Vec3) -> Option<(Vec3, Vec3)> {
         self.along(point, point.normalize())
     }
 
-    /// Where the line through `point` along a unit direction away from the scanner meets the height_field, and the unit normal there.
-    /// `None` where it does not.
+    /// Intersects the line through `point` along a unit direction away from the scanner with the face, by Newton's method;
+    /// also returns the unit normal there. `None` where they do not meet.
     pub(crate) fn along(&self, point: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
         let mut at = point;
         let mut normal = self.plane.normal();
@@ -101,7 +104,7 @@ impl HeightField {
             let place = self.plane.project(at);
             let [[height], [by_x], [by_y]] = self.height.frame(place.x, place.y);
             normal = self.plane.normal() - self.plane.lift_direction(Vector2::new(by_x, by_y));
-            // Towards the height_field the line falls, against its normal.
+            // Towards the face the line falls, against its normal.
             let approach = normal.dot(&direction);
             if approach.is_nan() || approach >= 0.0 {
                 return None;
@@ -117,7 +120,7 @@ impl HeightField {
 }
 
 impl Heights {
-    /// The spline through the heights, and how much larger than stated their noise is.
+    /// Fits the heights; also returns the ratio of their observed to their stated noise.
     fn smooth(&self, axes: [UniformKnots; 2]) -> Result<(FittedSpline<1>, f64), Undetermined> {
         let all = self.weighted(axes, |i| self.per_sigmas[i].powi(2));
         let penalty = all.select_penalty([1.0]).penalty;
@@ -149,7 +152,7 @@ impl Heights {
     }
 }
 
-/// One over the standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
+/// Returns one over the standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
 #[inline(always)]
 pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
     let range = sample.point.norm();
@@ -157,14 +160,14 @@ pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
     range / (f64::from(sample.sigma) * towards)
 }
 
-/// Tukey's biweight of a residual, in standard deviations.
+/// Returns Tukey's biweight of a residual, in standard deviations.
 #[inline(always)]
 pub(crate) fn biweight(residual: f64) -> f64 {
     let x = residual * (1.0 / CUT_OFF);
     (1.0 - x * x).max(0.0).powi(2)
 }
 
-/// Standard deviation of normally spread residuals with outliers, from the median of their sizes.
+/// Returns the standard deviation of normal residuals with outliers: median absolute deviation.
 fn robust_scale(mut sizes: Vec<f64>) -> f64 {
     /// The median of |x| of the standard normal distribution.
     const MEDIAN: f64 = 0.674_489_750_196_081_7;
@@ -176,7 +179,7 @@ fn robust_scale(mut sizes: Vec<f64>) -> f64 {
     (*median / MEDIAN).max(1e-6)
 }
 
-/// The samples that suffice for a smooth face.
+/// Thins the samples to as many as a smooth face needs.
 pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
     let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
     let columns = patch.samples.chunk_by(|a, b| a.column == b.column);

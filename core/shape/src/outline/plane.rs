@@ -1,10 +1,10 @@
-//! The plate's mean plane.
+//! The plate's mean plane: projection of points to it and heights over it.
 
 use nalgebra::Vector2;
 
 use crate::Vec3;
 
-/// The plate's principal plane.
+/// A plane with an origin and two orthonormal axes.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plane {
     origin: Vec3,
@@ -12,7 +12,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// The plane of points of which `normal` is the mean normal. Coverage against `normal` its axes turn
+    /// Builds the plane through `origin` across `normal`. Seen against `normal` its axes turn
     /// counter-clockwise.
     pub(crate) fn new(origin: Vec3, normal: Vec3) -> Self {
         let along = if normal.z.abs() < 0.9 { Vec3::z() } else { Vec3::x() };
@@ -20,18 +20,18 @@ impl Plane {
         Self { origin, axes: [first, normal.normalize().cross(&first)] }
     }
 
-    /// The same plane with its first axis along `direction`.
+    /// Returns the same plane with its first axis along `direction`.
     pub(crate) fn along(&self, direction: Vector2<f64>) -> Self {
         let first = self.lift_direction(direction).normalize();
         Self { origin: self.origin, axes: [first, self.normal().cross(&first)] }
     }
 
-    /// Unit normal towards the scanner.
+    /// Returns the unit normal towards the scanner.
     pub(crate) fn normal(&self) -> Vec3 {
         self.axes[0].cross(&self.axes[1])
     }
 
-    /// Height of a point over the plane.
+    /// Returns the height of a point over the plane.
     pub(crate) fn height(&self, point: Vec3) -> f64 {
         self.normal().dot(&(point - self.origin))
     }

@@ -1,4 +1,7 @@
-//! The seen part of the boundary loop.
+//! Visible part of the boundary loop: the crossings along it where the plate itself ends.
+//!
+//! In: the loop of `boundary_loop` and the crossings of the patch. Out: their places in the mean plane, counter-clockwise, for
+//! `corners` and `edge`. Where something nearer hides the edge its crossings are left out.
 
 use nalgebra::Vector2;
 
@@ -12,7 +15,7 @@ use crate::{PlateSpec, Vec3};
 /// The plate's loop is at least this part of its circumference long, counted in lattice steps.
 const LOOP_PART: f64 = 0.6;
 
-/// Places on the loop where the plate is seen to end, counter-clockwise seen from the scanner.
+/// Places on the loop where the plate ends visibly, counter-clockwise seen from the scanner.
 pub(super) struct VisibleBoundary<'a> {
     /// Crossings of each place.
     crossings: Vec<Vec<&'a Crossing>>,
@@ -25,6 +28,8 @@ pub(super) struct VisibleBoundary<'a> {
 }
 
 impl<'a> VisibleBoundary<'a> {
+    /// Collects the crossings along the longest loop.
+    ///
     /// # Errors
     /// [`OutlineError::Loop`] when there is no loop of the plate's length.
     pub(super) fn of(patch: &'a Patch, spec: &PlateSpec) -> Result<Self, OutlineError> {
@@ -60,20 +65,20 @@ impl<'a> VisibleBoundary<'a> {
         Ok(Self { crossings, points, flat, plane, step })
     }
 
-    /// Crossings of the places from one to another.
+    /// Returns the crossings of the places from one to another.
     pub(super) fn between(&self, from: usize, to: usize) -> impl Iterator<Item = &'a Crossing> {
         let n = self.crossings.len();
         let count = (to + n - from) % n;
         (0..count).flat_map(move |i| self.crossings[(from + i) % n].iter().copied())
     }
 
-    /// A corner, about at the height of the loop next to it.
+    /// Lifts a corner from the plane to about the height of the loop next to it.
     pub(super) fn lift(&self, corner: &Corner) -> Vec3 {
         self.points[corner.at] + self.plane.lift_direction(corner.point - self.flat[corner.at])
     }
 }
 
-/// Spacing of the samples on the plate: the side of the square that a sample stands for, metres.
+/// Returns the spacing of the samples on the plate: the side of the square that a sample stands for, metres.
 fn spacing(patch: &Patch) -> f64 {
     let widths = patch.crossings.iter().filter(|c| c.beyond != Beyond::SideFace);
     let mut widths: Vec<f64> = widths.map(|c| (c.outside - c.inside).norm()).collect();

@@ -1,15 +1,15 @@
-//! The outline of the plate as it was cut, in its own plane.
+//! Blank: the outline of the plate as it was cut, in its own plane.
 //!
-//! As ordered it is a rectangle, exactly; a scan of the blank tells more (`baseline`): each of its edges is a line with a bow, a
+//! As ordered it is a rectangle, exactly; a scan of the blank refines it (`correspondence`): each of its edges is a line with a bow, a
 //! parabola. It is the outline that all later strokes of the same plate are mapped to. S(u, v) keeps the rectangle as ordered, and
 //! goes on beyond it where the plate is larger by millimetres.
 
 /// Steps of a rounded outline.
 const PER_METRE: f64 = (1_u64 << 30) as f64;
-/// Where the material of the four edges lies in (u, v).
+/// Material coordinates (u, v) of the four edges.
 ///
 /// Edges v = 0, u = W, v = H, u = 0, each from corner to corner counter-clockwise as the boundary of a
-/// [`DiskMesh`](crate::DiskMesh).
+/// mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Corners (0,0), (W,0), (W,H), (0,H), metres.
@@ -23,7 +23,7 @@ pub struct Blank {
 }
 
 impl Blank {
-    /// The rectangle as ordered, metres: known exactly.
+    /// Builds the rectangle as ordered, metres: known exactly.
     #[must_use]
     pub fn rectangle(width: f64, height: f64) -> Self {
         Self {
@@ -34,7 +34,7 @@ impl Blank {
         }
     }
 
-    /// To whole nanometres (2^-30 m): what was rounded comes back to the last bit from text in millimetres, rounded again.
+    /// Rounds to whole nanometres (2^-30 m): a rounded outline survives text in millimetres to the last bit, rounded again.
     #[must_use]
     pub fn rounded(mut self) -> Self {
         let sigmas = self.corner_sigma.iter_mut().flatten().chain(&mut self.edge_sigma);
@@ -44,14 +44,14 @@ impl Blank {
         self
     }
 
-    /// Mean lengths of opposite edges, straight from corner to corner: along u, along v, metres.
+    /// Returns the mean lengths of opposite edges, straight from corner to corner: along u, along v, metres.
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
         let [bottom, right, top, left] = [(0, 1), (1, 2), (2, 3), (3, 0)].map(|(a, b)| self.distance(a, b));
         [0.5 * (bottom + top), 0.5 * (right + left)]
     }
 
-    /// The diagonal from (0,0) less the one from (W,0), metres.
+    /// Returns the diagonal from (0,0) less the one from (W,0), metres.
     #[must_use]
     pub fn diagonal_difference(&self) -> f64 {
         self.distance(0, 2) - self.distance(1, 3)
@@ -62,7 +62,7 @@ impl Blank {
         (b[0] - a[0]).hypot(b[1] - a[1])
     }
 
-    /// The place on an edge at a share (0 to 1) of its length from its first corner, metres.
+    /// Returns the place on an edge at a share (0 to 1) of its length from its first corner, metres.
     #[must_use]
     pub fn place(&self, edge: usize, share: f64) -> [f64; 2] {
         let next = (edge + 1) % 4;
@@ -79,8 +79,8 @@ impl Blank {
         [on_line[0] + way[1] * out, on_line[1] - way[0] * out]
     }
 
-    /// Where the vertices of a boundary loop lie when every one keeps its share of its edge's arc length (paper, section
-    /// 4.3): one place a vertex, metres. `corners` are the corners' positions in the loop, `arc` the vertices' arc lengths from the first
+    /// Places the vertices of a boundary loop by their share of their edge's arc length (Masuda et al., 4.3): one place a
+    /// vertex, metres. `corners` are the corners' positions in the loop, `arc` the vertices' arc lengths from the first
     /// corner of their edge.
     #[must_use]
     pub fn places(&self, corners: [usize; 4], arc: &[f64], edge_length: [f64; 4]) -> Vec<[f64; 2]> {

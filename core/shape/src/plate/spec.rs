@@ -1,8 +1,8 @@
-//! What is known of the plate before it is scanned.
+//! Nominal plate: size, thickness, rough orientation and region of interest.
 
 use crate::{Blank, Vec3};
 
-/// The plate as ordered, and what tells its corners apart.
+/// The plate as ordered, and the hint that distinguishes its corners.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlateSpec {
     /// Extent along u, metres.
@@ -11,16 +11,16 @@ pub struct PlateSpec {
     pub height: f64,
     /// Thickness, metres.
     pub thickness: f64,
-    /// How far inside the mid-surface's edge the scanned face ends (bevelled edges), metres.
+    /// Distance from the mid-surface's edge inwards to that of the scanned face (bevelled edges), metres.
     pub face_inset: f64,
     /// Rough direction of growing u, scanner frame, any length. Decides which corner is (0, 0).
     pub u_axis: Option<Vec3>,
-    /// Where the plate can be, scanner frame.
+    /// Box that contains the plate, scanner frame.
     pub region: Option<RegionOfInterest>,
 }
 
 impl PlateSpec {
-    /// The outline as ordered.
+    /// Returns the outline as ordered.
     #[must_use]
     pub fn rectangle(&self) -> Blank {
         Blank::rectangle(self.width, self.height)

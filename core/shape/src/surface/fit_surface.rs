@@ -1,14 +1,18 @@
-//! S(u, v) from all samples, once the mesh is flattened.
+//! Fit of S(u, v) to all samples by robust penalised least squares, once the mesh is flattened (Masuda et al., 4.4).
 //!
 //! A spline through the vertices' (u, v) carries the chart from the vertices to every place (a, b) of the face. Each
 //! sample then has its (u, v), its own mid-surface point (half the thickness below it along the face's normal) and its
 //! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
 
+use platen_numerics::reml::Penalty;
+use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
+use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::uniform_knots::UniformKnots;
+
 use crate::mesh::{Facets, SmoothFace};
 use crate::outline::{biweight, per_sigma_across};
-use crate::surface::{FittedSpline, Mask, SplineFit, Surface, TensorSpline, Undetermined, UniformKnots};
+use crate::surface::{Mask, Surface};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
-use platen_numerics::reml::Penalty;
 
 /// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without one gets spans of twice the length.
 const SPAN: f64 = 0.06;
@@ -19,12 +23,12 @@ const MASK_CELL: f64 = 0.025;
 /// Rows up to this far apart are neighbours: a single dropout is no hole.
 const NEIGHBOUR_ROWS: u32 = 2;
 
-/// How good the scan was.
+/// Quality of the scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
     /// Samples on the plate.
     pub n_samples: usize,
-    /// Samples that count: not thrown out as outliers.
+    /// Samples used: not rejected as outliers.
     pub n_used: usize,
     /// Share of the plate that was seen.
     pub coverage: f64,
@@ -36,7 +40,7 @@ pub struct Quality {
     pub lattice_step: f64,
 }
 
-/// The surface and how good its samples were.
+/// The fitted surface and the quality of its samples.
 pub(crate) struct FitToSamples {
     pub(crate) surface: Surface,
     pub(crate) quality: Quality,
@@ -89,7 +93,7 @@ pub(crate) fn fit_surface(
     Ok(FitToSamples { surface, quality })
 }
 
-/// The chart over (a, b), by least squares on the vertices, with a penalty that acts below three spans only.
+/// Fits the chart over (a, b), by least squares on the vertices, with a penalty that acts below three spans only.
 fn carry(face: &SmoothFace, places: &[[f64; 2]], chart: &Chart) -> Result<TensorSpline<2>, Undetermined> {
     let (a, b) = (face.mid.u, face.mid.v);
     let mut fit = SplineFit::<2>::new(a, b);
@@ -101,7 +105,7 @@ fn carry(face: &SmoothFace, places: &[[f64; 2]], chart: &Chart) -> Result<Tensor
     Ok(fit.solve_with(Penalty { u: weight(a.step()), v: weight(b.step()) })?.spline)
 }
 
-/// Mean normal of the plate: at right angles to both diagonals.
+/// Returns the mean normal of the plate: at right angles to both diagonals.
 fn direction(mid: &TensorSpline<3>) -> Vec3 {
     let corner = |a: f64, b: f64| Vec3::from(mid.point(a, b));
     let (w, h) = (mid.u.end(), mid.v.end());

@@ -1,4 +1,4 @@
-//! Which parts of the plate were seen.
+//! Mask of the parts of the plate that were seen.
 
 /// Cells of the original rectangle, and whether samples lie in them.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,7 +11,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Nothing seen yet, in cells of about `cell` metres.
+    /// Builds a mask with nothing seen, in cells of about `cell` metres.
     #[must_use]
     pub fn unseen(width: f64, height: f64, cell: f64) -> Self {
         let count = |length: f64| ((length / cell).ceil() as usize).clamp(1, 4096);
@@ -19,7 +19,7 @@ impl Mask {
         Self::of(width, height, [n_u, n_v], vec![false; n_u * n_v])
     }
 
-    /// A mask from its cells, v outer, u inner; `None` when their number does not fit.
+    /// Builds a mask from its cells, v outer, u inner; `None` when their number does not fit.
     #[must_use]
     pub fn from_cells(width: f64, height: f64, cells: [usize; 2], seen: Vec<bool>) -> Option<Self> {
         let [n_u, n_v] = cells;
@@ -31,25 +31,25 @@ impl Mask {
         Self { n_u, n_v, per_metre: [n_u as f64 / width, n_v as f64 / height], seen }
     }
 
-    /// Number of cells along u and along v.
+    /// Returns the number of cells along u and along v.
     #[must_use]
     pub fn cells(&self) -> [usize; 2] {
         [self.n_u, self.n_v]
     }
 
-    /// Per cell, v outer, u inner: whether it was seen.
+    /// Returns per cell, v outer, u inner, whether it was seen.
     #[must_use]
     pub fn seen_cells(&self) -> &[bool] {
         &self.seen
     }
 
-    /// Whether the cell around (u, v) was seen; places outside count for the nearest cell.
+    /// Returns whether the cell around (u, v) was seen; places outside count for the nearest cell.
     #[must_use]
     pub fn seen(&self, u: f64, v: f64) -> bool {
         self.seen[self.index(u, v)]
     }
 
-    /// Share of the cells that were seen.
+    /// Returns the share of the cells that were seen.
     #[must_use]
     pub fn coverage(&self) -> f64 {
         self.seen.iter().filter(|s| **s).count() as f64 / self.seen.len() as f64

@@ -1,12 +1,13 @@
 //! A surface as plain numbers, to be stored or sent across a library boundary.
 
-use super::Surface;
-use super::mask::Mask;
 use platen_numerics::block_banded_cholesky::BlockBandedFactor;
 use platen_numerics::tensor_spline::TensorSpline;
 use platen_numerics::uniform_knots::UniformKnots;
 
-/// Everything a [`Surface`] is made of. Control values lie v outer, u inner.
+use super::Surface;
+use super::mask::Mask;
+
+/// Data of a [`Surface`]. Control values lie v outer, u inner.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SurfaceParts {
     /// Knots of u: uniform, three beyond each end.
@@ -31,7 +32,7 @@ pub struct SurfaceParts {
     pub seen: Vec<bool>,
 }
 
-/// The parts do not fit together: the program that made them is at fault.
+/// Error: the parts do not fit together; the program that made them is at fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("surface: {what}; the program that sent this surface is at fault, report it")]
 pub struct SurfaceError {
@@ -68,7 +69,7 @@ impl Surface {
         Ok(Self { spline, thickness, precision, covariance, noise_share, mask })
     }
 
-    /// The parts of this surface.
+    /// Returns the parts of this surface.
     #[must_use]
     pub fn to_parts(&self) -> SurfaceParts {
         SurfaceParts {

@@ -139,7 +139,7 @@ impl Plate {
     }
 }
 
-/// What is scanned, and how.
+/// A scene and the parameters of its scan.
 #[derive(Clone)]
 pub struct Scene {
     pub plates: Vec<Plate>,

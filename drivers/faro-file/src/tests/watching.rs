@@ -8,8 +8,8 @@ use platen_formats::orient::Expected;
 use platen_formats::{ScanFile, ScanReader};
 use platen_scan::{Column, ScanEnd, ScanHeader, State};
 
-use crate::device::{Folder, Reading, Receiver};
-use crate::error::{Error, Result};
+use crate::device::{Folder, Reading};
+use crate::error::Error;
 use crate::watch::{Entry, Listing, Watch, list};
 
 const ROWS: u32 = 24;
@@ -52,38 +52,6 @@ fn file(extension: &str, scale: f64) -> Vec<u8> {
     let written = writer.finish(&ScanEnd::default()).unwrap();
     file.persist(written).unwrap();
     std::fs::read(&path).unwrap()
-}
-
-/// The end of what was delivered, after header and columns in their order.
-#[derive(Debug, Default)]
-struct Collected {
-    header: Option<ScanHeader>,
-    columns: u32,
-    end: Option<ScanEnd>,
-}
-
-impl Receiver for Collected {
-    fn check(&mut self, fraction: f64, _: &str) -> Result<()> {
-        assert!((0.0..=1.0).contains(&fraction), "progress {fraction}");
-        Ok(())
-    }
-
-    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
-        assert!(self.header.replace(header.clone()).is_none());
-        Ok(())
-    }
-
-    fn column(&mut self, column: &Column) -> Result<()> {
-        column.check(self.header.as_ref().unwrap().n_rows).unwrap();
-        self.columns += 1;
-        Ok(())
-    }
-
-    fn end(&mut self, end: &ScanEnd) -> Result<()> {
-        assert_eq!(self.columns, end.columns);
-        assert!(self.end.replace(*end).is_none());
-        Ok(())
-    }
 }
 
 const STABLE: u32 = 3;
@@ -274,22 +242,23 @@ fn fls_is_folder_gets_its_sentence_while_the_export_is_awaited() {
     assert_eq!(taken.as_deref(), Some("Scan_001.e57"));
 }
 
-/// Follows a folder in which `act` changes something at every pause; the outcome after at most 200 pauses.
+/// Follows a folder in which `act` changes something at every pause; the points of the scan after at most 200 pauses.
 fn follow(
     folder: &mut Folder,
     pattern: &str,
     act: &mut dyn FnMut(u32, &Path),
-) -> std::result::Result<Collected, platen_sdk::Error> {
+) -> Result<u64, platen_sdk::Error> {
     let reading = Reading { cloud: None, known: Expected::default() };
-    let path = folder.path.clone();
-    let (mut collected, mut pauses) = (Collected::default(), 0);
+    let (path, pattern, mut pauses) = (folder.path.clone(), glob::Pattern::new(pattern).unwrap(), 0);
     let mut pause = |why| {
         act(pauses, &path);
         pauses += 1;
         if pauses == 200 { Err(Error::TooLate(why)) } else { Ok(()) }
     };
-    folder.follow(&reading, glob::Pattern::new(pattern).unwrap(), &mut collected, &mut pause, &|| true)?;
-    Ok(collected)
+    let found = folder.wait(&reading, pattern, &mut |_| Ok(()), &mut pause, &|| true);
+    let checksum = found.as_ref().ok().map(|(_, _, oriented)| oriented.checksum());
+    folder.close(checksum);
+    found.map(|(_, mut reader, oriented)| reader.columns(&oriented).unwrap().finish().unwrap().points)
 }
 
 fn folder(path: &Path) -> Folder {
@@ -320,8 +289,8 @@ fn a_scan_that_grows_in_the_folder_is_measured_once_whole() {
                 std::fs::write(&path, &file[..file.len() * pause as usize / 80]).unwrap();
             }
         };
-        let collected = follow(&mut watched, "*", &mut write).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert_eq!(collected.end.unwrap().points, 698, "{name}");
+        let points = follow(&mut watched, "*", &mut write).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(points, 698, "{name}");
         std::fs::remove_file(&path).unwrap();
     }
 }

@@ -6,9 +6,9 @@ use std::thread::JoinHandle;
 
 use super::config::BridgeConfig;
 use super::connection;
+use super::counters::BridgeCounters;
 use super::head::Head;
 use super::shared::Shared;
-use super::tally::BridgeTally;
 
 /// A running bridge; dropping it ends it.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ impl Bridge {
     }
 
     /// What it has done so far.
-    pub fn tally(&self) -> BridgeTally {
+    pub fn counters(&self) -> BridgeCounters {
         self.shared.counts.read()
     }
 }
@@ -68,7 +68,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
         let shared = Arc::clone(shared);
         std::thread::spawn(move || {
             connection::serve(stream, number, &shared);
-            shared.gone(number);
+            shared.remove(number);
         });
     }
 }

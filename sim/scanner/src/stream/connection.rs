@@ -12,15 +12,15 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 
-use super::disturb::Step;
+use super::counters::increment;
 use super::event::Event;
 use super::fault::FaultKind;
 use super::frame::{self, Frame, FrameError};
+use super::frame_faults::Step;
 use super::message::{
-    Abort, Exception, Hello, Refusal, Resume, Role, ScanBegin, ScanEnd, Start, Status, Wanted,
+    Abort, Exception, Hello, Refusal, Resume, Role, ScanBegin, ScanEnd, ScanSettings, Start, Status,
 };
 use super::shared::{Scan, Shared};
-use super::tally::count;
 
 /// Time between two Status frames.
 const STATUS: Duration = Duration::from_millis(900);
@@ -37,10 +37,10 @@ type Flow = Result<(), Hangup>;
 struct Sending {
     scan: Arc<Scan>,
     /// Which columns are still to be sent; all of them until the lattice is known.
-    wanted: Option<Vec<bool>>,
+    requested: Option<Vec<bool>>,
     missing: Option<Vec<[u32; 2]>>,
     /// Columns looked at, in the order they were measured.
-    looked_at: usize,
+    examined: usize,
     /// Columns to be sent next.
     next: VecDeque<u32>,
 }
@@ -58,7 +58,7 @@ struct Connection<'a> {
 
 /// Serves a driver until one side hangs up.
 pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
-    let (events, heard) = channel();
+    let (events, incoming) = channel();
     let Ok(reading) = stream.try_clone() else { return };
     let reader = {
         let (events, shared) = (events.clone(), Arc::clone(shared));
@@ -76,7 +76,7 @@ pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
     };
     // Small frames must not wait for large ones to fill a packet.
     let _ = connection.stream.set_nodelay(true);
-    let Err(Hangup) = connection.run(&heard);
+    let Err(Hangup) = connection.run(&incoming);
     // The reader ends with the connection; one that has gone needs no hanging up.
     let _ = connection.stream.shutdown(Shutdown::Both);
     let _ = reader.join();
@@ -88,15 +88,15 @@ fn read(mut stream: TcpStream, connection: u32, shared: &Shared, events: &Sender
         let frame = match frame::read(&mut stream, due) {
             Ok(frame) => frame,
             Err(error) => {
-                if !matches!(error, FrameError::Gone) {
+                if !matches!(error, FrameError::Closed) {
                     tracing::warn!(connection, %error, "the driver is hung up on");
                 }
                 // A sender that has ended needs no word.
-                let _ = events.send(Event::Gone);
+                let _ = events.send(Event::Closed);
                 return;
             }
         };
-        shared.heard(connection);
+        shared.renew_lease(connection);
         if frame.kind == frame::ABORT
             && let Ok(abort) = serde_json::from_slice::<Abort>(&frame.payload)
         {
@@ -109,16 +109,16 @@ fn read(mut stream: TcpStream, connection: u32, shared: &Shared, events: &Sender
 }
 
 impl Connection<'_> {
-    fn run(&mut self, heard: &Receiver<Event>) -> Result<std::convert::Infallible, Hangup> {
+    fn run(&mut self, incoming: &Receiver<Event>) -> Result<std::convert::Infallible, Hangup> {
         let mut status_due = Instant::now() + STATUS;
         loop {
-            let wait = if self.has_more() { Duration::ZERO } else { status_due - Instant::now() };
-            match heard.recv_timeout(wait) {
+            let wait = if self.can_send() { Duration::ZERO } else { status_due - Instant::now() };
+            match incoming.recv_timeout(wait) {
                 Ok(Event::Frame(frame)) => self.command(&frame)?,
-                Ok(Event::Gone) | Err(RecvTimeoutError::Disconnected) => return Err(Hangup),
-                Ok(Event::Grown) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Event::Closed) | Err(RecvTimeoutError::Disconnected) => return Err(Hangup),
+                Ok(Event::ScanAdvanced) | Err(RecvTimeoutError::Timeout) => {}
             }
-            self.go_on()?;
+            self.send_available()?;
             if Instant::now() >= status_due {
                 if self.client.is_some() {
                     self.status()?;
@@ -128,13 +128,13 @@ impl Connection<'_> {
         }
     }
 
-    fn say(&mut self, kind: u16, scan: u32, message: &impl Serialize) -> Flow {
+    fn send_message(&mut self, kind: u16, scan: u32, message: &impl Serialize) -> Flow {
         let payload = serde_json::to_vec(message).map_err(|_| Hangup)?;
         self.send(Frame { kind, scan, payload })
     }
 
     fn refuse(&mut self, scan: u32, refusal: &Refusal) -> Flow {
-        self.say(frame::ERROR, scan, refusal)
+        self.send_message(frame::ERROR, scan, refusal)
     }
 
     fn command(&mut self, frame: &Frame) -> Flow {
@@ -142,7 +142,7 @@ impl Connection<'_> {
         match (frame.kind, &self.client) {
             (frame::HELLO, None) => self.hello(frame),
             (frame::HEARTBEAT, _) => Ok(()),
-            (kind, Some(_)) if kind & frame::MUST_KNOW == 0 => Ok(()),
+            (kind, Some(_)) if kind & frame::CRITICAL == 0 => Ok(()),
             (frame::CONFIGURE | frame::START | frame::RESUME | frame::ABORT, Some(_)) if !controls => {
                 self.refuse(0, &Refusal::new("denied", "a monitor only listens"))
             }
@@ -182,7 +182,7 @@ impl Connection<'_> {
             self.refuse(0, &busy)?;
             return Err(Hangup);
         }
-        let late = self.shared.disturb().once(FaultKind::ConnectLate, |_| true);
+        let late = self.shared.frame_faults().once(FaultKind::ConnectLate, |_| true);
         if let Some(ms) = late {
             std::thread::sleep(Duration::from_millis(ms.into()));
         }
@@ -195,39 +195,39 @@ impl Connection<'_> {
             .collect();
         let config = &self.shared.config;
         let serial =
-            if self.shared.suffers(FaultKind::WrongScanner) { "SIM9999" } else { config.serial.as_str() };
+            if self.shared.is_active(FaultKind::WrongScanner) { "SIM9999" } else { config.serial.as_str() };
         let capabilities = json!({
             "version": frame::VERSION, "model": "platen simulated scanner", "serial": serial,
             "firmware": env!("CARGO_PKG_VERSION"), "live": config.live, "modes": modes, "max_rows": 17351,
             "max_columns": 40960, "faces": 2, "kept_scans": config.kept_scans, "clock": "monotonic",
             "clock_synced": false,
         });
-        self.say(frame::CAPABILITIES, 0, &capabilities)
+        self.send_message(frame::CAPABILITIES, 0, &capabilities)
     }
 
     /// What would be done.
-    fn plan(&self, wanted: Wanted) -> Result<super::head::Plan, Refusal> {
-        if let Some(left) = self.shared.at_first(FaultKind::Asleep) {
+    fn plan(&self, settings: ScanSettings) -> Result<super::head::Plan, Refusal> {
+        if let Some(left) = self.shared.remaining_at_start(FaultKind::Asleep) {
             let text = "the scanner is starting up";
             return Err(Refusal::new("scanner", text).retry(left.as_millis() as u64 + 1));
         }
-        if self.shared.suffers(FaultKind::SdkMissing) {
+        if self.shared.is_active(FaultKind::SdkMissing) {
             return Err(Refusal::new("scanner", "the scanner's library is not registered on this computer"));
         }
-        let (wanted, notes) = altered(self.shared, wanted);
-        let mut plan = self.shared.head.plan(&wanted).map_err(|why| Refusal::new("config", why))?;
+        let (settings, notes) = altered(self.shared, settings);
+        let mut plan = self.shared.head.plan(&settings).map_err(|why| Refusal::new("config", why))?;
         plan.altered.splice(0..0, notes);
         Ok(plan)
     }
 
     fn configure(&mut self, frame: &Frame) -> Flow {
-        let wanted = self.parse(frame)?;
-        match self.plan(wanted) {
+        let settings = self.parse(frame)?;
+        match self.plan(settings) {
             Ok(plan) => {
-                let w = plan.wanted;
+                let s = plan.settings;
                 let duration_s = (self.shared.config.time_scale * plan.duration_s).max(plan.computing_s);
-                self.say(frame::CONFIGURED, 0, &json!({
-                    "divisor": w.divisor, "rate_kpts": w.rate_kpts, "compression": w.compression, "window": w.window,
+                self.send_message(frame::CONFIGURED, 0, &json!({
+                    "divisor": s.divisor, "rate_kpts": s.rate_kpts, "compression": s.compression, "window": s.window,
                     "duration_s": duration_s, "altered": plan.altered,
                 }))
             }
@@ -236,19 +236,19 @@ impl Connection<'_> {
     }
 
     fn start(&mut self, frame: &Frame) -> Flow {
-        count(&self.shared.counts.starts);
+        increment(&self.shared.counts.starts);
         let start: Start = self.parse(frame)?;
-        let card_missing = self.shared.suffers(FaultKind::CardMissing);
-        let scan = match self.plan(start.wanted) {
+        let card_missing = self.shared.is_active(FaultKind::CardMissing);
+        let scan = match self.plan(start.settings) {
             Ok(_) if card_missing => Err(Refusal::new("scanner", "there is no card in the scanner")),
             Ok(plan) => self.shared.begin(&start.job, plan),
             Err(refusal) => Err(refusal),
         };
         match scan {
             Ok(scan) => {
-                let lost = self.shared.disturb().once(FaultKind::ReplyLost, |_| true);
+                let lost = self.shared.frame_faults().once(FaultKind::ReplyLost, |_| true);
                 if lost.is_some() {
-                    self.shared.was_cut(false);
+                    self.shared.connection_cut(false);
                     return Err(Hangup);
                 }
                 self.sending_of(scan, None);
@@ -259,7 +259,7 @@ impl Connection<'_> {
     }
 
     fn resume(&mut self, frame: &Frame) -> Flow {
-        count(&self.shared.counts.resumes);
+        increment(&self.shared.counts.resumes);
         let resume: Resume = self.parse(frame)?;
         match self.shared.scan_of(&resume.job).filter(|scan| scan.spool.number == frame.scan) {
             Some(scan) => {
@@ -276,43 +276,43 @@ impl Connection<'_> {
     fn sending_of(&mut self, scan: Arc<Scan>, missing: Option<Vec<[u32; 2]>>) {
         scan.spool.listen(self.events.clone());
         let next = VecDeque::new();
-        self.sending = Some(Sending { scan, wanted: None, missing, looked_at: 0, next });
+        self.sending = Some(Sending { scan, requested: None, missing, examined: 0, next });
     }
 
     /// True when something can be sent at once.
-    fn has_more(&self) -> bool {
+    fn can_send(&self) -> bool {
         let Some(sending) = &self.sending else { return false };
         let spool = &sending.scan.spool;
-        match sending.wanted {
+        match sending.requested {
             None => spool.begun().is_some() || spool.is_over(),
-            Some(_) => spool.arrival(sending.looked_at).is_some() || spool.is_over(),
+            Some(_) => spool.arrival(sending.examined).is_some() || spool.is_over(),
         }
     }
 
     /// Sends what has come of the scan that is asked for.
-    fn go_on(&mut self) -> Flow {
+    fn send_available(&mut self) -> Flow {
         let Some(mut sending) = self.sending.take() else { return Ok(()) };
         let scan = Arc::clone(&sending.scan);
         let (spool, number) = (&scan.spool, scan.spool.number);
         if let Some(why) = spool.refused() {
             return self.refuse(number, &Refusal::new("scanner", why));
         }
-        if sending.wanted.is_none() {
+        if sending.requested.is_none() {
             let Some(begin) = spool.begun() else {
                 self.sending = Some(sending);
                 return Ok(());
             };
-            sending.wanted = Some(wanted(begin.columns, sending.missing.as_deref()));
-            self.say(frame::SCAN_BEGIN, number, &ScanBegin { job: spool.job.clone(), begin })?;
+            sending.requested = Some(requested_columns(begin.columns, sending.missing.as_deref()));
+            self.send_message(frame::SCAN_BEGIN, number, &ScanBegin { job: spool.job.clone(), begin })?;
         }
         // Looked at before the columns: whatever came before the end is seen then.
         let ended = spool.ended();
-        if sending.look(&mut |end| self.shared.disturb().below(end), self.within()) {
+        if sending.collect(&mut |end| self.shared.frame_faults().below(end), self.within()) {
             for column in sending.next.drain(..) {
                 self.column(number, spool.payload(column).map_err(|_| Hangup)?)?;
             }
         }
-        match ended.filter(|_| spool.arrival(sending.looked_at).is_none()) {
+        match ended.filter(|_| spool.arrival(sending.examined).is_none()) {
             Some(_) if scan.overflowed() => {
                 self.refuse(number, &Refusal::new("overflow", "the bridge's disk is full; make room on it"))
             }
@@ -326,42 +326,42 @@ impl Connection<'_> {
 
     /// Columns are shuffled within so many.
     fn within(&self) -> usize {
-        self.shared.disturb().lasting(FaultKind::Shuffled).map_or(1, |n| n.max(1) as usize)
+        self.shared.frame_faults().persistent(FaultKind::Shuffled).map_or(1, |n| n.max(1) as usize)
     }
 
     fn column(&mut self, scan: u32, payload: Vec<u8>) -> Flow {
         self.send(Frame { kind: frame::COLUMN, scan, payload })?;
         self.columns_sent += 1;
-        count(&self.shared.counts.columns_sent);
+        increment(&self.shared.counts.columns_sent);
         Ok(())
     }
 
     fn end(&mut self, scan: u32, mut end: ScanEnd) -> Flow {
-        if self.shared.suffers(FaultKind::WrongDigest) {
+        if self.shared.is_active(FaultKind::WrongDigest) {
             end.digest ^= 1;
         }
-        self.say(frame::SCAN_END, scan, &end)
+        self.send_message(frame::SCAN_END, scan, &end)
     }
 
     /// Sends a frame, or what becomes of it on its way.
     fn send(&mut self, frame: Frame) -> Flow {
-        let steps = self.shared.disturb().pass(frame, self.columns_sent);
+        let steps = self.shared.frame_faults().apply(frame, self.columns_sent);
         for step in steps {
             match step {
                 Step::Send(frame) => self.write(&frame, None)?,
-                Step::SendSpoiled(frame, bit) => self.write(&frame, Some(bit))?,
+                Step::SendCorrupted(frame, bit) => self.write(&frame, Some(bit))?,
                 Step::Header(length, bit) => {
                     let mut head = frame::header(frame::COLUMN, 0, self.sequence, length, frame::VERSION[0]);
                     if let Some(bit) = bit {
                         head[bit / 8] ^= 1 << (bit % 8);
                     }
                     self.stream.write_all(&head).map_err(|_| Hangup)?;
-                    count(&self.shared.counts.cuts);
+                    increment(&self.shared.counts.cuts);
                     return Err(Hangup);
                 }
                 Step::Wait(long) => std::thread::sleep(long),
                 Step::Cut | Step::Die => {
-                    self.shared.was_cut(step == Step::Die);
+                    self.shared.connection_cut(step == Step::Die);
                     return Err(Hangup);
                 }
             }
@@ -369,13 +369,13 @@ impl Connection<'_> {
         Ok(())
     }
 
-    fn write(&mut self, frame: &Frame, spoiled: Option<usize>) -> Flow {
+    fn write(&mut self, frame: &Frame, corrupted: Option<usize>) -> Flow {
         let mut bytes = frame::bytes(frame, self.sequence);
-        if self.shared.suffers(FaultKind::VersionMismatch) {
+        if self.shared.is_active(FaultKind::VersionMismatch) {
             let head = frame::header(frame.kind, frame.scan, self.sequence, frame.payload.len() as u32, 2);
             bytes[..frame::HEADER].copy_from_slice(&head);
         }
-        if let Some(bit) = spoiled {
+        if let Some(bit) = corrupted {
             bytes[frame::HEADER + bit / 8] ^= 1 << (bit % 8);
         }
         self.sequence += 1;
@@ -384,18 +384,18 @@ impl Connection<'_> {
 
     fn status(&mut self) -> Flow {
         let status = status(self.shared);
-        self.say(frame::STATUS, 0, &status)
+        self.send_message(frame::STATUS, 0, &status)
     }
 }
 
 impl Sending {
-    /// Puts the next columns that are wanted into `next`, `within` at a time in random order; false when none came.
-    fn look(&mut self, below: &mut dyn FnMut(u32) -> u32, within: usize) -> bool {
-        let Some(wanted) = &mut self.wanted else { return false };
+    /// Puts the next columns that are requested into `next`, `within` at a time in random order; false when none came.
+    fn collect(&mut self, below: &mut dyn FnMut(u32) -> u32, within: usize) -> bool {
+        let Some(requested) = &mut self.requested else { return false };
         while self.next.len() < ROUND.max(within) {
-            let Some(column) = self.scan.spool.arrival(self.looked_at) else { break };
-            self.looked_at += 1;
-            if std::mem::take(&mut wanted[column as usize]) {
+            let Some(column) = self.scan.spool.arrival(self.examined) else { break };
+            self.examined += 1;
+            if std::mem::take(&mut requested[column as usize]) {
                 self.next.push_back(column);
             }
         }
@@ -409,7 +409,7 @@ impl Sending {
 }
 
 /// Which columns are to be sent.
-fn wanted(columns: u32, missing: Option<&[[u32; 2]]>) -> Vec<bool> {
+fn requested_columns(columns: u32, missing: Option<&[[u32; 2]]>) -> Vec<bool> {
     let Some(missing) = missing else { return vec![true; columns as usize] };
     let asked = |column: u32| missing.iter().any(|[first, last]| (*first..=*last).contains(&column));
     (0..columns).map(asked).collect()
@@ -417,13 +417,13 @@ fn wanted(columns: u32, missing: Option<&[[u32; 2]]>) -> Vec<bool> {
 
 /// How things stand.
 fn status(shared: &Shared) -> Status {
-    let suffers = |kind| shared.suffers(kind);
+    let is_active = |kind| shared.is_active(kind);
     let running = shared.running();
     let (state, progress) = match &running {
-        _ if suffers(FaultKind::StaleStatus) => ("ready", 1.0),
-        _ if shared.at_first(FaultKind::Asleep).is_some() => ("connecting", 0.0),
+        _ if is_active(FaultKind::StaleStatus) => ("ready", 1.0),
+        _ if shared.remaining_at_start(FaultKind::Asleep).is_some() => ("connecting", 0.0),
         None => ("ready", 0.0),
-        Some(_) if suffers(FaultKind::ProgressJump) => ("scanning", 0.0),
+        Some(_) if is_active(FaultKind::ProgressJump) => ("scanning", 0.0),
         Some(scan) if !scan.spool.has_begun() || scan.spool.progress() == 0.0 => ("starting", 0.0),
         Some(scan) if scan.spool.progress() < 1.0 => ("scanning", scan.spool.progress()),
         Some(_) => ("finishing", 1.0),
@@ -433,32 +433,35 @@ fn status(shared: &Shared) -> Status {
     if let Some(stalls @ 1..) = running.filter(|scan| !scan.spool.has_begun()).map(|scan| scan.stalls()) {
         except(3, format!("the mirror is not up to speed, try {stalls} of 5"));
     }
-    if suffers(FaultKind::BatteryLow) {
+    if is_active(FaultKind::BatteryLow) {
         except(3, "the battery is at 4 %".to_owned());
     }
-    if suffers(FaultKind::Temperature) {
+    if is_active(FaultKind::Temperature) {
         except(3, "the scanner is at 46 degrees, at most 40 are allowed".to_owned());
     }
-    if suffers(FaultKind::Contamination) {
+    if is_active(FaultKind::Contamination) {
         except(3, "the mirror is dirty".to_owned());
     }
     Status {
         state,
         progress,
-        temperature_c: Some(if suffers(FaultKind::Temperature) { 46.0 } else { 31.5 }),
-        battery: Some(if suffers(FaultKind::BatteryLow) { 0.04 } else { 0.8 }),
+        temperature_c: Some(if is_active(FaultKind::Temperature) { 46.0 } else { 31.5 }),
+        battery: Some(if is_active(FaultKind::BatteryLow) { 0.04 } else { 0.8 }),
         exceptions,
         time_ns: shared.begun.elapsed().as_nanos() as u64,
         synced: false,
     }
 }
 
-/// What is wanted, as the scanner takes it.
-fn altered(shared: &Shared, wanted: Wanted) -> (Wanted, Vec<String>) {
-    if !shared.suffers(FaultKind::ParamsAltered) || wanted.rate_kpts <= 122 {
-        return (wanted, Vec::new());
+/// What is settings, as the scanner takes it.
+fn altered(shared: &Shared, settings: ScanSettings) -> (ScanSettings, Vec<String>) {
+    if !shared.is_active(FaultKind::ParamsAltered) || settings.rate_kpts <= 122 {
+        return (settings, Vec::new());
     }
-    let note =
-        format!("rate_kpts: {} was asked for, the scanner took {}", wanted.rate_kpts, wanted.rate_kpts / 2);
-    (Wanted { rate_kpts: wanted.rate_kpts / 2, ..wanted }, vec![note])
+    let note = format!(
+        "rate_kpts: {} was asked for, the scanner took {}",
+        settings.rate_kpts,
+        settings.rate_kpts / 2
+    );
+    (ScanSettings { rate_kpts: settings.rate_kpts / 2, ..settings }, vec![note])
 }

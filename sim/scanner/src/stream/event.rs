@@ -8,7 +8,7 @@ pub(super) enum Event {
     /// The driver says this.
     Frame(Frame),
     /// The driver has gone, or what it says is no frame.
-    Gone,
+    Closed,
     /// A scan has grown or ended.
-    Grown,
+    ScanAdvanced,
 }

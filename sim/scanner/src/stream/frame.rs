@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read};
 pub(super) const HEADER: usize = 32;
 
 /// Most bytes of a payload.
-pub(super) const LONGEST: usize = 1 << 20;
+pub(super) const MAX_PAYLOAD: usize = 1 << 20;
 
 /// The version spoken.
 pub(super) const VERSION: [u8; 2] = [1, 0];
@@ -25,7 +25,7 @@ pub(super) const SCAN_BEGIN: u16 = 0x8010;
 pub(super) const COLUMN: u16 = 0x8011;
 pub(super) const SCAN_END: u16 = 0x8012;
 /// Who does not know a type with this bit must refuse it.
-pub(super) const MUST_KNOW: u16 = 0x8000;
+pub(super) const CRITICAL: u16 = 0x8000;
 
 /// One frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,10 +40,10 @@ pub(super) struct Frame {
 pub(super) enum FrameError {
     /// Nothing more comes.
     #[error("the other side has gone")]
-    Gone,
+    Closed,
     /// What came is no frame, and nothing behind it can be trusted.
     #[error("{0}")]
-    Untrusted(&'static str),
+    Invalid(&'static str),
     /// The system refuses.
     #[error("{0}")]
     Io(#[from] std::io::Error),
@@ -58,12 +58,12 @@ pub(super) fn header(kind: u16, scan: u32, sequence: u64, length: u32, major: u8
     bytes[8..12].copy_from_slice(&length.to_le_bytes());
     bytes[16..24].copy_from_slice(&sequence.to_le_bytes());
     bytes[24..28].copy_from_slice(&scan.to_le_bytes());
-    let seal = seal(&bytes);
-    bytes[12..16].copy_from_slice(&seal.to_le_bytes());
+    let header_crc = header_crc(&bytes);
+    bytes[12..16].copy_from_slice(&header_crc.to_le_bytes());
     bytes
 }
 
-fn seal(header: &[u8; HEADER]) -> u32 {
+fn header_crc(header: &[u8; HEADER]) -> u32 {
     crc32c::crc32c_append(crc32c::crc32c(&header[..12]), &header[16..])
 }
 
@@ -78,36 +78,36 @@ pub(super) fn read(from: &mut impl Read, due: u64) -> Result<Frame, FrameError> 
     let mut head = [0; HEADER];
     fill(from, &mut head)?;
     let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
-    let untrusted = |what| Err(FrameError::Untrusted(what));
+    let invalid = |what| Err(FrameError::Invalid(what));
     if head[..4] != *b"PSB1" {
-        return untrusted("wrong magic");
+        return invalid("wrong magic");
     }
-    if word(12) != seal(&head) {
-        return untrusted("wrong checksum of a header");
+    if word(12) != header_crc(&head) {
+        return invalid("wrong checksum of a header");
     }
     if head[4] != VERSION[0] {
-        return untrusted("another major version");
+        return invalid("another major version");
     }
     let length = word(8) as usize;
-    if length > LONGEST {
-        return untrusted("a payload beyond 1 MiB");
+    if length > MAX_PAYLOAD {
+        return invalid("a payload beyond 1 MiB");
     }
     if u64::from(word(16)) | u64::from(word(20)) << 32 != due {
-        return untrusted("a frame out of sequence");
+        return invalid("a frame out of sequence");
     }
     let mut payload = vec![0; length];
     fill(from, &mut payload)?;
     let mut sum = [0; 4];
     fill(from, &mut sum)?;
     if u32::from_le_bytes(sum) != crc32c::crc32c(&payload) {
-        return untrusted("wrong checksum of a payload");
+        return invalid("wrong checksum of a payload");
     }
     Ok(Frame { kind: u16::from_le_bytes([head[6], head[7]]), scan: word(24), payload })
 }
 
 fn fill(from: &mut impl Read, bytes: &mut [u8]) -> Result<(), FrameError> {
     from.read_exact(bytes).map_err(|error| match error.kind() {
-        ErrorKind::UnexpectedEof | ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => FrameError::Gone,
+        ErrorKind::UnexpectedEof | ErrorKind::ConnectionReset | ErrorKind::BrokenPipe => FrameError::Closed,
         _ => error.into(),
     })
 }
@@ -124,10 +124,7 @@ mod tests {
         assert_eq!(written[..12], *b"PSB1\x01\x00\x09\x00\x02\x00\x00\x00");
         assert_eq!(written[16..34], *b"\x02\x01\0\0\0\0\0\0\x07\0\0\0\0\0\0\0{}");
         assert!(matches!(read(&mut &written[..], 258), Ok(again) if again == frame));
-        assert!(matches!(
-            read(&mut &written[..], 259),
-            Err(FrameError::Untrusted("a frame out of sequence"))
-        ));
+        assert!(matches!(read(&mut &written[..], 259), Err(FrameError::Invalid("a frame out of sequence"))));
         for bit in 0..8 * written.len() {
             let mut spoiled = written.clone();
             spoiled[bit / 8] ^= 1 << (bit % 8);

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::message::{Begin, Wanted};
+use super::message::{ScanLayout, ScanSettings};
 use super::{payload, spool};
 
 /// A scanner as its bridge sees it.
@@ -12,7 +12,7 @@ pub trait Head: Send + Sync {
     ///
     /// # Errors
     /// Why it cannot scan so, and what to ask for instead.
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String>;
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String>;
 
     /// Takes a planned scan, the `number`-th of the bridge: first `out.begin`, then columns in the order of their
     /// time.
@@ -26,7 +26,7 @@ pub trait Head: Send + Sync {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// As it will be.
-    pub wanted: Wanted,
+    pub settings: ScanSettings,
     /// From the command to a scan that no longer changes, seconds.
     pub duration_s: f64,
     /// What the computer takes by itself, however fast the scanner's time runs, seconds.
@@ -38,7 +38,7 @@ pub struct Plan {
 /// Who takes a scan.
 pub trait Receiver {
     /// The lattice is known.
-    fn begin(&mut self, begin: Begin) -> ControlFlow<()>;
+    fn begin(&mut self, begin: ScanLayout) -> ControlFlow<()>;
     /// A column as its payload is sent; the device's time in it says when it is due.
     fn column(&mut self, payload: Vec<u8>) -> ControlFlow<()>;
 }
@@ -70,14 +70,14 @@ impl Recording {
 }
 
 impl Head for Recording {
-    fn plan(&self, wanted: &Wanted) -> Result<Plan, String> {
+    fn plan(&self, settings: &ScanSettings) -> Result<Plan, String> {
         let altered = vec![format!("a recording is replayed: {}", self.path.display())];
-        Ok(Plan { wanted: *wanted, duration_s: self.duration_s, computing_s: 0.0, altered })
+        Ok(Plan { settings: *settings, duration_s: self.duration_s, computing_s: 0.0, altered })
     }
 
     fn scan(&self, plan: &Plan, _: u32, out: &mut dyn Receiver) -> Result<(), String> {
         let receiver = std::cell::RefCell::new(out);
-        let begun = |mut begin: Begin| {
+        let begun = |mut begin: ScanLayout| {
             begin.altered.extend_from_slice(&plan.altered);
             receiver.borrow_mut().begin(begin).is_continue()
         };

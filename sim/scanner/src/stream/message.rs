@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Part of the dome, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Region {
+pub struct Window {
     /// First azimuth.
     pub azimuth_start: f64,
     /// Towards growing azimuth.
@@ -17,7 +17,7 @@ pub struct Region {
 
 /// What is wanted of a scan, or what will be done.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Wanted {
+pub struct ScanSettings {
     /// Resolution 1/divisor.
     pub divisor: u32,
     /// Thousands of points per second.
@@ -27,7 +27,7 @@ pub struct Wanted {
     pub compression: u32,
     /// Part of the dome; everything without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub window: Option<Region>,
+    pub window: Option<Window>,
 }
 
 fn one() -> u32 {
@@ -46,7 +46,7 @@ pub enum Values {
 
 /// ScanBegin without its job: the lattice as it will be sent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Begin {
+pub struct ScanLayout {
     /// Cells of a column.
     pub rows: u32,
     /// Columns.
@@ -87,7 +87,7 @@ pub struct Begin {
 pub(super) struct ScanBegin {
     pub(super) job: String,
     #[serde(flatten)]
-    pub(super) begin: Begin,
+    pub(super) begin: ScanLayout,
 }
 
 /// ScanEnd.
@@ -128,7 +128,7 @@ pub(super) enum Role {
 pub(super) struct Start {
     pub(super) job: String,
     #[serde(flatten)]
-    pub(super) wanted: Wanted,
+    pub(super) settings: ScanSettings,
 }
 
 #[derive(Debug, Deserialize)]

@@ -2,7 +2,7 @@
 
 use crate::column::{SimColumn, SimState};
 
-use super::message::{Begin, Values};
+use super::message::{ScanLayout, Values};
 
 /// Bytes before the bitmap.
 pub(super) const FIXED: usize = 24;
@@ -12,7 +12,7 @@ const TIME: usize = 16;
 
 /// The payload of a column. `number` is its place at the bridge, `time_s` when its first sample was taken. Rows before
 /// the first echo and after the last are left out.
-pub fn column_payload(column: &SimColumn, number: u32, begin: &Begin, time_s: f64) -> Vec<u8> {
+pub fn column_payload(column: &SimColumn, number: u32, begin: &ScanLayout, time_s: f64) -> Vec<u8> {
     let valid = |row: &usize| column.state[*row] == SimState::Valid;
     let rows = 0..column.state.len();
     let first = rows.clone().find(valid).unwrap_or(0);

@@ -8,13 +8,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::config::BridgeConfig;
-use super::disturb::Disturb;
+use super::counters::{AtomicCounters, increment};
 use super::fault::FaultKind;
+use super::frame_faults::FrameFaults;
 use super::head::{Head, Plan, Receiver};
-use super::message::{Begin, Outcome, Refusal};
+use super::message::{Outcome, Refusal, ScanLayout};
 use super::payload;
 use super::spool::Spool;
-use super::tally::{Counts, count};
 
 /// How long a lease lasts from each frame of its holder.
 const LEASE: Duration = Duration::from_secs(5);
@@ -29,8 +29,8 @@ const STALL: (f64, u32) = (45.0, 5);
 pub(super) struct Shared {
     pub(super) config: BridgeConfig,
     pub(super) head: Box<dyn Head>,
-    pub(super) counts: Counts,
-    pub(super) disturb: Mutex<Disturb>,
+    pub(super) counts: AtomicCounters,
+    pub(super) frame_faults: Mutex<FrameFaults>,
     pub(super) begun: Instant,
     /// Scans are numbered from here on: numbers never return, even when a bridge starts again.
     first_number: u32,
@@ -89,12 +89,12 @@ impl Scan {
 
 impl Shared {
     pub(super) fn new(config: BridgeConfig, head: Box<dyn Head>) -> Self {
-        let disturb = Mutex::new(Disturb::new(&config.faults, config.seed));
+        let frame_faults = Mutex::new(FrameFaults::new(&config.faults, config.seed));
         Self {
             config,
             head,
-            counts: Counts::default(),
-            disturb,
+            counts: AtomicCounters::default(),
+            frame_faults,
             begun: Instant::now(),
             first_number: tenths_since_1970(),
             ending: AtomicBool::new(false),
@@ -131,7 +131,7 @@ impl Shared {
     }
 
     /// A connection has ended.
-    pub(super) fn gone(&self, number: u32) {
+    pub(super) fn remove(&self, number: u32) {
         self.state().open.retain(|(open, _)| *open != number);
     }
 
@@ -139,25 +139,25 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn disturb(&self) -> MutexGuard<'_, Disturb> {
-        self.disturb.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn frame_faults(&self) -> MutexGuard<'_, FrameFaults> {
+        self.frame_faults.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// True when this fault lasts.
-    pub(super) fn suffers(&self, kind: FaultKind) -> bool {
-        self.disturb().lasting(kind).is_some()
+    pub(super) fn is_active(&self, kind: FaultKind) -> bool {
+        self.frame_faults().persistent(kind).is_some()
     }
 
     /// True for the first so many milliseconds of the bridge that the fault says; gives what is left.
-    pub(super) fn at_first(&self, kind: FaultKind) -> Option<Duration> {
-        let ms = self.disturb().lasting(kind)?;
+    pub(super) fn remaining_at_start(&self, kind: FaultKind) -> Option<Duration> {
+        let ms = self.frame_faults().persistent(kind)?;
         Duration::from_millis(ms.into()).checked_sub(self.begun.elapsed())
     }
 
     /// Gives the lease to a client, or says who holds it. The same client takes it over: its connection before is
     /// closed.
     pub(super) fn lease(&self, client: &str, connection: u32) -> Result<(), Refusal> {
-        if let Some(left) = self.at_first(FaultKind::LeaseStuck) {
+        if let Some(left) = self.remaining_at_start(FaultKind::LeaseStuck) {
             return Err(busy("press-4", left));
         }
         let now = Instant::now();
@@ -179,7 +179,7 @@ impl Shared {
     }
 
     /// A frame of this connection has come.
-    pub(super) fn heard(&self, connection: u32) {
+    pub(super) fn renew_lease(&self, connection: u32) {
         if let Some(lease) = self.state().lease.as_mut().filter(|lease| lease.connection == connection) {
             lease.until = Instant::now() + LEASE;
         }
@@ -227,14 +227,14 @@ impl Shared {
     pub(super) fn abort(&self, job: &str) {
         if let Some(scan) = self.scan_of(job).filter(|scan| !scan.spool.is_over()) {
             scan.aborted.store(true, Ordering::Relaxed);
-            count(&self.counts.aborts);
+            increment(&self.counts.aborts);
         }
     }
 
     /// A connection was cut by a fault; the bridge forgets its scans when it died.
-    pub(super) fn was_cut(&self, died: bool) {
-        count(&self.counts.cuts);
-        let closed = self.disturb().lasting(FaultKind::ReconnectTooFast);
+    pub(super) fn connection_cut(&self, died: bool) {
+        increment(&self.counts.cuts);
+        let closed = self.frame_faults().persistent(FaultKind::ReconnectTooFast);
         let mut state = self.state();
         state.closed_until = closed.map(|ms| Instant::now() + Duration::from_millis(ms.into()));
         if died {
@@ -245,8 +245,8 @@ impl Shared {
     /// Takes a scan to its end, which takes as long as with a real scanner.
     fn run(&self, plan: &Plan, scan: &Scan, nth: u32) {
         let spool = &scan.spool;
-        count(&self.counts.scans);
-        let mut due = Due { shared: self, scan, started: Instant::now(), taken: 0, why: None };
+        increment(&self.counts.scans);
+        let mut due = PacedReceiver { shared: self, scan, started: Instant::now(), taken: 0, why: None };
         let taken = match due.spin_up() {
             ControlFlow::Continue(()) => self.head.scan(plan, nth, &mut due),
             ControlFlow::Break(()) => Ok(()),
@@ -279,7 +279,7 @@ fn busy(holder: &str, left: Duration) -> Refusal {
 }
 
 /// Puts what the head measures into the spool when a real scanner would have measured it.
-struct Due<'a> {
+struct PacedReceiver<'a> {
     shared: &'a Shared,
     scan: &'a Scan,
     started: Instant,
@@ -287,7 +287,7 @@ struct Due<'a> {
     why: Option<String>,
 }
 
-impl Due<'_> {
+impl PacedReceiver<'_> {
     /// Waits for this second of the scanner's time; breaks when the scan was aborted.
     fn wait_until(&self, second: f64) -> ControlFlow<()> {
         let due = Duration::from_secs_f64(self.shared.config.time_scale * second);
@@ -305,7 +305,7 @@ impl Due<'_> {
 
     /// The mirror comes up to speed, sooner or later.
     fn spin_up(&mut self) -> ControlFlow<()> {
-        let stalls = self.shared.disturb().lasting(FaultKind::StartStall).unwrap_or(0);
+        let stalls = self.shared.frame_faults().persistent(FaultKind::StartStall).unwrap_or(0);
         for stall in 1..=stalls.min(STALL.1) {
             self.scan.stalls.store(stall, Ordering::Relaxed);
             self.started = Instant::now();
@@ -325,9 +325,9 @@ impl Due<'_> {
     }
 
     /// What stops a scanner before its next column.
-    fn mishap(&mut self) -> ControlFlow<()> {
+    fn injected_failure(&mut self) -> ControlFlow<()> {
         let (taken, bytes) = (self.taken, self.scan.spool.bytes());
-        let at = |kind| self.shared.disturb().lasting(kind);
+        let at = |kind| self.shared.frame_faults().persistent(kind);
         if at(FaultKind::StorageFull).is_some_and(|column| taken >= column) {
             return self.fail("the card is full");
         }
@@ -342,9 +342,9 @@ impl Due<'_> {
     }
 }
 
-impl Receiver for Due<'_> {
-    fn begin(&mut self, mut begin: Begin) -> ControlFlow<()> {
-        if self.shared.suffers(FaultKind::ClockJump) {
+impl Receiver for PacedReceiver<'_> {
+    fn begin(&mut self, mut begin: ScanLayout) -> ControlFlow<()> {
+        if self.shared.is_active(FaultKind::ClockJump) {
             begin.acquired_unix_s = Some(0.0);
         }
         self.shared.counts.columns.store(begin.columns, Ordering::Relaxed);
@@ -356,9 +356,9 @@ impl Receiver for Due<'_> {
 
     fn column(&mut self, mut bytes: Vec<u8>) -> ControlFlow<()> {
         self.wait_until(payload::time_s(&bytes))?;
-        self.mishap()?;
+        self.injected_failure()?;
         self.taken += 1;
-        if self.taken > 3 && self.shared.suffers(FaultKind::ClockJump) {
+        if self.taken > 3 && self.shared.is_active(FaultKind::ClockJump) {
             payload::set_clock_back(&mut bytes);
         }
         match self.scan.spool.column(bytes) {

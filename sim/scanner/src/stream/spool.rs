@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::event::Event;
 use super::frame::{self, Frame};
-use super::message::{Begin, Outcome, ScanBegin, ScanEnd};
+use super::message::{Outcome, ScanBegin, ScanEnd, ScanLayout};
 use super::payload;
 
 /// Where a column lies.
@@ -35,7 +35,7 @@ pub(super) struct Spool {
 
 #[derive(Debug, Default)]
 struct Inner {
-    begin: Option<Begin>,
+    begin: Option<ScanLayout>,
     places: Vec<Option<Place>>,
     arrived: Vec<u32>,
     at: u64,
@@ -66,13 +66,13 @@ impl Spool {
     }
 
     /// The lattice is known.
-    pub(super) fn begin(&self, begin: Begin) -> std::io::Result<()> {
+    pub(super) fn begin(&self, begin: ScanLayout) -> std::io::Result<()> {
         let mut inner = self.inner();
         let message = ScanBegin { job: self.job.clone(), begin: begin.clone() };
         inner.places = vec![None; begin.columns as usize];
         inner.begin = Some(begin);
         inner.append(&self.file, frame::SCAN_BEGIN, self.number, serde_json::to_vec(&message)?)?;
-        inner.tell();
+        inner.notify();
         Ok(())
     }
 
@@ -86,7 +86,7 @@ impl Spool {
         let at = inner.append(&self.file, frame::COLUMN, self.number, bytes)?;
         inner.places[number as usize] = Some(Place { at, length, crc, points });
         inner.arrived.push(number);
-        inner.tell();
+        inner.notify();
         Ok(())
     }
 
@@ -99,7 +99,7 @@ impl Spool {
         let end = ScanEnd { outcome, reason, columns, points, digest };
         inner.append(&self.file, frame::SCAN_END, self.number, serde_json::to_vec(&end)?)?;
         inner.end = Some(end);
-        inner.tell();
+        inner.notify();
         Ok(())
     }
 
@@ -107,7 +107,7 @@ impl Spool {
     pub(super) fn refuse(&self, why: String) {
         let mut inner = self.inner();
         inner.refused = Some(why);
-        inner.tell();
+        inner.notify();
     }
 
     /// Why there will be no scan.
@@ -127,7 +127,7 @@ impl Spool {
     }
 
     /// What was announced, once it may be shown.
-    pub(super) fn begun(&self) -> Option<Begin> {
+    pub(super) fn begun(&self) -> Option<ScanLayout> {
         let inner = self.inner();
         inner.begin.clone().filter(|_| !self.held_back || inner.end.is_some())
     }
@@ -175,8 +175,8 @@ impl Inner {
         Ok(place)
     }
 
-    fn tell(&mut self) {
-        self.listeners.retain(|listener| listener.send(Event::Grown).is_ok());
+    fn notify(&mut self) {
+        self.listeners.retain(|listener| listener.send(Event::ScanAdvanced).is_ok());
     }
 }
 
@@ -186,7 +186,7 @@ impl Inner {
 /// The file is not there or holds no whole scan.
 pub(super) fn read_recording(
     path: &Path,
-    mut begun: impl FnMut(Begin) -> bool,
+    mut begun: impl FnMut(ScanLayout) -> bool,
     mut column: impl FnMut(Vec<u8>) -> bool,
 ) -> std::io::Result<()> {
     let broken = |what: String| std::io::Error::other(format!("{}: {what}", path.display()));

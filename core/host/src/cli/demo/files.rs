@@ -1,18 +1,18 @@
-//! The demo's files: those of `config/`, with the ports that the system gave and an output folder of their own.
+//! Files of the demo: those of `config/` with the assigned ports and an output folder of their own.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use crate::cli::CliError;
 
-/// Tells a folder of an earlier demo from one that holds something else.
+/// File that marks a folder as made by a demo.
 const MARK: &str = ".platen-demo";
 
 const PRESS: &str = include_str!("../../../../../config/sim-press.toml");
 const PLANT: &str = include_str!("../../../../../config/sim-plant.toml");
 const PLATE: &str = include_str!("../../../../../config/plates/plate-009.toml");
 
-/// Makes an empty folder; only an earlier demo is removed.
+/// Makes an empty folder, replacing an earlier demo only.
 pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
     if out.exists() {
         if !out.join(MARK).is_file() {
@@ -27,14 +27,14 @@ pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What the simulated press is told.
+/// Writes the configuration of the simulated press.
 pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
     let path = out.join("press.toml");
     std::fs::write(&path, PRESS)?;
     Ok(path)
 }
 
-/// The plant file for the ports that the system gave.
+/// Writes the plant file with the assigned ports.
 pub(super) fn plant_file(out: &Path, modbus: SocketAddr, plate: SocketAddr) -> Result<PathBuf, CliError> {
     let path = out.join("plant.toml");
     let text = PLANT

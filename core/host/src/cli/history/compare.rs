@@ -1,4 +1,4 @@
-//! `platen history compare`: two strokes side by side in (u, v).
+//! `platen history compare`: two strokes compared in the plate's coordinates (u, v).
 
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,8 @@ use crate::progress;
 use platen_engine::calibration::Calibration;
 use platen_engine::pipeline;
 use platen_engine::plugin::{Catalogue, Comparison, Surfaces};
-use platen_model::Report;
 use platen_model::units::mm;
+use platen_model::{Report, Verdict};
 use platen_report::picture::Caption;
 use platen_report::result::{PlateRecord, figure};
 use platen_report::{history_view, output_folder};
@@ -46,11 +46,15 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     same_size(&first, &before, &second, &now)?;
     let plate = plate_file(&plant, &second)?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
-    let rested = first.document.as_deref().and_then(|document| history_view::kept(document).supports);
-    // What the record is compared by today, however old it is.
+    let supports =
+        first.document.as_deref().and_then(|document| history_view::read_document(document).supports);
+    // The calibration in force today, whatever the age of the record.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
-    let task =
-        Calibration::task(calibration.as_ref(), &plate, history_view::moved(rested.as_deref(), &plate));
+    let task = Calibration::task(
+        calibration.as_ref(),
+        &plate,
+        history_view::supports_changed(supports.as_deref(), &plate),
+    );
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));
@@ -63,12 +67,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     };
     let figures = platen_history::compare(&first, &second);
     if common.json {
-        let found = reports.iter().map(|report| {
+        let comparisons = reports.iter().map(|report| {
             let figures: Vec<_> = report.findings.figures.iter().map(figure).collect();
             json!({ "plugin": report.comparison, "says": report.findings.says, "figures": figures })
         });
         return output::json(&json!({
-            "first": first.run_id, "second": second.run_id, "comparisons": found.collect::<Vec<_>>(),
+            "first": first.run_id, "second": second.run_id, "comparisons": comparisons.collect::<Vec<_>>(),
             "figures": figures, "files": written,
         }));
     }
@@ -99,7 +103,7 @@ fn name(stroke: &Stroke) -> String {
     format!("run {} (plate {}, stroke {})", stroke.run_id, stroke.plate, history_view::label(stroke))
 }
 
-/// The comparison as the plant configures it, else with its defaults.
+/// Returns a comparison as configured in the plant file, else with its default options.
 fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Comparison, CliError> {
     let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
     let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
@@ -107,12 +111,12 @@ fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Co
 }
 
 fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
-    let gone = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
-    let document = stroke.document.as_deref().ok_or_else(|| gone("was not measured"))?;
-    output_folder::surface_beside(document).map_err(|_| gone("its surface is not kept any more"))
+    let refused = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
+    let document = stroke.document.as_deref().ok_or_else(|| refused("was not measured"))?;
+    output_folder::surface_beside(document).map_err(|_| refused("its surface file is missing"))
 }
 
-/// Places of two plates are the same only where their rectangles are.
+/// Refuses plates of different size: their (u, v) do not name the same places.
 fn same_size(first: &Stroke, before: &Surface, second: &Stroke, now: &Surface) -> Result<(), CliError> {
     let size = |s: &Surface| format!("{:.1} x {:.1} mm", mm(s.width()), mm(s.height()));
     let [before, now] = [size(before), size(now)];
@@ -141,8 +145,9 @@ fn write(
     std::fs::create_dir_all(out)?;
     let record = PlateRecord::new(plate, now, None);
     let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);
-    // Two strokes side by side are judged by nobody: the verdict is that of the second.
-    let caption = Caption { plate: &title, stroke: None, verdict: history_view::verdict(strokes[1]) };
+    // A comparison of two strokes has no verdict of its own; the second stroke's is shown.
+    let caption =
+        Caption { plate: &title, stroke: None, verdict: strokes[1].verdict.unwrap_or(Verdict::NotMeasured) };
     let reports: Vec<&Report> = reports.iter().collect();
     Ok(output_folder::fields(out, now, &reports, &record, &caption)?)
 }

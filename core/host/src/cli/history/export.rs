@@ -1,4 +1,4 @@
-//! `platen history export`: all strokes as a table.
+//! `platen history export`: the strokes of a history as one table, CSV or Parquet.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -10,20 +10,20 @@ use super::open;
 use crate::cli::{CliError, Common, output};
 
 #[derive(Debug, Args)]
-#[command(
-    after_help = "One row a stroke: identity, times, verdict, what the press told (press.die_id, press.force, ...; newtons, metres, radians)\n\
-                        and every figure (gap.max, deviation.rms, ...; metres, radians, seconds, shares of one). What is not known is empty."
-)]
+#[command(after_help = "Examples:\n  platen history export config/plant-north.toml > strokes.csv\n  \
+                        platen history export config/plant-north.toml --out strokes.parquet\n\n\
+                        One row a stroke: identity, times, verdict, data of the press (press.die_id, press.force, ...; newtons, metres, radians)\n\
+                        and every figure (gap.max, deviation.rms, ...; metres, radians, seconds, shares of one). Unknown values are empty.")]
 pub(super) struct Command {
     /// Plant file
     plant: PathBuf,
-    /// File to write; without it, to the terminal or the pipe
+    /// File to write; stdout by default
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Format; by default what the file's name ends with, else CSV
+    /// Format; by default that of the file name's ending, else CSV
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Strokes of this plate only, by its number in the history
+    /// Only strokes of this plate, by its number in the history
     #[arg(long)]
     plate: Option<u32>,
 }
@@ -38,8 +38,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (_, archive) = open(&command.plant)?;
     let strokes = archive.strokes(&Filter { plate: command.plate, ..Filter::default() })?;
     let table = StrokeTable::new(&strokes);
-    let by_name = command.out.as_ref().and_then(|out| out.extension()).is_some_and(|end| end == "parquet");
-    let format = command.format.unwrap_or(if by_name { Format::Parquet } else { Format::Csv });
+    let parquet = command.out.as_ref().and_then(|out| out.extension()).is_some_and(|end| end == "parquet");
+    let format = command.format.unwrap_or(if parquet { Format::Parquet } else { Format::Csv });
     let mut bytes = Vec::new();
     match format {
         Format::Csv => table.write_csv(&mut bytes)?,

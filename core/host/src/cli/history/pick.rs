@@ -1,4 +1,4 @@
-//! How a stroke on record is named on the command line.
+//! Reference to a stroke on the command line: run id, or plate and stroke.
 
 use std::str::FromStr;
 
@@ -7,12 +7,12 @@ use platen_history::{Archive, Filter, Stroke};
 use crate::cli::CliError;
 use platen_report::history_view;
 
-/// A run id, or plate:stroke.
+/// Reference to a stroke: run id, or `plate:stroke`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum RunRef {
-    /// Key of the record.
+    /// Run id, the key of the record.
     Run(u32),
-    /// Number of the plate in the history, and the stroke as the list and the report name it.
+    /// Number of the plate in the history, and the stroke's label as in list and report.
     OfPlate(u32, String),
 }
 
@@ -32,7 +32,7 @@ impl FromStr for RunRef {
 }
 
 impl RunRef {
-    /// The stroke, the newest where a plate has several of this name.
+    /// Returns the stroke, the newest where a plate has several of this label.
     pub(super) fn find(&self, archive: &Archive) -> Result<Stroke, CliError> {
         match self {
             Self::Run(run_id) => Ok(archive.stroke(*run_id)?),

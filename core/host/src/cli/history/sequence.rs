@@ -1,4 +1,4 @@
-//! `platen history sequence`: how a plate was bent, as numbers.
+//! `platen history sequence`: the bending sequence of a plate as figures.
 
 use std::path::PathBuf;
 
@@ -15,11 +15,10 @@ use crate::progress;
 use platen_report::sequence::{Bend, Sequence, SequenceError, SequenceStroke, Summary};
 
 #[derive(Debug, Args)]
-#[command(
-    after_help = "feed: across the straight lines, from the strongest bend of the stroke before. re-hit: a bend that lies on an earlier one.\n\
-                        overshoot: the gap where the board says \"bent too far\". energy left: elastic energy from the measured to the\n\
-                        target's curvature, as a share of the first stroke's. Formulas: documentation of platen_report::sequence."
-)]
+#[command(after_help = "Example:\n  platen history sequence config/plant-north.toml 12\n\n\
+                        feed: distance across the straight lines from the strongest bend of the previous stroke. re-hit: a bend on an\n\
+                        earlier one. overshoot: gap under a template that is bent too far. energy left: elastic energy from the\n\
+                        measured to the target's curvature, as a share of the first stroke's. Formulas: platen_report::sequence.")]
 pub(super) struct Command {
     /// Plant file
     plant: PathBuf,
@@ -35,13 +34,12 @@ impl From<SequenceError> for CliError {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (plant, archive) = open(&command.plant)?;
-    let say = |what: &str| progress::phase(what);
     let curvature = pipeline::comparison(&common.catalogue(), &PluginUse::by_default("curvature"))?;
     let compare = |task: &Task, before: &Surface, now: &Surface| {
         let surfaces = Surfaces { now, before: Some(before), baseline: None };
         curvature.compare(task, surfaces).map_err(|error| error.to_string())
     };
-    let sequence = Sequence::of(&archive, &plant, command.plate, &compare, &say)?;
+    let sequence = Sequence::of(&archive, &plant, command.plate, &compare, &progress::phase)?;
     progress::done();
     if common.json {
         return output::json(&sequence);

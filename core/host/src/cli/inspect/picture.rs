@@ -29,7 +29,7 @@ struct Pixel {
 }
 
 /// Collects columns into pixels; its memory does not grow with the scan.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct RangePicture {
     width: usize,
     height: usize,

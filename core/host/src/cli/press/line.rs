@@ -1,4 +1,4 @@
-//! `check`, `ping` and `scan-unit`: the way to the press.
+//! `check`, `ping` and `scan-unit`: the link to the press.
 
 use std::ops::RangeInclusive;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use super::super::run::runtime;
 use super::{Common, Failure, client, output};
 use crate::progress;
 
-/// Unit ids to try.
+/// Range of unit ids.
 pub(super) type Units = RangeInclusive<u8>;
 
 /// Reads `1..10`, both ends included, or one number.
@@ -33,7 +33,7 @@ struct Exchange {
     bytes: u32,
 }
 
-/// What the host asks, most frequent first.
+/// Returns the exchanges of the host with the press, most frequent first.
 fn exchanges(press: &Press) -> Vec<Exchange> {
     let (read, write) = (press.map.read, press.map.write);
     let fast = if press.link.is_serial() { press.map.fast_count() } else { read.count };
@@ -53,7 +53,7 @@ fn exchanges(press: &Press) -> Vec<Exchange> {
     exchanges
 }
 
-/// What can be said without a connection; the plant file was found right when it was loaded.
+/// Prints what follows from the plant file alone: allow-list, exchanges and their time on the line.
 pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     let serial = match &press.link.transport {
         Transport::Rtu(serial, _) => Some(serial),
@@ -78,7 +78,8 @@ pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
             "exchanges": rows, "line_used_by_polling": polls,
         }))?);
     }
-    let role = if press.role == Role::Server { "asks the host, which listens on" } else { "is asked at" };
+    let role =
+        if press.role == Role::Server { "is the client of the host, which listens on" } else { "is read at" };
     output::line(&format!("{} {role} {} unit {}", press.name, press.link.transport, press.link.unit))?;
     let writes = if press.mode.writes() {
         format!(
@@ -90,7 +91,7 @@ pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     };
     output::line(&format!("profile {}; writes {writes}", press.map.profile.name()))?;
     if !press.map.counts_strokes() {
-        output::line("stroke counting is not available on this press: a missed stroke cannot be noticed")?;
+        output::line("this press has no stroke counter: a missed stroke cannot be detected")?;
     }
     let mut rows = vec![["exchange", "function", "registers", "line"].map(str::to_owned).to_vec()];
     rows.extend(exchanges.iter().map(|it| {
@@ -113,32 +114,32 @@ pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Round trips of one register, and whether the press takes a second connection beside.
+/// Measures the round trips of one register and tries a second connection.
 pub(super) fn ping(common: &Common, press: &Press, count: u32) -> Result<(), Failure> {
-    let mut asking = client(press)?;
+    let mut client = client(press)?;
     let one = Block { count: 1, ..press.map.read };
     let (connect, mut trips, second, identity) = runtime()?.block_on(async {
         let start = Instant::now();
-        asking.connect().await?;
+        client.connect().await?;
         let connect = start.elapsed();
         let mut trips = Vec::new();
         for _ in 0..count {
             let sent = Instant::now();
-            match asking.read(&one, 1).await {
-                // A refusal is an answer too.
+            match client.read(&one, 1).await {
+                // A refusal is timed as an answer.
                 Ok(_) | Err(LinkError::Exception { .. }) => trips.push(sent.elapsed()),
                 Err(error) => return Err(Failure::from(error)),
             }
         }
-        let mut other = client(press)?;
+        let mut other = super::client(press)?;
         let second = match &press.link.transport {
             Transport::Tcp(_) | Transport::RtuOverTcp(..) => {
                 Some(other.connect().await.is_ok() && other.read(&one, 1).await.is_ok())
             }
             Transport::Rtu(..) => None,
         };
-        // Most controllers refuse the question, some drop the connection for it.
-        let identity = asking.identify().await.unwrap_or_default().join(", ");
+        // Most controllers refuse identification, some drop the connection.
+        let identity = client.identify().await.unwrap_or_default().join(", ");
         Ok((connect, trips, second, identity))
     })?;
     trips.sort_unstable();
@@ -147,18 +148,18 @@ pub(super) fn ping(common: &Common, press: &Press, count: u32) -> Result<(), Fai
     let (least, median, most) = (at(0.0), at(0.5), at(1.0));
     if common.json {
         return Ok(output::json(&json!({
-            "peer": asking.peer(), "connect_ms": ms(connect), "reads": trips.len(),
+            "peer": client.peer(), "connect_ms": ms(connect), "reads": trips.len(),
             "least_ms": least, "median_ms": median, "most_ms": most, "second_connection": second, "identity": identity,
-            "round_trip_limits_ms": ROUND_TRIP_LIMITS_MS, "round_trips": asking.counts().round_trips,
+            "round_trip_limits_ms": ROUND_TRIP_LIMITS_MS, "round_trips": client.counts().round_trips,
         }))?);
     }
-    output::line(&format!("{}: connected in {:.1} ms", asking.peer(), ms(connect)))?;
+    output::line(&format!("{}: connected in {:.1} ms", client.peer(), ms(connect)))?;
     output::line(&format!(
-        "{} reads: {least:.1} ms at least, {median:.1} ms in the middle, {most:.1} ms at most",
+        "{} reads: {least:.1} ms at least, median {median:.1} ms, {most:.1} ms at most",
         trips.len()
     ))?;
     if !identity.is_empty() {
-        output::line(&format!("the controller says it is {identity}"))?;
+        output::line(&format!("identification of the controller: {identity}"))?;
     }
     match second {
         Some(true) => output::line("a second connection is answered: tools may run beside the host")?,
@@ -173,7 +174,7 @@ pub(super) fn ping(common: &Common, press: &Press, count: u32) -> Result<(), Fai
     Ok(())
 }
 
-/// Tries unit ids one after the other; 0 when one answered.
+/// Reads one register of each unit id; exit code 0 when one answers.
 pub(super) fn scan_units(common: &Common, press: &Press, units: &Units) -> Result<ExitCode, Failure> {
     let one = Block { count: 1, ..press.map.read };
     let mut found = Vec::new();
@@ -182,14 +183,14 @@ pub(super) fn scan_units(common: &Common, press: &Press, units: &Units) -> Resul
         progress::phase(&format!("unit {unit}"));
         let mut press = press.clone();
         press.link.unit = unit;
-        let mut asking = client(&press)?;
+        let mut client = client(&press)?;
         let answer = runtime.block_on(async {
-            asking.connect().await?;
-            asking.read(&one, 1).await
+            client.connect().await?;
+            client.read(&one, 1).await
         });
         match answer {
             Ok(words) => found.push((unit, format!("register {} is {}", one.start, words[0]))),
-            // A gateway says so for the units that are not there.
+            // Answers of a gateway for absent units.
             Err(LinkError::Exception { code: 0x0A | 0x0B, .. }) => {}
             Err(LinkError::Exception { code, .. }) => found.push((unit, format!("exception {code:02X}"))),
             Err(LinkError::Timeout { .. } | LinkError::Mismatch { .. } | LinkError::Broken { .. }) => {}

@@ -1,6 +1,6 @@
-//! `record` and `replay`: both blocks as they changed, kept as JSON lines, and what the handshake makes of them.
+//! `record` and `replay`: changes of both blocks as JSON lines, and the handshake run on them again.
 //!
-//! A line is a read that found something new: `t_mono_us` since the start, `t_utc`, `dir` (read), `unit`, `fc`, `addr`
+//! A line is a read with changed contents: `t_mono_us` since the start, `t_utc`, `dir` (read), `unit`, `fc`, `addr`
 //! and `words`, or `exception` or `error` instead of the words.
 
 use std::io::{BufRead, BufReader, Write};
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::super::run::{runtime, stop_signal};
-use super::{CliError, Common, Failure, client, output};
+use super::{CliError, Common, Failure, output};
 use crate::progress;
 
-/// One read that found something new, or failed.
+/// Read with changed contents, or a failed one.
 #[derive(Debug, Serialize, Deserialize)]
 struct Line {
     t_mono_us: u64,
@@ -54,7 +54,7 @@ impl Line {
         }
     }
 
-    /// Whether it says the same as another, but for its time.
+    /// Returns whether its contents equal those of another.
     fn repeats(&self, other: &Self) -> bool {
         (&self.words, self.exception, &self.error) == (&other.words, other.exception, &other.error)
     }
@@ -66,7 +66,7 @@ pub(super) fn record(
     file: &Path,
     for_time: Option<Duration>,
 ) -> Result<(), Failure> {
-    let mut asking = client(press)?;
+    let mut client = super::client(press)?;
     let refused = |error: std::io::Error| CliError::Failed(format!("{}: {error}", file.display()));
     let mut out = std::io::BufWriter::new(std::fs::File::create(file).map_err(refused)?);
     let (start, mut lines) = (Instant::now(), 0u64);
@@ -75,7 +75,7 @@ pub(super) fn record(
         let mut last: [Option<Line>; 2] = [None, None];
         while for_time.is_none_or(|limit| start.elapsed() < limit) {
             for (block, last) in [press.map.read, press.map.write].iter().zip(&mut last) {
-                let line = Line::new(press, block, start, look(&mut asking, block).await);
+                let line = Line::new(press, block, start, look(&mut client, block).await);
                 if last.as_ref().is_some_and(|last| last.repeats(&line)) {
                     continue;
                 }
@@ -102,14 +102,17 @@ pub(super) fn record(
     Ok(())
 }
 
-async fn look(asking: &mut Client<ModbusLink>, block: &Block) -> Result<Vec<u16>, LinkError> {
-    if !asking.connected() {
-        asking.connect().await?;
+async fn look(client: &mut Client<ModbusLink>, block: &Block) -> Result<Vec<u16>, LinkError> {
+    if !client.connected() {
+        client.connect().await?;
     }
-    asking.read(block, block.count).await
+    client.read(block, block.count).await
 }
 
-/// The blocks in a file, with its faulty lines refused by number.
+/// Reads the blocks of a recording.
+///
+/// # Errors
+/// A faulty line, with its number.
 fn load(press: &Press, file: &Path) -> Result<Vec<Sample>, CliError> {
     let unreadable = |error: std::io::Error| CliError::Usage(format!("{}: {error}", file.display()));
     let lines = BufReader::new(std::fs::File::open(file).map_err(unreadable)?).lines();
@@ -129,7 +132,7 @@ fn load(press: &Press, file: &Path) -> Result<Vec<Sample>, CliError> {
     Ok(samples)
 }
 
-/// 0 when the handshake takes the strokes that the recorded host took.
+/// Replays a recording; exit code 0 when the handshake accepts the strokes that the recorded host accepted.
 pub(super) fn replay(common: &Common, press: &Press, file: &Path) -> Result<ExitCode, Failure> {
     let samples = load(press, file)?;
     let replayed = platen_press::replay(press, &samples);
@@ -169,12 +172,12 @@ pub(super) fn replay(common: &Common, press: &Press, file: &Path) -> Result<Exit
         replayed.torn
     ))?;
     if replayed.recorded.is_empty() {
-        output::line("no host answered in this recording")?;
+        output::line("this recording has no answers of a host")?;
     } else if replayed.agrees() {
-        output::line("the recorded host took the same strokes")?;
+        output::line("the recorded host accepted the same strokes")?;
     } else {
         let (now, then) = (names(&replayed.accepted).join(" "), names(&replayed.recorded).join(" "));
-        output::line(&format!("the recorded host took others\n  now:  {now}\n  then: {then}"))?;
+        output::line(&format!("the recorded host accepted others\n  now:  {now}\n  then: {then}"))?;
     }
     Ok(ExitCode::from(u8::from(!replayed.agrees())))
 }

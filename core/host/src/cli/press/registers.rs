@@ -1,4 +1,4 @@
-//! `dump`, `watch` and `probe-order`: what stands in the registers.
+//! `dump`, `watch` and `probe-order`: contents of the registers.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -8,9 +8,9 @@ use platen_press::{Client, LinkError, ModbusLink, Reading, describe_inputs, desc
 use serde_json::{Map, Value as Json, json};
 
 use super::super::run::{runtime, stop_signal};
-use super::{CliError, Common, Failure, client, output};
+use super::{CliError, Common, Failure, output};
 
-/// Registers in one read of a range: few, so that one that is not there hides few others.
+/// Registers in one read of a range: few, so that a missing one hides few others.
 const CHUNK: u32 = 8;
 
 /// Zero-based addresses, the end excluded.
@@ -25,7 +25,7 @@ pub(super) fn range(text: &str) -> Result<Range, String> {
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
-/// Both blocks, by name.
+/// Words of both blocks.
 pub(super) struct Blocks {
     pub(super) press: Vec<u16>,
     pub(super) host: Vec<u16>,
@@ -39,7 +39,7 @@ pub(super) async fn read(press: &Press, client: &mut Client<ModbusLink>) -> Resu
     Ok(Blocks { press: client.read(p, p.count).await?, host: client.read(h, h.count).await? })
 }
 
-/// Named fields of both blocks, press first.
+/// Returns side, name and value of the fields of both blocks, the press's first.
 fn fields(press: &Press, blocks: &Blocks) -> Vec<(&'static str, String, String)> {
     let inputs = describe_inputs(&press.map, &blocks.press).into_iter();
     let outputs = describe_outputs(&press.map, &blocks.host).into_iter();
@@ -57,7 +57,7 @@ pub(super) fn dump(
     as_words: bool,
     range: Option<&Range>,
 ) -> Result<(), Failure> {
-    let mut client = client(press)?;
+    let mut client = super::client(press)?;
     if let Some(range) = range {
         let words = runtime()?.block_on(read_range(&mut client, range.clone()))?;
         return dump_range(common, range, &words);
@@ -94,7 +94,7 @@ pub(super) fn dump(
     Ok(output::table(&rows)?)
 }
 
-/// Any holding registers; those in a chunk that the press refuses are asked for one by one.
+/// Reads any holding registers; those in a chunk that the press refuses are read one by one.
 async fn read_range(client: &mut Client<ModbusLink>, range: Range) -> Result<Vec<(u32, u16)>, LinkError> {
     client.connect().await?;
     let mut words = Vec::new();
@@ -137,13 +137,13 @@ fn dump_range(common: &Common, range: &Range, words: &[(u32, u16)]) -> Result<()
     output::table(&rows)?;
     let refused = range.len() - words.len();
     if refused > 0 {
-        output::line(&format!("{refused} registers are refused by the press"))?;
+        output::line(&format!("the press refused {refused} registers"))?;
     }
     Ok(())
 }
 
 pub(super) fn watch(common: &Common, press: &Press) -> Result<(), Failure> {
-    let mut client = client(press)?;
+    let mut client = super::client(press)?;
     let start = Instant::now();
     let mut shown: Vec<(&str, String, String)> = Vec::new();
     let watched: Result<(), CliError> = runtime()?.block_on(async {
@@ -174,9 +174,9 @@ pub(super) fn watch(common: &Common, press: &Press) -> Result<(), Failure> {
     Ok(watched?)
 }
 
-/// 0 when one reading is the number expected.
+/// Searches a number in all word orders at an address and its neighbours; exit code 0 when one reading is that number.
 pub(super) fn probe_order(common: &Common, press: &Press, at: u16, expect: f64) -> Result<ExitCode, Failure> {
-    let mut client = client(press)?;
+    let mut client = super::client(press)?;
     let around = runtime()?.block_on(async {
         client.connect().await?;
         let first = u32::from(at).saturating_sub(1);
@@ -219,12 +219,12 @@ pub(super) fn probe_order(common: &Common, press: &Press, at: u16, expect: f64) 
         ))?;
     }
     if right.is_empty() {
-        output::line(&format!("{expect} does not stand at {at} or beside it in any order"))?;
+        output::line(&format!("{expect} is not found at {at} or beside it in any order"))?;
     }
     Ok(ExitCode::from(u8::from(right.is_empty())))
 }
 
-/// The registers from `first` on, fewer where the table ends before `end`.
+/// Reads the registers from `first`, fewer where the table ends before `end`.
 async fn read_words(client: &mut Client<ModbusLink>, first: u32, end: u32) -> Result<Vec<u16>, LinkError> {
     let mut words = Vec::new();
     for address in first..end.min(65_536) {

@@ -8,12 +8,12 @@ use platen_plant::PlantFile;
 use super::{CliError, Common, Failure, output};
 use crate::run::{StatusRecord, reset_request};
 
-/// A running host looks for requests once a second.
+/// Longest wait for the host, which looks for requests once a second.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Time between two looks whether it has.
+/// Interval of looking for its answer.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// 0 when the host took the request and nothing is wrong any more.
+/// Requests a reset; exit code 0 when the host carried it out and reports no fault.
 pub(super) fn run(common: &Common, plant: &PlantFile) -> Result<ExitCode, Failure> {
     let folder = &plant.output.folder;
     let request = reset_request(folder);
@@ -36,7 +36,8 @@ pub(super) fn run(common: &Common, plant: &PlantFile) -> Result<ExitCode, Failur
             break status;
         }
         if start.elapsed() > 2 * LIMIT {
-            let text = "the host took the request and has said nothing since; look at its log".to_owned();
+            let text =
+                "the host took the request and has not written its status since; see its log".to_owned();
             return Err(CliError::Failed(text).into());
         }
         std::thread::sleep(LOOK);

@@ -1,6 +1,6 @@
-//! `test`: the handshake at the real press, step by step, with a scanner that only stands in.
+//! `test`: the handshake at the real press, step by step, with a stand-in for scanner and evaluation.
 //!
-//! Results carry the bit `simulated`, so a press that follows the map's rules shows them and does not use them.
+//! Results carry the bit `simulated`: a press that follows the rules of the map displays them and does not use them.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -18,7 +18,7 @@ use super::super::run::{runtime, stop_signal};
 use super::{Common, Failure, output};
 use crate::progress;
 
-/// The figures by which a result can be told from every other stroke's: number as a gap, session as its place.
+/// Returns a result whose figures identify its stroke: the number as gap, the session as its place.
 pub fn stand_in(key: StrokeKey) -> Measurement {
     let [high, low] = key.session.to_be_bytes().map(f64::from);
     let values = [
@@ -28,42 +28,42 @@ pub fn stand_in(key: StrokeKey) -> Measurement {
         (Measure::Sense, -1.0),
     ];
     let figures = Figures { values: values.into(), stations: Vec::new() };
-    Measurement { verdict: Verdict::Fail, reason: None, figures, scanned_at: None, warning: None }
+    Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
-/// What the stand-in of scanner and evaluation saw.
+/// Order that the stand-in received.
 #[derive(Debug)]
 pub enum Seen {
-    /// A scan was ordered.
+    /// Scan of a stroke.
     Scan(StrokeKey),
-    /// An alarm came.
+    /// Alarm with its detail.
     Alarm(Code, Option<String>),
 }
 
-/// Scanner and evaluation that answer at once; tells what it was asked until the press side ends.
+/// Answers every order at once, as scanner and evaluation, and forwards scans and alarms until the press side ends.
 pub async fn serve(
     mut orders: mpsc::UnboundedReceiver<Order>,
     answers: mpsc::UnboundedSender<Answer>,
     seen: mpsc::UnboundedSender<Seen>,
 ) {
-    // Whoever does not listen any more has ended.
+    // A closed channel is the end of its listener.
     let answer = |answer: Answer| drop(answers.send(answer));
-    let tell = |what: Seen| drop(seen.send(what));
+    let forward = |what: Seen| drop(seen.send(what));
     answer(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(10)) });
     while let Some(order) = orders.recv().await {
         match order {
             Order::StartScan { key, .. } => {
-                tell(Seen::Scan(key));
+                forward(Seen::Scan(key));
                 answer(Answer::Acquired(key));
             }
             Order::Evaluate(key) => answer(Answer::Result(key, Box::new(stand_in(key)))),
-            Order::Alarm { code, detail, .. } => tell(Seen::Alarm(code, detail)),
+            Order::Alarm { code, detail, .. } => forward(Seen::Alarm(code, detail)),
             Order::Cancel(_) | Order::PartEnd | Order::Seen(_) => {}
         }
     }
 }
 
-/// One step of the handshake as it went.
+/// One step of the handshake: figure against limit.
 struct Step {
     what: String,
     figure: String,
@@ -71,7 +71,7 @@ struct Step {
     good: bool,
 }
 
-/// Everything seen in one trial.
+/// Steps of one trial.
 #[derive(Default)]
 struct Report {
     steps: Vec<Step>,
@@ -95,7 +95,7 @@ impl Report {
     }
 }
 
-/// 0 when every step kept its limit.
+/// Runs the trial; exit code 0 when every step is within its limit.
 pub(super) fn run(
     common: &Common,
     mut press: Press,
@@ -127,9 +127,9 @@ pub(super) fn run(
 
 async fn trial(press: &Press, strokes: u32, patience: Duration) -> Result<Report, Failure> {
     let (HostSide { orders, answers, mut status }, side) = channels();
-    let (tell, mut seen) = mpsc::unbounded_channel();
+    let (observer, mut seen) = mpsc::unbounded_channel();
     let journal = MemoryJournal::new(jiff::Timestamp::now().subsec_nanosecond() as u16 | 1);
-    tokio::spawn(serve(orders, answers.clone(), tell));
+    tokio::spawn(serve(orders, answers.clone(), observer));
     let ended = tokio::spawn(run_press(press.clone(), PressLink::new(press), journal, side));
     let mut stop = stop_signal()?;
     let mut report = Report::default();
@@ -139,7 +139,7 @@ async fn trial(press: &Press, strokes: u32, patience: Duration) -> Result<Report
     };
     let missed = status.borrow().metrics.missed;
     report.add("missed strokes", missed.to_string(), "0", missed == 0);
-    // The press side may have ended by itself; what it says is the same.
+    // The press side may have ended by itself.
     let _ = answers.send(Answer::Stop);
     let _ = ended.await;
     if let Err(why) = tried {
@@ -160,7 +160,10 @@ async fn trial(press: &Press, strokes: u32, patience: Duration) -> Result<Report
     Ok(report)
 }
 
-/// Waits for something in the status; says what did not come.
+/// Waits for a state of the host.
+///
+/// # Errors
+/// `what` did not come in time, or the press side ended.
 async fn until(
     status: &mut tokio::sync::watch::Receiver<Status>,
     what: &str,
@@ -210,7 +213,7 @@ async fn strokes_of(
         until(status, "the next stroke", patience, |status| status.metrics.strokes > seen).await?;
         let limit = press.link.response_timeout * 4 + Duration::from_secs(2);
         let after = until(status, "the result", limit, |status| published(status) > seen).await?;
-        // A press quicker than the status shows the last of its strokes only.
+        // The status shows only the last of strokes that come faster than it is read.
         seen = published(&after);
         one_stroke(press, &after, report);
         acknowledged(press, seen, status, report).await?;
@@ -218,7 +221,7 @@ async fn strokes_of(
     Ok(())
 }
 
-/// The times of the stroke whose result has just been written.
+/// Reports the times of the stroke whose result has just been written.
 fn one_stroke(press: &Press, status: &Status, report: &mut Report) {
     let ms = |time: Option<Duration>| {
         time.map_or("-".into(), |time| format!("{:.0} ms", time.as_secs_f64() * 1000.0))
@@ -238,7 +241,7 @@ fn one_stroke(press: &Press, status: &Status, report: &mut Report) {
     report.add(format!("{name}: result"), text, "no error", error.is_none());
 }
 
-/// A press that refuses simulated results, as it should, never acknowledges them: that is told, not held against it.
+/// Reports the acknowledge. A press that refuses simulated results, as it should, sends none: the step is good either way.
 async fn acknowledged(
     press: &Press,
     n: u64,
@@ -253,7 +256,7 @@ async fn acknowledged(
     let acked = seen.metrics.ack_timeouts == 0;
     let text = match seen.metrics.result_to_ack.last() {
         Some(time) if acked => format!("after {:.0} ms", time.as_secs_f64() * 1000.0),
-        _ => "none: right for a press that takes no simulated results".into(),
+        _ => "none, as is right for a press that refuses simulated results".into(),
     };
     report.add("acknowledge", text, format!("{} s", limit.as_secs_f64()), true);
     Ok(())

@@ -1,7 +1,7 @@
 //! `write-test`: a pattern in each figure of the host's block, for comparison with the screen of the press.
 //!
-//! Figures only: status, echoes, heartbeat and counters stay 0, so that no press takes the pattern for a result. Every
-//! write goes through the allow-list; at the end all of the figures hold their "no value" word again.
+//! Status, echoes, heartbeat and counters stay 0, so that no press takes the pattern for a result. Every write goes through
+//! the allow-list; at the end all figures hold their "no value" word again.
 
 use std::io::{BufRead, IsTerminal, Write};
 use std::process::ExitCode;
@@ -13,12 +13,12 @@ use platen_press::{Client, HostImage, LinkError, ModbusLink, PressImage, describ
 use serde_json::json;
 
 use super::super::run::runtime;
-use super::{CliError, Common, Failure, client, output};
+use super::{CliError, Common, Failure, output};
 
-/// A host beats at least twice in this time.
+/// Time of watching for a running host: two heartbeats at least.
 const WATCH: Duration = Duration::from_millis(1500);
 
-/// One field as it was written.
+/// Field with the pattern written to it.
 struct Written {
     field: Output,
     shows: String,
@@ -26,26 +26,26 @@ struct Written {
     confirmed: Option<bool>,
 }
 
-/// 0 when every pattern was read back, and none was denied at the screen.
+/// Runs the test; exit code 0 when every pattern was read back and none was denied at the screen.
 pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
     let mut press = press.clone();
     if !press.mode.writes() {
         press.mode = Mode::Simulate;
     }
-    let mut asking = client(&press)?;
-    let asks = std::io::stdin().is_terminal() && !common.json;
+    let mut client = super::client(&press)?;
+    let interactive = std::io::stdin().is_terminal() && !common.json;
     let runtime = runtime()?;
-    runtime.block_on(alone(&press, &mut asking))?;
+    runtime.block_on(alone(&press, &mut client))?;
     let mut written = Vec::new();
     for (step, field) in figures(&press).into_iter().enumerate() {
-        let done = runtime.block_on(show(&press, &mut asking, field, step))?;
+        let done = runtime.block_on(show(&press, &mut client, field, step))?;
         written.push(done);
-        if let (true, Some(last)) = (asks, written.last_mut()) {
+        if let (true, Some(last)) = (interactive, written.last_mut()) {
             last.confirmed = Some(confirm(last)?);
         }
     }
     let blank = HostImage::default().encode(&press.map, 0);
-    runtime.block_on(write(&press, &mut asking, &blank))?;
+    runtime.block_on(write(&press, &mut client, &blank))?;
     let good = written.iter().all(|it| it.read_back && it.confirmed != Some(false));
     if common.json {
         let row = |it: &Written| json!({ "field": it.field.name(), "shows": it.shows, "read_back": it.read_back, "confirmed": it.confirmed });
@@ -62,7 +62,7 @@ pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(u8::from(!good)))
 }
 
-/// Fields that hold a figure, in the order of their registers.
+/// Returns the fields that hold a figure, in the order of their registers.
 fn figures(press: &Press) -> Vec<Output> {
     let holds = |output: &Output| output.measure().is_some() || *output == Output::Station;
     let mut figures: Vec<_> = press.map.outputs.keys().copied().filter(holds).collect();
@@ -70,7 +70,7 @@ fn figures(press: &Press) -> Vec<Output> {
     figures
 }
 
-/// A result of which only this field has a figure, different from every other step's.
+/// Returns a result of which only this field has a figure, different from every other step's.
 fn image(press: &Press, field: Output, step: usize) -> HostImage {
     let Some(place) = press.map.output(field) else { return HostImage::default() };
     let raw = (11 * (step + 1)) as f64;
@@ -83,20 +83,20 @@ fn image(press: &Press, field: Output, step: usize) -> HostImage {
         },
     };
     let measurement =
-        Measurement { verdict: Verdict::CannotTell, reason: None, figures, scanned_at: None, warning: None };
+        Measurement { judgement: Verdict::CannotTell.into(), figures, scanned_at: None, warning: None };
     let key = StrokeKey { press: press.press_id, session: 0, stroke: 0, attempt: 0 };
     let result = Publication { key, run_id: 0, seq: 0, recipe_id: None, measurement };
     HostImage { result: Some(result), ..HostImage::default() }
 }
 
-/// Connects, and refuses another press than the plant file's.
-async fn reach(press: &Press, asking: &mut Client<ModbusLink>) -> Result<(), Failure> {
-    asking.connect().await?;
-    let words = asking.read(&press.map.read, press.map.read.count).await?;
+/// Connects; refuses a press other than the plant file's.
+async fn reach(press: &Press, client: &mut Client<ModbusLink>) -> Result<(), Failure> {
+    client.connect().await?;
+    let words = client.read(&press.map.read, press.map.read.count).await?;
     match PressImage::decode(&press.map, press.press_id, &words).map(|image| image.wrong) {
         Ok(Some(wrong)) => Err(Failure::Handshake(format!(
             "{}: {} is {}, the plant file says {}: is this the right press?",
-            asking.peer(),
+            client.peer(),
             wrong.input,
             wrong.found,
             wrong.expected
@@ -105,20 +105,20 @@ async fn reach(press: &Press, asking: &mut Client<ModbusLink>) -> Result<(), Fai
     }
 }
 
-/// Refuses to write where a host is at work.
-async fn alone(press: &Press, asking: &mut Client<ModbusLink>) -> Result<(), Failure> {
-    reach(press, asking).await?;
+/// Refuses to write to a press that a host writes to.
+async fn alone(press: &Press, client: &mut Client<ModbusLink>) -> Result<(), Failure> {
+    reach(press, client).await?;
     let block = press.map.write;
-    let before = asking.read(&block, block.count).await?;
+    let before = client.read(&block, block.count).await?;
     tokio::time::sleep(WATCH).await;
-    if asking.read(&block, block.count).await? != before {
+    if client.read(&block, block.count).await? != before {
         let text = "a host is writing to this press: stop it before a write-test";
         return Err(CliError::Failed(text.into()).into());
     }
     Ok(())
 }
 
-async fn write(press: &Press, asking: &mut Client<ModbusLink>, words: &[u16]) -> Result<(), LinkError> {
+async fn write(press: &Press, client: &mut Client<ModbusLink>, words: &[u16]) -> Result<(), LinkError> {
     let block = press.map.write;
     for range in press.write.ranges() {
         let start = u32::from(*range.start()).max(block.addresses().start);
@@ -126,7 +126,7 @@ async fn write(press: &Press, asking: &mut Client<ModbusLink>, words: &[u16]) ->
         if start < end {
             let offsets =
                 (start - block.addresses().start) as usize..(end - block.addresses().start) as usize;
-            asking.guarded_write(start as u16, &words[offsets]).await?;
+            client.guarded_write(start as u16, &words[offsets]).await?;
         }
     }
     Ok(())
@@ -134,17 +134,17 @@ async fn write(press: &Press, asking: &mut Client<ModbusLink>, words: &[u16]) ->
 
 async fn show(
     press: &Press,
-    asking: &mut Client<ModbusLink>,
+    client: &mut Client<ModbusLink>,
     field: Output,
     step: usize,
 ) -> Result<Written, Failure> {
-    if !asking.connected() {
-        reach(press, asking).await?;
+    if !client.connected() {
+        reach(press, client).await?;
     }
     let words = image(press, field, step).encode(&press.map, 0);
-    write(press, asking, &words).await?;
+    write(press, client, &words).await?;
     let block = press.map.write;
-    let found = asking.read(&block, block.count).await?;
+    let found = client.read(&block, block.count).await?;
     let value = |words: &[u16]| {
         describe_outputs(&press.map, words)
             .into_iter()

@@ -1,4 +1,4 @@
-//! The plate as the scanner sees it, with what the measurement says where.
+//! Picture of the scan's intensities with the measured edges, lines and markers over it, as SVG.
 
 use std::fmt::Write as _;
 
@@ -11,15 +11,15 @@ use platen_shape::{Measurement, Patch, Vec3};
 /// Largest width of the picture, pixels.
 const WIDTH: f64 = 1600.0;
 
-/// Intensities between these shares of the median become black to white: paint shows dark, glare at edges takes nothing.
+/// Shares of the median intensity drawn black and white: paint is dark, and glare at edges does not stretch the scale.
 const GRAYS: [f64; 2] = [0.25, 1.5];
 
-/// Room round the plate, pixels.
+/// Margin round the plate, pixels.
 const MARGIN: f64 = 40.0;
 
-/// From directions to pixels. Seen from the scanner, azimuths grow to the left.
+/// Map from directions to pixels. Seen from the scanner, azimuths grow to the left.
 struct View {
-    /// Direction of the middle of the plate, horizontally.
+    /// Horizontal direction of the plate's centre.
     forward: [f64; 2],
     /// Azimuth from there of column 0, and elevation of row 0.
     origin: [f64; 2],
@@ -41,7 +41,7 @@ impl View {
         };
         let (columns, rows) = (range(|s| s.column)?, range(|s| s.row)?);
         let step = [patch.azimuth_step, patch.elevation_step];
-        // Where column 0 and row 0 look, by the mean of all samples.
+        // Direction of column 0 and row 0: mean over all samples.
         let n = patch.samples.len() as f64;
         let origin = patch.samples.iter().fold([0.0, 0.0], |sum, s| {
             let [azimuth, elevation] = direction(forward, s.point);
@@ -68,7 +68,7 @@ impl View {
         [x * self.scale[0], y * self.scale[1]]
     }
 
-    /// The intensities as a PNG, one pixel a cell, clear where the plate was not seen.
+    /// Encodes the intensities as PNG, one pixel a cell, transparent where the plate was not seen.
     fn intensities(&self, patch: &Patch) -> Result<Vec<u8>, png::EncodingError> {
         let (n_x, n_y) = (self.columns[1] - self.columns[0] + 1, self.rows[1] - self.rows[0] + 1);
         let mut intensities: Vec<u16> = patch.samples.iter().map(|s| s.intensity).collect();
@@ -93,17 +93,17 @@ impl View {
     }
 }
 
-/// Azimuth against `forward` and elevation of a point.
+/// Returns azimuth relative to `forward` and elevation of a point.
 fn direction(forward: [f64; 2], p: Vec3) -> [f64; 2] {
     let ahead = forward[0] * p.x + forward[1] * p.y;
     let aside = forward[0] * p.y - forward[1] * p.x;
     [aside.atan2(ahead), p.z.atan2(p.x.hypot(p.y))]
 }
 
-/// The picture as SVG: reference lines yellow, edges cyan, markers as yellow crosses, discs found as red rings.
+/// Draws the picture: reference lines yellow, edges cyan, markers as yellow crosses, discs found as red rings.
 ///
 /// # Errors
-/// When the image cannot be encoded.
+/// The image cannot be encoded.
 pub(super) fn draw(
     patch: &Patch,
     measurement: &Measurement,

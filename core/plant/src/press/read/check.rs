@@ -1,4 +1,4 @@
-//! Conflicts between the fields of a map, each told with both fields.
+//! Conflicts between the fields of a map, each reported with both fields.
 
 use std::collections::BTreeMap;
 
@@ -33,13 +33,13 @@ impl Faults<'_> {
         self.found = Some(self.document.fault(place, message));
     }
 
-    /// The address of a register of a block as the file counts, with its kind.
+    /// Returns kind and address of a register of a block, as the file counts.
     fn register(&self, block: &Block, offset: u32) -> String {
         let first = self.located.map.address_base.first(block.table);
         format!("{} register {}", block.table.name(), first + u32::from(block.start) + offset)
     }
 
-    /// Fields that cross the end of their block, and fields that share a register.
+    /// Reports fields that cross the end of their block or share a register.
     fn direction<N: Name>(
         &mut self,
         fields: &BTreeMap<N, RegisterField>,
@@ -72,7 +72,7 @@ impl Faults<'_> {
         }
     }
 
-    /// Told at the field that the file speaks of, later in the file when it speaks of both.
+    /// Reports a shared register, at the later of the fields that the file gives.
     fn clash<N: Name>(
         &mut self,
         one: (N, Option<u8>),
@@ -82,17 +82,17 @@ impl Faults<'_> {
     ) {
         let at = |(name, _): (N, Option<u8>)| places.get(&name);
         let later = at(other).map(|place| place.offset) > at(one).map(|place| place.offset);
-        let (told, first) = if later { (other, one) } else { (one, other) };
-        let bit = told.1.and(first.1).map(|bit| format!(" bit {bit}")).unwrap_or_default();
+        let (reported, first) = if later { (other, one) } else { (one, other) };
+        let bit = reported.1.and(first.1).map(|bit| format!(" bit {bit}")).unwrap_or_default();
         let by = match at(first) {
             Some(place) => self.document.locate(place),
             None => "built-in".to_owned(),
         };
-        let place = at(told).unwrap_or(&self.located.place).clone();
+        let place = at(reported).unwrap_or(&self.located.place).clone();
         self.add(&place, format!("{register}{bit} is `{}` already ({by}); move one", first.0.name()));
     }
 
-    /// The host must never write what it reads.
+    /// Reports an overlap of the blocks: the host must not write registers of the press.
     fn blocks(&mut self) {
         let (read, write) = (self.located.map.read, self.located.map.write);
         let (ours, theirs) = (write.addresses(), read.addresses());
@@ -107,7 +107,7 @@ impl Faults<'_> {
         }
     }
 
-    /// Every output must be allowed.
+    /// Reports outputs outside the allow-list.
     fn allowed(&mut self, write: &WriteAllow) {
         let block = self.located.map.write;
         for (name, field) in &self.located.map.outputs {
@@ -122,7 +122,7 @@ impl Faults<'_> {
         }
     }
 
-    /// Fields without which there is no handshake.
+    /// Reports missing or unusable fields of the handshake.
     fn roles(&mut self) {
         let map = &self.located.map;
         let needs_ids = map.profile == Profile::Pph1;

@@ -13,7 +13,7 @@ use crate::press::{
 };
 use crate::{Dimension, Place, TomlTable, Unit};
 
-/// What fields are called and what they measure.
+/// Field names of one direction.
 pub(super) trait Name: Copy + Ord + 'static {
     const INPUT: bool;
     fn name(self) -> &'static str;
@@ -40,23 +40,23 @@ impl Name for Output {
     }
 }
 
-/// The fields of one direction, and where the file speaks of them.
+/// Fields of one direction, with the places of those that the file gives.
 pub(super) struct Given<N> {
     pub(super) fields: BTreeMap<N, RegisterField>,
     pub(super) places: BTreeMap<N, Place>,
 }
 
-/// What fields have in common, and what they say about more than themselves.
+/// Reader of fields: their common properties, and properties of the press that fields carry.
 pub(super) struct FieldReader {
     pub(super) order: WordOrder,
-    pub(super) address_base: AddressBase,
-    pub(super) block: Block,
+    /// Block of the fields and base of its addresses; `None` where they are faulty.
+    pub(super) block: Option<(Block, AddressBase)>,
     pub(super) counter: Counter,
     pub(super) heartbeat_in: Option<Duration>,
 }
 
 impl FieldReader {
-    /// Every field of a direction: the profile's, unless the file says otherwise.
+    /// Reads the fields of a direction: those of the profile with the changes of the file.
     pub(super) fn fields<N: Name>(
         &mut self,
         mut table: TomlTable<'_>,
@@ -85,7 +85,7 @@ impl FieldReader {
         failed.map_or(Ok(given), Err)
     }
 
-    /// What the file says about one field: nothing, that it does not exist, or where and what it is.
+    /// Reads one field: `None` if the file does not give it, `Some(None)` if it is `"none"`.
     fn one<N: Name>(
         &mut self,
         table: &mut TomlTable<'_>,
@@ -135,7 +135,7 @@ impl FieldReader {
         });
         let same = kind.is_ok_and(|kind| kind == default.kind);
         let scale = table.number("scale").check(|scale| match *scale == 0.0 {
-            true => Err("found 0, nothing can be told from 0 times a number".to_owned()),
+            true => Err("found 0, must not be 0".to_owned()),
             false => Ok(()),
         });
         let scale = scale.or(if same { default.scale } else { 1.0 });
@@ -174,7 +174,7 @@ impl FieldReader {
         Ok(field)
     }
 
-    /// `at = 3`, `at = "2.1"`, `at = "@1234"`, `at = "@1234.5"`, or `const = 1`.
+    /// Reads `at = 3`, `at = "2.1"`, `at = "@1234"`, `at = "@1234.5"`, or `const = 1`.
     fn place<N: Name>(
         &self,
         table: &mut TomlTable<'_>,
@@ -218,14 +218,16 @@ impl FieldReader {
     }
 
     fn offset(&self, offset: i64) -> Result<u16, String> {
-        let last = self.block.count - 1;
+        let Some((block, _)) = self.block else { return Ok(0) };
+        let last = block.count - 1;
         let inside = u16::try_from(offset).ok().filter(|&offset| offset <= last);
         inside.ok_or_else(|| format!("found register {offset} of its block, which has 0 to {last}"))
     }
 
     fn offset_of(&self, address: i64) -> Result<u16, String> {
-        let first = i64::from(self.address_base.first(self.block.table)) + i64::from(self.block.start);
-        let last = first + i64::from(self.block.count) - 1;
+        let Some((block, base)) = self.block else { return Ok(0) };
+        let first = i64::from(base.first(block.table)) + i64::from(block.start);
+        let last = first + i64::from(block.count) - 1;
         let inside = (first..=last).contains(&address);
         if inside {
             Ok((address - first) as u16)
@@ -234,7 +236,7 @@ impl FieldReader {
         }
     }
 
-    /// The keys that only fields of the press have; some say something about the press as a whole.
+    /// Reads the keys that only fields of the press have; some are properties of the press as a whole.
     fn input_keys(
         &mut self,
         table: &mut TomlTable<'_>,
@@ -302,7 +304,7 @@ fn output_keys(
     Ok(Own { expect: None, debounce_reads: 1, count: count?, from: from?.or(default.from) })
 }
 
-/// The type; `None` for a text without a length.
+/// Reads the type; `None` for a text without a length.
 fn read_kind(
     table: &mut TomlTable<'_>,
     dimension: Dimension,
@@ -331,7 +333,7 @@ fn read_unit(table: &mut TomlTable<'_>, dimension: Dimension, default: Unit) -> 
     table.choice("unit", &Unit::fitting(dimension)).or(default)
 }
 
-/// `invalid = "0x8000"` or `invalid = 32768`.
+/// Reads `invalid = "0x8000"` or `invalid = 32768`.
 fn read_invalid(table: &mut TomlTable<'_>) -> Result<Option<u32>, Reported> {
     let field = table.node("invalid").try_map(|node| {
         let value = match &node.kind {
@@ -346,7 +348,7 @@ fn read_invalid(table: &mut TomlTable<'_>) -> Result<Option<u32>, Reported> {
     field.optional()
 }
 
-/// What can be wrong within one field.
+/// Checks the keys of one field against each other.
 fn check_field(field: &RegisterField, dimension: Dimension) -> Result<(), String> {
     if !field.unit.fits(dimension) {
         let units: Vec<_> = Unit::fitting(dimension).into_iter().map(|(symbol, _)| symbol).collect();

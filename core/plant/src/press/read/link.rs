@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use super::ms;
 use crate::document::Reported;
-use crate::press::{Link, Parity, Quiet, Serial, Transport};
+use crate::press::{Link, Parity, Quiet, Serial, Socket, Transport};
 use crate::{Located, Place, TomlTable};
 
-/// What the words travel over.
+/// Type of the link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Way {
     Tcp,
@@ -17,7 +17,7 @@ enum Way {
     RtuOverTcp,
 }
 
-/// Reads the link, and where its type stands.
+/// Reads the link, and the place of its type.
 pub(super) fn read(mut table: TomlTable<'_>) -> Result<(Link, Option<Place>), Reported> {
     let document = table.document();
     let ways = [("tcp", Way::Tcp), ("rtu", Way::Rtu), ("rtu-over-tcp", Way::RtuOverTcp)];
@@ -35,31 +35,21 @@ pub(super) fn read(mut table: TomlTable<'_>) -> Result<(Link, Option<Place>), Re
     let backoff = backoff.optional();
     let quiet_place = table.integer("quiet_ms").in_range(1..=10_000).located().optional();
 
-    let way = way?;
-    let kind = way.as_ref().map_or(Way::Tcp, |way| way.value);
-    let link = match kind {
-        Way::Tcp | Way::RtuOverTcp => {
-            let host = table.name("host").required();
-            let port = table.integer("port").in_range(1..=65_535).map(|port| port as u16).or(502);
-            let peers = if kind == Way::Tcp { read_peers(&mut table) } else { Ok(Vec::new()) };
-            table.finish();
-            let (host, port, unit) = (host?, port?, unit?);
-            let mut link = if kind == Way::Tcp {
-                Link::tcp(host, port, unit)
-            } else {
-                Link::rtu_over_tcp(host, port, unit)
-            };
-            if let Transport::Tcp(socket) = &mut link.transport {
-                socket.peers = peers?;
-            }
-            link
-        }
-        Way::Rtu => {
-            let serial = read_serial(&mut table);
-            table.finish();
-            Link::rtu(serial?, unit?)
+    let kind = way.as_ref().map(|way| way.as_ref().map_or(Way::Tcp, |way| way.value));
+    // A link of unknown type may have the keys of every type.
+    let transport = match kind {
+        Ok(Way::Tcp) => read_socket(&mut table, true).map(Transport::Tcp),
+        Ok(Way::RtuOverTcp) => read_socket(&mut table, false).map(Transport::rtu_over_tcp),
+        Ok(Way::Rtu) => read_serial(&mut table).map(Transport::rtu),
+        Err(&reported) => {
+            table.excuse_missing(reported);
+            let _ = (read_socket(&mut table, true), read_serial(&mut table));
+            Err(reported)
         }
     };
+    table.finish();
+    let (transport, way) = (transport?, way?);
+    let link = Link::new(transport, unit?);
     let backoff = backoff?.map(|times| times.map(|ms| Duration::from_secs_f64(ms / 1000.0)));
     let [backoff_min, backoff_max] = backoff.unwrap_or([link.backoff_min, link.backoff_max]);
     let mut link = Link {
@@ -101,6 +91,13 @@ impl Link {
             Transport::Rtu(_, Quiet(quiet)) | Transport::RtuOverTcp(_, Quiet(quiet)) => *quiet = time,
         }
     }
+}
+
+fn read_socket(table: &mut TomlTable<'_>, with_peers: bool) -> Result<Socket, Reported> {
+    let host = table.name("host").required();
+    let port = table.integer("port").in_range(1..=65_535).map(|port| port as u16).or(502);
+    let peers = if with_peers { read_peers(table) } else { Ok(Vec::new()) };
+    Ok(Socket { peers: peers?, ..Socket::new(host?, port?) })
 }
 
 fn read_peers(table: &mut TomlTable<'_>) -> Result<Vec<IpAddr>, Reported> {

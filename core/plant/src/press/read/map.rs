@@ -1,4 +1,4 @@
-//! Reads `[press.map]`: the built-in map of the profile, with what the file says otherwise.
+//! Reads `[press.map]`: the built-in map of the profile with the changes of the file.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -15,41 +15,32 @@ use crate::{Place, TomlTable};
 const MOST_READ: i64 = 125;
 const MOST_WRITTEN: i64 = 123;
 
-/// A register map and where the file says what of it.
+/// Register map with the places of its parts in the file.
 #[derive(Debug)]
 pub(super) struct LocatedMap {
     pub(super) map: RegisterMap,
-    /// Where the file speaks of a field; the others are the profile's.
+    /// Places of the fields that the file gives; the others are the profile's.
     pub(super) inputs: BTreeMap<Input, Place>,
     pub(super) outputs: BTreeMap<Output, Place>,
-    /// Where `[press.map]` stands, for what is missing, and its `write`, for what does not fit.
+    /// Places of `[press.map]`, for missing fields, and of its `write`, for conflicts of the block.
     pub(super) place: Place,
     pub(super) write_place: Place,
     pub(super) heartbeat_in: Option<Duration>,
 }
 
-impl LocatedMap {
-    /// The registers of `"100..=163"` or `"100"`, counted as the map counts holding registers.
-    pub(super) fn range(&self, text: &str) -> Result<RangeInclusive<u16>, String> {
-        let first = self.map.address_base.first(RegisterTable::Holding);
-        let address = |text: &str| {
-            let number = text.trim().parse::<u32>().ok().and_then(|number| number.checked_sub(first));
-            number.and_then(|address| u16::try_from(address).ok())
-        };
-        let range = match text.split_once("..=") {
-            Some((start, end)) => address(start).zip(address(end)),
-            None => address(text).map(|only| (only, only)),
-        };
-        let (start, end) = range.filter(|(start, end)| start <= end).ok_or_else(|| {
-            format!("found {text:?}, expected registers like \"{}..={}\"", first + 100, first + 163)
-        })?;
-        Ok(start..=end)
-    }
+/// Parses the holding registers of `"100..=163"` or `"100"`.
+pub(super) fn parse_range(text: &str, base: AddressBase) -> Result<RangeInclusive<u16>, String> {
+    let first = base.first(RegisterTable::Holding);
+    let address = |text: &str| u16::try_from(text.trim().parse::<u32>().ok()?.checked_sub(first)?).ok();
+    let (start, end) = text.split_once("..=").unwrap_or((text, text));
+    let range = address(start).zip(address(end)).filter(|(start, end)| start <= end);
+    let (start, end) = range.ok_or_else(|| {
+        format!("found {text:?}, expected registers like \"{}..={}\"", first + 100, first + 163)
+    })?;
+    Ok(start..=end)
 }
 
-pub(super) fn read_map(mut table: TomlTable<'_>, profile: Profile) -> Result<LocatedMap, Reported> {
-    let place = table.place().clone();
-    let built_in = RegisterMap::of(profile);
+pub(super) fn read_base(table: &mut TomlTable<'_>) -> Result<AddressBase, Reported> {
     let bases = [
         (0, AddressBase::Zero),
         (1, AddressBase::One),
@@ -60,45 +51,47 @@ pub(super) fn read_map(mut table: TomlTable<'_>, profile: Profile) -> Result<Loc
         let base = bases.iter().find(|(number, _)| *number == found).map(|(_, base)| *base);
         base.ok_or_else(|| format!("found {found}, allowed 0, 1, 40001, 400001"))
     });
-    let address_base = address_base.or(AddressBase::default())?;
+    address_base.or(AddressBase::default())
+}
+
+/// Reads the rest of `[press.map]`. Where the base or a block is faulty, addresses are not checked.
+pub(super) fn read_map(
+    mut table: TomlTable<'_>,
+    profile: Profile,
+    base: Result<AddressBase, Reported>,
+) -> Result<LocatedMap, Reported> {
+    let place = table.place().clone();
+    let built_in = RegisterMap::of(profile);
     let orders = WordOrder::ALL.map(|order| (order.name(), order));
     let order = table.choice("word_order", &orders).or(WordOrder::default());
-    let read =
-        table.section("read").and_then(|block| read_block(block, built_in.read, address_base, MOST_READ));
-    let write_place =
-        if table.has("write") { table.table("write").located().required()?.place } else { place.clone() };
+    let read = table.section("read").and_then(|block| read_block(block, built_in.read, base, MOST_READ));
+    let has_write = table.has("write");
     let write = table.section("write").and_then(|block| {
         let document = block.document();
-        let write = read_block(block, built_in.write, address_base, MOST_WRITTEN)?;
+        let block_place = if has_write { block.place().clone() } else { place.clone() };
+        let write = read_block(block, built_in.write, base, MOST_WRITTEN)?;
         match write.table {
-            RegisterTable::Holding => Ok(write),
+            RegisterTable::Holding => Ok((write, block_place)),
             RegisterTable::Input => {
-                Err(document.fault(&write_place, "input registers cannot be written; use holding"))
+                Err(document.fault(&block_place, "input registers cannot be written; use holding"))
             }
         }
     });
-
-    let (read, write) = match (read, write) {
-        (Ok(read), Ok(write)) => (read, write),
-        (Err(reported), _) | (_, Err(reported)) => {
-            let _ = (table.table("in").optional(), table.table("out").optional());
-            table.finish();
-            return Err(reported);
-        }
-    };
+    let block = |block: Result<Block, Reported>| block.ok().zip(base.ok());
     let mut reader = FieldReader {
-        order: order?,
-        address_base,
-        block: read,
+        order: order.unwrap_or_default(),
+        block: block(read),
         counter: Counter::default(),
         heartbeat_in: None,
     };
     let inputs = table.section("in").and_then(|fields| reader.fields(fields, built_in.inputs, Input::ALL));
     let (counter, heartbeat_in) = (reader.counter, reader.heartbeat_in);
-    reader.block = write;
+    reader.block = block(write.as_ref().map(|(block, _)| *block).map_err(|reported| *reported));
     let outputs =
         table.section("out").and_then(|fields| reader.fields(fields, built_in.outputs, Output::ALL));
     table.finish();
+    let (address_base, read, (write, write_place)) = (base?, read?, write?);
+    order?;
     let (Given { fields: inputs, places: input_places }, Given { fields: outputs, places: output_places }) =
         (inputs?, outputs?);
     let map = RegisterMap { profile, address_base, read, write, inputs, outputs, counter };
@@ -108,7 +101,7 @@ pub(super) fn read_map(mut table: TomlTable<'_>, profile: Profile) -> Result<Loc
 fn read_block(
     mut table: TomlTable<'_>,
     built_in: Block,
-    base: AddressBase,
+    base: Result<AddressBase, Reported>,
     most: i64,
 ) -> Result<Block, Reported> {
     let document = table.document();
@@ -117,8 +110,8 @@ fn read_block(
     let start = table.integer("start").located().optional();
     let count = table.integer("count").in_range(1..=most).map(|count| count as u16).or(built_in.count);
     table.finish();
-    let (kind, count) = (kind?, count?);
-    let start = match start? {
+    let (kind, count, start, base) = (kind?, count?, start?, base?);
+    let start = match start {
         None => built_in.start,
         Some(start) => {
             let first = i64::from(base.first(kind));

@@ -1,14 +1,14 @@
-//! Connected parts of a set of cells.
+//! Connected components of a mask inside a window, by runs.
 
 use std::ops::Range;
 
 use platen_numerics::union_find::UnionFind;
 
-/// Label of a cell that is part of none.
+/// Label of a cell outside of the mask.
 pub(in crate::extract) const NO_LABEL: u32 = u32::MAX;
 
-/// Labels the parts of the set cells of a window, neighbours along rows and columns, by their first cell: label per cell and
-/// number of parts. Margins are not set, so columns do not run into each other.
+/// Labels the components of the set cells (neighbours along rows and columns), numbered by their first cell. Returns the label
+/// per cell and the number of components. Margins are not set, so columns do not run into each other.
 pub(in crate::extract) fn label_components(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut runs: Vec<Range<usize>> = Vec::new();
     let mut sets = UnionFind::default();
@@ -35,7 +35,7 @@ pub(in crate::extract) fn label_components(mask: &[bool], n_rows: usize) -> (Vec
     let mut number = vec![NO_LABEL; runs.len()];
     let mut n = 0;
     for (run, cells) in runs.into_iter().enumerate() {
-        // The root is the first run of its part.
+        // The root is the first run of its component.
         let root = sets.find(run as u32) as usize;
         if root == run {
             number[run] = n;
@@ -61,8 +61,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_numbered_by_their_first_cell() {
-        // ColumnStore of five rows: a fork that closes, and a part of its own.
+    fn components_are_numbered_by_their_first_cell() {
+        // ColumnStore of five rows: a fork that closes, and a component of its own.
         let picture = ["## # ", "#  # ", "#### ", "    #"];
         let mask: Vec<bool> = picture.iter().flat_map(|column| column.chars().map(|c| c == '#')).collect();
         let (label, n) = label_components(&mask, 5);

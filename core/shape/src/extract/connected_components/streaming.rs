@@ -1,4 +1,4 @@
-//! Connected components of the lattice, grown while columns arrive.
+//! Connected components of the lattice under the continuity criterion, joined while columns arrive (Masuda et al., 3.1).
 //!
 //! A column falls into *runs* of cells that are continuous downwards; runs of neighbouring columns are joined
 //! when any of their cells are continuous across. Components are sets of runs. What is summed over
@@ -6,8 +6,9 @@
 
 use std::ops::Range;
 
-use crate::extract::continuity::Link;
 use platen_numerics::union_find::UnionFind;
+
+use crate::extract::continuity::Link;
 
 /// Cells `rows` of one column, each continuous with the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +19,7 @@ pub(in crate::extract) struct Run {
     pub(in crate::extract) end_row: u32,
 }
 
-/// What is known of a component.
+/// Size and bounds of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::extract) struct Extent {
     /// Area across the beams, a lower bound of the surface's area, square millimetres.
@@ -37,7 +38,7 @@ impl Extent {
     }
 }
 
-/// Runs and the sets that they form.
+/// Runs of cells and the components that they form.
 #[derive(Debug, Clone, Default)]
 pub(in crate::extract) struct Components {
     runs: Vec<Run>,
@@ -66,7 +67,7 @@ impl Components {
         self.runs.len() as u32
     }
 
-    /// Those of `runs` that belong to a component given by its root.
+    /// Returns those of `runs` that belong to a component given by its root.
     pub(in crate::extract) fn runs_of(&mut self, roots: &[u32], runs: Range<u32>) -> Vec<Run> {
         let mut own = Vec::new();
         for number in runs {
@@ -102,7 +103,7 @@ impl Components {
         }
     }
 
-    /// Joins the runs of a column and of the next one where `across` says that their cells are continuous.
+    /// Joins the runs of a column and of the next one where their cells are continuous by `across`.
     ///
     /// `range_a(row)` and `range_b(row)` give ranges inside the runs. Overlapping runs are joined at the first row
     /// that links them; the rest of the overlap need not be looked at.

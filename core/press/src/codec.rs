@@ -1,0 +1,9 @@
+//! Codec between registers and typed images according to the register map; pure functions.
+
+mod host_image;
+mod press_image;
+mod words;
+
+pub use host_image::{HostImage, describe_outputs, saturates};
+pub use press_image::{PressImage, Torn, Wrong, describe_inputs};
+pub(crate) use words::{bits, raw_number};

@@ -1,0 +1,226 @@
+//! What the press itself saw of its host: the side on which tests assert.
+//!
+//! [`WriteMonitor`] looks at every write as it arrives, so a result that is published twice or changes under its number
+//! is seen even between two cycles of the program.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::program::Cause;
+use crate::registers::{HBlock, INVALID_I16, INVALID_U16, Verdict, h, status};
+
+/// Sentences kept of what was wrong; the counters go on.
+const SENTENCES: usize = 20;
+
+/// Counts of one press since its start.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Counters {
+    /// Milliseconds since the start.
+    pub now_ms: u64,
+    /// The press has made all its strokes, or its plate has passed, and the part has left.
+    pub done: bool,
+    /// Bends made whose trigger rose.
+    pub strokes: u64,
+    /// Baseline scans asked for.
+    pub baselines: u64,
+    /// Rescans asked for.
+    pub rescans: u64,
+    /// Stroke numbers left out on purpose.
+    pub skipped: u64,
+    /// Triggers taken back before they were accepted, while the host was busy.
+    pub lost_while_busy: u64,
+    /// Requests given up because a newer one came.
+    pub superseded: u64,
+    /// Requests without a result in time.
+    pub result_timeouts: u64,
+    /// Requests given up because the host was dead.
+    pub host_deaths: u64,
+    /// Requests whose echo came after the accept limit.
+    pub accepted_late: u64,
+    /// Parts begun.
+    pub parts: u64,
+    /// Restarts of the controller.
+    pub restarts: u64,
+    /// Times the plate's shape was asked for: scans begun.
+    pub plates_served: u64,
+    /// Missed strokes as the host reports them.
+    pub missed_reported: u16,
+
+    /// Connections accepted.
+    pub connections: u64,
+    /// Reads served.
+    pub reads: u64,
+    /// Writes served or refused.
+    pub writes: u64,
+    /// Writes with a word outside the H block.
+    pub writes_outside: u64,
+    /// Writes on a connection that had not read both blocks.
+    pub writes_before_sync: u64,
+    /// Writes while the registers were void or not those of the map.
+    pub writes_while_void: u64,
+    /// Faults of the line that were injected, by name.
+    pub line_faults: BTreeMap<String, u64>,
+
+    /// Distinct results seen in the H block.
+    pub published: u64,
+    /// Results that came again under another sequence number.
+    pub duplicates: u64,
+    /// Results whose words changed under the same sequence number.
+    pub changed: u64,
+    /// Contradictions between words.
+    pub wrong_values: u64,
+    /// What was wrong, the first few.
+    pub wrong: Vec<String>,
+    /// Owner words seen; more than one means more than one host.
+    pub owners: Vec<u16>,
+
+    /// Results taken, in order.
+    pub taken: Vec<AcceptedResult>,
+}
+
+/// One result as the press took it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AcceptedResult {
+    /// Why it was asked for.
+    pub cause: Cause,
+    /// Number of the stroke.
+    pub stroke_id: u16,
+    /// Session.
+    pub session_id: u16,
+    /// Attempt.
+    pub attempt: u16,
+    /// Part.
+    pub part_id: u32,
+    /// Bends the plate had when it was taken.
+    pub bends: u32,
+    /// From trigger to the host's echo.
+    pub accepted_ms: u64,
+    /// From trigger to the result.
+    pub result_ms: u64,
+    /// What it says.
+    pub verdict: Verdict,
+    /// The H block.
+    pub words: Vec<u16>,
+}
+
+impl Counters {
+    /// The counts alone, and the number of results taken: what can be asked often in a long run.
+    #[must_use]
+    pub fn counts(&mut self) -> (Self, usize) {
+        let taken = std::mem::take(&mut self.taken);
+        let counts = self.clone();
+        self.taken = taken;
+        (counts, self.taken.len())
+    }
+
+    /// Counts and keeps a sentence about a wrong value.
+    pub fn wrong(&mut self, sentence: String) {
+        self.wrong_values += 1;
+        if self.wrong.len() < SENTENCES {
+            self.wrong.push(sentence);
+        }
+    }
+
+    /// Results taken for bends, baselines and rescans apart.
+    #[must_use]
+    pub fn results(&self, cause: Cause) -> usize {
+        self.taken.iter().filter(|taken| taken.cause == cause).count()
+    }
+
+    /// Contradictions in a result that is about to be taken.
+    pub fn check_result(&mut self, host: &HBlock, recipe_id: u16) {
+        let stroke = host.word(h::RESULT_STROKE_ID);
+        if host.crc() != host.word(h::CRC16) {
+            let (found, needed) = (host.word(h::CRC16), host.crc());
+            self.wrong(format!("stroke {stroke}: check sum {found:#06x}, the words give {needed:#06x}"));
+        }
+        if host.word(h::RECIPE_ECHO) != recipe_id {
+            let found = host.word(h::RECIPE_ECHO);
+            self.wrong(format!("stroke {stroke}: recipe {found} echoed, {recipe_id} asked"));
+        }
+        let bits = host.word(h::STATUS);
+        let verdicts = [status::PASS, status::FAIL, status::NOT_MEASURED, status::CANNOT_TELL];
+        if verdicts.iter().filter(|&&bit| bits & bit != 0).count() != 1 {
+            self.wrong(format!("stroke {stroke}: status {bits:#06x} does not hold exactly one verdict"));
+        }
+        if bits & status::BUSY != 0 {
+            self.wrong(format!("stroke {stroke}: result valid while busy"));
+        }
+        if host.status(status::NOT_MEASURED) {
+            let gap = host.word(h::GAP_MAX);
+            if gap != INVALID_U16 {
+                self.wrong(format!("stroke {stroke}: not measured, yet a gap of {gap}"));
+            }
+        }
+        let [max, min] = [host.word(h::DEV_MAX), host.word(h::DEV_MIN)];
+        if max != INVALID_I16 && min != INVALID_I16 && max.cast_signed() < min.cast_signed() {
+            self.wrong(format!(
+                "stroke {stroke}: largest deviation {max:#06x} below the smallest {min:#06x}"
+            ));
+        }
+    }
+}
+
+/// Identity of a result: session, stroke, attempt.
+type Identity = (u16, u16, u16);
+
+/// Watches the H block from write to write.
+#[derive(Clone, Debug, Default)]
+pub struct WriteMonitor {
+    published: BTreeMap<Identity, (u16, Vec<u16>)>,
+    last_seq: Option<u16>,
+}
+
+impl WriteMonitor {
+    /// Looks at the H block after a write.
+    pub fn observe(&mut self, host: &HBlock, counters: &mut Counters) {
+        let owner = host.word(h::OWNER);
+        if owner != 0 && !counters.owners.contains(&owner) {
+            counters.owners.push(owner);
+        }
+        counters.missed_reported = host.word(h::MISSED_COUNT);
+        if host.status(status::PASS) && host.status(status::FAIL) {
+            counters.wrong(format!("status {:#06x}: pass and fail", host.word(h::STATUS)));
+        }
+        if !host.status(status::RESULT_VALID) {
+            return;
+        }
+        let stroke = host.word(h::RESULT_STROKE_ID);
+        if !host.whole() {
+            let [head, tail] = [host.word(h::RESULT_SEQ), host.word(h::RESULT_SEQ_TAIL)];
+            counters.wrong(format!("stroke {stroke}: valid, but sequence {head} and its copy {tail} differ"));
+            return;
+        }
+        let identity = (host.word(h::SESSION_ECHO), stroke, host.word(h::ATTEMPT_ECHO));
+        let seq = host.word(h::RESULT_SEQ);
+        let words = result_words(host);
+        match self.published.get(&identity) {
+            None => {
+                // Results that the press forgot while it restarted leave gaps; going back would be a lost journal.
+                let step = self.last_seq.map_or(1, |last| seq.wrapping_sub(last));
+                if step == 0 || step > u16::MAX / 2 {
+                    counters.wrong(format!("stroke {stroke}: sequence {seq} after {:?}", self.last_seq));
+                }
+                self.last_seq = Some(seq);
+                counters.published += 1;
+                self.published.insert(identity, (seq, words));
+            }
+            Some((first, _)) if *first != seq => counters.duplicates += 1,
+            Some((_, before)) if *before != words => counters.changed += 1,
+            Some(_) => {}
+        }
+    }
+}
+
+/// The words that belong to the result alone: figures, places, times, identity.
+fn result_words(host: &HBlock) -> Vec<u16> {
+    host.0[10..=48].iter().chain(&host.0[50..=51]).chain(&host.0[55..=61]).copied().collect()
+}
+
+/// Whole milliseconds of a duration.
+#[must_use]
+pub fn whole_ms(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}

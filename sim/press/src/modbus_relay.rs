@@ -1,0 +1,253 @@
+//! The line between host and press: TCP, RTU over TCP or a serial line, with faults on request.
+//!
+//! Each client gets a connection of its own to the private Modbus server. A message at a time goes through; what a
+//! fault does to it is decided here, where requests and answers are known, not by a proxy that sees bytes.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, WriteHalf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Mutex;
+use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBits};
+
+use crate::answer_faults::{Answer, apply_fault, exception};
+use crate::faults::LineFault;
+use crate::frame::{Framing, Message, Split, split_tcp};
+use crate::pty;
+use crate::shared::Shared;
+
+/// A serial slave drops a frame that stops in the middle for this long.
+const SILENCE: Duration = Duration::from_millis(30);
+/// Pause before a line that failed is tried again.
+const RETRY: Duration = Duration::from_millis(50);
+
+/// Accepts clients for ever.
+pub(crate) async fn serve_tcp(
+    listener: TcpListener,
+    framing: Framing,
+    unit: u8,
+    server: SocketAddr,
+    shared: Arc<Shared>,
+) {
+    loop {
+        let Ok((client, _)) = listener.accept().await else {
+            tokio::time::sleep(RETRY).await;
+            continue;
+        };
+        let shared = Arc::clone(&shared);
+        tokio::spawn(async move {
+            // Without lingering a dropped connection is a reset one, which is what a controller's restart gives.
+            let options = client.set_nodelay(true).and_then(|()| client.set_zero_linger());
+            let ended = match options {
+                Ok(()) => Relay::new(client, framing, unit, shared).run(server).await,
+                Err(error) => Err(error),
+            };
+            tracing::debug!(?ended, "client left");
+        });
+    }
+}
+
+/// Opens a serial line, 8 data bits, even parity, 1 stop bit.
+pub(crate) fn open_serial(device: &str, baud: u32) -> io::Result<SerialStream> {
+    Ok(tokio_serial::new(device, baud)
+        .data_bits(DataBits::Eight)
+        .parity(Parity::Even)
+        .stop_bits(StopBits::One)
+        .open_native_async()?)
+}
+
+/// Serves a serial line for ever; when it fails it is opened again, by its name.
+pub(crate) async fn serve_serial(
+    first: SerialStream,
+    device: String,
+    baud: u32,
+    unit: u8,
+    server: SocketAddr,
+    shared: Arc<Shared>,
+) {
+    let mut serial = Some(first);
+    loop {
+        if let Some(serial) = serial.take() {
+            let ended = Relay::new(serial, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
+            tracing::debug!(?ended, "serial line ended, opens again");
+        }
+        tokio::time::sleep(RETRY).await;
+        serial = open_serial(&device, baud).ok();
+    }
+}
+
+/// Serves a pseudo terminal for ever; one that was pulled comes back under another name, behind the same link.
+pub(crate) async fn serve_pty(
+    first: DuplexStream,
+    device: PathBuf,
+    unit: u8,
+    server: SocketAddr,
+    shared: Arc<Shared>,
+) {
+    let mut line = Some(first);
+    loop {
+        if let Some(line) = line.take() {
+            let ended = Relay::new(line, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
+            tracing::debug!(?ended, "adapter pulled");
+        }
+        tokio::time::sleep(RETRY).await;
+        shared.plugged_in().await;
+        line = pty::plug(&device).inspect_err(|error| tracing::debug!(%error, "no adapter")).ok();
+    }
+}
+
+/// The writing half of the client's stream; gone once the connection was reset.
+type Writer<S> = Arc<Mutex<Option<WriteHalf<S>>>>;
+
+/// One client's messages on their way to the server and back.
+struct Relay<S> {
+    reader: tokio::io::ReadHalf<S>,
+    writer: Writer<S>,
+    framing: Framing,
+    unit: u8,
+    shared: Arc<Shared>,
+    received: Vec<u8>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
+    fn new(stream: S, framing: Framing, unit: u8, shared: Arc<Shared>) -> Self {
+        let (reader, writer) = tokio::io::split(stream);
+        Self {
+            reader,
+            writer: Arc::new(Mutex::new(Some(writer))),
+            framing,
+            unit,
+            shared,
+            received: Vec::new(),
+        }
+    }
+
+    /// Until the client leaves, the press cuts the line, or a fault resets it.
+    async fn run(mut self, server: SocketAddr) -> io::Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let mut cuts = shared.cuts.subscribe();
+        cuts.mark_unchanged();
+        let mut server = TcpStream::connect(server).await?;
+        server.set_nodelay(true)?;
+        let writer = Arc::clone(&self.writer);
+        let ended = tokio::select! {
+            ended = self.pass(&mut server) => ended,
+            _ = cuts.changed() => Ok(()),
+            () = shared.stopped() => Ok(()),
+        };
+        writer.lock().await.take();
+        ended
+    }
+
+    async fn pass(&mut self, server: &mut TcpStream) -> io::Result<()> {
+        while let Some(request) = self.next_request().await? {
+            self.shared.thaw().await;
+            let fault = self.shared.draw_line_fault();
+            if self.shared.line().faults.echo && self.framing == Framing::Rtu {
+                send(&self.writer, &self.framing.encode(&request)).await?;
+            }
+            if fault == Some(LineFault::Reset) {
+                return Ok(());
+            }
+            let answer = if fault == Some(LineFault::Exception) {
+                exception(&request, self.shared.line().faults.exception_code)
+            } else {
+                exchange(server, &request).await?
+            };
+            self.shared.thaw().await;
+            let faulty = {
+                let mut line = self.shared.line();
+                let line = &mut *line;
+                apply_fault(answer, fault, self.framing, &line.faults, &mut line.random)
+            };
+            match faulty {
+                Answer::Reset => return Ok(()),
+                Answer::None => {}
+                Answer::Bytes(bytes) => send(&self.writer, &bytes).await?,
+                Answer::Late(bytes, delay) => {
+                    let writer = Arc::clone(&self.writer);
+                    tokio::spawn(async move {
+                        tokio::time::sleep(delay).await;
+                        // The host may have left by then: nobody to tell.
+                        let _ = send(&writer, &bytes).await;
+                    });
+                }
+                Answer::Dribble(bytes) => {
+                    for byte in bytes {
+                        send(&self.writer, &[byte]).await?;
+                        tokio::task::yield_now().await;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The next request that is for this press, `None` when the client has left.
+    async fn next_request(&mut self) -> io::Result<Option<Message>> {
+        loop {
+            match self.framing.split_request(&self.received) {
+                Split::Message(message, length) => {
+                    self.received.drain(..length);
+                    // On a serial line the other units answer for themselves.
+                    if self.framing == Framing::Tcp || message.unit == self.unit {
+                        return Ok(Some(message));
+                    }
+                }
+                Split::Junk(length) => {
+                    self.received.drain(..length);
+                }
+                Split::More => {
+                    let mut bytes = [0; 512];
+                    let read = self.reader.read(&mut bytes);
+                    let n = if self.framing == Framing::Rtu && !self.received.is_empty() {
+                        match tokio::time::timeout(SILENCE, read).await {
+                            Ok(n) => n?,
+                            Err(_) => {
+                                self.received.clear();
+                                continue;
+                            }
+                        }
+                    } else {
+                        read.await?
+                    };
+                    if n == 0 {
+                        return Ok(None);
+                    }
+                    self.received.extend(&bytes[..n]);
+                }
+            }
+        }
+    }
+}
+
+async fn send<S: AsyncWrite>(writer: &Writer<S>, bytes: &[u8]) -> io::Result<()> {
+    match writer.lock().await.as_mut() {
+        Some(writer) => {
+            writer.write_all(bytes).await?;
+            writer.flush().await
+        }
+        None => Err(io::ErrorKind::NotConnected.into()),
+    }
+}
+
+/// One request to the private server and its answer.
+async fn exchange(server: &mut TcpStream, request: &Message) -> io::Result<Message> {
+    server.write_all(&Framing::Tcp.encode(request)).await?;
+    let mut received = Vec::new();
+    loop {
+        match split_tcp(&received) {
+            Split::Message(answer, _) => return Ok(answer),
+            Split::Junk(_) => return Err(io::ErrorKind::InvalidData.into()),
+            Split::More => {
+                if server.read_buf(&mut received).await? == 0 {
+                    return Err(io::ErrorKind::UnexpectedEof.into());
+                }
+            }
+        }
+    }
+}
