@@ -8,6 +8,7 @@ pub mod cell;
 mod check;
 mod convert;
 mod demo;
+mod generate;
 mod history;
 mod inspect;
 mod measure;
@@ -24,14 +25,14 @@ mod verify;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 
 use platen_engine::pipeline::PipelineError;
 use platen_engine::plugin::{Catalogue, PluginError};
 use platen_formats::WriteError;
 use platen_report::output_folder::FilesError;
 
-/// Measures plates on a press, stroke by stroke.
+/// Measure plates on a press, stroke by stroke
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -94,6 +95,8 @@ enum Verb {
     Plugins(plugins::Command),
     /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
     Bench(bench::BenchArguments),
+    /// Generate man pages or shell completions
+    Generate(generate::Command),
 }
 
 /// Failure of a verb, by exit code.
@@ -175,6 +178,7 @@ pub fn main() -> ExitCode {
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
         Verb::Bench(_) => bench::start(),
+        Verb::Generate(command) => generate::run(&cli.common, command, Cli::command()),
     })
 }
 
