@@ -70,7 +70,7 @@ pub struct BenchArguments {
     /// Standard deviation of the range at 10 m, millimetres; `accuracy` takes several
     #[arg(long, value_name = "MM", value_delimiter = ',', default_value = "0.5")]
     pub noise_mm: Vec<f64>,
-    /// Angle between cells of the scan of the tables, degrees; the default gives the number of points of Masuda et al.
+    /// Angle between cells of the scan of the tables, degrees; the default gives as many points as Masuda et al. have
     #[arg(long, value_name = "DEG", default_value_t = QUARTER_DEG)]
     pub step_deg: f64,
     /// Vertices of the meshes of table 3
