@@ -13,7 +13,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use crate::simd::on_own_thread;
+use crate::vector_registers::ClearVectorRegisters;
 
 /// Rows of the net that one B-spline reaches back to.
 const REACH: usize = 3;
@@ -177,11 +177,8 @@ impl BlockBandedMatrix {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`].
-    pub fn factor(self) -> Result<BlockBandedFactor, NotPositiveDefinite> {
-        on_own_thread(|| self.factor_here())
-    }
-
-    fn factor_here(mut self) -> Result<BlockBandedFactor, NotPositiveDefinite> {
+    pub fn factor(mut self) -> Result<BlockBandedFactor, NotPositiveDefinite> {
+        let _clear = ClearVectorRegisters;
         let (layout, m) = (self.layout, self.layout.block());
         let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(m, Par::Seq, Default::default()));
         for row in 0..layout.n_rows() {
@@ -244,10 +241,7 @@ impl BlockBandedFactor {
 
     /// Solves A X = B in place; rows of `x` in the net's order, one column per component.
     pub fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
-        on_own_thread(|| self.solve_here(x));
-    }
-
-    fn solve_here<const D: usize>(&self, x: &mut [[f64; D]]) {
+        let _clear = ClearVectorRegisters;
         let mut work = self.forward(x);
         let (layout, m) = (self.layout, self.layout.block());
         for row in (0..layout.n_rows()).rev() {
@@ -270,7 +264,8 @@ impl BlockBandedFactor {
     #[must_use]
     pub fn variance(&self, f: &[f64]) -> f64 {
         let columns: Vec<[f64; 1]> = f.iter().map(|x| [*x]).collect();
-        on_own_thread(|| self.forward(&columns).as_ref().squared_norm_l2())
+        let _clear = ClearVectorRegisters;
+        self.forward(&columns).as_ref().squared_norm_l2()
     }
 
     /// L^-1 B in block order.
@@ -297,10 +292,7 @@ impl BlockBandedFactor {
     /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
     #[must_use]
     pub fn local_inverse(&self) -> Vec<[f64; 49]> {
-        on_own_thread(|| self.local_inverse_here())
-    }
-
-    fn local_inverse_here(&self) -> Vec<[f64; 49]> {
+        let _clear = ClearVectorRegisters;
         let (layout, m) = (self.layout, self.layout.block());
         let mut local = vec![[0.0; 49]; layout.n_u * layout.n_v];
         let mut recent = Recent::new(m);

@@ -4,7 +4,7 @@
 //!
 //! | room | method |
 //! |---|---|
-//! | [`simd`] | run-time dispatch to the widest vector registers |
+//! | `vector_registers` | clean-up after the dense kernels |
 //! | [`union_find`], [`random`], [`normal_distribution`] | disjoint sets, SplitMix64, the error function |
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
 //! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
@@ -22,9 +22,10 @@ mod normal_equations;
 pub mod penalised_curve;
 pub mod random;
 pub mod reml;
-pub mod simd;
+
 pub mod sparse;
 pub mod spline_fit;
 pub mod tensor_spline;
 pub mod uniform_knots;
 pub mod union_find;
+mod vector_registers;

@@ -18,7 +18,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
-use crate::simd::on_own_thread;
+use crate::vector_registers::ClearVectorRegisters;
 
 /// Reason why a system could not be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -196,13 +196,13 @@ impl<const D: usize> Spd<D> {
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|e| too_large(unknowns, e))?;
         let (factor, matrix) = (&mut self.factor, SparseColMatRef::new(self.matrix.as_ref(), &self.values));
-        let factored = on_own_thread(|| {
-            let stack = MemStack::new(&mut memory);
-            let shift = Default::default();
-            let plan = Default::default();
-            symbolic.factorize_numeric_llt(factor, matrix, Side::Upper, shift, Par::Seq, stack, plan).is_ok()
-        });
-        if factored { Ok(()) } else { Err(SparseError::NotPositiveDefinite { unknowns }) }
+        let _clear = ClearVectorRegisters;
+        let stack = MemStack::new(&mut memory);
+        let (shift, plan) = Default::default();
+        symbolic
+            .factorize_numeric_llt(factor, matrix, Side::Upper, shift, Par::Seq, stack, plan)
+            .map(|_| ())
+            .map_err(|_| SparseError::NotPositiveDefinite { unknowns })
     }
 
     /// Solves with the last factor, in place; each column of `columns` is one right-hand side, one entry per node.
@@ -221,10 +221,9 @@ impl<const D: usize> Spd<D> {
             }
         }
         let right = MatMut::from_column_major_slice_mut(&mut x, unknowns, columns.len());
-        on_own_thread(|| {
-            let stack = MemStack::new(&mut memory);
-            LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(Conj::No, right, Par::Seq, stack);
-        });
+        let _clear = ClearVectorRegisters;
+        let stack = MemStack::new(&mut memory);
+        LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(Conj::No, right, Par::Seq, stack);
         for (column, x) in columns.iter_mut().zip(x.chunks_exact(unknowns)) {
             for (value, &place) in column.iter_mut().zip(&self.place) {
                 value.copy_from_slice(&x[place as usize * D..][..D]);

@@ -7,7 +7,7 @@
 use super::Graph;
 
 /// Parts up to this size are eliminated along their longer extent. Larger leaves are quicker to order, but 48 gives
-/// an eighth more fill.
+/// an eighth more fill (benchmarks of the flattening plugins).
 const LEAF: usize = 20;
 
 /// Returns the nodes of `graph` in elimination order. `points` has one point per node.
