@@ -61,7 +61,10 @@ fn a_recording_replays_to_the_last_bit() {
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(refused.status.code() == Some(1) && said.contains("this is no whole recording"), "{said}");
+    assert!(
+        refused.status.code() == Some(1) && said.contains("the recording is incomplete or invalid"),
+        "{said}"
+    );
 }
 
 #[test]

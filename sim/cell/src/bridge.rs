@@ -1,4 +1,4 @@
-//! Scans over TCP: the bridge that `scanner --serve` and `cell --serve` run.
+//! Scan bridge of `scanner --serve` and `cell --serve`.
 
 use crate::control_client::ControlClient;
 use crate::error::Error;
@@ -11,34 +11,34 @@ use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-/// Where and how scans are served.
+/// Options of the bridge.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct BridgeOptions {
-    /// BridgeOptions scans here by the scan bridge protocol; port 0 lets the system choose
+    /// Serve scans on this address by the scan bridge protocol; port 0 lets the system choose
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) serve: Option<SocketAddr>,
-    /// Share of a real scanner's time that a scan takes; 0: no longer than the computer needs
+    /// Set the duration of a scan relative to a real scanner; 0: as fast as the computer allows
     #[arg(long, default_value_t = 0.0, requires = "serve")]
     time_scale: f64,
-    /// Send columns only when a scan has ended, as the vendor's software does
+    /// Send columns only after the end of a scan, as the vendor's software does
     #[arg(long, requires = "serve")]
     after_the_fact: bool,
-    /// What goes wrong, with a column, a share or milliseconds: drop-mid-scan=17; a wrong name lists them all
+    /// Inject a fault, with a column, a share (one in n) or milliseconds: drop-mid-scan=17; an unknown name lists all faults
     #[arg(long = "fault", value_name = "NAME[=NUMBER]", requires = "serve")]
     faults: Vec<Fault>,
-    /// Keep the frames of every scan in this folder
+    /// Record the frames of every scan in this folder
     #[arg(long, value_name = "FOLDER", requires = "serve")]
     record: Option<PathBuf>,
-    /// BridgeOptions the scan of such a file, whatever is asked for
+    /// Replay a recording, whatever is requested
     #[arg(long, value_name = "FILE", requires = "serve")]
     pub(crate) replay: Option<PathBuf>,
-    /// Without a window scan the whole dome, not the plate and `--margin-deg` round it
+    /// Scan the whole dome when no window is requested, instead of the plate and `--margin-deg` around it
     #[arg(long, requires = "serve")]
     dome: bool,
 }
 
 impl BridgeOptions {
-    /// Starts the bridge, when one is pending.
+    /// Starts the bridge if `--serve` is given.
     pub(crate) fn start(&self, device: &ScannerOptions, plate: PlateSource) -> Result<Option<Bridge>, Error> {
         let Some(address) = self.serve else { return Ok(None) };
         let head: Box<dyn Head> = match &self.replay {
@@ -70,19 +70,19 @@ impl BridgeOptions {
     }
 }
 
-/// The plate of a press, asked on its second port.
+/// Returns the plate of a press as a source, queried on the control port.
 pub(crate) fn plate_of_press(press: String) -> PlateSource {
     Box::new(move || {
         ControlClient::open(&press).and_then(|mut line| line.plate()).map_err(|error| error.to_string())
     })
 }
 
-/// Always the same plate.
+/// Returns a fixed plate as a source.
 pub(crate) fn fixed_plate(state: Option<PlateState>) -> PlateSource {
     Box::new(move || Ok(state.clone()))
 }
 
-/// Says in one line what the bridge has done.
+/// Prints the counters of the bridge in one line.
 pub(crate) fn print_counters(bridge: &Bridge) -> Result<(), Error> {
     let line = serde_json::json!({ "bridge": bridge.counters() });
     let mut out = std::io::stdout().lock();

@@ -1,8 +1,9 @@
-//! Verb `cell`: a press and a scanner on one plate. The scanner serves scans over TCP, or drops a file into a folder at
-//! each stroke, the way an export script of a real scanner does.
+//! Command `cell`: a press and a scanner on one plate. The scanner serves scans over TCP, or writes a file into a folder at
+//! each stroke, as an export script of a real scanner does.
 //!
-//! Files: the scanner starts when the host has accepted a stroke and the plate lies still; the file is named
-//! `SESSION-STROKE-ATTEMPT.e57` and appears whole, but for a late one (`--late-file`). The scanner knows the press only by its second port.
+//! Files: the scanner starts when the host has accepted a stroke and the plate is at rest. The file is named
+//! `SESSION-STROKE-ATTEMPT.e57` and appears complete, except for a late one (`--late-file`). The scanner communicates with the press
+//! through its control port only.
 
 use crate::bridge;
 use crate::control_client::{ControlClient, PendingStroke};
@@ -19,24 +20,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How long a late file is not there, and then how long only its first half.
+/// Delay of a late file, and then the time during which only its first half exists.
 const LATE: Duration = Duration::from_millis(750);
 
-/// How often the scanner looks at the press.
+/// Interval of polling the press.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Press and scanner.
+/// Options of the command `cell`.
 #[derive(Debug, Args)]
 pub(crate) struct Command {
     #[command(flatten)]
     press: press::Command,
-    /// Folder for scans
+    /// Write a scan file into this folder at each accepted stroke
     #[arg(long, value_name = "FOLDER", required_unless_present = "serve")]
     drop: Option<PathBuf>,
-    /// The file of this stroke comes late, and half of it lies under its name before the rest, as on a slow share
+    /// Write the file of this stroke late and in two halves, as on a slow network share
     #[arg(long, value_name = "STROKE", requires = "drop")]
     late_file: Option<u16>,
-    /// Format of the scans: e57, ptx, xyz or xyb
+    /// Set the format of the files: e57, ptx, xyz or xyb
     #[arg(long, default_value = "e57")]
     format: String,
     #[command(flatten)]
@@ -45,7 +46,7 @@ pub(crate) struct Command {
     serve: bridge::BridgeOptions,
 }
 
-/// Runs press and scanner until the press is told to end.
+/// Runs press and scanner until the press is stopped.
 pub(crate) async fn run(command: Command) -> Result<(), Error> {
     let example = PathBuf::from(format!("scan.{}", command.format));
     if FileFormat::of(&example).is_none() {
@@ -54,7 +55,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
     let press = press::start(&command.press).await?;
     let control = press.control().to_string();
     let bridge = command.serve.start(&command.device, bridge::plate_of_press(control.clone()))?;
-    // What is announced can be used.
+    // Before the announcement, so that the folder exists when the ports are printed.
     command.drop.as_ref().map_or(Ok(()), std::fs::create_dir_all)?;
     press::announce(Some(&press), bridge.as_ref().map(Bridge::address))?;
     match command.drop {
@@ -70,7 +71,7 @@ pub(crate) async fn run(command: Command) -> Result<(), Error> {
     bridge.as_ref().map_or(Ok(()), bridge::print_counters)
 }
 
-/// Runs the press beside a scanner that drops files.
+/// Runs the press beside a scanner that writes files.
 async fn run_with_file_drop(
     press: SimPress,
     command: &press::Command,
@@ -81,7 +82,7 @@ async fn run_with_file_drop(
     tokio::select! {
         ended = press::run_until_stopped(press, command) => {
             ending.store(true, Ordering::Relaxed);
-            // Without the press the scanner loses its line; that is no failure any more.
+            // The scanner loses its connection when the press ends; that is no failure here.
             let _ = scans.await;
             ended
         }
@@ -129,12 +130,12 @@ impl Scanner {
         } else {
             capture.write(&path)?;
         }
-        tracing::info!(path = %path.display(), "scan dropped");
+        tracing::info!(path = %path.display(), "scan file written");
         Ok(())
     }
 }
 
-/// Writes a file late and in two halves.
+/// Writes a file with a delay and in two halves.
 fn write_in_halves(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let (first, second) = bytes.split_at(bytes.len() / 2);
     std::thread::sleep(LATE);

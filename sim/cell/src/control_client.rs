@@ -1,4 +1,4 @@
-//! The press's second port, asked from outside.
+//! Client of the press's control port.
 
 use crate::error::Error;
 use platen_sim_plate::{PlateState, Reply, Request};
@@ -9,17 +9,17 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-/// How long an answer may take.
+/// Time limit of an answer.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A connection to the second port.
+/// Connection to the control port.
 #[derive(Debug)]
 pub(crate) struct ControlClient {
     address: String,
     reader: BufReader<TcpStream>,
 }
 
-/// What is to be scanned: a stroke that the host has accepted and now waits for.
+/// Stroke that the host has accepted and for whose scan it waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PendingStroke {
     pub(crate) session: u16,
@@ -34,7 +34,7 @@ enum Registers {
 }
 
 impl ControlClient {
-    /// Connects.
+    /// Connects to the control port.
     pub(crate) fn open(address: &str) -> Result<Self, Error> {
         let failed =
             |error: std::io::Error| Error::Control { address: address.into(), what: error.to_string() };
@@ -43,7 +43,7 @@ impl ControlClient {
         Ok(Self { address: address.into(), reader: BufReader::new(stream) })
     }
 
-    /// The plate as it lies; `None` while there is none or while it moves.
+    /// Requests the plate; `None` while the press is empty or the plate moves.
     pub(crate) fn plate(&mut self) -> Result<Option<PlateState>, Error> {
         let request = serde_json::to_string(&Request::Plate).unwrap_or_default();
         match self.ask(&request)? {
@@ -52,7 +52,7 @@ impl ControlClient {
         }
     }
 
-    /// The stroke that the host waits for, if it waits for one and the plate lies still.
+    /// Returns the stroke for whose scan the host waits, if any and if the plate is at rest.
     pub(crate) fn pending(&mut self) -> Result<Option<PendingStroke>, Error> {
         let Registers::Registers { p: press, h: host } = self.ask(r#"{"get":"registers"}"#)?;
         let word = |block: &[u16], at: usize| block.get(at).copied().unwrap_or(0);
@@ -70,7 +70,7 @@ impl ControlClient {
             writeln!(self.reader.get_mut(), "{request}").and_then(|()| self.reader.read_line(&mut line));
         let failed = |what: String| Error::Control { address: self.address.clone(), what };
         match said {
-            Ok(0) => Err(failed("it has ended".into())),
+            Ok(0) => Err(failed("the connection was closed; start the press again".into())),
             Ok(_) => {
                 serde_json::from_str(&line).map_err(|error| failed(format!("`{}`: {error}", line.trim_end())))
             }

@@ -1,38 +1,38 @@
-//! Why the program ends without having done what was asked.
+//! Errors of the program.
 
 use std::path::PathBuf;
 
-/// An error by who must act.
+/// Error of the program, by who must act.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// The file is not there.
+    /// File that cannot be read.
     #[error("{path}: {source}")]
     Read { path: PathBuf, source: std::io::Error },
-    /// The file is wrong.
+    /// Invalid file.
     #[error("{path}:{line}: {message}")]
     Config { path: PathBuf, line: usize, message: String },
-    /// The plate that it describes is impossible.
+    /// Description of an impossible plate.
     #[error("{path}: {source}")]
     Plate { path: PathBuf, source: platen_sim_plate::PlateError },
-    /// The file's name does not say which format is meant.
-    #[error("{path}: unknown ending; write .e57, .ptx, .xyz or .xyb")]
+    /// File name with an unknown extension.
+    #[error("{path}: unknown extension; write .e57, .ptx, .xyz or .xyb")]
     Format { path: PathBuf },
-    /// The press cannot start or go on.
+    /// Error of the press.
     #[error(transparent)]
     Press(#[from] platen_sim_press::Error),
-    /// The press does not say what lies in it.
+    /// Error of the control port.
     #[error("press at {address}: {what}")]
     Control { address: String, what: String },
-    /// A scan cannot be written.
+    /// Scan that cannot be written.
     #[error(transparent)]
     File(#[from] platen_sim_scanner::FileError),
-    /// The system refuses signals, output or a file.
-    #[error("the system refuses: {0}")]
+    /// Error of the operating system: signals, output or a file.
+    #[error("operating system: {0}")]
     System(#[from] std::io::Error),
 }
 
 impl Error {
-    /// 2 when a file or an option is to be corrected, else 1.
+    /// Returns the exit code: 2 when a file or an option must be corrected, else 1.
     pub(crate) fn exit_code(&self) -> u8 {
         use platen_sim_press::Error as Press;
         match self {

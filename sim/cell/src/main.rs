@@ -1,17 +1,16 @@
-//! Program `platen-sim`: a simulated press, a simulated scanner, or both on one plate, for hosts to be tried out and
-//! tested on over real sockets and real files.
+//! Program `platen-sim`: a simulated press, a simulated scanner, or both on one plate, for tests of hosts over real sockets and
+//! files.
 //!
 //! - `platen-sim press` serves Modbus and the plate's shape on loopback.
-//! - `platen-sim scanner PLATE.toml --out scan.e57` scans a described plate into a file, with the truth beside it.
+//! - `platen-sim scanner PLATE.toml --out scan.e57` scans a described plate into a file, with the ground truth beside it.
 //! - `platen-sim scanner PLATE.toml --serve 127.0.0.1:7040` serves scans of it by the scan bridge protocol.
-//! - `platen-sim cell --serve 127.0.0.1:7040` is a press with such a scanner beside it.
-//! - `platen-sim cell --drop FOLDER` is a press whose scanner drops a file into a folder at each accepted stroke.
+//! - `platen-sim cell --serve 127.0.0.1:7040` runs a press with such a scanner beside it.
+//! - `platen-sim cell --drop FOLDER` runs a press whose scanner writes a file into a folder at each accepted stroke.
 //!
-//! Who serves prints one line when the ports answer: `{"modbus":"127.0.0.1:5020","plate":"127.0.0.1:5021"}`, with
-//! `"scanner"` where scans are served, and at the end what the bridge has done.
-//! They end on SIGTERM, on Ctrl-C, when told to over the second port and, with `--with-parent`, when their standard
-//! input closes. Results go to stdout, the log to stderr (`PLATEN_LOG`); exit codes: 0 done, 1 failed, 2 bad usage or
-//! file.
+//! A server prints one line when its ports are open: `{"modbus":"127.0.0.1:5020","plate":"127.0.0.1:5021"}`, with
+//! `"scanner"` where scans are served, and at the end the counters of the bridge. It ends on SIGTERM, Ctrl-C, the command `stop` of the
+//! control port and, with `--with-parent`, when its standard input closes. Results go to stdout, the log to stderr (`PLATEN_LOG`). Exit
+//! codes: 0 success, 1 failure, 2 invalid usage or file.
 
 mod bridge;
 mod cell;
@@ -26,9 +25,17 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
-/// Simulated press and scanner.
+const EXAMPLES: &str = "\
+Examples:
+  platen-sim press --modbus-port 5020 --plate-port 5021
+  platen-sim scanner plate.toml --out scan.e57 --truth truth.json
+  platen-sim scanner plate.toml --serve 127.0.0.1:7040 --fault drop-mid-scan=17
+  platen-sim cell config/sim-press.toml --serve 127.0.0.1:7040
+  platen-sim cell --strokes 3 --drop scans";
+
+/// Simulate a plate press, a terrestrial laser scanner, or both on one plate
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -36,11 +43,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// A press on Modbus that bends a simulated plate at each stroke
+    /// Serve a press on Modbus that bends a simulated plate at each stroke
     Press(press::Command),
-    /// Scans a simulated plate into a file, or serves scans over TCP
+    /// Cast one scan of a plate into a file, or serve scans by the scan bridge protocol
     Scanner(scanner::Command),
-    /// A press with a scanner that serves scans over TCP or drops them into a folder
+    /// Serve a press, and scans of its plate over TCP or as files in a folder
     Cell(cell::Command),
 }
 

@@ -1,4 +1,4 @@
-//! Verb `press`.
+//! Command `press`: a press on Modbus.
 
 use crate::error::Error;
 use crate::toml_file;
@@ -10,30 +10,30 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use tokio::signal::unix::{SignalKind, signal};
 
-/// What the command line says of the press; options overrule the file.
+/// Options of the press; they override the file.
 #[derive(Debug, Args)]
 pub(crate) struct Command {
-    /// Description of press, plate and faults; without it a press with one 4 x 4 m plate
+    /// Read press, plate and faults from this TOML file; default: a press with one 4 x 4 m plate
     config: Option<PathBuf>,
-    /// Port of Modbus TCP; 0 lets the system choose
+    /// Serve Modbus TCP on this port; 0 lets the system choose
     #[arg(long, value_name = "PORT")]
     modbus_port: Option<u16>,
-    /// Port on which the plate is served; 0 lets the system choose
+    /// Serve the plate (control port) on this port; 0 lets the system choose
     #[arg(long, value_name = "PORT")]
     plate_port: Option<u16>,
-    /// Strokes per part, at most
+    /// Limit the strokes per part
     #[arg(long)]
     strokes: Option<u32>,
-    /// Seed of springback, sessions and faults
+    /// Set the seed of springback, sessions and faults
     #[arg(long)]
     seed: Option<u64>,
-    /// End when standard input closes, so that the press never outlives who started it
+    /// End when standard input closes, so that the press does not outlive its parent process
     #[arg(long)]
     with_parent: bool,
 }
 
 impl Command {
-    /// The file with the options on top.
+    /// Returns the file's configuration with the options applied.
     fn config(&self) -> Result<Config, Error> {
         let mut config = self.config.as_deref().map_or_else(|| Ok(Config::default()), toml_file::read)?;
         if let Some(port) = self.modbus_port {
@@ -50,7 +50,7 @@ impl Command {
     }
 }
 
-/// Runs the press until it is told to end.
+/// Runs the press until it is stopped.
 pub(crate) async fn run(command: &Command) -> Result<(), Error> {
     let press = start(command).await?;
     announce(Some(&press), None)?;
@@ -62,19 +62,19 @@ pub(crate) async fn start(command: &Command) -> Result<SimPress, Error> {
     Ok(SimPress::start(command.config()?).await?)
 }
 
-/// Lets the press run until it is told to end.
+/// Waits until the press ends or a stop is requested.
 pub(crate) async fn run_until_stopped(mut press: SimPress, command: &Command) -> Result<(), Error> {
     tokio::select! {
         ended = press.ended() => ended?,
         told = stop_requested(command.with_parent) => told?,
     }
     if let Ok(counters) = serde_json::to_string(&press.counters()) {
-        tracing::info!(%counters, "press ends");
+        tracing::info!(%counters, "press stopped");
     }
     Ok(())
 }
 
-/// Resolves on SIGTERM, on Ctrl-C and, where pending, when standard input closes.
+/// Waits for SIGTERM, Ctrl-C or, if requested, the end of standard input.
 pub(crate) async fn stop_requested(with_parent: bool) -> Result<(), Error> {
     let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {
@@ -85,7 +85,7 @@ pub(crate) async fn stop_requested(with_parent: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Says where the ports are, in one line. A press on a serial line has no Modbus port.
+/// Prints the addresses of the ports in one line. A press on a serial line has no Modbus port.
 pub(crate) fn announce(press: Option<&SimPress>, scanner: Option<SocketAddr>) -> Result<(), Error> {
     let mut line = serde_json::Map::new();
     if let Some(press) = press {
@@ -102,13 +102,13 @@ pub(crate) fn announce(press: Option<&SimPress>, scanner: Option<SocketAddr>) ->
     Ok(())
 }
 
-/// Resolves when standard input closes. A thread of its own waits for that: the runtime could not end while one of its
-/// threads does.
+/// Waits for the end of standard input, in a separate thread: the runtime could not end while one of its
+/// threads reads it.
 async fn stdin_closed() {
     let (closed, wait) = tokio::sync::oneshot::channel();
     std::thread::spawn(move || {
         let ended = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
-        // Nobody listens any more when the press has ended for another reason.
+        // An error means that the press has ended for another reason.
         let _ = closed.send(ended);
     });
     let _ = wait.await;

@@ -1,4 +1,4 @@
-//! Verb `scanner`: one scan of a plate into a file, or as many as are asked for over TCP.
+//! Command `scanner`: one scan of a plate into a file, or scans served over TCP.
 
 use crate::error::Error;
 use crate::scanner_options::ScannerOptions;
@@ -8,20 +8,20 @@ use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{CellCounts, FileFormat, truth_document};
 use std::path::{Path, PathBuf};
 
-/// One scan.
+/// Options of the command `scanner`.
 #[derive(Debug, Args)]
 pub(crate) struct Command {
-    /// Description of the plate: blank, shape, pose
+    /// Read the plate (blank, shape, pose) from this TOML file
     plate: Option<PathBuf>,
-    /// File to write: .e57, .ptx, .xyz or .xyb
+    /// Write one scan to this file: .e57, .ptx, .xyz or .xyb
     #[arg(long, requires = "plate", required_unless_present = "serve", conflicts_with = "serve")]
     out: Option<PathBuf>,
-    /// File for what a measurement should find, as JSON
+    /// Write the ground truth of the scan to this file, as JSON
     #[arg(long, requires = "out")]
     truth: Option<PathBuf>,
     #[command(flatten)]
     serve: bridge::BridgeOptions,
-    /// Second port of a simulated press whose plate is scanned
+    /// Scan the plate of the simulated press with this control port
     #[arg(long, value_name = "ADDRESS", requires = "serve", conflicts_with = "plate")]
     press: Option<String>,
     /// End when standard input closes
@@ -31,7 +31,7 @@ pub(crate) struct Command {
     device: ScannerOptions,
 }
 
-/// Scans once into a file, or serves scans until told to end.
+/// Scans once into a file, or serves scans until a stop is requested.
 pub(crate) async fn run(command: &Command) -> Result<(), Error> {
     match (&command.plate, &command.out) {
         (Some(plate), Some(out)) => write(command, plate, out),

@@ -1,4 +1,4 @@
-//! The scanner of all verbs: its errors, its place, what stands before it; and one scan by it.
+//! Options of the scanner common to all commands, and one scan with them.
 
 use crate::error::Error;
 use clap::{Args, ValueEnum};
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Period of the cyclic range error, metres.
 const CYCLIC_PERIOD: f64 = 1.2;
 
-/// What stands before the plate.
+/// Object in front of the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Occluder {
     Nothing,
@@ -20,40 +20,40 @@ enum Occluder {
     Both,
 }
 
-/// The scanner and its place.
+/// Options of the scanner.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScannerOptions {
-    /// Angle between cells, degrees
+    /// Set the angle between cells, degrees
     #[arg(long, default_value_t = 0.05)]
     step_deg: f64,
-    /// What is scanned round the plate, degrees
+    /// Scan this margin around the plate, degrees
     #[arg(long, default_value_t = 6.0)]
     pub(crate) margin_deg: f64,
-    /// Standard deviation of a range at 10 m, millimetres; 0.5 in files, in streams that of the rate asked for
+    /// Set the standard deviation of a range at 10 m, millimetres; default: 0.5 in files, that of the requested rate in streams
     #[arg(long)]
     pub(crate) noise_mm: Option<f64>,
-    /// Amplitude of the cyclic range error of period 1.2 m, millimetres
+    /// Set the amplitude of the cyclic range error of period 1.2 m, millimetres
     #[arg(long, default_value_t = 0.0)]
     cyclic_mm: f64,
-    /// Half width of the plate's mirror lobe, in which echoes are lost, degrees; 0: mill scale, which has none
+    /// Set the half width of the plate's specular lobe, in which echoes are lost, degrees; 0: mill scale, none
     #[arg(long, default_value_t = 0.0)]
     mirror_lobe_deg: f64,
-    /// Seed of all errors
+    /// Set the seed of all errors
     #[arg(long, default_value_t = 1)]
     pub(crate) scan_seed: u64,
-    /// What stands between scanner and plate
+    /// Place an object between scanner and plate
     #[arg(long, value_enum, default_value_t = Occluder::Nothing)]
     hidden_by: Occluder,
 }
 
-/// A scan with all that is known of it.
+/// Scan with its scene.
 pub(crate) struct Capture {
     pub(crate) scene: Scene,
     pub(crate) scan: SimScan,
 }
 
 impl ScannerOptions {
-    /// What stands round the plate.
+    /// Returns the surroundings of the plate.
     pub(crate) fn surroundings(&self) -> Surroundings {
         let hides = |what| self.hidden_by == what || self.hidden_by == Occluder::Both;
         Surroundings {
@@ -63,7 +63,7 @@ impl ScannerOptions {
         }
     }
 
-    /// Its errors.
+    /// Returns the error model.
     pub(crate) fn instrument(&self) -> Instrument {
         Instrument {
             range_sigma: self.noise_mm.unwrap_or(0.5) * 1e-3,
@@ -78,7 +78,7 @@ impl ScannerOptions {
         }
     }
 
-    /// Scans; `number` tells the noise of repeated scans apart.
+    /// Takes a scan; `number` selects the noise of repeated scans.
     pub(crate) fn capture(&self, state: Option<&PlateState>, number: u64) -> Result<Capture, PlateError> {
         let plate = state.map(Plate::new).transpose()?;
         let lattice =
@@ -93,7 +93,7 @@ impl ScannerOptions {
 }
 
 impl Capture {
-    /// Writes the scan in the format of the file's ending.
+    /// Writes the scan in the format of the file's extension.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         let format = FileFormat::of(path).ok_or_else(|| Error::Format { path: path.into() })?;
         Ok(self.scan.write(path, format, FileOrder::default())?)

@@ -1,10 +1,10 @@
-//! TOML files, with the line of what is wrong in them.
+//! TOML files, with the line of an error.
 
 use crate::error::Error;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// Reads a document.
+/// Reads a TOML file.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.into(), source })?;
     toml::from_str(&text).map_err(|error| {

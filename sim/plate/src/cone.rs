@@ -1,9 +1,9 @@
-//! A cone, developed about its apex.
+//! Circular cone, developed about its apex (isometric map).
 
 use crate::{Jet, Vec3};
 
-/// Cone of half angle alpha with the plate's middle at `slant` metres from the apex. In the plate's frame
-/// x = s runs across the middle straight line and y = r along it, away from the apex.
+/// Cone of half angle alpha; the plate's middle lies `slant` metres from the apex. In the plate's frame
+/// x = s runs across the middle generator and y = r along it, away from the apex.
 #[derive(Debug, Clone)]
 pub(crate) struct Cone {
     slant: f64,
@@ -14,14 +14,14 @@ pub(crate) struct Cone {
 }
 
 impl Cone {
-    /// `radius` (m): radius of normal curvature in the middle; `growth`: its positive growth per metre of slant;
+    /// Creates a cone. `radius` (m): radius of normal curvature in the middle; `growth`: its positive growth per metre of slant;
     /// `side`: 1 when the centre lies above the plate, else -1.
     pub(crate) fn new(radius: f64, growth: f64, side: f64) -> Self {
         let (sin_alpha, cos_alpha) = growth.atan().sin_cos();
         Self { slant: radius / growth, sin_alpha, cos_alpha, side }
     }
 
-    /// Point and derivatives by (s, r): the polar angle of the development is the angle about the axis times
+    /// Returns the point and its derivatives by (s, r). The polar angle of the development is the angle about the axis times
     /// sin(alpha).
     pub(crate) fn jet(&self, s: f64, r: f64) -> Jet {
         let along = self.slant + r;
@@ -42,11 +42,11 @@ impl Cone {
             normal_du: Vec3::zeros(),
             normal_dv: normal_phi,
         };
-        self.turned_up(polar.reparameterized([[sin_phi, cos_phi], [cos_phi / rho, -sin_phi / rho]]))
+        self.mirrored_if_below(polar.reparameterized([[sin_phi, cos_phi], [cos_phi / rho, -sin_phi / rho]]))
     }
 
-    /// Mirrors the cone about the plate's plane when its axis lies below; the normal stays the upper one.
-    fn turned_up(&self, jet: Jet) -> Jet {
+    /// Mirrors the cone about the plate's plane when its axis lies below; the normal remains the upper one.
+    fn mirrored_if_below(&self, jet: Jet) -> Jet {
         let mirror = |v: Vec3| Vec3::new(v.x, v.y, v.z * self.side);
         let normal = |v: Vec3| mirror(v) * self.side;
         Jet {

@@ -1,18 +1,20 @@
-//! How a blank was really cut: its corners off the rectangle's, its edges bowed.
+//! Cutting errors of a blank: corner offsets and bowed edges, as a map from the ordered rectangle to the cut blank.
+//!
+//! Corner offsets are interpolated bilinearly, edge bows are parabolas blended linearly across the rectangle.
 
 use crate::Blank;
 
-/// The map from the ordered rectangle to the cut blank: corners moved, edges bowed as parabolas, straight blends between.
+/// Map from the ordered rectangle to the cut blank.
 #[derive(Debug, Clone)]
 pub(crate) struct CuttingError {
     size: [f64; 2],
     corners: [[f64; 2]; 4],
-    /// Outwards, in the middle of the edges v = 0, u = W, v = H, u = 0.
+    /// Sagitta of the edges v = 0, u = W, v = H, u = 0, positive outwards, metres.
     bows: [f64; 4],
 }
 
 impl CuttingError {
-    /// `None` for the rectangle itself.
+    /// Creates the map of a blank; `None` for an exact rectangle.
     pub(crate) fn new(blank: &Blank) -> Option<Self> {
         let corners = blank.corners_off_mm.map(|off| off.map(|mm| mm * 1e-3));
         let bows = blank.bows_mm.map(|mm| mm * 1e-3);
@@ -21,7 +23,7 @@ impl CuttingError {
         is_cut.then_some(Self { size, corners, bows })
     }
 
-    /// Material point (u, v) of a place (a, b) of the rectangle, and its derivatives
+    /// Returns the material point (u, v) of the point (a, b) of the rectangle, and its derivatives
     /// `[[du/da, du/db], [dv/da, dv/db]]`.
     pub(crate) fn material(&self, a: f64, b: f64) -> ([f64; 2], [[f64; 2]; 2]) {
         let [w, h] = self.size;

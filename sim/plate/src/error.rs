@@ -1,29 +1,29 @@
-//! What can be wrong with a plate's description.
+//! Errors of plate descriptions and strokes.
 
-/// Why a state cannot be built or a stroke cannot be applied.
+/// Error of building a state or applying a stroke, by who must act.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlateError {
-    /// The description contradicts itself: change the document.
-    #[error("plate.{key}: {found} is not possible; {advice}")]
+    /// Invalid value in a description: change the document.
+    #[error("plate.{key}: {found} is not allowed; {advice}")]
     Description {
-        /// Key of the document.
+        /// Key in the document.
         key: &'static str,
-        /// What stands there.
+        /// Value found.
         found: f64,
-        /// What to write instead.
+        /// Allowed values.
         advice: &'static str,
     },
-    /// A stroke that this model cannot apply: change the programme.
+    /// Stroke that this model cannot apply: change the programme.
     #[error("stroke at {at_mm} mm, axis {axis_deg} deg: {reason}")]
     Stroke {
-        /// Where it was to be applied.
+        /// Position of the die, from the plate's middle.
         at_mm: f64,
-        /// Direction of its die.
+        /// Direction of the die.
         axis_deg: f64,
-        /// Why not.
+        /// Reason.
         reason: &'static str,
     },
-    /// A target that strokes cannot reach.
+    /// Target that parallel strokes cannot reach.
     #[error("no programme bends a plate to {target}; choose cylinder, sphere or torus")]
     Target {
         /// Name of the shape.

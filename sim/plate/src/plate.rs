@@ -1,4 +1,6 @@
-//! The prepared geometry of one state of a plate.
+//! Geometry prepared from one state of a plate: surface, derivatives, curvature and material map.
+//!
+//! The mid-surface is a [`SweptSurface`] or a [`Cone`]; faces are its parallel surfaces at plus and minus half the thickness.
 
 use crate::cone::Cone;
 use crate::cutting_error::CuttingError;
@@ -9,7 +11,7 @@ use crate::swept_surface::SweptSurface;
 use crate::{Blank, Jet, PlateError, PlateState, Shape, Vec3};
 use nalgebra::Isometry3;
 
-/// One of the four side faces.
+/// Side face of a plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// v = 0, runs along u.
@@ -23,7 +25,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// All four, in the order of the outline.
+    /// All four sides, in the order of the outline.
     pub const ALL: [Self; 4] = [Self::Bottom, Self::Right, Self::Top, Self::Left];
 }
 
@@ -44,11 +46,11 @@ pub struct Curvature {
 
 #[derive(Debug, Clone)]
 enum Surface {
-    SweptSurface(Box<SweptSurface>),
+    Swept(Box<SweptSurface>),
     Cone(Cone),
 }
 
-/// A bent plate: material points (u, v, h) to places, h counted from the mid-surface along the upper normal.
+/// Bent plate: map from material points (u, v, h) to points in space; h is counted from the mid-surface along the upper normal.
 #[derive(Debug, Clone)]
 pub struct Plate {
     blank: Blank,
@@ -65,7 +67,7 @@ pub struct Plate {
 }
 
 impl Plate {
-    /// Prepares the geometry of `state`; shapes that are not developable cost some 20 ms.
+    /// Prepares the geometry of `state`; about 20 ms for shapes that are not developable.
     ///
     /// # Errors
     /// [`PlateError::Description`] with the key at fault.
@@ -86,7 +88,7 @@ impl Plate {
             map: MaterialMap::identity(),
             scanner_from_plate: state.pose.scanner_from_plate(),
         };
-        if let Surface::SweptSurface(swept) = &plate.surface
+        if let Surface::Swept(swept) = &plate.surface
             && !swept.is_developable()
         {
             plate.map = MaterialMap::least_energy(swept, axis, [width, height]);
@@ -94,37 +96,37 @@ impl Plate {
         Ok(plate)
     }
 
-    /// Extent along u as ordered, metres.
+    /// Returns the ordered extent along u, metres.
     pub fn width(&self) -> f64 {
         self.width
     }
 
-    /// Extent along v as ordered, metres.
+    /// Returns the ordered extent along v, metres.
     pub fn height(&self) -> f64 {
         self.height
     }
 
-    /// Thickness, metres.
+    /// Returns the thickness, metres.
     pub fn thickness(&self) -> f64 {
         self.thickness
     }
 
-    /// Blank as described.
+    /// Returns the blank as described.
     pub fn blank(&self) -> &Blank {
         &self.blank
     }
 
-    /// Painted markers (u, v), metres.
+    /// Returns the painted markers (u, v), metres.
     pub fn markers(&self) -> &[[f64; 2]] {
         &self.markers
     }
 
-    /// From the local frame to the scanner frame.
+    /// Returns the transform from the local frame to the scanner frame.
     pub fn scanner_from_plate(&self) -> &Isometry3<f64> {
         &self.scanner_from_plate
     }
 
-    /// Mid-surface in the local frame with derivatives by (u, v).
+    /// Returns the mid-surface in the local frame with derivatives by (u, v).
     pub fn local_jet(&self, u: f64, v: f64) -> Jet {
         let (x, y) = (u - self.width / 2.0, v - self.height / 2.0);
         let [ax, ay] = self.axis;
@@ -140,10 +142,10 @@ impl Plate {
             }
         }
         let jet = match &self.surface {
-            Surface::SweptSurface(swept) => swept.jet(s, r),
+            Surface::Swept(swept) => swept.jet(s, r),
             Surface::Cone(cone) => cone.jet(s, r),
         };
-        // The surface has x across the axis; turn it so that x is along u.
+        // The surface has x across the axis; rotate it so that x is along u.
         let turned = |p: Vec3| Vec3::new(ay * p.x + ax * p.y, -ax * p.x + ay * p.y, p.z);
         let jet = jet.reparameterized(jacobian);
         Jet {
@@ -156,7 +158,7 @@ impl Plate {
         }
     }
 
-    /// The surface `h` metres above the mid-surface, scanner frame, with derivatives by (u, v).
+    /// Returns the parallel surface `h` metres above the mid-surface, scanner frame, with derivatives by (u, v).
     pub fn jet(&self, u: f64, v: f64, h: f64) -> Jet {
         let jet = self.local_jet(u, v).offset(h);
         let turn = &self.scanner_from_plate.rotation;
@@ -170,27 +172,27 @@ impl Plate {
         }
     }
 
-    /// Mid-surface, scanner frame.
+    /// Returns a point of the mid-surface, scanner frame.
     pub fn mid(&self, u: f64, v: f64) -> Vec3 {
         self.jet(u, v, 0.0).point
     }
 
-    /// Upper unit normal, scanner frame; the same on mid-surface and faces.
+    /// Returns the upper unit normal, scanner frame; it is the same on mid-surface and faces.
     pub fn normal(&self, u: f64, v: f64) -> Vec3 {
         self.jet(u, v, 0.0).normal
     }
 
-    /// Upper face, the one that is scanned.
+    /// Returns a point of the upper face, the one that is scanned.
     pub fn top(&self, u: f64, v: f64) -> Vec3 {
         self.jet(u, v, self.thickness / 2.0).point
     }
 
-    /// Underside.
+    /// Returns a point of the underside.
     pub fn underside(&self, u: f64, v: f64) -> Vec3 {
         self.jet(u, v, -self.thickness / 2.0).point
     }
 
-    /// Corners (0,0), (W,0), (W,H), (0,H) of the upper face.
+    /// Returns the corners (0,0), (W,0), (W,H), (0,H) of the upper face.
     pub fn corners(&self) -> [Vec3; 4] {
         [(0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height)].map(|(a, b)| {
             let ([u, v], _) = self.material(a, b);
@@ -198,8 +200,8 @@ impl Plate {
         })
     }
 
-    /// Material point (u, v) at the place (a, b) of the rectangle as ordered, and its derivatives
-    /// `[[du/da, du/db], [dv/da, dv/db]]`: the place itself unless the blank was cut off it.
+    /// Returns the material point (u, v) at (a, b) of the ordered rectangle and its derivatives
+    /// `[[du/da, du/db], [dv/da, dv/db]]`: the identity unless the blank has cutting errors.
     pub fn material(&self, a: f64, b: f64) -> ([f64; 2], [[f64; 2]; 2]) {
         match &self.cut {
             Some(cut) => cut.material(a, b),
@@ -207,7 +209,7 @@ impl Plate {
         }
     }
 
-    /// Material point (u, v) at `along` in 0..1 of a side face.
+    /// Returns the material point (u, v) at the fraction `along` (0..1) of a side face.
     pub fn side_uv(&self, side: Side, along: f64) -> [f64; 2] {
         let [a, b] = match side {
             Side::Bottom => [along * self.width, 0.0],
@@ -218,7 +220,7 @@ impl Plate {
         self.material(a, b).0
     }
 
-    /// Curvature `h` metres above the mid-surface (0: the mid-surface's own).
+    /// Returns the curvature of the parallel surface `h` metres above the mid-surface, from its two fundamental forms.
     pub fn curvature(&self, u: f64, v: f64, h: f64) -> Curvature {
         let jet = self.local_jet(u, v).offset(h);
         let [e, f, g] = [jet.du.dot(&jet.du), jet.du.dot(&jet.dv), jet.dv.dot(&jet.dv)];
@@ -235,7 +237,7 @@ impl Plate {
         }
     }
 
-    /// Upper face at `nu` x `nv` equally spaced material points, u outer.
+    /// Samples the upper face at `nu` x `nv` equally spaced material points, u outer.
     pub fn grid(&self, nu: usize, nv: usize) -> Vec<Vec<Vec3>> {
         let at = |i: usize, n: usize, length: f64| length * i as f64 / (n.max(2) - 1) as f64;
         (0..nu)
@@ -243,7 +245,7 @@ impl Plate {
             .collect()
     }
 
-    /// `n` points of the upper face along the straight line in (u, v) between two material points.
+    /// Samples `n` points of the upper face along the straight line in (u, v) between two material points.
     pub fn line(&self, from: [f64; 2], to: [f64; 2], n: usize) -> Vec<Vec3> {
         let mix = |k: usize, share: f64| from[k] + (to[k] - from[k]) * share;
         (0..n)
@@ -252,22 +254,22 @@ impl Plate {
             .collect()
     }
 
-    /// How far the material point (u, v) of the upper face moved since `before`, scanner frame.
+    /// Returns the displacement of the material point (u, v) of the upper face since `before`, scanner frame.
     pub fn displacement(&self, before: &Self, u: f64, v: f64) -> Vec3 {
         self.top(u, v) - before.top(u, v)
     }
 }
 
-/// The surface of a shape and the direction of its axis in (u, v).
+/// Builds the surface of a shape; returns it with the direction of its axis in (u, v).
 fn surface(shape: &Shape, width: f64, height: f64) -> Result<(Surface, [f64; 2]), PlateError> {
-    // Material maps may move points a little beyond the rectangle.
+    // The material map may move points slightly beyond the rectangle.
     let reach = 0.5 * width.hypot(height) * 1.05;
     let constant = |kappa: f64| Profile::new(kappa, Vec::new(), reach);
     let along = |axis_deg: f64| {
         let (sin, cos) = axis_deg.to_radians().sin_cos();
         [cos, sin]
     };
-    let swept = |profile, section| Surface::SweptSurface(Box::new(SweptSurface { profile, section }));
+    let swept = |profile, section| Surface::Swept(Box::new(SweptSurface { profile, section }));
     Ok(match shape {
         Shape::Flat => (swept(constant(0.0), constant(0.0)), along(90.0)),
         Shape::Cylinder { radius_mm, axis_deg } => {
@@ -294,7 +296,7 @@ fn surface(shape: &Shape, width: f64, height: f64) -> Result<(Surface, [f64; 2])
     })
 }
 
-/// The cone, and whether its axis direction must be turned round so that it leads away from the apex.
+/// Builds a cone; returns it with true when its axis must be reversed to lead away from the apex.
 fn cone(
     axis: [f64; 2],
     start_mm: f64,
@@ -308,7 +310,7 @@ fn cone(
     if start * end < 0.0 {
         return Err(fault("both radii of a cone have the same sign"));
     }
-    // Half the length of the middle straight line: to the nearer pair of edges.
+    // Half the length of the middle generator, to the nearer pair of edges.
     let half = (width / 2.0 / axis[0].abs()).min(height / 2.0 / axis[1].abs());
     let growth = (end.abs() - start.abs()).abs() / (2.0 * half);
     if growth < 1e-6 {

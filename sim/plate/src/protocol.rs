@@ -1,25 +1,24 @@
-//! What the simulated press answers about its plate: one line of JSON per request, one per reply, over TCP.
+//! Messages by which the simulated press serves its plate: one line of JSON per request and per reply, over TCP.
 //!
-//! `{"get":"plate"}` is answered by `{"plate":{...}}`, by `{"plate":null}` while no plate lies in the press, or
-//! by `{"error":"..."}`.
+//! `{"get":"plate"}` is answered by `{"plate":{...}}`, by `{"plate":null}` while the press is empty, or by `{"error":"..."}`.
 
 use crate::PlateState;
 use serde::{Deserialize, Serialize};
 
-/// A question, one line.
+/// Request, one line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "get", rename_all = "snake_case")]
 pub enum Request {
-    /// The plate as it lies in the press now.
+    /// State of the plate in the press.
     Plate,
 }
 
-/// The answer, one line.
+/// Reply, one line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
-    /// The plate, `None` while there is none.
+    /// State of the plate, `None` while the press is empty.
     Plate(Option<Box<PlateState>>),
-    /// The question was not understood, or the plate is moving; says which.
+    /// Reason why there is no state: the request is invalid, or the plate is moving.
     Error(String),
 }

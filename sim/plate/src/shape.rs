@@ -1,4 +1,4 @@
-//! The shapes a mid-surface can have, as written in a document.
+//! Shapes of a mid-surface, as written in a description file.
 
 use crate::PlateError;
 use crate::profile::{Profile, Step};
@@ -6,36 +6,36 @@ use serde::{Deserialize, Serialize};
 
 /// Shape of the mid-surface. All radii are those of the mid-surface, in millimetres.
 ///
-/// `axis_deg` is the direction of the straight lines (of the die), counted from u towards v: at 90 degrees the
-/// plate bends along u. Positions across the straight lines are counted from the plate's middle, positive
+/// `axis_deg` is the direction of the generators (of the die), counted from u towards v: at 90 degrees the
+/// plate bends along u. Positions across the generators are counted from the plate's middle, positive
 /// towards the direction `axis_deg - 90`; positions along them, positive towards `axis_deg`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// As cut.
+    /// Plane.
     Flat,
-    /// One radius.
+    /// Circular cylinder.
     Cylinder {
         /// Positive when the centre lies above the plate.
         radius_mm: f64,
-        /// Direction of the straight lines, degrees.
+        /// Direction of the generators, degrees.
         axis_deg: f64,
     },
-    /// Radius of normal curvature growing along the straight lines.
+    /// Circular cone: the radius of normal curvature grows along the generators.
     Cone {
-        /// Direction of the middle straight line from its start to its end, degrees.
+        /// Direction of the middle generator from its start to its end, degrees.
         axis_deg: f64,
-        /// Radius at the start of the middle straight line.
+        /// Radius at the start of the middle generator.
         radius_start_mm: f64,
         /// Radius at its end.
         radius_end_mm: f64,
     },
-    /// The same radius in all directions.
+    /// Sphere.
     Sphere {
         /// Positive when the centre lies above the plate.
         radius_mm: f64,
     },
-    /// Two radii: a circle of `radius_mm` along the axis direction, swept along one of `cross_radius_mm`.
+    /// Torus: a circle of `radius_mm` along the axis direction, swept along one of `cross_radius_mm`.
     Torus {
         /// Direction of `radius_mm`, degrees.
         axis_deg: f64,
@@ -44,16 +44,16 @@ pub enum Shape {
         /// Across it, along the middle line.
         cross_radius_mm: f64,
     },
-    /// Curvature across the straight lines that changes in smooth steps: partly bent plates.
+    /// Cylinder whose curvature changes in smooth steps: a partly bent plate.
     Steps {
-        /// Direction of the straight lines, degrees.
+        /// Direction of the generators, degrees.
         axis_deg: f64,
         /// Curvature before the first step, 1/m.
         curvature_per_m: f64,
         /// Changes, in any order.
         steps: Vec<CurvatureStep>,
     },
-    /// What strokes leave behind: bend bands over the plate, some across the others.
+    /// Superposition of bend bands left by strokes, in one or two perpendicular directions.
     Bands {
         /// Direction of the die for `bands`, degrees.
         axis_deg: f64,
@@ -65,7 +65,7 @@ pub enum Shape {
     },
 }
 
-/// A smooth change of curvature (quintic, continuous second derivative).
+/// Smooth change of curvature (quintic, continuous second derivative).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurvatureStep {
@@ -73,25 +73,25 @@ pub struct CurvatureStep {
     pub at_mm: f64,
     /// Length over which the curvature changes.
     pub width_mm: f64,
-    /// By how much it changes, 1/m.
+    /// Change, 1/m.
     pub change_per_m: f64,
 }
 
-/// A strip bent by one stroke: its curvature rises over half the width and falls over the other half, so that
+/// Strip bent by one stroke. Its curvature rises over half the width and falls over the other half, so that
 /// equal bands at half their width from each other add up to a constant curvature.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Band {
     /// Middle of the band, from the plate's middle.
     pub at_mm: f64,
-    /// Whole width.
+    /// Full width.
     pub width_mm: f64,
     /// Angle by which the plate is bent over the whole band, positive concave upwards.
     pub angle_deg: f64,
 }
 
 impl Shape {
-    /// Name of the shape as in the document.
+    /// Returns the name of the shape as in the document.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Flat => "flat",
@@ -105,7 +105,7 @@ impl Shape {
     }
 }
 
-/// 1/radius in 1/m; a radius below 100 mm is a slip of the pen.
+/// Returns 1/radius in 1/m; refuses a radius below 100 mm as a typing error.
 pub(crate) fn curvature(key: &'static str, radius_mm: f64) -> Result<f64, PlateError> {
     if radius_mm.is_finite() && radius_mm.abs() >= 100.0 {
         Ok(1e3 / radius_mm)
@@ -126,7 +126,7 @@ fn width(key: &'static str, width_mm: f64) -> Result<f64, PlateError> {
     }
 }
 
-/// Profile of constant curvature plus steps.
+/// Builds a profile of constant curvature plus steps.
 pub(crate) fn step_profile(
     curvature: f64,
     steps: &[CurvatureStep],
@@ -145,7 +145,7 @@ pub(crate) fn step_profile(
     Ok(Profile::new(curvature, steps, reach))
 }
 
-/// Profile of bend bands. A band of width w and angle a is a step up by k = 2 a / w about a quarter of the
+/// Builds a profile of bend bands. A band of width w and angle a is a step up by k = 2 a / w about a quarter of the
 /// width before its middle and the same step down a quarter behind it.
 pub(crate) fn band_profile(bands: &[Band], reach: f64) -> Result<Profile, PlateError> {
     let mut steps = Vec::with_capacity(2 * bands.len());

@@ -1,18 +1,18 @@
-//! The document that says all about a plate: blank, shape, pose.
+//! Description of a plate at one moment: blank, shape, pose. The serde form is the format of description files.
 
 use crate::{PlateError, Shape, Vec3};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// Everything about a plate at one moment. This is what description files hold and what the press serves.
+/// State of a plate: the content of description files and of the press's replies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlateState {
-    /// The rectangle it was cut as.
+    /// Blank before forming.
     pub blank: Blank,
     /// Shape of the mid-surface.
     pub shape: Shape,
-    /// Where it lies.
+    /// Position and orientation in the scanner frame.
     #[serde(default)]
     pub pose: Pose,
     /// Strokes applied so far.
@@ -20,14 +20,14 @@ pub struct PlateState {
     pub strokes: u32,
 }
 
-/// A cut further off than this is another plate.
-const MOST_OFF_MM: f64 = 100.0;
+/// Largest cutting error, millimetres; a larger one belongs to another plate.
+const MAX_CUTTING_ERROR_MM: f64 = 100.0;
 
-fn is_nothing<T: Default + PartialEq>(value: &T) -> bool {
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// The rectangle, how far it was cut off it, and the painted markers.
+/// Ordered rectangle, its cutting errors, and painted markers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Blank {
@@ -37,45 +37,45 @@ pub struct Blank {
     pub height_mm: f64,
     /// Thickness.
     pub thickness_mm: f64,
-    /// How far the corners (0,0), (W,0), (W,H), (0,H) were cut off those of the rectangle, (u, v).
-    #[serde(default, skip_serializing_if = "is_nothing")]
+    /// Offsets of the corners (0,0), (W,0), (W,H), (0,H) from those of the rectangle, (u, v).
+    #[serde(default, skip_serializing_if = "is_default")]
     pub corners_off_mm: [[f64; 2]; 4],
-    /// How far the edges v = 0, u = W, v = H, u = 0 bulge in their middles, outwards.
-    #[serde(default, skip_serializing_if = "is_nothing")]
+    /// Sagitta of the edges v = 0, u = W, v = H, u = 0, positive outwards.
+    #[serde(default, skip_serializing_if = "is_default")]
     pub bows_mm: [f64; 4],
-    /// Middles of dark discs painted on the upper face, (u, v).
+    /// Centres of dark discs painted on the upper face, (u, v).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub markers_mm: Vec<[f64; 2]>,
 }
 
-/// Where the plate's middle lies and how the plate is turned, scanner frame.
+/// Position of the plate's middle and orientation of the plate, scanner frame.
 ///
-/// The plate is rolled about x, then pitched about y, then turned by `yaw_deg` about z (so that its u axis points
-/// there), then moved.
+/// The plate is rolled about x, then pitched about y, then rotated by `yaw_deg` about z (the direction of its u axis),
+/// then translated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
     /// Middle of the mid-surface.
     pub centre_mm: [f64; 3],
-    /// About z, counter-clockwise from above.
+    /// Rotation about z, counter-clockwise from above.
     pub yaw_deg: f64,
-    /// About y.
+    /// Rotation about y.
     #[serde(default)]
     pub pitch_deg: f64,
-    /// About x.
+    /// Rotation about x.
     #[serde(default)]
     pub roll_deg: f64,
 }
 
 impl Default for Pose {
-    /// Seven metres in front of a scanner that stands 3.6 m above the plate.
+    /// Returns a pose seven metres in front of a scanner that stands 3.6 m above the plate.
     fn default() -> Self {
         Self { centre_mm: [6000.0, 0.0, -3600.0], yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 }
     }
 }
 
 impl Pose {
-    /// The transform from the plate's local frame to the scanner frame, metres.
+    /// Returns the transform from the plate's local frame to the scanner frame, metres.
     pub fn scanner_from_plate(&self) -> Isometry3<f64> {
         let [x, y, z] = self.centre_mm.map(|c| c * 1e-3);
         let turn = UnitQuaternion::from_euler_angles(
@@ -86,7 +86,7 @@ impl Pose {
         Isometry3::from_parts(Translation3::new(x, y, z), turn)
     }
 
-    /// The pose of a rotation (columns: local x, y, z in the scanner frame) and a position, metres.
+    /// Creates the pose of a rotation (columns: local x, y, z in the scanner frame) and a position, metres.
     pub fn from_parts(rotation: &Rotation3<f64>, centre: Vec3) -> Self {
         let (roll, pitch, yaw) = rotation.euler_angles();
         Self {
@@ -99,7 +99,7 @@ impl Pose {
 }
 
 impl PlateState {
-    /// A flat plate of these measures in the default pose.
+    /// Creates a flat plate of these dimensions in the default pose.
     pub fn flat(width_mm: f64, height_mm: f64, thickness_mm: f64) -> Self {
         Self {
             blank: Blank { width_mm, height_mm, thickness_mm, ..Blank::default() },
@@ -109,7 +109,7 @@ impl PlateState {
         }
     }
 
-    /// Checks the measures of the blank and the numbers of the pose.
+    /// Checks the dimensions of the blank and the numbers of the pose.
     pub(crate) fn check(&self) -> Result<(), PlateError> {
         let blank = &self.blank;
         for (key, found, least) in [
@@ -122,7 +122,7 @@ impl PlateState {
             }
         }
         let off = blank.corners_off_mm.iter().flatten().chain(&blank.bows_mm);
-        if let Some(found) = off.copied().find(|off| off.is_nan() || off.abs() > MOST_OFF_MM) {
+        if let Some(found) = off.copied().find(|off| off.is_nan() || off.abs() > MAX_CUTTING_ERROR_MM) {
             let advice = "write how far the cut is off the rectangle, 100 mm at most";
             return Err(PlateError::Description { key: "blank.corners_off_mm or bows_mm", found, advice });
         }

@@ -1,12 +1,15 @@
-//! How strokes bend a plate.
+//! Kinematic forming model: strokes, their planning by equal bend bands, and the plate's handling between strokes.
+//!
+//! A stroke bends a strip by a given angle, of which a given share springs back; there is no moment-curvature law. Equal bands at half
+//! their width from each other add up to a constant curvature.
 
 use crate::{Band, Blank, PlateError, PlateState, Pose, Shape};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-/// One stroke of the press: the die comes down along a line and bends the plate by `angle_deg`; when it is
-/// lifted the share `springback` of the angle is lost.
+/// Stroke of the press: the die bends the plate by `angle_deg` along a line; when it is
+/// lifted, the share `springback` of the angle is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stroke {
@@ -23,7 +26,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// The strip that stays bent.
+    /// Returns the bend band that remains after springback.
     fn band(&self) -> Band {
         Band {
             at_mm: self.at_mm,
@@ -33,15 +36,15 @@ impl Stroke {
     }
 }
 
-/// How a stroke's die lies on a plate that has bends already.
+/// Orientation of a stroke's die on a plate that already has bends.
 enum DieOrientation {
-    /// Along the axis, or against it (positions change sign).
+    /// Parallel to the axis, or antiparallel (positions change sign).
     Along { sign: f64 },
-    /// Across the axis, with the sign of its positions along the axis.
+    /// Perpendicular to the axis, with the sign of its positions along the axis.
     Across { sign: f64 },
 }
 
-/// Directions closer than this are the same, degrees.
+/// Tolerance of equal directions, degrees.
 const SAME_DIRECTION_DEG: f64 = 1e-6;
 
 fn die_orientation(die_deg: f64, axis_deg: f64) -> Option<DieOrientation> {
@@ -57,10 +60,10 @@ fn die_orientation(die_deg: f64, axis_deg: f64) -> Option<DieOrientation> {
 }
 
 impl PlateState {
-    /// Bends the plate by one stroke. The pose stays; see [`Handling`] for what moving the plate does.
+    /// Bends the plate by one stroke. The pose is unchanged; [`Handling`] models the movement between strokes.
     ///
     /// # Errors
-    /// [`PlateError::Stroke`] when the plate is none that strokes made, or when the die lies neither along nor
+    /// [`PlateError::Stroke`] when the plate has a shape not made by strokes, or when the die lies neither along nor
     /// across the dies before it: two oblique bends have no closed form.
     pub fn apply(&mut self, stroke: &Stroke) -> Result<(), PlateError> {
         let refuse = |reason| PlateError::Stroke { at_mm: stroke.at_mm, axis_deg: stroke.axis_deg, reason };
@@ -84,19 +87,19 @@ impl PlateState {
     }
 }
 
-/// How a press operator plans a plate.
+/// Parameters of a forming programme.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Plan {
     /// Strokes side by side, from edge to edge, at least 2.
     pub strokes_per_pass: u32,
-    /// How often the plate is gone over; each pass bends an equal share.
+    /// Number of passes over the plate; each pass bends an equal share.
     pub passes: u32,
-    /// Share that the planner expects to spring back; the steel's own scatters about it.
+    /// Share of the angle that the planner expects to spring back; the actual springback scatters about it.
     pub springback: f64,
-    /// Standard deviation of the steel's springback, as a share of `springback`.
+    /// Standard deviation of the actual springback, relative to `springback`.
     pub springback_scatter: f64,
-    /// Seed of that scatter.
+    /// Seed of the scatter.
     pub seed: u64,
 }
 
@@ -106,11 +109,11 @@ impl Default for Plan {
     }
 }
 
-/// Strokes that bend a flat plate to a target.
+/// Sequence of strokes that bends a flat plate to a target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programme {
-    /// In order.
+    /// Strokes in order.
     pub strokes: Vec<Stroke>,
 }
 
@@ -120,8 +123,8 @@ impl Programme {
     /// in both directions, along the axis first.
     ///
     /// # Errors
-    /// [`PlateError::Target`] for shapes that parallel strokes cannot reach, [`PlateError::Description`] for an
-    /// impossible plan.
+    /// [`PlateError::Target`] for shapes that parallel strokes cannot reach; [`PlateError::Description`] for an
+    /// invalid plan.
     pub fn toward(target: &Shape, blank: &Blank, plan: &Plan) -> Result<Self, PlateError> {
         let directions: Vec<(f64, f64)> = match *target {
             Shape::Cylinder { radius_mm, axis_deg } => vec![(axis_deg, radius_mm)],
@@ -160,7 +163,7 @@ impl Programme {
     }
 }
 
-/// One pass of strokes from edge to edge that adds `curvature` (1/m) everywhere.
+/// Returns one pass of strokes from edge to edge that adds `curvature` (1/m) everywhere.
 fn pass(blank: &Blank, plan: &Plan, axis_deg: f64, curvature: f64, rng: &mut Pcg64) -> Vec<Stroke> {
     let (sin, cos) = axis_deg.to_radians().sin_cos();
     let extent_mm = blank.width_mm * sin.abs() + blank.height_mm * cos.abs();
@@ -176,18 +179,18 @@ fn pass(blank: &Blank, plan: &Plan, axis_deg: f64, curvature: f64, rng: &mut Pcg
     (0..plan.strokes_per_pass).map(stroke).collect()
 }
 
-/// One normal number of standard deviation `sigma`, which is finite and not negative.
+/// Draws a normal deviate of standard deviation `sigma`, which is finite and not negative.
 fn scatter(sigma: f64, rng: &mut Pcg64) -> f64 {
     Normal::new(0.0, sigma).map_or(0.0, |normal| normal.sample(rng))
 }
 
-/// How the plate moves while it is handled between strokes: it never lies twice in the same place.
+/// Random movement of the plate while it is handled between strokes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Handling {
-    /// Standard deviation of the position, in the plane.
+    /// Standard deviation of the position in the horizontal plane, each axis.
     pub slide_mm: f64,
-    /// Standard deviation of the turn about the vertical.
+    /// Standard deviation of the rotation about the vertical.
     pub turn_deg: f64,
     /// Standard deviation of the tilt about both horizontal axes.
     pub tilt_deg: f64,
@@ -202,7 +205,7 @@ impl Default for Handling {
 }
 
 impl Handling {
-    /// Where a plate that belongs at `home` lies after `strokes` strokes; the same every time it is asked.
+    /// Returns the pose after `strokes` strokes of a plate whose nominal pose is `home`; a pure function of its arguments.
     pub fn place(&self, home: &Pose, strokes: u32) -> Pose {
         let mut rng = Pcg64::new(u128::from(self.seed), u128::from(strokes));
         let mut about = |middle: f64, sigma: f64| middle + scatter(sigma.abs(), &mut rng);

@@ -1,8 +1,8 @@
-//! A mid-surface with its derivatives.
+//! Point of a surface with its first derivatives (1-jet).
 
 use crate::Vec3;
 
-/// A point of a surface with first derivatives of point and normal by the two parameters.
+/// Point of a surface with first derivatives of point and normal by the two parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jet {
     /// Point, metres.
@@ -20,7 +20,7 @@ pub struct Jet {
 }
 
 impl Jet {
-    /// The same with parameters (a, b) of which the present ones are functions; `jacobian` holds
+    /// Returns the jet by new parameters (a, b) of which the present ones are functions (chain rule); `jacobian` contains
     /// `[[d first/da, d first/db], [d second/da, d second/db]]`.
     pub(crate) fn reparameterized(&self, jacobian: [[f64; 2]; 2]) -> Self {
         let [[a, b], [c, d]] = jacobian;
@@ -33,7 +33,7 @@ impl Jet {
         }
     }
 
-    /// The surface at `h` metres along the normal.
+    /// Returns the jet of the parallel surface at `h` metres along the normal.
     pub(crate) fn offset(&self, h: f64) -> Self {
         Self {
             point: self.point + self.normal * h,

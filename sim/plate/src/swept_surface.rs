@@ -1,13 +1,14 @@
-//! A section swept along a profile: every shape but the cone.
+//! Surface of a plane section swept along a plane profile: every shape except the cone.
 //!
-//! The profile C(s) lies in the plane of x and z with curvature k1(s); the section (X(r), Z(r)) with curvature
-//! k2(r) stands upright on it: P(s, r) = C(s) + X(r) e_y + Z(r) N(s), N the profile's upper normal. A straight
-//! section gives cylinders, steps and parallel bands (isometric); two circles of one radius a sphere; two circles a torus.
-//! Principal curvatures: k2 along r, k1 cos(b) / (1 - k1 Z) along s, b the section's angle.
+//! The profile C(s) lies in the xz plane with curvature k1(s). The section (X(r), Z(r)) with curvature k2(r) lies in its normal
+//! plane: P(s, r) = C(s) + X(r) e_y + Z(r) N(s), where N is the profile's upper normal. A straight section gives cylinders, steps and
+//! parallel bands (isometric); two circles of one radius give a sphere, two circles a torus. Principal
+//! curvatures: k2 along r, k1 cos(b) / (1 - k1 Z) along s, where b is the section's tangent angle.
 
 use crate::profile::Profile;
 use crate::{Jet, Vec3};
 
+/// Section swept along a profile.
 #[derive(Debug, Clone)]
 pub(crate) struct SweptSurface {
     pub(crate) profile: Profile,
@@ -15,12 +16,12 @@ pub(crate) struct SweptSurface {
 }
 
 impl SweptSurface {
-    /// True when the map from (s, r) is isometric.
+    /// Returns true when the map from (s, r) is isometric.
     pub(crate) fn is_developable(&self) -> bool {
         self.profile.is_straight() || self.section.is_straight()
     }
 
-    /// The metric is diag(g, 1): g = (1 - k1 Z)^2 and its slopes by s and r.
+    /// Returns g and its derivatives by s and r; the metric is diag(g, 1) with g = (1 - k1 Z)^2.
     pub(crate) fn metric(&self, s: f64, r: f64) -> (f64, [f64; 2]) {
         let (c, q) = (self.profile.at(s), self.section.at(r));
         let stretch = 1.0 - c.curvature * q.z;
@@ -29,7 +30,7 @@ impl SweptSurface {
         (stretch * stretch, [2.0 * stretch * by_s, 2.0 * stretch * by_r])
     }
 
-    /// Point and derivatives by (s, r), in the frame x = s, y = r, z up at the origin.
+    /// Returns the point and its derivatives by (s, r), in the frame x = s, y = r, z up at the origin.
     pub(crate) fn jet(&self, s: f64, r: f64) -> Jet {
         let (c, q) = (self.profile.at(s), self.section.at(r));
         let (sin_a, cos_a) = c.angle.sin_cos();

@@ -159,7 +159,7 @@ fn sphere_points_lie_on_the_sphere_and_strain_is_small() {
 #[test]
 fn impossible_descriptions_are_refused_by_key() {
     let refused = |shape: Shape| Plate::new(&state(shape)).unwrap_err().to_string();
-    assert!(refused(Shape::Sphere { radius_mm: 0.0 }).starts_with("plate.radius_mm: 0 is not possible"));
+    assert!(refused(Shape::Sphere { radius_mm: 0.0 }).starts_with("plate.radius_mm: 0 is not allowed"));
     let cone = |radius_start_mm, radius_end_mm| Shape::Cone { axis_deg: 0.0, radius_start_mm, radius_end_mm };
     assert!(refused(cone(5000.0, -5000.0)).contains("same sign"));
     assert!(refused(cone(5000.0, 5000.0)).contains("cylinder"));

@@ -1,35 +1,35 @@
-//! What a fault makes of an answer; pure.
+//! Fault injection into Modbus answers; pure functions.
 
 use std::time::Duration;
 
 use crate::faults::{LineFault, LineFaults};
 use crate::frame::{Framing, Message};
 
-/// Bytes of noise before an answer.
+/// Number of noise bytes before an answer.
 const NOISE: usize = 5;
 
-/// What goes back to the host.
+/// Answer to the host after fault injection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
-    /// These bytes, now.
+    /// Sends these bytes at once.
     Bytes(Vec<u8>),
-    /// These bytes, after a while.
+    /// Sends these bytes after a delay.
     Late(Vec<u8>, Duration),
-    /// These bytes, one by one.
+    /// Sends these bytes one at a time.
     Dribble(Vec<u8>),
-    /// Nothing.
+    /// Sends nothing.
     None,
-    /// The connection is reset.
+    /// Resets the connection.
     Reset,
 }
 
-/// The exception answer to `request`.
+/// Returns the exception response to `request` (MODBUS Application Protocol V1.1b3, section 7).
 pub(crate) fn exception(request: &Message, code: u8) -> Message {
     let function = request.pdu.first().copied().unwrap_or(0) | 0x80;
     Message { pdu: vec![function, code], ..*request }
 }
 
-/// `answer` as bytes after `fault`.
+/// Encodes `answer` with `fault` applied.
 pub(crate) fn apply_fault(
     mut answer: Message,
     fault: Option<LineFault>,
@@ -75,7 +75,7 @@ pub(crate) fn apply_fault(
     }
 }
 
-/// One register more or less than was asked, in a read's answer; another count in a write's echo.
+/// Adds or removes one register in the answer to a read; changes the count in the answer to a write.
 fn resize(pdu: &mut Vec<u8>, by: i8) {
     match pdu.first() {
         Some(3) if pdu.len() >= 4 => {

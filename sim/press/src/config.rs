@@ -1,4 +1,4 @@
-//! What a simulated press is told at its start: one table of a TOML file.
+//! Configuration of a simulated press, read from a TOML file.
 
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::faults::{LineFaults, StrokeFaults};
 use crate::forming_model::{PlateConfig, Strategy};
 use crate::{Error, Result};
 
-/// A press. Every key has a default; an unknown key is an error.
+/// Configuration of a press. Every key has a default; an unknown key is an error.
 ///
 /// ```toml
 /// press_id = 3
@@ -31,33 +31,33 @@ use crate::{Error, Result};
 pub struct Config {
     /// Plant number of the press.
     pub press_id: u16,
-    /// Map version the press claims; anything but 1 must keep a host from writing.
+    /// Map version of the P block; a host must not write when it is not 1.
     pub map_version: u16,
     /// Address of the P block.
     pub p_base: u16,
     /// Address of the H block.
     pub h_base: u16,
-    /// Unit id it answers to.
+    /// Modbus unit id.
     pub unit: u8,
-    /// Where it listens for its host.
+    /// Link to the host.
     pub link: LinkConfig,
-    /// Address of both loopback ports.
+    /// Local address of both ports.
     pub bind: IpAddr,
-    /// Port of the plate's and the tests' lines; 0: the system chooses.
+    /// Control port; 0 lets the system choose.
     pub control_port: u16,
-    /// Strokes of one part, at most.
+    /// Largest number of strokes per part.
     pub strokes: u32,
-    /// Parts pressed one after the other.
+    /// Number of parts.
     pub parts: u32,
-    /// How the next bend is chosen.
+    /// Selection of the next bend.
     pub strategy: Strategy,
-    /// The host scans the blank before the first stroke.
+    /// Requests a baseline scan before the first stroke.
     pub baseline: bool,
-    /// Strokes come by themselves; `false`: only on request.
+    /// Starts strokes automatically; `false`: only on request.
     pub automatic: bool,
-    /// The press waits for the host's ready bit before a stroke.
+    /// Waits for the host's ready bit before a stroke.
     pub wait_ready: bool,
-    /// Results marked as simulated are taken.
+    /// Accepts results marked as simulated.
     pub take_simulated: bool,
     /// Number of the plate file.
     pub recipe_id: u16,
@@ -65,17 +65,17 @@ pub struct Config {
     pub part_id: u32,
     /// Name of the part, 16 ASCII characters.
     pub part_name: String,
-    /// Last stroke number before the first stroke.
+    /// Value of the stroke counter at the start.
     pub stroke_id: u16,
     /// Seed of sessions and faults.
     pub seed: u64,
-    /// Times.
+    /// Durations.
     pub timings: Timings,
-    /// The plate and its bends.
+    /// Plate and forming programme.
     pub plate: PlateConfig,
     /// Faults of the line.
     pub line_faults: LineFaults,
-    /// Faults of the controller's program.
+    /// Faults of the PLC program.
     pub stroke_faults: StrokeFaults,
 }
 
@@ -110,19 +110,19 @@ impl Default for Config {
     }
 }
 
-/// How a host reaches the press.
+/// Link between host and press.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum LinkConfig {
     /// Modbus TCP.
     Tcp {
-        /// 0: the system chooses.
+        /// Port; 0 lets the system choose.
         #[serde(default)]
         port: u16,
     },
-    /// RTU frames through a TCP connection, as a serial device server passes them.
+    /// RTU frames over a TCP connection, as forwarded by a serial device server.
     RtuOverTcp {
-        /// 0: the system chooses.
+        /// Port; 0 lets the system choose.
         #[serde(default)]
         port: u16,
     },
@@ -134,10 +134,10 @@ pub enum LinkConfig {
         #[serde(default = "default_baud")]
         baud: u32,
     },
-    /// RTU on a pseudo terminal that the press makes: a serial line without hardware. A connection that is cut is an
-    /// adapter that is pulled and comes back under another name.
+    /// RTU on a pseudo terminal created by the press: a serial line without hardware. Cutting the connection simulates an
+    /// adapter that is unplugged and returns under another name.
     Pty {
-        /// A link to the terminal is put here, as `/dev/serial/by-id` has them.
+        /// Path of a symbolic link to the terminal, as in `/dev/serial/by-id`.
         device: PathBuf,
     },
 }
@@ -152,11 +152,11 @@ fn default_baud() -> u32 {
     19_200
 }
 
-/// Times of the press, in milliseconds.
+/// Durations of the press, in milliseconds.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Timings {
-    /// One cycle of the controller.
+    /// Cycle time of the controller.
     pub cycle_ms: u64,
     /// From the start of the program to the first action.
     pub start_ms: u64,
@@ -164,19 +164,19 @@ pub struct Timings {
     pub down_ms: u64,
     /// Ram up.
     pub up_ms: u64,
-    /// From the end of one stroke's handshake to the next action.
+    /// From the end of a handshake to the next action.
     pub between_ms: u64,
-    /// Registers are 0 for this long after a restart.
+    /// Time during which registers are 0 after a restart.
     pub restart_ms: u64,
-    /// Own heartbeat.
+    /// Interval of the press's heartbeat.
     pub heartbeat_ms: u64,
-    /// Host dead after this long without its heartbeat.
+    /// Time without host heartbeat after which the host counts as dead.
     pub host_ms: u64,
-    /// Alarm when the host takes longer to accept.
+    /// Time for acceptance, after which an alarm is raised.
     pub accept_ms: u64,
-    /// The press goes on without a result after this long.
+    /// Time for a result, after which the press continues without one.
     pub result_ms: u64,
-    /// From taking a result to raising the acknowledge bit.
+    /// Delay from accepting a result to setting the acknowledge bit.
     pub ack_ms: u64,
 }
 
@@ -199,7 +199,7 @@ impl Default for Timings {
 }
 
 impl Config {
-    /// Checks what the types cannot say.
+    /// Checks constraints beyond the types.
     ///
     /// # Errors
     /// [`Error::Config`] with the key and the limit.
@@ -209,21 +209,30 @@ impl Config {
         if p < h + 64 && h < p + 32 {
             return refuse(
                 "h_base",
-                format!("the blocks at {p} and {h} overlap; keep 32 words for the first, 64 for the other"),
+                format!("the blocks at {p} and {h} overlap; reserve 32 words for P, 64 words for H"),
             );
         }
         if p.max(h) + 100 > 65_536 {
-            return refuse("p_base", format!("a block at {} leaves the table of 65536 words", p.max(h)));
+            return refuse(
+                "p_base",
+                format!("a block at {} exceeds the table of 65536 words; choose a lower address", p.max(h)),
+            );
         }
         if self.timings.cycle_ms == 0 {
-            return refuse("timings.cycle_ms", String::from("a cycle takes at least 1 ms"));
+            return refuse("timings.cycle_ms", String::from("found 0; write at least 1 ms"));
         }
         let line = &self.line_faults;
         if !(0.0..=1.0).contains(&line.total()) {
-            return refuse("line_faults", format!("probabilities add up to {}, at most 1", line.total()));
+            return refuse(
+                "line_faults",
+                format!("probabilities sum to {}; at most 1 is permitted", line.total()),
+            );
         }
         if line.late_ms[0] > line.late_ms[1] {
-            return refuse("line_faults.late_ms", format!("{:?} is not shortest, longest", line.late_ms));
+            return refuse(
+                "line_faults.late_ms",
+                format!("{:?}: write the shortest delay first, then the longest", line.late_ms),
+            );
         }
         Ok(())
     }

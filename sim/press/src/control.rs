@@ -1,10 +1,10 @@
-//! The second port: line-delimited JSON for whoever wants to know about the plate and for tests.
+//! Control port: line-delimited JSON for the simulated scanner, tests and instructors.
 //!
 //! | line | answer |
 //! |---|---|
-//! | `{"get":"plate"}` | `{"plate":{...}}`, `{"plate":null}` when no plate lies in the press, `{"error":"..."}` while it moves |
-//! | `{"get":"stats"}` | `{"stats":{...}}`, a [`crate::counters::Counters`] |
-//! | `{"get":"counts"}` | `{"counts":{...}}`, the same without the results taken, whose number is `results` |
+//! | `{"get":"plate"}` | `{"plate":{...}}`, `{"plate":null}` when the press is empty, `{"error":"..."}` while the plate moves |
+//! | `{"get":"stats"}` | `{"stats":{...}}`, the [`crate::counters::Counters`] |
+//! | `{"get":"counts"}` | `{"counts":{...}}`, the same without the list of accepted results, whose number is `results` |
 //! | `{"get":"registers"}` | `{"registers":{"p":[..],"h":[..]}}` |
 //! | `{"do":"stroke"}`, `{"do":{"counter":65530}}`, any [`Command`] | `{"ok":true}` or `{"error":"..."}` |
 
@@ -22,51 +22,51 @@ use crate::faults::{LineFaults, StrokeFaults};
 use crate::program::Cause;
 use crate::shared::{Machine, Shared};
 
-/// What a test, or an instructor, can have the press do.
+/// Command of a test or an instructor.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
-    /// The next bend at once, whatever the host is doing.
+    /// Makes the next bend at once, whatever the state of the host.
     Stroke,
-    /// A scan of the plate as it lies.
+    /// Requests a scan without a bend.
     Baseline,
-    /// The last stroke again.
+    /// Requests another scan of the last stroke.
     Rescan,
-    /// The part leaves.
+    /// Ends the part.
     PartEnd,
-    /// A new session; the counter starts again from 0.
+    /// Starts a new session with the stroke counter at 0.
     NewSession,
-    /// The last stroke number, within the session.
+    /// Sets the stroke counter within the session.
     Counter(u16),
-    /// Strokes by themselves, or only on request.
+    /// Switches automatic strokes on or off.
     Automatic(bool),
-    /// Control bits held up, whatever the program does.
+    /// Forces control bits to 1.
     Force(u16),
-    /// Control bits held down.
+    /// Forces control bits to 0.
     Mask(u16),
-    /// Another plant number, as if the cable led to another press.
+    /// Changes the plant number, as if the cable led to another press.
     PressId(u16),
-    /// Another map version.
+    /// Changes the map version.
     MapVersion(u16),
-    /// Connections reset, registers 0, then a new session.
+    /// Restarts the controller: resets connections, clears registers, then starts a new session.
     Restart,
-    /// The registers stand still for so many milliseconds, while reads are answered.
+    /// Freezes the registers for this time in milliseconds while reads are answered.
     HaltMs(u64),
-    /// Nothing is answered for so many milliseconds; then everything.
+    /// Holds back all answers for this time in milliseconds.
     FreezeMs(u64),
-    /// All connections are reset.
+    /// Resets all connections.
     Cut,
-    /// The serial adapter is pulled and comes back after so many milliseconds, under another name.
+    /// Unplugs the serial adapter; it returns after this time in milliseconds under another name.
     PullMs(u64),
-    /// Faults of the line from now on.
+    /// Replaces the faults of the line.
     LineFaults(LineFaults),
-    /// Faults of the program from the next stroke on.
+    /// Replaces the faults of the program from the next stroke on.
     StrokeFaults(StrokeFaults),
-    /// The press ends.
+    /// Stops the press.
     Stop,
 }
 
-/// One line from a client.
+/// Request of a client, one line.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Line {
@@ -83,7 +83,7 @@ enum Get {
     Registers,
 }
 
-/// Accepts clients for ever.
+/// Accepts clients until the process ends.
 pub(crate) async fn serve(listener: TcpListener, shared: Arc<Shared>) {
     loop {
         match listener.accept().await {
@@ -91,11 +91,11 @@ pub(crate) async fn serve(listener: TcpListener, shared: Arc<Shared>) {
                 let shared = Arc::clone(&shared);
                 tokio::spawn(async move {
                     let ended = serve_client(client, &shared).await;
-                    tracing::debug!(?ended, "control client left");
+                    tracing::debug!(?ended, "control client disconnected");
                 });
             }
             Err(error) => {
-                tracing::debug!(%error, "control port");
+                tracing::debug!(%error, "control port: connection not accepted");
                 tokio::time::sleep(Duration::from_millis(50)).await;
             }
         }
@@ -114,7 +114,7 @@ async fn serve_client(client: TcpStream, shared: &Shared) -> io::Result<()> {
     Ok(())
 }
 
-/// The answer to one line.
+/// Returns the answer to one line.
 fn answer(line: &str, shared: &Shared) -> serde_json::Value {
     let error = |text: String| serde_json::json!({ "error": text });
     let answered = match serde_json::from_str(line) {
@@ -141,12 +141,12 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
             Ok(()) => Ok(serde_json::json!({ "ok": true })),
             Err(refused) => Ok(error(refused.to_string())),
         },
-        Err(misread) => Ok(error(format!("{misread}; ask {{\"get\":\"plate\"}}"))),
+        Err(invalid) => Ok(error(format!("{invalid}; write for example {{\"get\":\"plate\"}}"))),
     };
     answered.unwrap_or_else(|unwritable| error(unwritable.to_string()))
 }
 
-/// Carries out one command.
+/// Executes one command.
 pub(crate) fn execute(command: Command, shared: &Shared) -> Result<()> {
     let now = shared.now();
     let mut machine = shared.machine();

@@ -1,7 +1,7 @@
-//! What the press itself saw of its host: the side on which tests assert.
+//! Counters of a press: the behaviour of its host as seen by the press, on which tests assert.
 //!
-//! [`WriteMonitor`] looks at every write as it arrives, so a result that is published twice or changes under its number
-//! is seen even between two cycles of the program.
+//! [`WriteMonitor`] examines every write as it arrives, so that a result that is published twice or changes under its number is
+//! detected even between two cycles of the program.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -11,81 +11,81 @@ use serde::Serialize;
 use crate::program::Cause;
 use crate::registers::{HBlock, INVALID_I16, INVALID_U16, Verdict, h, status};
 
-/// Sentences kept of what was wrong; the counters go on.
-const SENTENCES: usize = 20;
+/// Largest number of messages kept; counting continues.
+const MAX_MESSAGES: usize = 20;
 
-/// Counts of one press since its start.
+/// Counters of a press since its start.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Counters {
     /// Milliseconds since the start.
     pub now_ms: u64,
-    /// The press has made all its strokes, or its plate has passed, and the part has left.
+    /// All strokes are made, or the plate has passed, and the last part has left.
     pub done: bool,
-    /// Bends made whose trigger rose.
+    /// Strokes made and triggered.
     pub strokes: u64,
-    /// Baseline scans asked for.
+    /// Baseline scans requested.
     pub baselines: u64,
-    /// Rescans asked for.
+    /// Rescans requested.
     pub rescans: u64,
-    /// Stroke numbers left out on purpose.
+    /// Stroke numbers skipped by a fault.
     pub skipped: u64,
-    /// Triggers taken back before they were accepted, while the host was busy.
+    /// Triggers withdrawn before acceptance while the host was busy.
     pub lost_while_busy: u64,
-    /// Requests given up because a newer one came.
+    /// Requests superseded by a newer one.
     pub superseded: u64,
-    /// Requests without a result in time.
+    /// Requests without a result within the limit.
     pub result_timeouts: u64,
-    /// Requests given up because the host was dead.
+    /// Requests dropped because the host was dead.
     pub host_deaths: u64,
-    /// Requests whose echo came after the accept limit.
+    /// Requests accepted after the limit.
     pub accepted_late: u64,
-    /// Parts begun.
+    /// Parts started.
     pub parts: u64,
     /// Restarts of the controller.
     pub restarts: u64,
-    /// Times the plate's shape was asked for: scans begun.
+    /// Requests for the plate's shape: scans started.
     pub plates_served: u64,
-    /// Missed strokes as the host reports them.
+    /// Missed strokes reported by the host.
     pub missed_reported: u16,
 
     /// Connections accepted.
     pub connections: u64,
-    /// Reads served.
+    /// Reads received.
     pub reads: u64,
-    /// Writes served or refused.
+    /// Writes received.
     pub writes: u64,
     /// Writes with a word outside the H block.
     pub writes_outside: u64,
-    /// Writes on a connection that had not read both blocks.
+    /// Writes on a connection that had not read both blocks before.
     pub writes_before_sync: u64,
-    /// Writes while the registers were void or not those of the map.
+    /// Writes while the registers were cleared or had another map version.
     pub writes_while_void: u64,
-    /// Faults of the line that were injected, by name.
+    /// Injected line faults, by name.
     pub line_faults: BTreeMap<String, u64>,
 
     /// Distinct results seen in the H block.
     pub published: u64,
-    /// Results that came again under another sequence number.
+    /// Results published again under another sequence number.
     pub duplicates: u64,
     /// Results whose words changed under the same sequence number.
     pub changed: u64,
-    /// Contradictions between words.
+    /// Inconsistencies between words.
     pub wrong_values: u64,
-    /// What was wrong, the first few.
+    /// Messages about inconsistencies, the first few.
     pub wrong: Vec<String>,
-    /// Owner words seen; more than one means more than one host.
+    /// Owner words seen; more than one indicates more than one host.
     pub owners: Vec<u16>,
 
-    /// Results taken, in order.
+    /// Accepted results, in order.
     pub taken: Vec<AcceptedResult>,
 }
 
-/// One result as the press took it.
+/// Result accepted by the press.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AcceptedResult {
-    /// Why it was asked for.
+    /// Cause of the request.
     pub cause: Cause,
-    /// Number of the stroke.
+    /// Stroke number.
     pub stroke_id: u16,
     /// Session.
     pub session_id: u16,
@@ -93,20 +93,20 @@ pub struct AcceptedResult {
     pub attempt: u16,
     /// Part.
     pub part_id: u32,
-    /// Bends the plate had when it was taken.
+    /// Bends of the plate at that time.
     pub bends: u32,
-    /// From trigger to the host's echo.
+    /// Time from trigger to the host's echo.
     pub accepted_ms: u64,
-    /// From trigger to the result.
+    /// Time from trigger to the result.
     pub result_ms: u64,
-    /// What it says.
+    /// Verdict.
     pub verdict: Verdict,
-    /// The H block.
+    /// H block.
     pub words: Vec<u16>,
 }
 
 impl Counters {
-    /// The counts alone, and the number of results taken: what can be asked often in a long run.
+    /// Returns the counters without the list of results, and the number of results: cheap to request in a long run.
     #[must_use]
     pub fn counts(&mut self) -> (Self, usize) {
         let taken = std::mem::take(&mut self.taken);
@@ -115,43 +115,43 @@ impl Counters {
         (counts, self.taken.len())
     }
 
-    /// Counts and keeps a sentence about a wrong value.
-    pub fn wrong(&mut self, sentence: String) {
+    /// Counts an inconsistency and keeps a message about it.
+    pub fn wrong(&mut self, message: String) {
         self.wrong_values += 1;
-        if self.wrong.len() < SENTENCES {
-            self.wrong.push(sentence);
+        if self.wrong.len() < MAX_MESSAGES {
+            self.wrong.push(message);
         }
     }
 
-    /// Results taken for bends, baselines and rescans apart.
+    /// Returns the number of accepted results of a cause.
     #[must_use]
     pub fn results(&self, cause: Cause) -> usize {
         self.taken.iter().filter(|taken| taken.cause == cause).count()
     }
 
-    /// Contradictions in a result that is about to be taken.
+    /// Checks the words of a result that is about to be accepted.
     pub fn check_result(&mut self, host: &HBlock, recipe_id: u16) {
         let stroke = host.word(h::RESULT_STROKE_ID);
         if host.crc() != host.word(h::CRC16) {
             let (found, needed) = (host.word(h::CRC16), host.crc());
-            self.wrong(format!("stroke {stroke}: check sum {found:#06x}, the words give {needed:#06x}"));
+            self.wrong(format!("stroke {stroke}: checksum {found:#06x}, the words require {needed:#06x}"));
         }
         if host.word(h::RECIPE_ECHO) != recipe_id {
             let found = host.word(h::RECIPE_ECHO);
-            self.wrong(format!("stroke {stroke}: recipe {found} echoed, {recipe_id} asked"));
+            self.wrong(format!("stroke {stroke}: recipe {found} echoed, {recipe_id} requested"));
         }
         let bits = host.word(h::STATUS);
         let verdicts = [status::PASS, status::FAIL, status::NOT_MEASURED, status::CANNOT_TELL];
         if verdicts.iter().filter(|&&bit| bits & bit != 0).count() != 1 {
-            self.wrong(format!("stroke {stroke}: status {bits:#06x} does not hold exactly one verdict"));
+            self.wrong(format!("stroke {stroke}: status {bits:#06x} does not contain exactly one verdict"));
         }
         if bits & status::BUSY != 0 {
-            self.wrong(format!("stroke {stroke}: result valid while busy"));
+            self.wrong(format!("stroke {stroke}: result_valid is set while busy"));
         }
         if host.status(status::NOT_MEASURED) {
             let gap = host.word(h::GAP_MAX);
             if gap != INVALID_U16 {
-                self.wrong(format!("stroke {stroke}: not measured, yet a gap of {gap}"));
+                self.wrong(format!("stroke {stroke}: not measured, but the gap is {gap}"));
             }
         }
         let [max, min] = [host.word(h::DEV_MAX), host.word(h::DEV_MIN)];
@@ -166,7 +166,7 @@ impl Counters {
 /// Identity of a result: session, stroke, attempt.
 type Identity = (u16, u16, u16);
 
-/// Watches the H block from write to write.
+/// Monitor of the H block from write to write.
 #[derive(Clone, Debug, Default)]
 pub struct WriteMonitor {
     published: BTreeMap<Identity, (u16, Vec<u16>)>,
@@ -174,7 +174,7 @@ pub struct WriteMonitor {
 }
 
 impl WriteMonitor {
-    /// Looks at the H block after a write.
+    /// Examines the H block after a write.
     pub fn observe(&mut self, host: &HBlock, counters: &mut Counters) {
         let owner = host.word(h::OWNER);
         if owner != 0 && !counters.owners.contains(&owner) {
@@ -198,7 +198,7 @@ impl WriteMonitor {
         let words = result_words(host);
         match self.published.get(&identity) {
             None => {
-                // Results that the press forgot while it restarted leave gaps; going back would be a lost journal.
+                // Results lost during a restart of the press leave gaps; a decrease would indicate a lost journal of the host.
                 let step = self.last_seq.map_or(1, |last| seq.wrapping_sub(last));
                 if step == 0 || step > u16::MAX / 2 {
                     counters.wrong(format!("stroke {stroke}: sequence {seq} after {:?}", self.last_seq));
@@ -214,12 +214,12 @@ impl WriteMonitor {
     }
 }
 
-/// The words that belong to the result alone: figures, places, times, identity.
+/// Returns the words that belong to the result alone: figures, positions, times, identity.
 fn result_words(host: &HBlock) -> Vec<u16> {
     host.0[10..=48].iter().chain(&host.0[50..=51]).chain(&host.0[55..=61]).copied().collect()
 }
 
-/// Whole milliseconds of a duration.
+/// Returns the whole milliseconds of a duration.
 #[must_use]
 pub fn whole_ms(duration: Duration) -> u64 {
     u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)

@@ -1,53 +1,55 @@
-//! What can go wrong with a simulated press.
+//! Errors of a simulated press.
 
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use platen_sim_plate::PlateError;
 
-/// Why a press cannot start, execute or go on.
+/// Error of a press, by who must act.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The configuration contradicts itself: change it.
+    /// Invalid configuration: change it.
     #[error("simulated press: {key}: {why}")]
     Config {
-        /// Key of the table.
+        /// Key in the configuration.
         key: &'static str,
-        /// What is wrong and what is possible.
+        /// Reason and permitted values.
         why: String,
     },
-    /// The plate cannot be bent so: change the blank, the target or the plan.
+    /// Plate that cannot be built or bent: change the blank, the target or the plan.
     #[error("simulated press: {0}")]
     Plate(#[from] PlateError),
-    /// A port cannot be had: free it or write 0.
+    /// Port unavailable: free it or write 0.
     #[error(
-        "simulated press: cannot listen on {address}: {source}; free the port or let the system choose with 0"
+        "simulated press: cannot listen on {address}: {source}; free the port, or write 0 to let the system choose"
     )]
     Listen {
-        /// Address that was asked for.
+        /// Requested address.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A serial line cannot be opened.
-    #[error("simulated press: cannot open {device}: {source}; check the name and who else has it open")]
+    /// Serial line that cannot be opened.
+    #[error(
+        "simulated press: cannot open {device}: {source}; check the name, and that no other program has opened it"
+    )]
     Serial {
         /// Name of the device.
         device: String,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A command that does not fit the state of the press.
-    #[error("simulated press: refused: {0}")]
+    /// Command not permitted in the present state.
+    #[error("simulated press: command refused: {0}")]
     Refused(&'static str),
-    /// A state that was waited for did not come.
-    #[error("simulated press: not within {limit:?}: {what}; the press saw {counters}")]
+    /// Awaited state not reached in time.
+    #[error("simulated press: {what}: not reached within {limit:?}; counters {counters}")]
     Late {
-        /// What was waited for.
+        /// Awaited state.
         what: String,
-        /// How long.
+        /// Time limit.
         limit: Duration,
-        /// The counters as JSON.
+        /// Counters as JSON.
         counters: String,
     },
 }

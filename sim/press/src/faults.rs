@@ -1,49 +1,48 @@
-//! Faults on request: what a shop's network and a controller do to a host, each behind a switch with a probability.
+//! Faults that can be injected: those of the line ([`LineFaults`]) and those of the PLC program ([`StrokeFaults`]).
 //!
-//! All switches are off by default and draw from one seed, so a run can be repeated. [`LineFaults`] damage answers on
-//! their way to the host, [`StrokeFaults`] are a controller's own bad habits.
+//! All probabilities are 0 by default. Faults are drawn from one seed, so that a run can be repeated.
 
 use serde::{Deserialize, Serialize};
 
-/// Faults of the line; each probability is per request, at most one fault hits one request.
+/// Probabilities of line faults per request; at most one fault affects a request.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LineFaults {
-    /// The answer comes `late_ms` later; later answers may overtake it.
+    /// The answer is delayed by `late_ms`; later answers may overtake it.
     pub late: f64,
     /// Shortest and longest delay of a late answer.
     pub late_ms: [u64; 2],
-    /// The connection is reset instead of the request being served.
+    /// The connection is reset before the request is served.
     pub reset: f64,
-    /// The connection is reset after the request was served: the host cannot know.
+    /// The connection is reset after the request was served, which the host cannot detect.
     pub reset_after: f64,
-    /// Served, never answered.
+    /// The request is served but not answered.
     pub no_answer: f64,
-    /// Another transaction id in the answer (TCP only).
+    /// The answer has another transaction id (TCP only).
     pub wrong_transaction: f64,
-    /// Another unit id in the answer.
+    /// The answer has another unit id.
     pub wrong_unit: f64,
-    /// Another function code in the answer.
+    /// The answer has another function code.
     pub wrong_function: f64,
-    /// One register less than was asked, in a frame that is whole.
+    /// The answer has one register less than requested, in a valid frame.
     pub short: f64,
-    /// One register more than was asked, in a frame that is whole.
+    /// The answer has one register more than requested, in a valid frame.
     pub long: f64,
-    /// An exception instead of the service.
+    /// The request is answered by an exception and not served.
     pub exception: f64,
     /// Code of that exception.
     pub exception_code: u8,
-    /// Random bytes before the answer.
+    /// Random bytes precede the answer.
     pub noise: f64,
-    /// One bit of the answer is flipped; on RTU the check sum tells, on TCP nothing does, so it hits the header there.
+    /// One bit of the answer is flipped; with TCP framing, which has no checksum, only in the first six header bytes.
     pub bit_flip: f64,
-    /// Only the first half of the answer.
+    /// Only the first half of the answer is sent.
     pub half: f64,
-    /// The answer twice.
+    /// The answer is sent twice.
     pub twice: f64,
-    /// The answer byte by byte.
+    /// The answer is sent byte by byte.
     pub dribble: f64,
-    /// Every request comes back before its answer, as two-wire adapters do (RTU only).
+    /// Every request is echoed before its answer, as by two-wire adapters (RTU only).
     pub echo: bool,
 }
 
@@ -72,7 +71,7 @@ impl Default for LineFaults {
     }
 }
 
-/// What happens to one request and its answer.
+/// Fault of one request and its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LineFault {
     /// See [`LineFaults::late`].
@@ -128,7 +127,7 @@ impl LineFaults {
         ]
     }
 
-    /// The fault of the next request, drawn in the order of the fields.
+    /// Draws the fault of the next request, in the order of the fields.
     pub fn draw(&self, random: &mut fastrand::Rng) -> Option<LineFault> {
         let mut at = random.f64();
         for (fault, probability) in self.table() {
@@ -140,40 +139,40 @@ impl LineFaults {
         None
     }
 
-    /// Sum of all probabilities; above 1 the last switches would never act.
+    /// Returns the sum of all probabilities, which must not exceed 1.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.table().iter().map(|(_, probability)| probability).sum()
     }
 }
 
-/// Bad habits of the controller's program; each probability is per stroke.
+/// Probabilities of faults of the PLC program, per stroke.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StrokeFaults {
-    /// The number and its copy differ for `torn_ms` while the trigger stands already.
+    /// The stroke number and its copy differ for `torn_ms` after the trigger is set.
     pub torn: f64,
-    /// How long a block stays torn.
+    /// Duration of the inconsistent block.
     pub torn_ms: u64,
-    /// The trigger falls and rises again for `bounce_ms` before it stands.
+    /// The trigger toggles for `bounce_ms` before it is stable.
     pub bounce: f64,
-    /// How long a trigger bounces; it changes every cycle.
+    /// Duration of the bouncing; the trigger toggles every cycle.
     pub bounce_ms: u64,
-    /// After the result the trigger rises again with the same number for `repeat_ms`.
+    /// After the result the trigger is set again with the same number for `repeat_ms`.
     pub repeat_trigger: f64,
-    /// How long the repeated trigger stands.
+    /// Duration of the repeated trigger.
     pub repeat_ms: u64,
-    /// A number is left out: the host sees one stroke too few.
+    /// A stroke number is skipped: the host misses one stroke.
     pub skip: f64,
-    /// The counter starts again from 0 in a new session.
+    /// The stroke counter restarts from 0 in a new session.
     pub counter_back: f64,
     /// The result is never acknowledged.
     pub no_ack: f64,
-    /// The next stroke comes while the host is busy with this one.
+    /// The next stroke is made while the host is busy with this one.
     pub hasty: f64,
-    /// How long the trigger of a hasty stroke stands; 0 until it is taken.
+    /// Duration of the trigger of a hasty stroke; 0: until it is accepted.
     pub hasty_ms: u64,
-    /// The controller restarts while the stroke waits for its result.
+    /// The controller restarts while a stroke waits for its result.
     pub reboot: f64,
 }
 
@@ -196,7 +195,7 @@ impl Default for StrokeFaults {
     }
 }
 
-/// The faults drawn for one stroke.
+/// Faults drawn for one stroke.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StrokePlan {
     /// See [`StrokeFaults::torn`].
@@ -218,7 +217,7 @@ pub struct StrokePlan {
 }
 
 impl StrokeFaults {
-    /// The faults of the next stroke; each switch draws once, so one switch does not move another's draws.
+    /// Draws the faults of the next stroke; each fault draws once, so that changing one probability does not affect the others.
     pub fn draw(&self, random: &mut fastrand::Rng) -> StrokePlan {
         let mut hit = |probability: f64| random.f64() < probability;
         StrokePlan {

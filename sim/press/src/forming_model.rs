@@ -1,13 +1,13 @@
-//! The plate under the ram: which bend comes next, and what it does to the plate.
+//! Forming model: choice of the next bend and its effect on the plate.
 //!
-//! The first strokes follow a programme planned for a share of the target's curvature. With
-//! [`Strategy::ClosedLoop`] the press stops as soon as a result passes and, when the programme is through, corrects
-//! where the results say the template stands open.
+//! The forming is kinematic (`platen_sim_plate::Stroke`): prescribed angle and springback share, no moment-curvature law. The first
+//! strokes follow a programme planned for a share of the target's curvature. With [`Strategy::ClosedLoop`] the press stops as soon as
+//! a result passes and, after the programme, corrects the place of the largest template gap.
 //!
-//! Correction: a board of chord L on a plate that is bent too little everywhere touches in its middle and opens at
-//! its ends, so the bend belongs between the plate's middle and the place of the gap. Where the plate is bent too far
-//! the board rests on its ends and opens in its middle: there it is bent back. A bend by the angle a in the
-//! middle of the board moves its ends by a L / 4; the press bends half of that angle and looks again.
+//! Correction: a template of chord L on a plate that is bent too little everywhere touches in its middle and has gaps at
+//! its ends, so the bend belongs between the plate's middle and the place of the gap. Where the plate is bent too far the
+//! template rests on its ends and has a gap in its middle; there it is bent back. A bend by the angle a in the
+//! middle of the template moves its ends by a L / 4. The press applies half of the closing angle and measures again.
 
 use platen_sim_plate::{Blank, Handling, Plan, PlateState, Pose, Programme, Shape, Stroke};
 use serde::{Deserialize, Serialize};
@@ -15,39 +15,39 @@ use serde::{Deserialize, Serialize};
 use crate::Result;
 use crate::registers::{HBlock, Verdict};
 
-/// Share of the angle that would close the gap at once; half keeps the press from bending too far.
+/// Share of the closing angle that is applied; half avoids bending too far.
 const CORRECTION: f64 = 0.5;
-/// Rescans asked for when a result without figures leaves the press blind.
+/// Largest number of rescans after a result without figures.
 const RESCANS: u16 = 2;
 
-/// How the next bend is chosen.
+/// Selection of the next bend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Strategy {
-    /// The programme of bends, one after the other, whatever the results say.
+    /// Executes the programme in order, independent of the results.
     #[default]
     Programme,
-    /// Where the result says that the plate is open, until it passes.
+    /// Corrects the place of the largest gap until a result passes.
     ClosedLoop,
 }
 
-/// The plate, its target and how it is bent there.
+/// Plate, target and forming programme.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlateConfig {
-    /// The blank.
+    /// Blank.
     pub blank: Blank,
     /// Cylinder, sphere or torus; radii of the mid-surface.
     pub target: Shape,
     /// Share of the target's curvature that the programme bends, 0 to 1.
     pub share: f64,
-    /// The programme.
+    /// Plan of the programme.
     pub plan: Plan,
-    /// Where the plate lies.
+    /// Nominal pose of the plate.
     pub pose: Pose,
-    /// How it moves between strokes.
+    /// Movement between strokes.
     pub handling: Handling,
-    /// Chord of the template that the press reckons corrections with.
+    /// Chord of the template, for the corrections.
     pub chord_mm: f64,
 }
 
@@ -65,18 +65,18 @@ impl Default for PlateConfig {
     }
 }
 
-/// What the press does next with this plate.
+/// Next action on a plate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
-    /// Bend.
+    /// Bends the plate.
     Bend(Stroke),
-    /// Ask for another scan: the last result had no figures.
+    /// Requests another scan: the last result had no figures.
     Rescan,
-    /// Leave it.
+    /// Ends the part.
     End,
 }
 
-/// One plate on its way from flat to its target.
+/// Plate being formed from flat to its target.
 #[derive(Clone, Debug)]
 pub struct FormingModel {
     config: PlateConfig,
@@ -88,7 +88,7 @@ pub struct FormingModel {
 }
 
 impl FormingModel {
-    /// A flat plate and a programme toward its target.
+    /// Creates a flat plate and a programme towards its target.
     ///
     /// # Errors
     /// [`crate::Error::Plate`] when the target cannot be reached by strokes or the blank is impossible.
@@ -102,18 +102,18 @@ impl FormingModel {
         Ok(Self { config: config.clone(), strategy, programme, state, last: None, corrections: 0 })
     }
 
-    /// The plate as it lies now.
+    /// Returns the present state of the plate.
     #[must_use]
     pub fn state(&self) -> &PlateState {
         &self.state
     }
 
-    /// Keeps the latest result.
+    /// Records the latest result.
     pub fn record_result(&mut self, result: &HBlock) {
         self.last = Some(*result);
     }
 
-    /// What comes next; `attempt` counts the rescans of the last stroke.
+    /// Returns the next action; `attempt` is the number of rescans of the last stroke.
     #[must_use]
     pub fn next(&self, attempt: u16) -> Next {
         let made = usize::try_from(self.state.strokes).unwrap_or(usize::MAX);
@@ -131,10 +131,10 @@ impl FormingModel {
         }
     }
 
-    /// Bends the plate; it does not lie where it lay before.
+    /// Bends the plate and moves it as handling between strokes does.
     ///
     /// # Errors
-    /// [`crate::Error::Plate`] when the stroke lies across the strokes before it at an odd angle.
+    /// [`crate::Error::Plate`] when the stroke is oblique to the strokes before it.
     pub fn bend(&mut self, stroke: &Stroke) -> Result<()> {
         if usize::try_from(self.state.strokes).is_ok_and(|made| made >= self.programme.len()) {
             self.corrections += 1;
@@ -144,9 +144,9 @@ impl FormingModel {
         Ok(())
     }
 
-    /// A stroke by half the angle that would close the gap: between the plate's middle and the open place, or at
+    /// Returns a stroke by half the closing angle: between the plate's middle and the place of the gap, or at
     /// that place where the plate is bent too far.
-    /// Targets bent in two directions are corrected in them by turns.
+    /// Targets bent in two directions are corrected alternately.
     fn correction(&self, last: &HBlock) -> Option<Stroke> {
         let (gap_mm, [u_mm, v_mm]) = (last.gap_max_mm()?, last.gap_at_mm()?);
         if last.sense() == 0 {
@@ -165,7 +165,7 @@ impl FormingModel {
         Some(Stroke { at_mm, angle_deg: wanted_deg / (1.0 - springback), springback, ..*model })
     }
 
-    /// Directions of the die in the programme, in order of appearance.
+    /// Returns the directions of the die in the programme, in order of appearance.
     fn axes_deg(&self) -> Vec<f64> {
         let mut axes = Vec::new();
         for stroke in &self.programme {

@@ -1,27 +1,27 @@
-//! Frames of Modbus on a byte stream: where one ends, and the same message in TCP's and in RTU's clothes.
+//! Modbus frames on a byte stream, in TCP and in RTU framing.
 //!
 //! TCP: transaction id, protocol 0, length, unit, PDU (Modbus Messaging on TCP/IP, 3.1.3). RTU: unit, PDU, CRC-16
-//! low byte first (Modbus over Serial Line, 2.5.1). An RTU frame has no length: of a request it follows from the
+//! low byte first (Modbus over Serial Line, 2.5.1). An RTU frame has no length field: that of a request follows from the
 //! function code and, for writes, the byte count.
 
-/// How messages are framed on the line.
+/// Framing of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Framing {
-    /// With a header that carries a transaction id and the length.
+    /// MBAP header with transaction id and length.
     Tcp,
-    /// With a check sum behind.
+    /// Trailing CRC-16.
     Rtu,
 }
 
-/// Header of TCP with the unit id.
+/// Length of the MBAP header with the unit id.
 const HEADER: usize = 7;
 /// Longest PDU.
 const PDU_MAX: usize = 253;
 
-/// One message, whatever its frame.
+/// Message, independent of its framing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Ties an answer to its request on TCP; 0 on RTU.
+    /// Transaction id on TCP; 0 on RTU.
     pub transaction: u16,
     /// Unit id.
     pub unit: u8,
@@ -29,19 +29,19 @@ pub struct Message {
     pub pdu: Vec<u8>,
 }
 
-/// What the start of a buffer holds.
+/// Content at the start of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Split {
-    /// A message of so many bytes.
+    /// Message and its length in bytes.
     Message(Message, usize),
-    /// Not enough yet.
+    /// Incomplete message.
     More,
-    /// Not a request at all: drop so many bytes.
+    /// Invalid bytes, and the number of bytes to discard.
     Junk(usize),
 }
 
 impl Framing {
-    /// The first request in `bytes`.
+    /// Splits off the first request in `bytes`.
     #[must_use]
     pub fn split_request(self, bytes: &[u8]) -> Split {
         match self {
@@ -50,7 +50,7 @@ impl Framing {
         }
     }
 
-    /// `message` as bytes on the line.
+    /// Encodes `message`.
     #[must_use]
     pub fn encode(self, message: &Message) -> Vec<u8> {
         match self {
@@ -74,7 +74,7 @@ impl Framing {
     }
 }
 
-/// The first message of a TCP stream, request or answer.
+/// Splits off the first message of a TCP stream, request or answer.
 #[must_use]
 pub fn split_tcp(bytes: &[u8]) -> Split {
     let Some(header) = bytes.first_chunk::<HEADER>() else { return Split::More };
@@ -107,7 +107,7 @@ fn split_rtu_request(bytes: &[u8]) -> Split {
     Split::Message(Message { transaction: 0, unit: body[0], pdu: body[1..].to_vec() }, end)
 }
 
-/// CRC-16/MODBUS.
+/// Returns the CRC-16/MODBUS.
 #[must_use]
 pub fn crc16(bytes: &[u8]) -> u16 {
     crc::Crc::<u16>::new(&crc::CRC_16_MODBUS).checksum(bytes)

@@ -1,13 +1,13 @@
-//! A Modbus server that behaves like a plate press.
+//! Modbus server that simulates a plate press.
 //!
-//! The press serves the register map PPH-1 over TCP, over RTU through TCP or on a serial line. Its program
-//! ([`program::Program`]) is the press side of the handshake, run every few milliseconds as a controller runs its
-//! own; at each stroke it bends a simulated plate ([`forming_model::FormingModel`]), which it shows on a second port
-//! ([`control`]) to the simulated scanner. What the host does is counted on this side ([`counters::Counters`]): tests
-//! assert there. [`faults`] lists what can be made to go wrong.
+//! The press serves the register map PPH-1 over Modbus TCP ("MODBUS Messaging on TCP/IP Implementation Guide V1.0b"), RTU framing over TCP,
+//! or RTU on a serial line; services follow the "MODBUS Application Protocol V1.1b3". Its program ([`program::Program`]) is
+//! the press side of the handshake, executed cyclically as in a PLC. Each stroke bends a simulated plate
+//! ([`forming_model::FormingModel`]), which is served on a second port ([`control`]) to the simulated scanner. [`counters::Counters`]
+//! record the behaviour of the host as seen by the press; tests assert on them. [`faults`] lists the faults that can be injected.
 //!
-//! **Invariants.** Nothing is shared with the host: registers, check sum, handshake and framing are written from the
-//! page a second time. [`press::Press::step`] reads no clock and no socket. The same seed gives the same faults.
+//! **Invariants.** No code is shared with the host: registers, checksum, handshake and framing are written a second time from their
+//! specification. [`press::Press::step`] reads no clock and no socket. Equal seeds give equal faults.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), platen_sim_press::Error> {
@@ -57,10 +57,10 @@ use config::LinkConfig;
 use frame::Framing;
 use shared::Shared;
 
-/// This crate's results.
+/// Result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// A running press; dropping it ends it.
+/// Running press; dropping it stops it.
 #[derive(Debug)]
 pub struct SimPress {
     shared: Arc<Shared>,
@@ -73,7 +73,7 @@ impl SimPress {
     /// Opens the ports and starts the program.
     ///
     /// # Errors
-    /// [`Error::Config`], [`Error::Plate`], and [`Error::Listen`] or [`Error::Serial`] when a port cannot be had.
+    /// [`Error::Config`], [`Error::Plate`], and [`Error::Listen`] or [`Error::Serial`] when a port is unavailable.
     pub async fn start(config: Config) -> Result<Self> {
         let shared = Arc::new(Shared::new(&config)?);
         let mut tasks = JoinSet::new();
@@ -123,48 +123,48 @@ impl SimPress {
         Ok(Self { shared, modbus, control, tasks })
     }
 
-    /// Where the host connects; `None` on a serial line.
+    /// Returns the address of the Modbus port; `None` on a serial line.
     #[must_use]
     pub fn modbus(&self) -> Option<SocketAddr> {
         self.modbus
     }
 
-    /// Where the plate is served.
+    /// Returns the address of the control port.
     #[must_use]
     pub fn control(&self) -> SocketAddr {
         self.control
     }
 
-    /// What the press has seen so far.
+    /// Returns the counters since the start.
     #[must_use]
     pub fn counters(&self) -> Counters {
         self.shared.machine().press.counters.clone()
     }
 
-    /// The H block as it stands.
+    /// Returns the present H block.
     #[must_use]
     pub fn h_block(&self) -> HBlock {
         self.shared.machine().table.h_block()
     }
 
-    /// The P block as it stands.
+    /// Returns the present P block.
     #[must_use]
     pub fn p_block(&self) -> [u16; registers::P_LEN] {
         self.shared.machine().table.p_block()
     }
 
-    /// Carries out a command, as the control port would.
+    /// Executes a command, as the control port does.
     ///
     /// # Errors
-    /// [`Error::Refused`] when it does not fit the state of the press.
+    /// [`Error::Refused`] when the state of the press does not permit it.
     pub fn command(&self, command: Command) -> Result<()> {
         control::execute(command, &self.shared)
     }
 
-    /// Waits until `holds` is true of what the press saw, looked at once a cycle.
+    /// Waits until `holds` is true of the counters, evaluated once per cycle.
     ///
     /// # Errors
-    /// [`Error::Late`] with the counters when it does not come within `limit`.
+    /// [`Error::Late`] with the counters after `limit`.
     pub async fn until(
         &self,
         what: &str,
@@ -174,7 +174,7 @@ impl SimPress {
         self.shared.until(what, limit, holds).await
     }
 
-    /// Resolves when the press ends: after [`Command::Stop`], or when its program fails.
+    /// Waits for the end of the press: [`Command::Stop`], or a failure of its program.
     ///
     /// # Errors
     /// [`Error::Plate`] when a stroke cannot be made.
@@ -198,7 +198,7 @@ async fn forever(task: impl Future<Output = ()>) -> Result<()> {
     Ok(())
 }
 
-/// Runs the program, cycle after cycle.
+/// Runs the program cyclically.
 async fn run_program(cycle: Duration, shared: Arc<Shared>) -> Result<()> {
     let mut ticks = tokio::time::interval(cycle);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);

@@ -1,7 +1,7 @@
-//! The line between host and press: TCP, RTU over TCP or a serial line, with faults on request.
+//! Relay between host and Modbus server: TCP, RTU over TCP or a serial line, with fault injection.
 //!
-//! Each client gets a connection of its own to the private Modbus server. A message at a time goes through; what a
-//! fault does to it is decided here, where requests and answers are known, not by a proxy that sees bytes.
+//! Each client has its own connection to the private Modbus server, and one message at a time is relayed. Faults are injected
+//! here, at the level of requests and answers, and not in a proxy of bytes.
 
 use std::io;
 use std::net::SocketAddr;
@@ -20,12 +20,12 @@ use crate::frame::{Framing, Message, Split, split_tcp};
 use crate::pty;
 use crate::shared::Shared;
 
-/// A serial slave drops a frame that stops in the middle for this long.
+/// Silence after which a serial slave discards an incomplete frame.
 const SILENCE: Duration = Duration::from_millis(30);
-/// Pause before a line that failed is tried again.
+/// Pause before a failed line is reopened.
 const RETRY: Duration = Duration::from_millis(50);
 
-/// Accepts clients for ever.
+/// Accepts clients until the process ends.
 pub(crate) async fn serve_tcp(
     listener: TcpListener,
     framing: Framing,
@@ -40,13 +40,13 @@ pub(crate) async fn serve_tcp(
         };
         let shared = Arc::clone(&shared);
         tokio::spawn(async move {
-            // Without lingering a dropped connection is a reset one, which is what a controller's restart gives.
+            // Without lingering, dropping a connection resets it, as a restart of a controller does.
             let options = client.set_nodelay(true).and_then(|()| client.set_zero_linger());
             let ended = match options {
                 Ok(()) => Relay::new(client, framing, unit, shared).run(server).await,
                 Err(error) => Err(error),
             };
-            tracing::debug!(?ended, "client left");
+            tracing::debug!(?ended, "Modbus client disconnected");
         });
     }
 }
@@ -60,7 +60,7 @@ pub(crate) fn open_serial(device: &str, baud: u32) -> io::Result<SerialStream> {
         .open_native_async()?)
 }
 
-/// Serves a serial line for ever; when it fails it is opened again, by its name.
+/// Serves a serial line until the process ends; reopens it by name when it fails.
 pub(crate) async fn serve_serial(
     first: SerialStream,
     device: String,
@@ -73,14 +73,14 @@ pub(crate) async fn serve_serial(
     loop {
         if let Some(serial) = serial.take() {
             let ended = Relay::new(serial, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
-            tracing::debug!(?ended, "serial line ended, opens again");
+            tracing::debug!(?ended, "serial line closed, reopening");
         }
         tokio::time::sleep(RETRY).await;
         serial = open_serial(&device, baud).ok();
     }
 }
 
-/// Serves a pseudo terminal for ever; one that was pulled comes back under another name, behind the same link.
+/// Serves a pseudo terminal until the process ends; after an unplug a new terminal is created behind the same link.
 pub(crate) async fn serve_pty(
     first: DuplexStream,
     device: PathBuf,
@@ -92,18 +92,18 @@ pub(crate) async fn serve_pty(
     loop {
         if let Some(line) = line.take() {
             let ended = Relay::new(line, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
-            tracing::debug!(?ended, "adapter pulled");
+            tracing::debug!(?ended, "serial adapter unplugged");
         }
         tokio::time::sleep(RETRY).await;
         shared.plugged_in().await;
-        line = pty::plug(&device).inspect_err(|error| tracing::debug!(%error, "no adapter")).ok();
+        line = pty::plug(&device).inspect_err(|error| tracing::debug!(%error, "no pseudo terminal")).ok();
     }
 }
 
-/// The writing half of the client's stream; gone once the connection was reset.
+/// Writing half of the client's stream; `None` after a reset.
 type Writer<S> = Arc<Mutex<Option<WriteHalf<S>>>>;
 
-/// One client's messages on their way to the server and back.
+/// Relay of one client's messages.
 struct Relay<S> {
     reader: tokio::io::ReadHalf<S>,
     writer: Writer<S>,
@@ -126,7 +126,7 @@ impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
         }
     }
 
-    /// Until the client leaves, the press cuts the line, or a fault resets it.
+    /// Relays until the client disconnects, the press cuts the line, or a fault resets it.
     async fn run(mut self, server: SocketAddr) -> io::Result<()> {
         let shared = Arc::clone(&self.shared);
         let mut cuts = shared.cuts.subscribe();
@@ -172,7 +172,7 @@ impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
                     let writer = Arc::clone(&self.writer);
                     tokio::spawn(async move {
                         tokio::time::sleep(delay).await;
-                        // The host may have left by then: nobody to tell.
+                        // An error means that the host has disconnected by then.
                         let _ = send(&writer, &bytes).await;
                     });
                 }
@@ -187,13 +187,13 @@ impl<S: AsyncRead + AsyncWrite + Send + 'static> Relay<S> {
         Ok(())
     }
 
-    /// The next request that is for this press, `None` when the client has left.
+    /// Returns the next request for this unit; `None` when the client has disconnected.
     async fn next_request(&mut self) -> io::Result<Option<Message>> {
         loop {
             match self.framing.split_request(&self.received) {
                 Split::Message(message, length) => {
                     self.received.drain(..length);
-                    // On a serial line the other units answer for themselves.
+                    // On a serial line requests to other units are ignored.
                     if self.framing == Framing::Tcp || message.unit == self.unit {
                         return Ok(Some(message));
                     }
@@ -235,7 +235,7 @@ async fn send<S: AsyncWrite>(writer: &Writer<S>, bytes: &[u8]) -> io::Result<()>
     }
 }
 
-/// One request to the private server and its answer.
+/// Sends one request to the private server and returns its answer.
 async fn exchange(server: &mut TcpStream, request: &Message) -> io::Result<Message> {
     server.write_all(&Framing::Tcp.encode(request)).await?;
     let mut received = Vec::new();

@@ -1,7 +1,7 @@
-//! The press: ram, plate, program and its faults, advanced one controller cycle at a time.
+//! Press: ram, plate, program and injected faults, advanced by one controller cycle at a time.
 //!
-//! [`Press::step`] reads the H block from the registers, runs the program, moves the ram and writes the P block; it
-//! is a function of the press, the registers and the time, so a test can run it without a clock or a socket.
+//! [`Press::step`] reads the H block from the registers, runs the program, moves the ram and writes the P block. It is a function of
+//! the press, the registers and the time, so that tests run it without a clock or a socket.
 
 use std::time::Duration;
 
@@ -15,29 +15,29 @@ use crate::program::{Cause, Event, Limits, Program, Request};
 use crate::registers::{HBlock, P_LEN, Table, ascii_words, control, h, p, status};
 use crate::{Error, Result};
 
-/// How long part_end stands before the next part is laid in.
+/// Duration of the part_end bit before the next part.
 const PART_END: Duration = Duration::from_millis(600);
 
-/// Where the ram is and what it waits for.
+/// Phase of the press cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// Registers are void until then.
+    /// Controller restarting: registers are 0 until then.
     Void { until: Duration },
-    /// Ram up; the next action not before then.
+    /// Ram up; no action before then.
     Rest { until: Duration },
-    /// Ram going down for this stroke.
+    /// Ram moving down for this stroke.
     Down { until: Duration, stroke: Stroke },
-    /// Ram going up.
+    /// Ram moving up.
     Up { until: Duration },
-    /// A request waits for its result.
+    /// Request waiting for its result.
     Wait,
-    /// The part leaves.
+    /// Part leaving the press.
     PartEnd { until: Duration },
-    /// All parts are done.
+    /// All parts done.
     Done,
 }
 
-/// A press with one plate.
+/// Press with one plate.
 #[derive(Clone, Debug)]
 pub struct Press {
     config: Config,
@@ -48,30 +48,30 @@ pub struct Press {
     random: fastrand::Rng,
     part_id: u32,
     baseline_due: bool,
-    /// Until when a repeated trigger stands.
+    /// End of a repeated trigger.
     repeat_until: Option<Duration>,
-    /// When a hasty stroke's trigger falls.
+    /// End of a hasty stroke's trigger.
     hasty_until: Option<Duration>,
     bounced: bool,
     last_tail: u16,
-    /// The registers stand still until then.
+    /// Registers are frozen until then.
     pub(crate) halted_until: Option<Duration>,
-    /// Bits the tests hold up, whatever the program does.
+    /// Control bits forced to 1.
     pub(crate) forced: u16,
-    /// Bits the tests hold down.
+    /// Control bits forced to 0.
     pub(crate) masked: u16,
     pub(crate) automatic: bool,
-    /// What the press saw.
+    /// Counters of the press.
     pub counters: Counters,
-    /// Sees every write.
+    /// Monitor of all writes.
     pub write_monitor: WriteMonitor,
 }
 
 impl Press {
-    /// A press that starts at time 0.
+    /// Creates a press that starts at time 0.
     ///
     /// # Errors
-    /// [`Error::Config`] and [`Error::Plate`] for a configuration that cannot be.
+    /// [`Error::Config`] and [`Error::Plate`] for an invalid configuration.
     pub fn new(config: &Config) -> Result<Self> {
         config.check()?;
         let mut random = fastrand::Rng::with_seed(config.seed);
@@ -100,37 +100,37 @@ impl Press {
         Ok(press)
     }
 
-    /// The plate as the scanner finds it, or why it cannot be scanned.
+    /// Returns the plate for the scanner, or the reason why it cannot be scanned.
     #[must_use]
     pub fn plate(&self) -> Reply {
         match self.phase {
             Phase::Down { .. } | Phase::Up { .. } => {
-                Reply::Error(String::from("the plate is moving: wait for the ram"))
+                Reply::Error(String::from("the plate is moving; wait until the ram is up"))
             }
             Phase::PartEnd { .. } | Phase::Done => Reply::Plate(None),
             _ => Reply::Plate(Some(self.forming.state().clone().into())),
         }
     }
 
-    /// The plate, wherever it is.
+    /// Returns the state of the plate, also while it moves.
     #[must_use]
     pub fn plate_state(&self) -> &PlateState {
         self.forming.state()
     }
 
-    /// The program.
+    /// Returns the program.
     #[must_use]
     pub fn program(&self) -> &Program {
         &self.program
     }
 
-    /// Whether the registers hold the map; a host must not write otherwise.
+    /// Returns whether the registers contain a valid map; otherwise a host must not write.
     #[must_use]
     pub fn serves_the_map(&self) -> bool {
         self.config.map_version == crate::registers::MAP_VERSION && !matches!(self.phase, Phase::Void { .. })
     }
 
-    /// One cycle at `now`, counted from the start of the press.
+    /// Executes one cycle at the time `now` since the start of the press.
     ///
     /// # Errors
     /// [`Error::Plate`] when a stroke cannot be made.
@@ -162,46 +162,46 @@ impl Press {
         Ok(())
     }
 
-    /// A stroke now, whatever the host is doing.
+    /// Makes a stroke at once, whatever the state of the host.
     ///
     /// # Errors
     /// [`Error::Refused`] after the last part, [`Error::Plate`] when the stroke cannot be made.
     pub fn stroke(&mut self, now: Duration) -> Result<()> {
         match (self.phase, self.forming.next(u16::MAX)) {
             (Phase::Done | Phase::PartEnd { .. } | Phase::Void { .. }, _) => {
-                Err(Error::Refused("no plate lies in the press"))
+                Err(Error::Refused("the press is empty"))
             }
             (_, Next::Bend(stroke)) => {
                 self.forming.bend(&stroke)?;
                 self.raise(Cause::Stroke, now);
                 Ok(())
             }
-            _ => Err(Error::Refused("the plate's programme has no further stroke")),
+            _ => Err(Error::Refused("the programme of the plate has no further stroke")),
         }
     }
 
-    /// A baseline scan or a rescan now.
+    /// Requests a baseline scan or a rescan.
     ///
     /// # Errors
-    /// [`Error::Refused`] while a request waits, or when there is no stroke to scan again.
+    /// [`Error::Refused`] while a request is pending, or when there is no stroke to scan again.
     pub fn request(&mut self, cause: Cause, now: Duration) -> Result<()> {
         if self.program.request().is_some() {
-            return Err(Error::Refused("a request waits for its result already"));
+            return Err(Error::Refused("a request is pending already"));
         }
         if cause == Cause::Rescan && self.program.stroke_id == 0 {
-            return Err(Error::Refused("no stroke was made yet"));
+            return Err(Error::Refused("no stroke has been made"));
         }
         self.raise(cause, now);
         Ok(())
     }
 
-    /// The part leaves; the next one follows if there is one to come.
+    /// Ends the part; the next one follows if any.
     pub fn end_part(&mut self, now: Duration) {
         self.program.withdraw();
         self.phase = Phase::PartEnd { until: now + PART_END };
     }
 
-    /// The controller restarts: registers 0, then a new session; the plate stays as it is.
+    /// Restarts the controller: registers 0, then a new session; the plate is unchanged.
     pub fn restart(&mut self, table: &mut Table, now: Duration) {
         table.clear();
         self.counters.restarts += 1;
@@ -210,24 +210,24 @@ impl Press {
         self.phase = Phase::Void { until: now + Duration::from_millis(self.config.timings.restart_ms) };
     }
 
-    /// A new session with the counter at `stroke_id`.
+    /// Starts a new session with the stroke counter at `stroke_id`.
     pub fn new_session(&mut self, stroke_id: u16) {
         self.program.begin_session(self.random.u16(1..));
         self.program.stroke_id = stroke_id;
     }
 
-    /// The last stroke number, within the running session.
+    /// Sets the stroke counter within the present session.
     pub fn set_counter(&mut self, stroke_id: u16) {
         self.program.stroke_id = stroke_id;
     }
 
-    /// Another plant number or map version.
+    /// Changes plant number or map version.
     pub(crate) fn set_identity(&mut self, press_id: Option<u16>, map_version: Option<u16>) {
         self.config.press_id = press_id.unwrap_or(self.config.press_id);
         self.config.map_version = map_version.unwrap_or(self.config.map_version);
     }
 
-    /// Other faults of the program from the next stroke on.
+    /// Replaces the faults of the program from the next stroke on.
     pub fn set_stroke_faults(&mut self, faults: crate::faults::StrokeFaults) {
         self.config.stroke_faults = faults;
     }
@@ -301,7 +301,7 @@ impl Press {
         }
     }
 
-    /// The faults that act while a request waits.
+    /// Applies the faults that act while a request is pending.
     fn apply_stroke_faults(&mut self, table: &mut Table, host: &HBlock, now: Duration) -> Result<()> {
         self.repeat_until = self.repeat_until.filter(|&until| now < until);
         let request = self.program.request().copied();
@@ -332,7 +332,7 @@ impl Press {
         Ok(())
     }
 
-    /// Moves the ram and decides what comes next.
+    /// Moves the ram and changes the phase.
     fn advance(&mut self, host: &HBlock, now: Duration) -> Result<()> {
         let ms = Duration::from_millis;
         match self.phase {
@@ -351,7 +351,7 @@ impl Press {
         Ok(())
     }
 
-    /// The next action on this plate, once the host is ready for one.
+    /// Starts the next action on this plate once the host is ready.
     fn begin(&mut self, host: &HBlock, now: Duration) -> Result<()> {
         let ready = self.program.host_alive(now) && host.status(status::READY);
         if self.config.wait_ready && !ready {
@@ -393,7 +393,7 @@ impl Press {
         Ok(())
     }
 
-    /// The P block of this cycle.
+    /// Returns the P block of this cycle.
     fn p_block(&mut self, now: Duration) -> [u16; P_LEN] {
         let moving = matches!(self.phase, Phase::Down { .. } | Phase::Up { .. });
         let leaving = matches!(self.phase, Phase::PartEnd { .. } | Phase::Done);
@@ -440,7 +440,7 @@ impl Press {
     }
 }
 
-/// What a number looks like while one of its bytes is still the old one.
+/// Returns a stroke number whose high byte has not been updated yet.
 fn torn(stroke_id: u16) -> u16 {
     stroke_id ^ 0x0100
 }

@@ -1,8 +1,8 @@
-//! The controller's program: the press side of the handshake, as the reference Structured Text has it.
+//! PLC program: the press side of the handshake, after the reference implementation in Structured Text.
 //!
 //! [`Program::step`] is one cycle of the controller, a pure function of its state, the H block and the time. Beyond
-//! the reference it raises a baseline scan (a number of its own, bit 9 beside the trigger) and a rescan (bit 8, the
-//! same stroke number, one attempt more); a result must then echo the attempt too.
+//! the reference it requests a baseline scan (own stroke number, bit 9 beside the trigger) and a rescan (bit 8, the
+//! same stroke number, next attempt); a result must then echo the attempt too.
 
 use std::time::Duration;
 
@@ -10,61 +10,61 @@ use serde::Serialize;
 
 use crate::registers::{HBlock, MAP_VERSION, control, h, status};
 
-/// Times the program waits.
+/// Time limits of the program.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// From trigger to acceptance before the alarm.
     pub accept: Duration,
-    /// From trigger to result before the press goes on without one.
+    /// From trigger to result before the press continues without one.
     pub result: Duration,
-    /// Host heartbeat standing still for this long: host dead.
+    /// Unchanged host heartbeat after which the host counts as dead.
     pub host: Duration,
-    /// Between two counts of the own heartbeat.
+    /// Interval of the press's heartbeat.
     pub heartbeat: Duration,
-    /// From taking a result to raising the acknowledge bit.
+    /// From accepting a result to setting the acknowledge bit.
     pub ack_delay: Duration,
 }
 
-/// Why the host is asked for a scan.
+/// Cause of a scan request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
-    /// A bend was made.
+    /// Stroke made.
     Stroke,
-    /// The plate is to be scanned as it lies.
+    /// Baseline scan without a bend.
     Baseline,
-    /// The last stroke is to be scanned again.
+    /// Repeated scan of the last stroke.
     Rescan,
 }
 
-/// A request that waits for its result.
+/// Pending request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// Why.
+    /// Cause.
     pub cause: Cause,
-    /// When the trigger rose.
+    /// Time at which the trigger was set.
     pub raised: Duration,
-    /// When the host's echo was seen.
+    /// Time of the host's echo.
     pub accepted: Option<Duration>,
     accept_alarm: bool,
 }
 
-/// What one cycle brought about.
+/// Event of one cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// The host echoed the stroke number.
+    /// Stroke number echoed by the host.
     Accepted,
-    /// No echo within the accept limit; the request stands.
+    /// No echo within the accept limit; the request stays pending.
     AcceptLate,
-    /// The result, as it stood in the H block when it was taken.
+    /// Result accepted, with the H block at that time.
     ResultAccepted(Request, Box<HBlock>),
-    /// No result within the limit: the press goes on without one.
+    /// No result within the limit: the press continues without one.
     ResultTimeout(Request),
-    /// The host's heartbeat stopped: the press goes on without a result.
+    /// Host heartbeat stopped: the press continues without a result.
     HostDead(Request),
 }
 
-/// State of the program from one cycle to the next.
+/// State of the program.
 #[derive(Clone, Debug)]
 pub struct Program {
     limits: Limits,
@@ -72,11 +72,11 @@ pub struct Program {
     pub stroke_id: u16,
     /// Number of this run of the program, or of this part.
     pub session_id: u16,
-    /// Rescans of the latest stroke.
+    /// Number of rescans of the latest stroke.
     pub attempt: u16,
-    /// The program never acknowledges; results then end with the next trigger.
+    /// Fault: the program never acknowledges; results then end with the next trigger.
     pub withholds_ack: bool,
-    /// Results marked as simulated are taken; a real press must not, a training cell has no others.
+    /// Accepts results marked as simulated. A real press must not; a training cell has no others.
     pub takes_simulated: bool,
     request: Option<Request>,
     ack_at: Option<Duration>,
@@ -87,7 +87,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// A program that starts at `now` with no stroke made.
+    /// Creates a program that starts at `now` with no stroke made.
     #[must_use]
     pub fn new(limits: Limits, session_id: u16, now: Duration) -> Self {
         Self {
@@ -106,25 +106,25 @@ impl Program {
         }
     }
 
-    /// The request that waits for a result.
+    /// Returns the pending request.
     #[must_use]
     pub fn request(&self) -> Option<&Request> {
         self.request.as_ref()
     }
 
-    /// Own heartbeat word.
+    /// Returns the press's heartbeat word.
     #[must_use]
     pub fn heartbeat(&self) -> u16 {
         self.heartbeat
     }
 
-    /// Whether the host's heartbeat has moved within its limit.
+    /// Returns whether the host's heartbeat has changed within its limit.
     #[must_use]
     pub fn host_alive(&self, now: Duration) -> bool {
         self.host_beat_at.is_some_and(|at| now - at < self.limits.host)
     }
 
-    /// Asks the host for a scan; a request that still waits is given up and returned.
+    /// Requests a scan; a pending request is superseded and returned.
     pub fn raise(&mut self, cause: Cause, now: Duration) -> Option<Request> {
         if cause == Cause::Rescan {
             self.attempt += 1;
@@ -135,12 +135,12 @@ impl Program {
         self.request.replace(Request { cause, raised: now, accepted: None, accept_alarm: false })
     }
 
-    /// Takes the request back: the trigger falls without a result.
+    /// Withdraws the request: the trigger is cleared without a result.
     pub fn withdraw(&mut self) {
         self.request = None;
     }
 
-    /// A new session, as after a part change; a waiting request is given up.
+    /// Starts a new session, as after a part change; a pending request is dropped.
     pub fn begin_session(&mut self, session_id: u16) {
         self.session_id = session_id;
         self.attempt = 0;
@@ -148,7 +148,7 @@ impl Program {
         self.ack_at = None;
     }
 
-    /// The control bits this program owns: trigger, acknowledge, rescan, baseline.
+    /// Returns the control bits of the program: trigger, acknowledge, rescan, baseline.
     #[must_use]
     pub fn control(&self, now: Duration) -> u16 {
         let asks = match self.request {
@@ -163,7 +163,7 @@ impl Program {
         asks | if acks { control::ACK } else { 0 }
     }
 
-    /// One cycle.
+    /// Executes one cycle.
     pub fn step(&mut self, host: &HBlock, now: Duration) -> Vec<Event> {
         self.beat(host, now);
         let mut events = Vec::new();
@@ -211,7 +211,7 @@ impl Program {
         self.host_beat = Some(beat);
     }
 
-    /// The echo of the stroke number; a rescan has the same number, so there the host must be busy with it or done.
+    /// Returns whether the host has echoed the stroke number; a rescan has the same number, so the host must also be busy with it or done.
     fn accepts(&self, host: &HBlock, request: &Request) -> bool {
         host.word(h::ACK_STROKE_ID) == self.stroke_id
             && host.word(h::SESSION_ECHO) == self.session_id
@@ -220,7 +220,7 @@ impl Program {
                 || host.word(h::ATTEMPT_ECHO) == self.attempt)
     }
 
-    /// The rule by which a press may use a result at all.
+    /// Returns whether the result in the H block satisfies all conditions for its use.
     fn holds(&self, host: &HBlock, now: Duration) -> bool {
         host.word(h::MAP_VERSION) == MAP_VERSION
             && host.status(status::RESULT_VALID)
@@ -233,7 +233,7 @@ impl Program {
     }
 }
 
-/// The number after `stroke_id`: 65535 is followed by 1, 0 means none.
+/// Returns the number after `stroke_id`: 65535 is followed by 1, 0 means none.
 #[must_use]
 pub fn next_stroke_id(stroke_id: u16) -> u16 {
     stroke_id.checked_add(1).unwrap_or(1)

@@ -1,8 +1,8 @@
-//! A pseudo terminal as a serial line: the host opens its name, the press has its other end.
+//! Pseudo terminal as a serial line: the host opens its name, the press uses the other end.
 //!
-//! A terminal that nobody has open is hung up, which an event loop would report for ever after. So threads of their own
-//! read and write it; they end, and with them the terminal, when the press lets go of its end. The link goes first, as
-//! a pulled adapter's does: the terminal's number may be another's a moment later.
+//! A terminal that is not open at the other end reports hang-up permanently, which would keep an event loop busy. Two threads
+//! therefore read and write it with blocking calls; they end, and with them the terminal, when the press drops its end. The link is
+//! removed first, as that of an unplugged adapter is: the terminal's number may be reused a moment later.
 
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use serialport::{SerialPort, TTYPort};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, ReadHalf, WriteHalf, duplex, split};
 use tokio::runtime::Handle;
 
-/// Longest wait in one read, and between two looks at a terminal that nobody has open.
+/// Time limit of one read, and interval of polling a terminal that is not open.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Makes a terminal, links `device` to it, and gives the press's end.
+/// Creates a terminal, links `device` to it, and returns the press's end.
 pub(crate) fn plug(device: &Path) -> io::Result<DuplexStream> {
     let (mut line, host) = TTYPort::pair()?;
     line.set_timeout(LOOK)?;
@@ -43,7 +43,7 @@ pub(crate) fn plug(device: &Path) -> io::Result<DuplexStream> {
     Ok(near)
 }
 
-/// The name under which the host finds a terminal.
+/// Symbolic link under which the host finds a terminal.
 #[derive(Clone)]
 struct Link {
     device: PathBuf,
@@ -51,16 +51,16 @@ struct Link {
 }
 
 impl Link {
-    /// Called before either end of the terminal is closed; a link to the next terminal stays.
+    /// Removes the link before either end of the terminal is closed; a link to a newer terminal is kept.
     fn remove(&self) {
         if std::fs::read_link(&self.device).is_ok_and(|terminal| terminal == self.terminal) {
-            // Who removed the folder meanwhile has removed the link.
+            // An error means that the folder has been removed with the link.
             let _ = std::fs::remove_file(&self.device);
         }
     }
 }
 
-/// Replaces the link at one go: whoever opens it finds the old terminal or the new one.
+/// Replaces the link atomically: it always leads to the old terminal or to the new one.
 fn relink(name: &str, device: &Path) -> io::Result<()> {
     let fresh = device.with_extension("new");
     std::os::unix::fs::symlink(name, &fresh)?;
@@ -74,7 +74,7 @@ fn read_line(line: &mut TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &H
             Ok(n @ 1..) if runtime.block_on(press.write_all(&bytes[..n])).is_err() => return,
             Ok(1..) => {}
             Err(error) if error.kind() == ErrorKind::TimedOut => {}
-            // Nobody has the terminal open.
+            // The terminal is not open.
             Ok(0) | Err(_) => thread::sleep(LOOK),
         }
     }
@@ -83,7 +83,7 @@ fn read_line(line: &mut TTYPort, mut press: WriteHalf<DuplexStream>, runtime: &H
 fn write_line(line: &mut TTYPort, mut press: ReadHalf<DuplexStream>, runtime: &Handle, pulled: &AtomicBool) {
     let mut bytes = [0; 512];
     while let Ok(n @ 1..) = runtime.block_on(press.read(&mut bytes)) {
-        // What is said on a line where nobody listens is lost.
+        // Bytes on a line that is not open are lost.
         let _ = line.write_all(&bytes[..n]);
     }
     pulled.store(true, Ordering::Relaxed);

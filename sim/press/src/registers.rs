@@ -1,8 +1,8 @@
-//! The register map PPH-1 (plate press - host, version 1), written from its page and on purpose not shared with the
+//! Register map PPH-1 (plate press - host, version 1), written from its specification and deliberately not shared with the
 //! host: an offset that is wrong on one side shows as wrong figures between the two.
 //!
-//! Holding registers only. The press fills the P block (32 words) and reads the H block (64 words); the host is
-//! allowed to write the H block and nothing else. Everything is 16-bit; 32-bit values carry the high word first.
+//! Holding registers only. The press writes the P block (32 words) and reads the H block (64 words); the host may write the H block
+//! only. All words are 16 bit; 32-bit values have the high word first.
 
 use serde::Serialize;
 
@@ -17,13 +17,13 @@ pub const H_LEN: usize = 64;
 pub mod p {
     /// Constant 1.
     pub const MAP_VERSION: usize = 0;
-    /// Counts up every 250 to 500 ms.
+    /// Incremented every 250 to 500 ms.
     pub const HEARTBEAT: usize = 1;
     /// Bits of [`super::control`].
     pub const CONTROL: usize = 2;
     /// 1..=65535, 0 none.
     pub const STROKE_ID: usize = 3;
-    /// New at each start of the program and each part change.
+    /// Changes at each start of the program and each part change.
     pub const SESSION_ID: usize = 4;
     /// Number of the plate file.
     pub const RECIPE_ID: usize = 5;
@@ -47,11 +47,11 @@ pub mod p {
 
 /// Bits of the P block's control word.
 pub mod control {
-    /// Measuring wanted.
+    /// Measuring enabled.
     pub const ENABLE: u16 = 1 << 0;
-    /// A stroke waits for its scan.
+    /// Stroke waiting for its scan.
     pub const TRIGGER: u16 = 1 << 1;
-    /// The result was taken.
+    /// Result accepted.
     pub const ACK: u16 = 1 << 2;
     /// Stop the scan.
     pub const ABORT: u16 = 1 << 3;
@@ -59,11 +59,11 @@ pub mod control {
     pub const ERROR_RESET: u16 = 1 << 4;
     /// Ram up, plate at rest.
     pub const CLEAR_TO_SCAN: u16 = 1 << 5;
-    /// The part leaves the press.
+    /// Part leaving the press.
     pub const PART_END: u16 = 1 << 7;
     /// Measure the same stroke again.
     pub const RESCAN: u16 = 1 << 8;
-    /// A scan without a bend.
+    /// Scan without a bend.
     pub const BASELINE: u16 = 1 << 9;
 }
 
@@ -71,19 +71,19 @@ pub mod control {
 pub mod h {
     /// Constant 1.
     pub const MAP_VERSION: usize = 0;
-    /// Counts up every 500 ms.
+    /// Incremented every 500 ms.
     pub const HEARTBEAT: usize = 1;
     /// Bits of [`super::status`].
     pub const STATUS: usize = 2;
     /// Echo of the accepted stroke id.
     pub const ACK_STROKE_ID: usize = 3;
-    /// Which stroke the result is for.
+    /// Stroke of the result.
     pub const RESULT_STROKE_ID: usize = 4;
     /// Echo of the session id.
     pub const SESSION_ECHO: usize = 5;
-    /// Commit word, +1 for each published result.
+    /// Commit word, incremented with each published result.
     pub const RESULT_SEQ: usize = 8;
-    /// Strokes the host could not take.
+    /// Number of strokes missed by the host.
     pub const MISSED_COUNT: usize = 9;
     /// Signed, 0.01 mm.
     pub const DEV_MAX: usize = 10;
@@ -105,27 +105,27 @@ pub mod h {
     pub const GAP_V: usize = 58;
     /// Signed: -1 not bent enough, 0 within, +1 bent too far.
     pub const SENSE: usize = 60;
-    /// Attempt the result is for.
+    /// Attempt of the result.
     pub const ATTEMPT_ECHO: usize = 61;
 }
 
 /// Bits of the H block's status word.
 pub mod status {
-    /// A trigger would be taken.
+    /// Ready for a trigger.
     pub const READY: u16 = 1 << 0;
-    /// A stroke is being scanned or evaluated.
+    /// Stroke being scanned or evaluated.
     pub const BUSY: u16 = 1 << 1;
-    /// The result words hold.
+    /// Result words valid.
     pub const RESULT_VALID: u16 = 1 << 2;
     /// Within the limits.
     pub const PASS: u16 = 1 << 3;
     /// Outside the limits.
     pub const FAIL: u16 = 1 << 4;
-    /// The plate may move.
+    /// Scan done: the plate may move.
     pub const SCAN_DONE: u16 = 1 << 7;
-    /// The result comes from a simulated measurement and may not be used.
+    /// Result of a simulated measurement, not to be used.
     pub const SIMULATED: u16 = 1 << 9;
-    /// No figures, with a reason.
+    /// Not measured: no figures, with a reason.
     pub const NOT_MEASURED: u16 = 1 << 12;
     /// Figures, but no verdict.
     pub const CANNOT_TELL: u16 = 1 << 13;
@@ -136,7 +136,7 @@ pub const INVALID_I16: u16 = 0x8000;
 /// "No value" of the unsigned words.
 pub const INVALID_U16: u16 = 0xFFFF;
 
-/// The H block as the press reads it.
+/// H block as read by the press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HBlock(
     /// 64 raw words.
@@ -144,25 +144,25 @@ pub struct HBlock(
 );
 
 impl HBlock {
-    /// The word at `offset`; offsets are the constants of [`h`].
+    /// Returns the word at `offset`; offsets are the constants of [`h`].
     #[must_use]
     pub fn word(&self, offset: usize) -> u16 {
         self.0[offset]
     }
 
-    /// Whether all `bits` of the status word are set.
+    /// Returns whether all `bits` of the status word are set.
     #[must_use]
     pub fn status(&self, bits: u16) -> bool {
         self.word(h::STATUS) & bits == bits
     }
 
-    /// Whether the commit word and its copy agree.
+    /// Returns whether the commit word and its copy agree.
     #[must_use]
     pub fn whole(&self) -> bool {
         self.word(h::RESULT_SEQ) == self.word(h::RESULT_SEQ_TAIL)
     }
 
-    /// CRC-16/MODBUS of words 3..=51 and 55..=61, each high byte first.
+    /// Returns the CRC-16/MODBUS of words 3..=51 and 55..=61, each high byte first.
     #[must_use]
     pub fn crc(&self) -> u16 {
         let bytes: Vec<u8> =
@@ -170,7 +170,7 @@ impl HBlock {
         crate::frame::crc16(&bytes)
     }
 
-    /// What the result words say, as the operator's panel of the press would show it.
+    /// Returns the verdict, as the operator panel of the press displays it.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         if self.status(status::NOT_MEASURED) {
@@ -184,13 +184,13 @@ impl HBlock {
         }
     }
 
-    /// Worst template gap in millimetres, if the result has one.
+    /// Returns the largest template gap in millimetres, if the result has one.
     #[must_use]
     pub fn gap_max_mm(&self) -> Option<f64> {
         (self.word(h::GAP_MAX) != INVALID_U16).then(|| f64::from(self.word(h::GAP_MAX)) * 0.01)
     }
 
-    /// Place of the worst gap on the plate in millimetres, if the result has one.
+    /// Returns the position (u, v) of the largest gap in millimetres, if the result has one.
     #[must_use]
     pub fn gap_at_mm(&self) -> Option<[f64; 2]> {
         let [u, v] = [self.word(h::GAP_U), self.word(h::GAP_V)];
@@ -198,14 +198,14 @@ impl HBlock {
             .then(|| [f64::from(u.cast_signed()), f64::from(v.cast_signed())])
     }
 
-    /// -1 not bent enough, 0 within, +1 bent too far.
+    /// Returns the sense: -1 not bent enough, 0 within the limits, +1 bent too far.
     #[must_use]
     pub fn sense(&self) -> i16 {
         self.word(h::SENSE).cast_signed()
     }
 }
 
-/// A result's verdict.
+/// Verdict of a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -213,15 +213,15 @@ pub enum Verdict {
     Pass,
     /// Outside the limits.
     Fail,
-    /// Measured, the figures do not decide.
+    /// Measured, but the figures do not decide.
     CannotTell,
     /// Not measured.
     NotMeasured,
 }
 
-/// The holding registers of the press, address 0 to the end of the table.
+/// Holding registers of the press, address 0 to the end of the table.
 ///
-/// Clients write anywhere in the table, as on most controllers; the program overwrites its P block each cycle.
+/// Clients may write anywhere in the table, as on most controllers; the program overwrites its P block each cycle.
 #[derive(Clone, Debug)]
 pub struct Table {
     words: Vec<u16>,
@@ -230,7 +230,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table of zeros with the two blocks at the given addresses, ending 36 words behind the later block.
+    /// Creates a table of zeros with the two blocks at the given addresses; it ends 36 words after the later block.
     #[must_use]
     pub fn new(p_base: u16, h_base: u16) -> Self {
         let (p_base, h_base) = (usize::from(p_base), usize::from(h_base));
@@ -238,14 +238,14 @@ impl Table {
         Self { words: vec![0; end], p_base, h_base }
     }
 
-    /// `count` words from `address`, or `None` where the table ends before.
+    /// Returns `count` words from `address`, or `None` beyond the end of the table.
     #[must_use]
     pub fn read(&self, address: u16, count: u16) -> Option<&[u16]> {
         let start = usize::from(address);
         self.words.get(start..start + usize::from(count))
     }
 
-    /// Stores `words` from `address`; `false`, with nothing stored, where the table ends before.
+    /// Stores `words` from `address`; returns `false`, with nothing stored, beyond the end of the table.
     #[must_use]
     pub fn write(&mut self, address: u16, words: &[u16]) -> bool {
         let start = usize::from(address);
@@ -258,28 +258,28 @@ impl Table {
         }
     }
 
-    /// Whether all `count` words from `address` lie in the H block.
+    /// Returns whether all `count` words from `address` lie in the H block.
     #[must_use]
     pub fn in_h_block(&self, address: u16, count: usize) -> bool {
         let start = usize::from(address);
         start >= self.h_base && start + count <= self.h_base + H_LEN
     }
 
-    /// Whether the `count` words from `address` touch the P block.
+    /// Returns whether the `count` words from `address` overlap the P block.
     #[must_use]
     pub fn touches_p_block(&self, address: u16, count: u16) -> bool {
         let start = usize::from(address);
         start < self.p_base + P_LEN && start + usize::from(count) > self.p_base
     }
 
-    /// Whether the `count` words from `address` touch the H block.
+    /// Returns whether the `count` words from `address` overlap the H block.
     #[must_use]
     pub fn touches_h_block(&self, address: u16, count: u16) -> bool {
         let start = usize::from(address);
         start < self.h_base + H_LEN && start + usize::from(count) > self.h_base
     }
 
-    /// The H block as it stands.
+    /// Returns the present H block.
     #[must_use]
     pub fn h_block(&self) -> HBlock {
         let mut block = [0; H_LEN];
@@ -287,7 +287,7 @@ impl Table {
         HBlock(block)
     }
 
-    /// The P block as it stands.
+    /// Returns the present P block.
     #[must_use]
     pub fn p_block(&self) -> [u16; P_LEN] {
         let mut block = [0; P_LEN];
@@ -295,18 +295,18 @@ impl Table {
         block
     }
 
-    /// Publishes the P block.
+    /// Writes the P block.
     pub fn set_p_block(&mut self, block: &[u16; P_LEN]) {
         self.words[self.p_base..self.p_base + P_LEN].copy_from_slice(block);
     }
 
-    /// All registers zero, as after a cold start of the controller.
+    /// Sets all registers to zero, as after a cold start of the controller.
     pub fn clear(&mut self) {
         self.words.fill(0);
     }
 }
 
-/// `name` as eight words of ASCII, high byte first, zero-padded; what is not ASCII becomes `?`.
+/// Encodes `name` as eight words of ASCII, high byte first, zero-padded; other characters become `?`.
 #[must_use]
 pub fn ascii_words(name: &str) -> [u16; 8] {
     let mut bytes = [0; 16];

@@ -1,4 +1,5 @@
-//! The Modbus server on its private port: registers, and what each connection has done to them.
+//! Modbus server on its private port: holding-register services (functions 3, 6 and 16 of "MODBUS Application Protocol V1.1b3") and
+//! the checks of each connection's writes.
 
 use std::future::{Ready, ready};
 use std::sync::Arc;
@@ -12,22 +13,22 @@ use tokio_modbus::server::tcp::{Server, accept_tcp_connection};
 
 use crate::shared::{Machine, Shared};
 
-/// Pause after the server ended by itself, as it does when a connection cannot be accepted.
+/// Pause before the server restarts after a failed accept.
 const RESTART_PAUSE: Duration = Duration::from_millis(10);
 
-/// Serves until the process ends; the library's server gives up on a failed accept, this one does not.
+/// Serves until the process ends; restarts the library's server, which ends on a failed accept.
 pub(crate) async fn serve(listener: TcpListener, unit: u8, shared: Arc<Shared>) {
     let server = Server::new(listener);
     let new_service = |_| Ok(Some(Connection::new(unit, Arc::clone(&shared))));
     let on_connected = |stream, address| async move { accept_tcp_connection(stream, address, new_service) };
     loop {
         let ended = server.serve(&on_connected, |error| tracing::debug!(%error, "connection ended")).await;
-        tracing::debug!(?ended, "Modbus server ended, starts again");
+        tracing::debug!(?ended, "Modbus server ended, restarting");
         tokio::time::sleep(RESTART_PAUSE).await;
     }
 }
 
-/// One client's view of the registers.
+/// Connection of one client.
 struct Connection {
     unit: u8,
     shared: Arc<Shared>,

@@ -1,4 +1,4 @@
-//! The state that the program's cycle, the Modbus server, the line and the control port share.
+//! State shared by the cycle of the program, the Modbus server, the relay and the control port.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -12,14 +12,14 @@ use crate::press::Press;
 use crate::registers::Table;
 use crate::{Error, Result};
 
-/// The press with its registers.
+/// Press and its registers.
 #[derive(Debug)]
 pub(crate) struct Machine {
     pub(crate) press: Press,
     pub(crate) table: Table,
 }
 
-/// The line's faults.
+/// Faults of the line.
 #[derive(Debug)]
 pub(crate) struct Line {
     pub(crate) faults: LineFaults,
@@ -28,17 +28,17 @@ pub(crate) struct Line {
     pub(crate) pulled_until: Option<Instant>,
 }
 
-/// Everything the tasks of one press share.
+/// State shared by the tasks of one press.
 #[derive(Debug)]
 pub(crate) struct Shared {
     machine: Mutex<Machine>,
     line: Mutex<Line>,
     started: Instant,
-    /// Counts the cycles.
+    /// Number of cycles.
     pub(crate) cycles: watch::Sender<u64>,
-    /// Counts up when all connections are to be cut.
+    /// Incremented to cut all connections.
     pub(crate) cuts: watch::Sender<u64>,
-    /// Becomes true once.
+    /// Set to true to stop the press.
     pub(crate) stop: watch::Sender<bool>,
 }
 
@@ -62,7 +62,7 @@ impl Shared {
         })
     }
 
-    /// Time since the start.
+    /// Returns the time since the start.
     pub(crate) fn now(&self) -> Duration {
         self.started.elapsed()
     }
@@ -75,7 +75,7 @@ impl Shared {
         self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One cycle of the controller.
+    /// Executes one cycle of the controller.
     pub(crate) fn cycle(&self) -> Result<()> {
         let now = self.now();
         let mut machine = self.machine();
@@ -106,7 +106,7 @@ impl Shared {
         Some(fault)
     }
 
-    /// Waits while the line is frozen.
+    /// Waits until the line is no longer frozen.
     pub(crate) async fn thaw(&self) {
         loop {
             let until = self.line().frozen_until;
@@ -117,7 +117,7 @@ impl Shared {
         }
     }
 
-    /// Waits while the adapter of a serial line is not plugged in.
+    /// Waits until the serial adapter is plugged in.
     pub(crate) async fn plugged_in(&self) {
         let until = self.line().pulled_until.take();
         if let Some(until) = until {
@@ -125,14 +125,14 @@ impl Shared {
         }
     }
 
-    /// Resolves when the press is to stop.
+    /// Waits for the request to stop.
     pub(crate) async fn stopped(&self) {
         let mut stop = self.stop.subscribe();
-        // An error means that the sender is gone, and the sender is in `self`.
+        // An error would mean that the sender was dropped, but it is in `self`.
         let _ = stop.wait_for(|&stop| stop).await;
     }
 
-    /// Waits until `what` holds of the counters.
+    /// Waits until `holds` is true of the counters.
     pub(crate) async fn until(
         &self,
         what: &str,

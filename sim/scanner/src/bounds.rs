@@ -1,9 +1,9 @@
-//! Axis-parallel boxes and a tree over them.
+//! Axis-aligned bounding boxes and a bounding volume hierarchy (BVH) over them.
 
 use crate::ray::Ray;
 use platen_sim_plate::Vec3;
 
-/// Axis-parallel box, metres.
+/// Axis-aligned bounding box, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounds {
     min: Vec3,
@@ -11,7 +11,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Smallest box that holds all points, grown by `margin` on every side.
+    /// Returns the smallest box that contains all points, grown by `margin` on every side.
     pub(crate) fn of(points: impl IntoIterator<Item = Vec3>, margin: f64) -> Self {
         let mut bounds = Self { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) };
         for point in points {
@@ -29,13 +29,13 @@ impl Bounds {
         (self.min + self.max) / 2.0
     }
 
-    /// Range at which a ray enters (0 when it starts inside), unless it misses or enters beyond `limit`.
+    /// Returns the range at which a ray enters (0 when it starts inside); `None` when it misses or enters beyond `limit` (slab method).
     fn entry(&self, ray: &Ray, inverse: &Vec3, limit: f64) -> Option<f64> {
         let (mut near, mut far) = (0.0_f64, limit);
         for k in 0..3 {
             let (a, b) =
                 ((self.min[k] - ray.origin[k]) * inverse[k], (self.max[k] - ray.origin[k]) * inverse[k]);
-            // min and max drop the NaN of a ray that runs inside a face.
+            // min and max ignore the NaN of a ray that lies in a face.
             near = near.max(a.min(b));
             far = far.min(a.max(b));
         }
@@ -55,10 +55,10 @@ enum Node {
     },
 }
 
-/// Items in a leaf.
+/// Largest number of items in a leaf.
 const LEAF: usize = 2;
 
-/// Depth that a tree over u32 items cannot exceed, since every inner node halves its items.
+/// Upper bound of the depth of a tree over u32 items: every inner node halves its items.
 const STACK: usize = 64;
 
 /// Bounding volume hierarchy, split at the median of the longest axis.
@@ -69,7 +69,7 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// A tree over `bounds`; items are known by their index.
+    /// Builds a tree over `bounds`; items are identified by their index.
     pub(crate) fn new(bounds: &[Bounds]) -> Self {
         let mut tree = Self { nodes: Vec::new(), items: (0..bounds.len() as u32).collect() };
         if !bounds.is_empty() {
@@ -98,8 +98,8 @@ impl Tree {
         self.build(bounds, first + middle, end);
     }
 
-    /// Offers every item whose box the ray meets before `limit`, near boxes first. `visit` returns the range of
-    /// the nearest hit so far, beyond which nothing more is offered.
+    /// Calls `visit` for every item whose box the ray enters before `limit`, near boxes first. `visit` returns the range of
+    /// the nearest hit so far, beyond which no further item is visited.
     pub(crate) fn visit(&self, ray: &Ray, mut limit: f64, mut visit: impl FnMut(u32, f64) -> f64) {
         let inverse = ray.direction.map(|c| 1.0 / c);
         let mut stack = [(0_u32, 0.0_f64); STACK];
@@ -126,7 +126,7 @@ impl Tree {
                     if children[0].1 < children[1].1 {
                         children.swap(0, 1);
                     }
-                    // The nearer one is pushed last and so visited first.
+                    // The nearer child is pushed last and therefore visited first.
                     for (child, near) in children.into_iter().filter_map(|(child, near)| Some((child, near?)))
                     {
                         stack[height] = (child, near);

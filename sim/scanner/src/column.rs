@@ -1,42 +1,42 @@
-//! What a simulated scan consists of.
+//! Columns of a simulated scan: measured values and ground truth.
 
 use crate::ray::Label;
 
-/// What the instrument knows of a cell.
+/// Measured state of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SimState {
-    /// Range and direction.
+    /// Range and direction were measured.
     Valid,
-    /// The beam went out there and no usable echo came back.
+    /// The beam was emitted and no usable echo returned.
     NoEcho,
 }
 
-/// What the simulator knows of a cell.
+/// Ground truth of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TruthCell {
-    /// What the middle of the beam hit.
+    /// Object hit by the middle of the beam.
     pub label: Label,
-    /// The footprint straddles an edge, and the range is a mixture.
+    /// Mixed pixel: the footprint straddles an edge.
     pub mixed: bool,
     /// Range of the middle of the beam without any error, metres; 0 where nothing was hit.
     pub range: f64,
 }
 
-/// One column, rows from the top down; all vectors have one entry per row.
+/// Column of a scan, rows from the top down; all vectors have one entry per row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimColumn {
-    /// Place by growing azimuth.
+    /// Index by increasing azimuth.
     pub index: u32,
-    /// Measured on the back side of the mirror turn.
+    /// Measured on the back face.
     pub back_face: bool,
-    /// Metres; meaningless unless valid.
+    /// Range, metres; undefined unless valid.
     pub range_m: Vec<f32>,
-    /// Radians, as the instrument reports it.
+    /// Angle reported by the instrument, radians.
     pub azimuth: Vec<f64>,
-    /// Radians, as the instrument reports it.
+    /// Angle reported by the instrument, radians.
     pub elevation: Vec<f64>,
-    /// 0..=2047.
+    /// Echo intensity, 0..=2047.
     pub intensity: Vec<u16>,
     /// Per cell.
     pub state: Vec<SimState>,

@@ -1,28 +1,28 @@
-//! Resolutions, measuring rates and times of a phase scanner of the Focus family.
+//! Resolutions, measuring rates and scan times of a phase scanner of the FARO Focus family.
 //!
-//! A mirror turns about a horizontal axis while the head turns about the vertical; each turn of the mirror writes
-//! one column on the front and one on the back, so that half a turn of the head covers the full circle. Figures: from
-//! published control code and the maker's table; the times of the table are reproduced to a second.
+//! A mirror rotates about a horizontal axis while the head rotates about the vertical. Each turn of the mirror writes one column on the
+//! front face and one on the back face, so that half a turn of the head covers the full circle. Figures are from published control code
+//! and the maker's table, whose times are reproduced to a second.
 
 use std::f64::consts::{PI, TAU};
 
 /// Columns of a full circle at resolution 1/1.
 const FULL_COLUMNS: f64 = 40_960.0;
 
-/// Fastest mirror, Hz. The permitted pairs of resolution and rate are exactly those below it.
+/// Highest mirror frequency, Hz. The permitted pairs of resolution and rate are exactly those below it.
 const FASTEST_MIRROR: f64 = 97.0;
 
-/// Rate at which the data sheet gives its noise, points per second, and that noise at 10 m on mill scale at 60 degrees,
+/// Rate at which the data sheet states its noise, points per second, and that noise at 10 m on mill scale at 60 degrees,
 /// metres: 0.6 mm at 90 % reflectivity, weaker echoes by the power 0.35.
 const QUIET: (f64, f64) = (122e3, 1.06e-3);
 
-/// Seconds until the mirror is at speed.
+/// Time until the mirror is at speed, seconds.
 const SPIN_UP: f64 = 9.0;
 
-/// Seconds after the last column until the scan's file no longer changes.
+/// Time after the last column until the scan's file no longer changes, seconds.
 const SETTLE: f64 = 12.0;
 
-/// A way to scan.
+/// Scan mode of a device: resolution, measuring rate and noise compression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Device {
     divisor: u32,
@@ -30,48 +30,48 @@ pub struct Device {
     averaged: u32,
 }
 
-/// Why a device cannot scan that way.
+/// Error of an invalid scan mode.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DeviceError {
-    /// There is no such resolution.
+    /// Unknown resolution.
     #[error(
         "resolution 1/{divisor} does not exist; choose 1/1, 1/2, 1/4, 1/5, 1/8, 1/10, 1/16, 1/20 or 1/32"
     )]
     Resolution {
-        /// As asked for.
+        /// Requested value.
         divisor: u32,
     },
-    /// There is no such rate.
+    /// Unknown measuring rate.
     #[error("{rate_kpts} kpts/s does not exist; choose 122, 244, 488 or 976")]
     Rate {
-        /// As asked for.
+        /// Requested value.
         rate_kpts: u32,
     },
-    /// Noise compression is by 1, 2 or 4.
+    /// Unknown noise compression.
     #[error("noise compression {compression} does not exist; choose 1, 2 or 4")]
     Compression {
-        /// As asked for.
+        /// Requested value.
         compression: u32,
     },
-    /// The mirror cannot turn so fast.
+    /// Mirror frequency above the limit.
     #[error(
-        "1/{divisor} at {rate_kpts} kpts/s needs a mirror of {mirror_hz:.0} Hz, it turns at most at 97 Hz; choose a lower rate"
+        "1/{divisor} at {rate_kpts} kpts/s requires a mirror frequency of {mirror_hz:.0} Hz, at most 97 Hz are possible; choose a lower rate"
     )]
     Mirror {
-        /// As asked for.
+        /// Requested value.
         divisor: u32,
-        /// As asked for.
+        /// Requested value.
         rate_kpts: u32,
-        /// What it would take.
+        /// Required mirror frequency.
         mirror_hz: f64,
     },
 }
 
 impl Device {
-    /// Resolution 1/`divisor`, measuring rate, and noise compression (1: none; n: n^2 samples become one).
+    /// Creates a mode of resolution 1/`divisor`, measuring rate, and noise compression (1: none; n: n^2 samples are averaged).
     ///
     /// # Errors
-    /// [`DeviceError`] with what is possible.
+    /// [`DeviceError`] with the permitted values.
     pub fn new(divisor: u32, rate_kpts: u32, compression: u32) -> Result<Self, DeviceError> {
         if ![1, 2, 4, 5, 8, 10, 16, 20, 32].contains(&divisor) {
             return Err(DeviceError::Resolution { divisor });
@@ -90,41 +90,41 @@ impl Device {
         Ok(device)
     }
 
-    /// Turns of the mirror per second.
+    /// Returns the mirror frequency, turns per second.
     pub fn mirror_hz(&self) -> f64 {
         self.rate / FULL_COLUMNS * f64::from(self.divisor)
     }
 
-    /// Angle between columns and between rows, radians.
+    /// Returns the angle between columns and between rows, radians.
     pub fn step(&self) -> f64 {
         TAU / FULL_COLUMNS * f64::from(self.divisor * self.averaged)
     }
 
-    /// Rows and columns of a full scan that reaches from the zenith down to 62.5 degrees below the horizon.
+    /// Returns rows and columns of a full scan, from the zenith down to 62.5 degrees below the horizon.
     pub fn full_lattice(&self) -> [u32; 2] {
         let columns = FULL_COLUMNS / f64::from(self.divisor * self.averaged);
         [(columns * 152.5 / 360.0).round() as u32, columns.round() as u32]
     }
 
-    /// Seconds that the head turns for a horizontal window, radians. Up to half a circle only one side of each mirror turn
-    /// is used; the vertical window saves nothing.
+    /// Returns the sweep time of a horizontal window (radians), seconds. Up to half a circle only one face of each mirror turn
+    /// is used; a vertical window saves no time.
     pub fn sweep_s(&self, width: f64) -> f64 {
         let full = FULL_COLUMNS / (2.0 * self.mirror_hz() * f64::from(self.divisor));
         full * (width / PI).min(1.0)
     }
 
-    /// Seconds from the command to a file that no longer changes: spin-up, sweep, settling.
+    /// Returns the time from the command to a file that no longer changes, seconds: spin-up, sweep, settling.
     pub fn duration_s(&self, width: f64) -> f64 {
         SPIN_UP + self.sweep_s(width) + SETTLE
     }
 
-    /// Seconds after the command at which the share `done` of a window's columns is measured.
+    /// Returns the time after the command at which the share `done` of a window's columns is measured, seconds.
     pub fn column_s(&self, width: f64, done: f64) -> f64 {
         SPIN_UP + self.sweep_s(width) * done
     }
 
-    /// Standard deviation of a range at 10 m, as [`crate::Instrument::range_sigma`] counts it: it grows with the root of
-    /// the rate and falls with compression.
+    /// Returns the standard deviation of a range at 10 m as defined by [`crate::Instrument::range_sigma`]: proportional to the root of
+    /// the rate and inversely to compression.
     pub fn range_sigma(&self) -> f64 {
         let (rate, sigma) = QUIET;
         sigma * (self.rate / rate).sqrt() / f64::from(self.averaged)

@@ -1,4 +1,4 @@
-//! Scans as files, in the formats and the orders in which scanners' software exports them.
+//! Scan files in the formats and orders in which the software of scanners exports them: E57, PTX, XYZ, XYB.
 
 mod e57;
 mod error;
@@ -14,45 +14,45 @@ use std::path::Path;
 pub use e57::E57Encoding;
 pub use error::FileError;
 
-/// A finished scan.
+/// Complete scan.
 #[derive(Debug, Clone)]
 pub struct SimScan {
-    /// Directions.
+    /// Lattice of directions.
     pub lattice: SimLattice,
     /// All columns, in order.
     pub columns: Vec<SimColumn>,
 }
 
-/// In which order a file holds the lattice. The default is the one that vendor software is known for: row 0 at the top,
+/// Order of rows and columns in a file. The default is that of the vendor's software: row 0 at the top,
 /// columns clockwise seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FileOrder {
     /// Row 0 is the lowest.
     pub bottom_up: bool,
-    /// Columns by growing azimuth.
+    /// Columns by increasing azimuth.
     pub counter_clockwise: bool,
     /// Rows and columns are swapped.
     pub transposed: bool,
 }
 
-/// A format, with what can differ between files of it.
+/// File format with its variants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileFormat {
-    /// ASTM E2807, structured.
+    /// E57 (ASTM E2807), structured.
     E57(E57Encoding),
-    /// Text, all cells, metres.
+    /// PTX: text, all cells, metres.
     Ptx {
         /// Lines end in CR LF.
         crlf: bool,
     },
-    /// Text with row and column, cells without echo left out.
+    /// XYZ: text with row and column, without the cells that have no echo.
     Xyz,
-    /// Binary, all cells.
+    /// XYB: binary, all cells.
     Xyb,
 }
 
 impl FileFormat {
-    /// The usual format of a file name's ending; `None` for an ending that is not known here.
+    /// Returns the usual format of a file name's extension; `None` for an unknown extension.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()? {
             "e57" => Some(Self::E57(E57Encoding::default())),
@@ -64,30 +64,30 @@ impl FileFormat {
     }
 }
 
-/// One cell of a file.
+/// Cell as written to a file.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     row: u32,
     column: u32,
     azimuth: f64,
     elevation: f64,
-    /// Metres; `None` without echo.
+    /// Range, metres; `None` without echo.
     range: Option<f64>,
     intensity: u16,
 }
 
 impl Cell {
-    /// Metres, scanner frame; `None` without echo.
+    /// Returns the point in the scanner frame, metres; `None` without echo.
     fn point(&self) -> Option<[f64; 3]> {
         self.range.map(|range| (unit(self.azimuth, self.elevation) * range).into())
     }
 }
 
 impl SimScan {
-    /// Writes the scan. The file appears under its name when it is complete.
+    /// Writes the scan to a temporary file and renames it, so that `path` appears only when it is complete.
     ///
     /// # Errors
-    /// [`FileError`] when the file cannot be written.
+    /// [`FileError`] with the path when the file cannot be written.
     pub fn write(&self, path: &Path, format: FileFormat, order: FileOrder) -> Result<(), FileError> {
         let part = path.with_extension("part");
         let failed = |source| FileError::Io { path: path.into(), source };
@@ -107,13 +107,13 @@ impl SimScan {
         std::fs::rename(&part, path).map_err(failed)
     }
 
-    /// Rows and columns of a file in this order.
+    /// Returns the numbers of rows and columns of a file in this order.
     fn size(&self, order: FileOrder) -> [u32; 2] {
         let [rows, columns] = [self.lattice.n_rows, self.lattice.n_columns];
         if order.transposed { [columns, rows] } else { [rows, columns] }
     }
 
-    /// All cells, column after column, each from its row 0 on.
+    /// Iterates over all cells, column by column, each from its row 0.
     fn cells(&self, order: FileOrder) -> impl Iterator<Item = Cell> + '_ {
         let [n_rows, n_columns] = self.size(order);
         (0..n_columns).flat_map(move |column| (0..n_rows).map(move |row| self.cell(order, row, column)))

@@ -1,38 +1,38 @@
-//! The scanner's errors.
+//! Error model of the scanner: range noise, mixed pixels, lost echoes, cyclic and two-face errors, warm-up.
 
 use crate::ray::{Hit, Label};
 
-/// Error model of a scanner. Lengths in metres, angles in radians.
+/// Parameters of the error model. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
-    /// Standard deviation of a range at 10 m on mill-scaled steel at 60 degrees incidence, the way plates are seen. Data
+    /// Standard deviation of a range at 10 m on mill-scaled steel at 60 degrees incidence, a typical view of a plate. Data
     /// sheets: 0.5 mm with filtering to 1.7 mm at full rate.
     pub range_sigma: f64,
-    /// Degrees of freedom of the range error; `None` is normal, 3 has heavy tails. The standard deviation stays `range_sigma`'s.
+    /// Degrees of freedom of the range error (Student's t, scaled to the same variance); `None`: normal distribution.
     pub tail_dof: Option<f64>,
-    /// Angle over which the beam's intensity falls to 1/e^2, full width.
+    /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
-    /// Standard deviation of each reported angle against the beam's own.
+    /// Standard deviation of each reported angle against the true direction of the beam.
     pub angular_sigma: f64,
-    /// Share of echoes lost whatever they hit.
+    /// Probability that any echo is lost.
     pub dropout: f64,
     /// Cyclic range error of a phase measurement.
     pub cyclic: Option<Cyclic>,
-    /// Half width of the mirror lobe of the plate: echoes within it overload the receiver.
+    /// Half width of the specular lobe of the plate: echoes within it overload the receiver.
     pub specular_lobe: Option<f64>,
-    /// Two faces of the mirror turn.
+    /// Errors of a scan with two faces; `None`: one face.
     pub faces: Option<Faces>,
-    /// The head turns clockwise: columns are measured from the last to the first.
+    /// Clockwise rotation of the head: columns are measured from the last to the first.
     pub clockwise: bool,
-    /// Columns at the start of each face before the laser is warm: their ranges scatter by centimetres.
+    /// Columns at the start of each face measured before the laser is warm; their ranges scatter by centimetres.
     pub warm_up_columns: u32,
-    /// Nothing nearer and nothing farther is measured.
+    /// Shortest and longest range measured.
     pub reach: [f64; 2],
-    /// Seed of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// Range error `amplitude` * sin(2 pi range / period + phase).
+/// Cyclic range error `amplitude` * sin(2 pi range / period + phase).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cyclic {
     /// Metres.
@@ -43,22 +43,22 @@ pub struct Cyclic {
     pub phase: f64,
 }
 
-/// A scan of two faces: each turn of the mirror measures a column of both, half a turn of the head apart.
+/// Errors of a scan of two faces: each turn of the mirror measures a column of both, half a turn of the head apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faces {
-    /// First column of the other face by growing azimuth: of the back face, of the front face where the head turns
+    /// First column of the second face by increasing azimuth: of the back face, or of the front face where the head rotates
     /// clockwise.
     pub seam_column: u32,
-    /// Angle of the beam against the mirror's plane; changes sign between the faces.
+    /// Collimation error: angle of the beam against the mirror's plane; changes sign between the faces.
     pub collimation: f64,
-    /// Tilt of the mirror axis; changes sign between the faces.
+    /// Trunnion error: tilt of the mirror axis; changes sign between the faces.
     pub trunnion: f64,
-    /// How the scanner moved between the faces, metres.
+    /// Displacement of the scanner between the faces, metres.
     pub moved: [f64; 3],
 }
 
 impl Default for Instrument {
-    /// A phase scanner with filtering on, one face, no systematic errors.
+    /// Returns a phase scanner with filtering, one face and no systematic errors.
     fn default() -> Self {
         Self {
             range_sigma: 0.5e-3,
@@ -78,13 +78,13 @@ impl Default for Instrument {
 }
 
 impl Instrument {
-    /// An instrument that makes no error at all.
+    /// Returns an instrument without errors.
     pub fn perfect() -> Self {
         Self { range_sigma: 0.0, footprint: 0.0, dropout: 0.0, ..Self::default() }
     }
 }
 
-/// Diffuse reflectivity at 905 nm to 1550 nm, from common knowledge: mill scale is dark, painted walls bright.
+/// Returns the diffuse reflectivity at 905 nm to 1550 nm; typical values: mill scale is dark, painted walls are bright.
 pub(crate) fn reflectivity(label: Label) -> f64 {
     match label {
         Label::Nothing => 0.0,
@@ -103,32 +103,32 @@ pub(crate) fn reflectivity(label: Label) -> f64 {
 /// Reflectivity of marker paint.
 pub(crate) const MARKER_REFLECTIVITY: f64 = 0.05;
 
-/// Echo that [`Instrument::range_sigma`] refers to: mill scale at 60 degrees.
+/// Strength of the reference echo of [`Instrument::range_sigma`]: mill scale at 60 degrees.
 const REFERENCE_STRENGTH: f64 = 0.35 * 0.5;
 
-/// Share of the variance at 10 m that does not depend on range (jitter of the electronics).
+/// Share of the variance at 10 m that is independent of range (jitter of the electronics).
 const RANGE_FLOOR: f64 = 0.25;
 
-/// Standard deviation falls with this power of the echo's strength. A data sheet with 0.6 mm at 90 % and 1.2 mm at 10 % (10 m) gives
+/// Exponent of the echo's strength in the standard deviation. A data sheet with 0.6 mm at 90 % and 1.2 mm at 10 % (10 m) gives
 /// 0.32, at 25 m 0.38.
 const STRENGTH_POWER: f64 = 0.35;
 
-/// Echo of a hit relative to a white wall head-on at the same distance.
+/// Returns the strength of an echo relative to a white wall at normal incidence at the same distance (Lambert's law).
 pub(crate) fn strength(hit: &Hit, marker: bool) -> f64 {
     let reflectivity = if marker { MARKER_REFLECTIVITY } else { reflectivity(hit.label) };
     reflectivity * hit.cos_incidence
 }
 
 impl Instrument {
-    /// Standard deviation of a range on an echo of this strength.
+    /// Returns the standard deviation of a range for an echo of this strength.
     pub(crate) fn sigma_at(&self, range: f64, strength: f64) -> f64 {
         let by_range = (RANGE_FLOOR + (1.0 - RANGE_FLOOR) * (range / 10.0).powi(2)).sqrt();
-        // An echo below a thousandth of the reference is lost anyway.
+        // Echoes below a thousandth of the reference are lost anyway.
         let weak = (REFERENCE_STRENGTH / strength.max(1e-3 * REFERENCE_STRENGTH)).powf(STRENGTH_POWER);
         self.range_sigma * by_range * weak
     }
 
-    /// Probability that the echo of a hit is lost: everywhere a little, more when it is weak, and inside the mirror lobe.
+    /// Returns the probability that an echo is lost: the constant dropout, weakness of the echo, and the specular lobe combined.
     pub(crate) fn loss(&self, hit: &Hit, strength: f64) -> f64 {
         if self.dropout == 0.0 {
             return 0.0;
@@ -143,7 +143,7 @@ impl Instrument {
         1.0 - (1.0 - self.dropout) * (1.0 - weak * 0.1) * (1.0 - mirror)
     }
 
-    /// Systematic error of a range.
+    /// Returns the systematic error of a range.
     pub(crate) fn bias(&self, range: f64) -> f64 {
         self.cyclic.map_or(0.0, |c| c.amplitude * (std::f64::consts::TAU * range / c.period + c.phase).sin())
     }

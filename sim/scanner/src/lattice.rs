@@ -1,29 +1,29 @@
-//! The directions in which a scanner looks.
+//! Regular lattice of scan directions.
 
 use platen_sim_plate::{Plate, Side, Vec3};
 
-/// Lowest elevation that a scanner reaches, degrees: below are its own feet.
+/// Lowest elevation of a scanner, degrees: its own base obstructs the view below.
 pub const LOWEST_DEG: f64 = -62.5;
 
-/// A regular lattice of directions, radians: columns by growing azimuth (counter-clockwise from +x), rows from the top down.
+/// Regular lattice of directions, radians: columns by increasing azimuth (counter-clockwise from +x), rows from the top down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimLattice {
     /// Azimuth of column 0.
     pub azimuth_start: f64,
-    /// Between columns.
+    /// Angle between columns.
     pub azimuth_step: f64,
-    /// Columns.
+    /// Number of columns.
     pub n_columns: u32,
     /// Elevation of row 0.
     pub elevation_start: f64,
-    /// Between rows, positive.
+    /// Angle between rows, positive.
     pub elevation_step: f64,
-    /// Rows.
+    /// Number of rows.
     pub n_rows: u32,
 }
 
 impl SimLattice {
-    /// The lattice of one step that covers azimuths from `azimuth_start` over `azimuth_width` and elevations between
+    /// Returns the lattice of one step that covers azimuths from `azimuth_start` over `azimuth_width` and elevations between
     /// `elevation_min` and `elevation_max`. At least 2 x 2 cells.
     pub fn covering(
         azimuth_start: f64,
@@ -43,7 +43,7 @@ impl SimLattice {
         }
     }
 
-    /// The lattice of one step that covers `points` (scanner frame) and `margin` radians round them. They must
+    /// Returns the lattice of one step that covers `points` (scanner frame) and `margin` radians around them. The points must
     /// lie within half a turn.
     pub fn around(points: &[Vec3], margin: f64, step: f64) -> Self {
         let middle = points.iter().sum::<Vec3>();
@@ -61,13 +61,13 @@ impl SimLattice {
         Self::covering(start, width, elevation[0] - margin, elevation[1] + margin, step)
     }
 
-    /// The lattice that covers a plate and `margin` radians round it, or the place of a plate in an empty press.
+    /// Returns the lattice that covers a plate and `margin` radians around it, or the place of a plate in an empty press.
     pub fn of_plate(plate: Option<&Plate>, margin: f64, step: f64) -> Self {
         Self::around(&outline(plate), margin, step).on_encoder()
     }
 
-    /// The same lattice on directions that are multiples of the step, as an encoder's are, without the rows that lie
-    /// below what a scanner reaches.
+    /// Aligns the lattice to multiples of the step, as an encoder does, and removes the rows that lie
+    /// below [`LOWEST_DEG`].
     #[must_use]
     pub fn on_encoder(&self) -> Self {
         let down_to = |angle: f64, step: f64| (angle / step).floor() * step;
@@ -81,23 +81,23 @@ impl SimLattice {
         }
     }
 
-    /// Nominal azimuth of a column, not wrapped.
+    /// Returns the nominal azimuth of a column, not wrapped.
     pub fn azimuth(&self, column: u32) -> f64 {
         self.azimuth_start + self.azimuth_step * f64::from(column)
     }
 
-    /// Nominal elevation of a row.
+    /// Returns the nominal elevation of a row.
     pub fn elevation(&self, row: u32) -> f64 {
         self.elevation_start - self.elevation_step * f64::from(row)
     }
 
-    /// Number of cells.
+    /// Returns the number of cells.
     pub fn n_cells(&self) -> usize {
         self.n_columns as usize * self.n_rows as usize
     }
 }
 
-/// Points on a plate's outline; for an empty press, those where a plate would lie.
+/// Returns points on a plate's outline; for an empty press, those of a typical plate.
 fn outline(plate: Option<&Plate>) -> Vec<Vec3> {
     let Some(plate) = plate else {
         return [(4.0, -1.5), (4.0, 1.5), (8.0, -1.5), (8.0, 1.5)]
@@ -109,7 +109,7 @@ fn outline(plate: Option<&Plate>) -> Vec<Vec3> {
     points.map(|[u, v]| plate.top(u, v)).collect()
 }
 
-/// Unit vector of a direction.
+/// Returns the unit vector of a direction.
 pub(crate) fn unit(azimuth: f64, elevation: f64) -> Vec3 {
     let ((sin_az, cos_az), (sin_el, cos_el)) = (azimuth.sin_cos(), elevation.sin_cos());
     Vec3::new(cos_el * cos_az, cos_el * sin_az, sin_el)

@@ -1,4 +1,4 @@
-//! From directions to measured columns.
+//! Measurement of columns: rays of the lattice, echoes of the footprint, errors of the receiver.
 
 use crate::column::{SimColumn, SimState, TruthCell};
 use crate::instrument::{Instrument, strength};
@@ -10,10 +10,10 @@ use rand_distr::{Distribution, StandardNormal, StudentT};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::RngCore;
 
-/// Neighbours on one object whose ranges differ by more than this are seen across a fold, metres.
-const FOLD: f64 = 0.1;
+/// Range difference of neighbouring cells of one object that is treated as an edge, metres.
+const RANGE_JUMP: f64 = 0.1;
 
-/// A cell counts as mixed when its footprint sees ranges this far apart, metres.
+/// Range spread within a footprint above which a cell counts as a mixed pixel, metres.
 const MIXED_SPREAD: f64 = 0.02;
 
 /// Standard deviation of a range before the laser is warm, metres.
@@ -22,14 +22,14 @@ const WARM_UP_SIGMA: f64 = 0.03;
 /// Largest intensity.
 pub const INTENSITY_MAX: u16 = 2047;
 
-/// What the middle of every beam of one column hit, without errors of the range.
+/// Rays through the middle of every cell of one column, and their hits without range errors.
 #[derive(Debug)]
 pub(crate) struct Trace {
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
 }
 
-/// A scene seen by an instrument through a lattice.
+/// Scene, lattice and instrument of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) scene: &'a Scene,
@@ -37,8 +37,8 @@ pub(crate) struct View<'a> {
     pub(crate) instrument: &'a Instrument,
 }
 
-/// What a column's random numbers are for; each purpose has its own stream, so that switching one error on
-/// leaves the others' numbers alone.
+/// Purpose of a column's random numbers; each purpose has its own stream, so that switching one error on
+/// does not change the others' numbers.
 #[derive(Clone, Copy)]
 enum Purpose {
     Angles = 0,
@@ -55,7 +55,7 @@ impl View<'_> {
         self.instrument.faces.is_some_and(|faces| (column >= faces.seam_column) != self.instrument.clockwise)
     }
 
-    /// True for the first columns that either face measures: the laser has just been switched on.
+    /// Returns true for the first columns that either face measures after the laser is switched on.
     fn is_warm_up(&self, column: u32) -> bool {
         let seam = self.instrument.faces.map_or(0, |faces| faces.seam_column);
         let face = if column < seam { 0..seam } else { seam..self.lattice.n_columns };
@@ -93,14 +93,14 @@ impl View<'_> {
         }
     }
 
-    /// Error of the azimuth that changes sign between the faces.
+    /// Returns the azimuth error of collimation and trunnion axis, which changes sign between the faces.
     fn azimuth_error(&self, column: u32, elevation: f64) -> f64 {
         let Some(faces) = self.instrument.faces else { return 0.0 };
         let error = faces.collimation / elevation.cos() + faces.trunnion * elevation.tan();
         if self.is_back(column) { -error } else { error }
     }
 
-    /// Measures a column, whose neighbours tell where edges are.
+    /// Measures a column; its neighbours are used to find edges.
     pub(crate) fn measure(
         &self,
         column: u32,
@@ -145,7 +145,7 @@ impl View<'_> {
         Echo { hit: *hit, strength: strength(hit, marker), mixed: false }
     }
 
-    /// The echo of the whole footprint. A phase scanner adds up what comes back from everywhere under the spot:
+    /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot:
     /// the range is the mean, weighted by power, which falls with the square of the distance.
     fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>) -> Option<Echo> {
         let across = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
@@ -171,15 +171,15 @@ impl View<'_> {
             return None;
         }
         let mixed = farthest - nearest > MIXED_SPREAD;
-        // Without a jump the middle of the beam says it more exactly than the mean of the samples.
+        // Without a range jump the middle of the beam is more exact than the mean of the samples.
         let hit =
             if mixed { Hit { range: range / power, ..nearest_hit? } } else { middle.or(nearest_hit)? };
         Some(Echo { hit, strength, mixed })
     }
 
-    /// What the receiver makes of an echo: state, range, intensity.
+    /// Simulates the receiver: returns state, range and intensity of an echo.
     fn receive(&self, column: u32, echo: Option<Echo>, rng: &mut Pcg64) -> (SimState, f64, u16) {
-        // Every cell draws the same numbers, whatever it sees.
+        // Every cell draws the same number of deviates, with or without an echo.
         let lost = unit_interval(rng);
         let error = self.unit_error(rng);
         let gain: f64 = StandardNormal.sample(rng);
@@ -199,7 +199,7 @@ impl View<'_> {
         (SimState::Valid, range, level.clamp(1.0, f64::from(INTENSITY_MAX)) as u16)
     }
 
-    /// A random number of variance 1.
+    /// Draws a range error of variance 1.
     fn unit_error(&self, rng: &mut Pcg64) -> f64 {
         match self.instrument.tail_dof {
             Some(dof) if dof > 2.0 => {
@@ -210,7 +210,7 @@ impl View<'_> {
     }
 }
 
-/// What comes back to the receiver.
+/// Echo at the receiver.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     hit: Hit,
@@ -246,7 +246,7 @@ const SPOT: [(f64, f64, f64); 19] = {
     ]
 };
 
-/// Sum of their weights.
+/// Sum of the weights of [`SPOT`].
 const SPOT_WEIGHT: f64 = {
     let (mut sum, mut k) = (0.0, 0);
     while k < SPOT.len() {
@@ -256,11 +256,11 @@ const SPOT_WEIGHT: f64 = {
     sum
 };
 
-/// True when one of the eight neighbours lies on another object or across a fold.
+/// Returns true when one of the eight neighbours lies on another object or across a range jump.
 fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Trace>) -> bool {
     let middle = here.hits[row];
     let differs = |other: &Option<Hit>| match (&middle, other) {
-        (Some(a), Some(b)) => a.object != b.object || (a.range - b.range).abs() > FOLD,
+        (Some(a), Some(b)) => a.object != b.object || (a.range - b.range).abs() > RANGE_JUMP,
         (None, None) => false,
         _ => true,
     };
@@ -268,7 +268,7 @@ fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Tr
     columns.into_iter().any(|column| column.hits[rows.clone()].iter().any(differs))
 }
 
-/// Uniform in [0, 1).
+/// Draws a uniform deviate in [0, 1).
 fn unit_interval(rng: &mut Pcg64) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }

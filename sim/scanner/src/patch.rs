@@ -1,23 +1,23 @@
-//! Exact intersection of rays with the six curved faces of a plate.
+//! Ray intersection with the six curved faces of a plate, by Newton's method on parametric patches.
 
 use crate::bounds::Bounds;
 use crate::ray::{Label, Ray};
 use platen_sim_plate::{Jet, Plate, Side, Vec3};
 
-/// Longest edge of a patch, metres.
+/// Longest edge of a patch, metres: short against the radii, so that Newton's method converges from the patch's middle.
 const PATCH: f64 = 0.12;
 
-/// By how much the boxes grow beyond the 5 x 5 points that they hold: the arc between points 30 mm apart rises
+/// Margin of the boxes around the 5 x 5 sampled points: the arc between points 30 mm apart rises
 /// 0.1 mm at a curvature of 1/m.
 const MARGIN: f64 = 1e-3;
 
-/// A root is found when the point lies this close to the ray, metres.
+/// Convergence limit: distance of the surface point from the ray, metres.
 const CLOSE: f64 = 1e-11;
 
-/// Faces and patches overlap by this, metres, so that no ray slips between them.
+/// Overlap of faces and patches, metres, so that no ray passes between them.
 const OVERLAP: f64 = 1e-9;
 
-/// Which of the six faces.
+/// Face of a plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Face {
     Top,
@@ -25,7 +25,7 @@ enum Face {
     Side(Side),
 }
 
-/// A rectangle in the two parameters of a face: (a, b) of the rectangle as ordered, or one of them and the height above the
+/// Rectangle in the two parameters of a face: (a, b) of the ordered rectangle, or one of them and the height above the
 /// mid-surface on a side.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
@@ -34,7 +34,7 @@ pub(crate) struct Patch {
     to: [f64; 2],
 }
 
-/// Where a ray meets a patch.
+/// Intersection of a ray with a patch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PatchHit {
     pub(crate) range: f64,
@@ -51,7 +51,7 @@ impl Face {
         }
     }
 
-    /// Place on the rectangle as ordered, and height, of the parameters (a, b).
+    /// Returns the point of the ordered rectangle and the height of the parameters (a, b).
     fn place(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
         let (width, height, half) = (plate.width(), plate.height(), plate.thickness() / 2.0);
         match self {
@@ -64,7 +64,7 @@ impl Face {
         }
     }
 
-    /// 1 where da x db points out of the plate, else -1.
+    /// Returns 1 where da x db points out of the plate, else -1.
     fn outward(self) -> f64 {
         match self {
             Self::Top | Self::Side(Side::Bottom | Side::Right) => 1.0,
@@ -72,7 +72,7 @@ impl Face {
         }
     }
 
-    /// Point and derivatives by (a, b).
+    /// Returns the point and its derivatives by (a, b).
     fn point(self, plate: &Plate, a: f64, b: f64) -> (Vec3, Vec3, Vec3) {
         let [a, b, h] = self.place(plate, a, b);
         let ([u, v], [[u_a, u_b], [v_a, v_b]]) = plate.material(a, b);
@@ -87,7 +87,7 @@ impl Face {
 }
 
 impl Patch {
-    /// All patches of a plate.
+    /// Divides the faces of a plate into patches.
     pub(crate) fn all(plate: &Plate) -> Vec<Self> {
         let mut patches = Vec::new();
         let faces = [Face::Top, Face::Underside].into_iter().chain(Side::ALL.map(Face::Side));
@@ -116,7 +116,7 @@ impl Patch {
         }
     }
 
-    /// Number of the face, 0 to 5.
+    /// Returns the number of the face, 0 to 5.
     pub(crate) fn object(&self) -> u16 {
         match self.face {
             Face::Top => 0,
@@ -131,16 +131,16 @@ impl Patch {
         Bounds::of(points, MARGIN)
     }
 
-    /// Where the ray enters the plate through this patch: a root of X(a, b) = origin + t direction by Newton's
+    /// Returns the point where the ray enters the plate through this patch: a root of X(a, b) = origin + t direction by Newton's
     /// method from the patch's middle. A patch is small against its radii, so that a root on it is reached in three
     /// or four steps; a root elsewhere belongs to another patch. Near a horizon the ray may leave through the
-    /// patch that it entered by; then the other root is looked for from the scanner's side.
+    /// patch through which it entered; the other root is then searched from the scanner's side.
     pub(crate) fn cast(&self, plate: &Plate, ray: &Ray) -> Option<PatchHit> {
         let middle = [0, 1].map(|k| (self.from[k] + self.to[k]) / 2.0);
         let first = self.root(plate, ray, middle);
         let root = match first {
             Some(root) if !self.leaves(&root, ray) => root,
-            // Near a horizon: the ray left here, or the tangent plane in the middle holds the ray.
+            // Near a horizon: this root is the exit, or the ray lies in the tangent plane of the middle.
             _ => {
                 let [a, b] = first.map_or(middle, |root| root.parameters);
                 let (_, da, db) = self.face.point(plate, a, b);
@@ -162,7 +162,7 @@ impl Patch {
         root.normal.dot(&ray.direction) * self.face.outward() > 0.0
     }
 
-    /// Newton's method from `start`; gives up one patch away from this one.
+    /// Runs Newton's method from `start`; stops when the iterate is farther than two patch lengths from this patch.
     fn root(&self, plate: &Plate, ray: &Ray, start: [f64; 2]) -> Option<Root> {
         let [mut a, mut b] = start;
         for _ in 0..12 {
@@ -173,14 +173,14 @@ impl Patch {
                 return None;
             }
             let range = normal.dot(&(point - ray.origin)) / slope;
-            let miss = ray.at(range) - point;
-            if miss.norm_squared() < CLOSE * CLOSE {
+            let residual = ray.at(range) - point;
+            if residual.norm_squared() < CLOSE * CLOSE {
                 return Some(Root { range, parameters: [a, b], normal });
             }
-            // The miss lies in the tangent plane: split it along da and db.
+            // The residual lies in the tangent plane: resolve it along da and db.
             let area = normal.norm_squared();
-            a += miss.cross(&db).dot(&normal) / area;
-            b += da.cross(&miss).dot(&normal) / area;
+            a += residual.cross(&db).dot(&normal) / area;
+            b += da.cross(&residual).dot(&normal) / area;
             let near =
                 |x: f64, k: usize| (self.from[k] - 2.0 * PATCH..=self.to[k] + 2.0 * PATCH).contains(&x);
             if !near(a, 0) || !near(b, 1) {
@@ -191,7 +191,7 @@ impl Patch {
     }
 }
 
-/// A point common to a ray and the surface of a patch, with da x db there.
+/// Common point of a ray and the surface of a patch, with da x db there.
 struct Root {
     range: f64,
     parameters: [f64; 2],

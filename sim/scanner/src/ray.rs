@@ -1,39 +1,39 @@
-//! Rays and what they hit.
+//! Rays and hits.
 
 use platen_sim_plate::Vec3;
 
-/// What a beam hit.
+/// Object hit by a beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Label {
-    /// Nothing within reach.
+    /// No object within reach.
     #[default]
     Nothing,
-    /// The scanned face of the plate.
+    /// Upper, scanned face of the plate.
     PlateTop,
-    /// The other face.
+    /// Lower face of the plate.
     PlateUnderside,
-    /// One of the four side faces.
+    /// Side face of the plate.
     PlateSide,
-    /// A die that carries the plate.
+    /// Die that supports the plate.
     Die,
-    /// The press table.
+    /// Press table.
     Table,
-    /// Frame and ram.
+    /// Frame and ram of the press.
     Press,
-    /// RayCastHead floor.
+    /// Floor of the shop.
     Floor,
     /// Wall of the shop.
     Wall,
     /// Switch cabinet.
     Cabinet,
-    /// Somebody.
+    /// Person.
     Person,
-    /// A crane's chain.
+    /// Chain of a crane.
     Chain,
 }
 
-/// A half line from `origin` along the unit vector `direction`.
+/// Half line from `origin` along the unit vector `direction`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Metres.
@@ -43,22 +43,22 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// Point at `range` metres.
+    /// Returns the point at `range` metres.
     pub fn at(&self, range: f64) -> Vec3 {
         self.origin + self.direction * range
     }
 }
 
-/// The nearest thing on a ray.
+/// Nearest intersection on a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Metres from the ray's origin.
     pub range: f64,
     /// Cosine of the angle between the reversed beam and the surface normal.
     pub cos_incidence: f64,
-    /// What it is.
+    /// Kind of object.
     pub label: Label,
-    /// Which one it is: equal only for the same face of the same thing.
+    /// Identity of the object: equal only for the same face of the same object.
     pub object: u16,
     /// Material point of a hit on the plate, metres.
     pub uv: Option<[f64; 2]>,

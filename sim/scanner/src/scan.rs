@@ -1,4 +1,4 @@
-//! A whole scan, column after column, on several threads.
+//! Multi-threaded scan, delivered column by column in order.
 
 use crate::column::SimColumn;
 use crate::instrument::Instrument;
@@ -7,12 +7,12 @@ use crate::measure::{Trace, View};
 use crate::scene::Scene;
 use std::ops::{ControlFlow, Range};
 
-/// Columns worked on at a time: enough to keep threads busy, few enough to deliver steadily.
+/// Columns per batch: enough to keep all threads busy, few enough to deliver steadily.
 const BATCH: u32 = 64;
 
-/// Scans: hands every column, in order, to `deliver` until it says to stop.
+/// Scans a scene and passes every column, in order, to `deliver` until it returns `Break`.
 ///
-/// The result does not depend on `threads`: random numbers belong to columns.
+/// The result does not depend on `threads`: random numbers are assigned per column.
 pub fn scan(
     scene: &Scene,
     lattice: &SimLattice,
@@ -23,7 +23,7 @@ pub fn scan(
     scan_range(scene, lattice, instrument, threads, 0..lattice.n_columns, deliver)
 }
 
-/// Scans some neighbouring columns of a lattice; they are the same as in the whole scan.
+/// Scans a range of columns; they are equal to those of the whole scan.
 pub(crate) fn scan_range(
     scene: &Scene,
     lattice: &SimLattice,
@@ -38,7 +38,7 @@ pub(crate) fn scan_range(
     let mut first = columns.start.saturating_sub(1);
     for start in columns.clone().step_by(BATCH as usize) {
         let end = (start + BATCH).min(columns.end);
-        // One more than is measured: the neighbour of the last.
+        // One column more than is measured: the neighbour of the last.
         let traced = first + traces.len() as u32;
         traces
             .extend(parallel(traced..(end + 1).min(lattice.n_columns), threads, |column| view.trace(column)));
@@ -57,7 +57,7 @@ pub(crate) fn scan_range(
     ControlFlow::Continue(())
 }
 
-/// All columns of a scan.
+/// Scans a scene and returns all columns.
 pub fn scan_all(
     scene: &Scene,
     lattice: &SimLattice,
@@ -72,7 +72,7 @@ pub fn scan_all(
     columns
 }
 
-/// `work` for every column of a range, in order; neighbouring columns go to different threads.
+/// Runs `work` for every column of a range and returns the results in order; neighbouring columns run on different threads.
 fn parallel<T: Send>(columns: Range<u32>, threads: usize, work: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = threads.clamp(1, columns.len().max(1));
     if threads == 1 {

@@ -1,4 +1,4 @@
-//! What stands round the scanner.
+//! Scene of a scan: plate and surroundings with their bounding volume hierarchies.
 
 use crate::bounds::{Bounds, Tree};
 use crate::patch::{Patch, PatchHit};
@@ -7,13 +7,13 @@ use crate::solid::Solid;
 use crate::surroundings::{self, Surroundings};
 use platen_sim_plate::{Plate, Vec3};
 
-/// Object numbers of solids start here; those below are the plate's faces.
+/// First object number of solids; lower numbers are the plate's faces.
 const FIRST_SOLID: u16 = 16;
 
 /// Radius of a painted marker, metres.
 pub const MARKER_RADIUS: f64 = 0.02;
 
-/// Plate and surroundings, ready for casting rays. Scanner frame, metres; the scanner stands in the origin.
+/// Plate and surroundings, prepared for ray casting. Scanner frame, metres; the scanner is at the origin.
 #[derive(Debug, Clone)]
 pub struct Scene {
     plate: Option<Plate>,
@@ -24,13 +24,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A press shop round `plate`, or an empty press.
+    /// Builds a press shop around `plate`, or an empty press.
     pub fn new(plate: Option<Plate>, surroundings: &Surroundings) -> Self {
         let solids = surroundings::solids(plate.as_ref(), surroundings);
         Self::of(plate, solids)
     }
 
-    /// A plate and any solids.
+    /// Builds a scene of a plate and given solids.
     pub fn of(plate: Option<Plate>, solids: Vec<(Label, Solid)>) -> Self {
         let patches = plate.as_ref().map(Patch::all).unwrap_or_default();
         let bounds = |plate: &Plate| patches.iter().map(|patch| patch.bounds(plate)).collect();
@@ -40,17 +40,17 @@ impl Scene {
         Self { plate, patches, patch_tree, solids, solid_tree }
     }
 
-    /// The plate, when there is one.
+    /// Returns the plate, if any.
     pub fn plate(&self) -> Option<&Plate> {
         self.plate.as_ref()
     }
 
-    /// Everything but the plate.
+    /// Returns all objects except the plate.
     pub fn solids(&self) -> &[(Label, Solid)] {
         &self.solids
     }
 
-    /// The nearest hit within `reach` metres. Hits on the plate are exact to 1e-11 m.
+    /// Returns the nearest hit within `reach` metres. Hits on the plate are exact to 1e-11 m.
     pub fn cast(&self, ray: &Ray, reach: f64) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         let mut keep = |hit: Option<Hit>, limit: f64| match hit.filter(|hit| hit.range < limit) {
@@ -81,13 +81,13 @@ impl Scene {
         Some(Hit { range, cos_incidence, label: *label, object: FIRST_SOLID + index as u16, uv: None })
     }
 
-    /// True when a material point of the upper face is painted dark.
+    /// Returns true when a material point of the upper face lies on a painted marker.
     pub fn is_marker(&self, [u, v]: [f64; 2]) -> bool {
         let near = |marker: &[f64; 2]| (marker[0] - u).hypot(marker[1] - v) < MARKER_RADIUS;
         self.plate.as_ref().is_some_and(|plate| plate.markers().iter().any(near))
     }
 
-    /// True when nothing hides a point of the upper face from the scanner.
+    /// Returns true when a point of the upper face is visible from the scanner.
     pub fn sees(&self, point: Vec3) -> bool {
         let range = point.norm();
         let ray = Ray { origin: Vec3::zeros(), direction: point / range };

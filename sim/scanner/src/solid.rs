@@ -1,31 +1,31 @@
-//! The two solids that the surroundings are built of.
+//! Boxes and capsules, of which the surroundings consist, with closed-form ray intersection.
 
 use crate::bounds::Bounds;
 use crate::ray::Ray;
 use nalgebra::Isometry3;
 use platen_sim_plate::Vec3;
 
-/// A simple body.
+/// Solid body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Solid {
-    /// A box.
+    /// Box.
     Cuboid {
-        /// From the box's own frame (origin in its middle) to the scanner frame.
+        /// Transform from the box's own frame (origin in its middle) to the scanner frame.
         pose: Isometry3<f64>,
-        /// Half its edges, metres.
+        /// Half edge lengths, metres.
         half: Vec3,
     },
-    /// All points within `radius` of a segment; a ball when both ends agree.
+    /// Capsule: all points within `radius` of a segment; a ball when both ends agree.
     Capsule {
         /// Ends of the segment, metres.
         ends: [Vec3; 2],
-        /// Metres.
+        /// Radius, metres.
         radius: f64,
     },
 }
 
 impl Solid {
-    /// An upright box: its middle, edges, and turn about the vertical.
+    /// Creates an upright box from its middle, edge lengths, and rotation about the vertical.
     pub fn upright(middle: Vec3, edges: Vec3, yaw: f64) -> Self {
         Self::Cuboid { pose: Isometry3::new(middle, Vec3::z() * yaw), half: edges / 2.0 }
     }
@@ -44,7 +44,7 @@ impl Solid {
         }
     }
 
-    /// Range of the nearest hit from outside and the outward unit normal there.
+    /// Returns the range of the nearest hit from outside and the outward unit normal there.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Vec3)> {
         match self {
             Self::Cuboid { pose, half } => cuboid(ray, pose, half),
@@ -81,7 +81,7 @@ fn capsule(ray: &Ray, ends: &[Vec3; 2], radius: f64) -> Option<(f64, Vec3)> {
         }
     };
     if length_squared > 0.0 {
-        // Across the segment: |start + t d|^2 without the part along it.
+        // Infinite cylinder: |start + t d|^2 without the component along the segment.
         let across = |v: Vec3| v - along * (v.dot(&along) / length_squared);
         let (s, d) = (across(start), across(ray.direction));
         if let Some(range) = first_root(d.norm_squared(), s.dot(&d), s.norm_squared() - radius * radius) {
@@ -100,7 +100,7 @@ fn capsule(ray: &Ray, ends: &[Vec3; 2], radius: f64) -> Option<(f64, Vec3)> {
     nearest
 }
 
-/// Smaller root of a t^2 + 2 b t + c = 0.
+/// Returns the smaller root of a t^2 + 2 b t + c = 0.
 fn first_root(a: f64, b: f64, c: f64) -> Option<f64> {
     let discriminant = b * b - a * c;
     (a > 0.0 && discriminant >= 0.0).then(|| (-b - discriminant.sqrt()) / a)

@@ -1,12 +1,12 @@
-//! A bridge: the server beside a scanner that speaks the scan bridge protocol, for hosts to be tested on.
+//! Bridge: the server of the scan bridge protocol beside a scanner, for tests of hosts and drivers.
 //!
-//! Written from the protocol's page alone, so that a mistake of the driver and one of the page do not cancel. A
-//! [`Bridge`] serves scans of a [`Head`]: of a [`RayCastHead`], where rays are cast at a simulated plate, or of a
-//! [`Recording`] of earlier frames. Scans lie on disk while they are measured and sent, so that their size costs no
-//! memory; a driver that is slow, or comes back after its connection broke, gets every column all the same.
+//! It is written from the protocol's page alone, so that an error of the driver and one of the page do not cancel. A [`Bridge`]
+//! serves the scans of a [`Head`]: of a [`RayCastHead`], which casts rays at a simulated plate, or of a [`Recording`] of earlier
+//! frames. Scans are spooled to disk while they are measured and sent, so that their size costs no memory and a driver that is slow or
+//! reconnects receives every column.
 //!
-//! A scan takes the time of a real scanner, scaled. [`FaultKind`] lists what can go wrong; what goes wrong with the
-//! light (noise, bias, warm-up, two faces) is in [`crate::Instrument`].
+//! A scan takes the time of a real scanner, scaled by a factor. [`FaultKind`] lists the faults of link, bridge and scanner;
+//! errors of the measurement (noise, bias, warm-up, two faces) belong to [`crate::Instrument`].
 
 mod bridge;
 mod config;

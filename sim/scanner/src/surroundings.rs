@@ -1,23 +1,23 @@
-//! A press shop round the plate.
+//! Surroundings of the plate: dies, table, press, shop, people, a chain.
 
 use crate::ray::Label;
 use crate::solid::Solid;
 use platen_sim_plate::{Plate, PlateState, Vec3};
 
-/// What stands in the shop. The scanner is `floor_m` above the floor and looks along +x to the press.
+/// Objects of the shop. The scanner is `-floor` metres above the floor and looks along +x to the press.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surroundings {
     /// Height of the floor in the scanner frame, metres (negative).
     pub floor: f64,
     /// Distance to the wall behind the press, metres.
     pub wall: f64,
-    /// Frame and ram behind the plate.
+    /// Frame and ram behind the plate are present.
     pub press: bool,
-    /// Somebody stands beside the plate, out of the way.
+    /// A person stands beside the plate without hiding it.
     pub bystander: bool,
-    /// Somebody stands before the plate and hides part of its near edge.
+    /// A person stands in front of the plate and hides part of its near edge.
     pub person_in_front: bool,
-    /// A crane's chain hangs before the plate and hides a strip.
+    /// The chain of a crane hangs in front of the plate and hides a strip.
     pub chain: bool,
 }
 
@@ -28,7 +28,7 @@ impl Default for Surroundings {
 }
 
 impl Surroundings {
-    /// An empty hall.
+    /// Returns surroundings without press and people.
     pub fn bare() -> Self {
         Self { press: false, bystander: false, ..Self::default() }
     }
@@ -40,7 +40,7 @@ const DIE_RADIUS: f64 = 0.07;
 /// Gap between table and plate, where the dies stand, metres.
 const UNDER_PLATE: f64 = 0.35;
 
-/// All solids round `plate` (or round the place where a plate of default pose would lie).
+/// Returns all solids around `plate`, or around a plate of default pose when the press is empty.
 pub(crate) fn solids(plate: Option<&Plate>, around: &Surroundings) -> Vec<(Label, Solid)> {
     let home = PlateState::flat(3000.0, 2500.0, 36.0).pose.scanner_from_plate().translation.vector;
     let centre = plate.map_or(home, |plate| plate.scanner_from_plate().translation.vector);
@@ -49,7 +49,7 @@ pub(crate) fn solids(plate: Option<&Plate>, around: &Surroundings) -> Vec<(Label
         corners.into_iter().fold(centre.z, f64::min)
     });
     let table_top = lowest - UNDER_PLATE;
-    // Directions away from the scanner and to its left, seen from the plate.
+    // Horizontal directions away from the scanner and to the left of that.
     let away = Vec3::new(centre.x, centre.y, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
     let left = Vec3::new(-away.y, away.x, 0.0);
     let yaw = away.y.atan2(away.x);
@@ -94,7 +94,7 @@ fn walls(around: &Surroundings) -> impl Iterator<Item = Solid> {
     .into_iter()
 }
 
-/// Dies in rows under the plate; their round heads touch its underside.
+/// Returns dies in rows under the plate; their round heads touch its underside.
 fn dies(plate: &Plate, table_top: f64) -> impl Iterator<Item = Solid> {
     let shares = [1.0 / 6.0, 0.5, 5.0 / 6.0];
     let at = move |i: usize| (shares[i / 2] * plate.width(), (0.2 + 0.6 * (i % 2) as f64) * plate.height());
@@ -105,7 +105,7 @@ fn dies(plate: &Plate, table_top: f64) -> impl Iterator<Item = Solid> {
     })
 }
 
-/// The place of the press: directions seen from the plate.
+/// Local directions at the plate by which the press is placed.
 struct Place {
     centre: Vec3,
     away: Vec3,
@@ -122,7 +122,7 @@ impl Place {
         Vec3::new(flat.x, flat.y, z)
     }
 
-    /// A box that stands on the floor; its edges run away, left and up.
+    /// Returns a box that stands on the floor; its edges point away, left and up.
     fn upright(&self, away: f64, left: f64, height: f64, edges: [f64; 3]) -> Solid {
         let middle = self.at(away, left, self.floor + height / 2.0);
         Solid::upright(middle, Vec3::from(edges), self.yaw)
@@ -134,7 +134,7 @@ impl Place {
         self.upright(0.0, 0.0, height, [edge, edge, height])
     }
 
-    /// Two columns, a beam and the ram behind the plate.
+    /// Returns two columns, a beam and the ram behind the plate.
     fn press(&self) -> impl Iterator<Item = Solid> {
         let behind = self.reach + 0.6;
         let aside = self.reach + 0.5;
@@ -149,7 +149,7 @@ impl Place {
         .into_iter()
     }
 
-    /// A person 1.78 m tall.
+    /// Returns the limbs of a person 1.78 m tall.
     fn person(&self, away: f64, left: f64) -> impl Iterator<Item = Solid> {
         let floor = self.floor;
         let limb = move |side: f64, from: f64, to: f64, radius: f64| {
@@ -167,7 +167,7 @@ impl Place {
         .into_iter()
     }
 
-    /// Links of 20 mm steel from above the beam of sight down to the plate's height, every other one turned.
+    /// Returns chain links of 20 mm steel from above the line of sight down to the plate's height, alternately rotated.
     fn chain(&self) -> impl Iterator<Item = Solid> {
         const PITCH: f64 = 0.08;
         let top = 0.5;

@@ -1,4 +1,4 @@
-//! What a measurement of a simulated scan should find.
+//! Ground truth of a simulated scan, as a JSON document.
 
 use crate::column::{SimColumn, SimState};
 use crate::ray::Label;
@@ -6,27 +6,27 @@ use crate::scene::Scene;
 use platen_sim_plate::{Plate, PlateState};
 use serde_json::{Value, json};
 
-/// Places of the coarse grid along each direction.
+/// Points of the coarse grid along each direction.
 const GRID: u32 = 21;
 
-/// Largest distance of neighbouring places of the fine grid, metres.
+/// Largest distance of neighbouring points of the fine grid, metres.
 const FINE: f64 = 0.05;
 
-/// How many cells of a scan saw what.
+/// Numbers of cells of a scan by what they hit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CellCounts {
     /// All cells.
     pub cells: u64,
     /// Cells whose middle ray meets the plate's upper face.
     pub plate_top: u64,
-    /// Those of them that were measured.
+    /// Valid cells among them.
     pub plate_top_valid: u64,
     /// Cells whose footprint straddles an edge.
     pub mixed: u64,
 }
 
 impl CellCounts {
-    /// AtomicCounters a column in.
+    /// Adds the cells of a column.
     pub fn add(&mut self, column: &SimColumn) {
         for (truth, state) in column.truth.iter().zip(&column.state) {
             let on_plate = truth.label == Label::PlateTop;
@@ -38,11 +38,11 @@ impl CellCounts {
     }
 }
 
-/// The truth as a document: the plate's state, corners, markers and two grids of the upper face (metres, scanner frame),
-/// curvature of the mid-surface (1/m), and how many cells saw it.
+/// Returns the ground truth as a document: the plate's state, corners, markers and two grids of the upper face (metres, scanner frame),
+/// curvature of the mid-surface (1/m), and numbers of cells.
 ///
-/// Grids are even over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 places with curvatures, `face` is
-/// finer, at most 50 mm from place to place, positions only. Null when no plate is in the scene.
+/// Grids are regular over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 points with curvatures, `face` is
+/// finer, with at most 50 mm between points, positions only. The result is null when the scene has no plate.
 pub fn truth_document(state: &PlateState, scene: &Scene, counts: &CellCounts) -> Value {
     let Some(plate) = scene.plate() else { return Value::Null };
     let corners: Vec<[f64; 3]> = plate.corners().map(Into::into).to_vec();
@@ -79,7 +79,7 @@ fn position(plate: &Plate, u: f64, v: f64) -> Value {
     json!([x, y, z])
 }
 
-/// A value for each place of an even grid.
+/// Evaluates `value` at each point of a regular grid.
 fn places(plate: &Plate, [nu, nv]: [u32; 2], value: &dyn Fn(f64, f64) -> Value) -> Vec<Value> {
     let share = |k: u32, n: u32| f64::from(k) / f64::from(n - 1);
     let at = |k: u32| (share(k % nu, nu) * plate.width(), share(k / nu, nv) * plate.height());

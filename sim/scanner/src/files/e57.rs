@@ -1,4 +1,4 @@
-//! E57, structured: row and column of every cell, intensity, validity.
+//! E57 writer (ASTM E2807), structured: row and column indices, intensity and invalid state of every cell.
 
 use super::{Cell, FileOrder, SimScan};
 use crate::measure::INTENSITY_MAX;
@@ -6,7 +6,7 @@ use e57::{E57Writer, IntensityLimits, RawValues, Record, RecordDataType, RecordN
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-/// How coordinates are stored.
+/// Encoding of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum E57Encoding {
     /// x, y, z in steps of 10 micrometres.
@@ -56,7 +56,7 @@ impl E57Encoding {
         }
     }
 
-    /// Coordinates and validity: 0 measured, 1 direction only, 2 nothing.
+    /// Returns coordinates and invalid state: 0 valid, 1 direction only, 2 invalid.
     fn coordinates(self, cell: &Cell) -> ([f64; 3], i64) {
         match (self, cell.point(), cell.range) {
             (Self::Spherical, _, Some(range)) => ([range, wrapped(cell.azimuth), cell.elevation], 0),
@@ -67,7 +67,7 @@ impl E57Encoding {
     }
 }
 
-/// Azimuth in (-pi, pi], as the standard asks.
+/// Wraps an azimuth into (-pi, pi], as the standard requires.
 fn wrapped(azimuth: f64) -> f64 {
     azimuth - TAU * ((azimuth - PI) / TAU).ceil()
 }
@@ -92,7 +92,7 @@ fn values(encoding: E57Encoding, cell: &Cell) -> RawValues {
     values
 }
 
-/// Writes all cells; those without echo are flagged.
+/// Writes all cells; those without echo have an invalid state.
 pub(super) fn write(scan: &SimScan, path: &Path, encoding: E57Encoding, order: FileOrder) -> Result<()> {
     let mut file = E57Writer::from_file(path, "platen-sim-file")?;
     let mut cloud = file.add_pointcloud("platen-sim-scan", prototype(encoding, scan.size(order)))?;

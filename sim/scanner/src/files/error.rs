@@ -1,24 +1,24 @@
-//! Why a file was not written.
+//! Errors of writing scan files.
 
 use std::path::PathBuf;
 
-/// An error with the file's name.
+/// Error of writing a file, with its path.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The system refuses.
+    /// Error of the operating system.
     #[error("{path}: cannot be written: {source}")]
     Io {
-        /// File.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The E57 library refuses.
+    /// Error of the E57 library.
     #[error("{path}: cannot be written: {source}")]
     E57 {
-        /// File.
+        /// Path of the file.
         path: PathBuf,
-        /// What the library says.
+        /// Error of the library.
         source: ::e57::Error,
     },
 }

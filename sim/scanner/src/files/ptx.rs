@@ -1,10 +1,10 @@
-//! PTX: ten lines of header, then every cell; a cell without echo is `0 0 0 0.5`.
+//! PTX writer: ten header lines, then every cell; a cell without echo is `0 0 0 0.5`.
 
 use super::{FileOrder, SimScan};
 use crate::measure::INTENSITY_MAX;
 use std::io::{Result, Write};
 
-/// Line 1 holds the columns, line 2 the rows, the fast index. Position and matrix are those of the scanner's own frame.
+/// Writes a PTX file. Line 1 is the number of columns, line 2 that of rows, the fast index. Position and matrix are the identity.
 pub(super) fn write(scan: &SimScan, out: &mut impl Write, crlf: bool, order: FileOrder) -> Result<()> {
     let end = if crlf { "\r\n" } else { "\n" };
     let [rows, columns] = scan.size(order);

@@ -1,9 +1,9 @@
-//! XYZ with row and column first; cells without echo are left out.
+//! XYZ writer with row and column first; cells without echo are omitted.
 
 use super::{FileOrder, SimScan};
 use std::io::{Result, Write};
 
-/// `row column x y z reflectance`, metres, reflectance 0..=2047.
+/// Writes lines `row column x y z reflectance`, metres, reflectance 0..=2047.
 pub(super) fn write(scan: &SimScan, out: &mut impl Write, order: FileOrder) -> Result<()> {
     for cell in scan.cells(order) {
         if let Some([x, y, z]) = cell.point() {

@@ -1,4 +1,4 @@
-//! XYB: a short text header, then 26 bytes per cell, little endian; a cell without echo is zero.
+//! XYB writer: a short text header, then 26 bytes per cell, little endian; a cell without echo is zero.
 
 use super::{FileOrder, SimScan};
 use std::io::{Result, Write};

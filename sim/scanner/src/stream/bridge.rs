@@ -1,4 +1,4 @@
-//! A bridge: its port, and a thread for each connection.
+//! Bridge: a listening port, and a thread for each connection.
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use super::counters::BridgeCounters;
 use super::head::Head;
 use super::shared::Shared;
 
-/// A running bridge; dropping it ends it.
+/// Running bridge; dropping it stops it.
 #[derive(Debug)]
 pub struct Bridge {
     address: SocketAddr,
@@ -19,10 +19,10 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Listens; scans are taken with `head`.
+    /// Starts listening; scans are taken by `head`.
     ///
     /// # Errors
-    /// When the port is taken.
+    /// The port is in use, or the folder of recordings cannot be created.
     pub fn start(config: BridgeConfig, head: Box<dyn Head>) -> std::io::Result<Self> {
         if let Some(folder) = &config.record {
             std::fs::create_dir_all(folder)?;
@@ -37,12 +37,12 @@ impl Bridge {
         Ok(Self { address, shared, port: Some(port) })
     }
 
-    /// Where it listens.
+    /// Returns the address of the port.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What it has done so far.
+    /// Returns the counters since the start.
     pub fn counters(&self) -> BridgeCounters {
         self.shared.counts.read()
     }
@@ -51,7 +51,7 @@ impl Bridge {
 impl Drop for Bridge {
     fn drop(&mut self) {
         self.shared.end();
-        // Wakes the thread that waits for connections.
+        // Unblocks the thread that accepts connections.
         let _ = TcpStream::connect(self.address);
         if let Some(port) = self.port.take() {
             let _ = port.join();

@@ -1,33 +1,33 @@
-//! How a bridge serves.
+//! Configuration of a bridge.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use super::fault::Fault;
 
-/// How a bridge serves.
+/// Configuration of a bridge.
 #[derive(Debug, Clone)]
 pub struct BridgeConfig {
-    /// Where it listens; port 0 lets the system choose.
+    /// Address of the port; port 0 lets the system choose.
     pub address: SocketAddr,
-    /// Serial number of its scanner.
+    /// Serial number of the scanner.
     pub serial: String,
-    /// Columns are sent while the head turns. The vendor's software gives none before the scan's file is closed.
+    /// Columns are sent while the head rotates. The vendor's software delivers none before the scan's file is closed.
     pub live: bool,
-    /// So many scans are kept.
+    /// Number of scans kept for Resume.
     pub kept_scans: usize,
-    /// Share of a real scanner's time that a scan takes; 0: no longer than the computer needs.
+    /// Duration of a scan relative to a real scanner; 0: as fast as the computer allows.
     pub time_scale: f64,
-    /// Folder in which every scan is kept as a recording, `scan-NUMBER.psb`.
+    /// Folder in which every scan is recorded as `scan-NUMBER.psb`.
     pub record: Option<PathBuf>,
-    /// What goes wrong.
+    /// Injected faults.
     pub faults: Vec<Fault>,
-    /// Seed of what goes wrong by chance.
+    /// Seed of random faults.
     pub seed: u64,
 }
 
 impl Default for BridgeConfig {
-    /// Loopback, live, in no time, without faults.
+    /// Returns a bridge on loopback, live, at full speed, without faults.
     fn default() -> Self {
         Self {
             address: (Ipv4Addr::LOCALHOST, 0).into(),

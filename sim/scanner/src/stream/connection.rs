@@ -1,5 +1,5 @@
-//! One connection: a thread reads what the driver says, another sends. Heartbeats and Abort are heard however much is
-//! waiting to be sent.
+//! Connection to one driver. One thread reads, another sends, so that Heartbeat and Abort take effect however many columns wait to
+//! be sent.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -22,26 +22,26 @@ use super::message::{
 };
 use super::shared::{Scan, Shared};
 
-/// Time between two Status frames.
+/// Interval of Status frames.
 const STATUS: Duration = Duration::from_millis(900);
 
-/// Columns sent between two looks at what the driver says.
+/// Columns sent between two checks for incoming frames.
 const ROUND: usize = 16;
 
-/// The connection ends.
+/// End of the connection.
 struct Hangup;
 
 type Flow = Result<(), Hangup>;
 
-/// A scan that is being sent.
+/// Progress of sending a scan.
 struct Sending {
     scan: Arc<Scan>,
-    /// Which columns are still to be sent; all of them until the lattice is known.
+    /// Columns still to be sent, by number; `None` until the lattice is known.
     requested: Option<Vec<bool>>,
     missing: Option<Vec<[u32; 2]>>,
-    /// Columns looked at, in the order they were measured.
+    /// Number of columns examined, in the order of measurement.
     examined: usize,
-    /// Columns to be sent next.
+    /// Columns to send next.
     next: VecDeque<u32>,
 }
 
@@ -56,7 +56,7 @@ struct Connection<'a> {
     events: Sender<Event>,
 }
 
-/// Serves a driver until one side hangs up.
+/// Serves a driver until one side closes the connection.
 pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
     let (events, incoming) = channel();
     let Ok(reading) = stream.try_clone() else { return };
@@ -74,24 +74,24 @@ pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
         columns_sent: 0,
         events,
     };
-    // Small frames must not wait for large ones to fill a packet.
+    // Small frames must not be delayed by Nagle's algorithm.
     let _ = connection.stream.set_nodelay(true);
     let Err(Hangup) = connection.run(&incoming);
-    // The reader ends with the connection; one that has gone needs no hanging up.
+    // The reader ends with the connection; an error means that it is closed already.
     let _ = connection.stream.shutdown(Shutdown::Both);
     let _ = reader.join();
 }
 
-/// Reads until the driver has gone. What cannot wait is done here.
+/// Reads frames until the connection ends. Renews the lease and executes Abort at once.
 fn read(mut stream: TcpStream, connection: u32, shared: &Shared, events: &Sender<Event>) {
     for due in 0.. {
         let frame = match frame::read(&mut stream, due) {
             Ok(frame) => frame,
             Err(error) => {
                 if !matches!(error, FrameError::Closed) {
-                    tracing::warn!(connection, %error, "the driver is hung up on");
+                    tracing::warn!(connection, %error, "connection to the driver closed: invalid frame");
                 }
-                // A sender that has ended needs no word.
+                // An error means that the sending thread has ended.
                 let _ = events.send(Event::Closed);
                 return;
             }
@@ -144,21 +144,21 @@ impl Connection<'_> {
             (frame::HEARTBEAT, _) => Ok(()),
             (kind, Some(_)) if kind & frame::CRITICAL == 0 => Ok(()),
             (frame::CONFIGURE | frame::START | frame::RESUME | frame::ABORT, Some(_)) if !controls => {
-                self.refuse(0, &Refusal::new("denied", "a monitor only listens"))
+                self.refuse(0, &Refusal::new("denied", "a monitor may not send commands"))
             }
             (frame::CONFIGURE, Some(_)) => self.configure(frame),
             (frame::START, Some(_)) => self.start(frame),
             (frame::RESUME, Some(_)) => self.resume(frame),
-            // The reader has done it already.
+            // Executed by the reader already.
             (frame::ABORT, Some(_)) => Ok(()),
             (kind, _) => {
-                self.refuse(0, &Refusal::new("unknown_type", format!("{kind:#06x} now")))?;
+                self.refuse(0, &Refusal::new("unknown_type", format!("{kind:#06x} is not allowed here")))?;
                 Err(Hangup)
             }
         }
     }
 
-    /// The message in a frame, or a refusal that names what is wrong.
+    /// Parses the message in a frame; refuses an invalid one with the reason.
     fn parse<T: DeserializeOwned>(&mut self, frame: &Frame) -> Result<T, Hangup> {
         match serde_json::from_slice(&frame.payload) {
             Ok(message) => Ok(message),
@@ -173,7 +173,7 @@ impl Connection<'_> {
         let hello: Hello = self.parse(frame)?;
         let [lowest, highest] = hello.versions;
         if lowest > frame::VERSION || highest < frame::VERSION {
-            self.refuse(0, &Refusal::new("version", "this bridge speaks 1.0"))?;
+            self.refuse(0, &Refusal::new("version", "this bridge supports version 1.0"))?;
             return Err(Hangup);
         }
         if hello.role == Role::Controller
@@ -205,7 +205,7 @@ impl Connection<'_> {
         self.send_message(frame::CAPABILITIES, 0, &capabilities)
     }
 
-    /// What would be done.
+    /// Plans a scan, with the faults that prevent or alter it.
     fn plan(&self, settings: ScanSettings) -> Result<super::head::Plan, Refusal> {
         if let Some(left) = self.shared.remaining_at_start(FaultKind::Asleep) {
             let text = "the scanner is starting up";
@@ -279,7 +279,7 @@ impl Connection<'_> {
         self.sending = Some(Sending { scan, requested: None, missing, examined: 0, next });
     }
 
-    /// True when something can be sent at once.
+    /// Returns true when a frame of the scan can be sent at once.
     fn can_send(&self) -> bool {
         let Some(sending) = &self.sending else { return false };
         let spool = &sending.scan.spool;
@@ -289,7 +289,7 @@ impl Connection<'_> {
         }
     }
 
-    /// Sends what has come of the scan that is asked for.
+    /// Sends the available frames of the requested scan.
     fn send_available(&mut self) -> Flow {
         let Some(mut sending) = self.sending.take() else { return Ok(()) };
         let scan = Arc::clone(&sending.scan);
@@ -305,7 +305,7 @@ impl Connection<'_> {
             sending.requested = Some(requested_columns(begin.columns, sending.missing.as_deref()));
             self.send_message(frame::SCAN_BEGIN, number, &ScanBegin { job: spool.job.clone(), begin })?;
         }
-        // Looked at before the columns: whatever came before the end is seen then.
+        // Read before the columns, so that no column before the end is missed.
         let ended = spool.ended();
         if sending.collect(&mut |end| self.shared.frame_faults().below(end), self.within()) {
             for column in sending.next.drain(..) {
@@ -324,7 +324,7 @@ impl Connection<'_> {
         }
     }
 
-    /// Columns are shuffled within so many.
+    /// Returns the number of columns within which the order is shuffled.
     fn within(&self) -> usize {
         self.shared.frame_faults().persistent(FaultKind::Shuffled).map_or(1, |n| n.max(1) as usize)
     }
@@ -343,7 +343,7 @@ impl Connection<'_> {
         self.send_message(frame::SCAN_END, scan, &end)
     }
 
-    /// Sends a frame, or what becomes of it on its way.
+    /// Sends a frame through the fault injection.
     fn send(&mut self, frame: Frame) -> Flow {
         let steps = self.shared.frame_faults().apply(frame, self.columns_sent);
         for step in steps {
@@ -389,7 +389,7 @@ impl Connection<'_> {
 }
 
 impl Sending {
-    /// Puts the next columns that are requested into `next`, `within` at a time in random order; false when none came.
+    /// Moves the next requested columns to `next`, shuffled among `within`; returns false when there are none.
     fn collect(&mut self, below: &mut dyn FnMut(u32) -> u32, within: usize) -> bool {
         let Some(requested) = &mut self.requested else { return false };
         while self.next.len() < ROUND.max(within) {
@@ -408,14 +408,14 @@ impl Sending {
     }
 }
 
-/// Which columns are to be sent.
+/// Returns which columns are to be sent, by number.
 fn requested_columns(columns: u32, missing: Option<&[[u32; 2]]>) -> Vec<bool> {
     let Some(missing) = missing else { return vec![true; columns as usize] };
     let asked = |column: u32| missing.iter().any(|[first, last]| (*first..=*last).contains(&column));
     (0..columns).map(asked).collect()
 }
 
-/// How things stand.
+/// Builds a Status message.
 fn status(shared: &Shared) -> Status {
     let is_active = |kind| shared.is_active(kind);
     let running = shared.running();
@@ -437,10 +437,10 @@ fn status(shared: &Shared) -> Status {
         except(3, "the battery is at 4 %".to_owned());
     }
     if is_active(FaultKind::Temperature) {
-        except(3, "the scanner is at 46 degrees, at most 40 are allowed".to_owned());
+        except(3, "the temperature is 46 degrees C, at most 40 are permitted".to_owned());
     }
     if is_active(FaultKind::Contamination) {
-        except(3, "the mirror is dirty".to_owned());
+        except(3, "the mirror is contaminated; clean it".to_owned());
     }
     Status {
         state,
@@ -453,13 +453,13 @@ fn status(shared: &Shared) -> Status {
     }
 }
 
-/// What is settings, as the scanner takes it.
+/// Applies the fault `params-altered` to the requested settings; returns them with a note.
 fn altered(shared: &Shared, settings: ScanSettings) -> (ScanSettings, Vec<String>) {
     if !shared.is_active(FaultKind::ParamsAltered) || settings.rate_kpts <= 122 {
         return (settings, Vec::new());
     }
     let note = format!(
-        "rate_kpts: {} was asked for, the scanner took {}",
+        "rate_kpts: {} was requested, the scanner set {}",
         settings.rate_kpts,
         settings.rate_kpts / 2
     );

@@ -1,31 +1,31 @@
-//! What a bridge has done, counted by all its connections.
+//! Counters of a bridge, shared by its connections.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde::Serialize;
 
-/// What a bridge has done.
+/// Counters of a bridge since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct BridgeCounters {
-    /// Connections taken.
+    /// Connections accepted.
     pub connections: u32,
-    /// Scans that the head began.
+    /// Scans started by the head.
     pub scans: u32,
-    /// Start frames.
+    /// Start frames received.
     pub starts: u32,
-    /// Resume frames.
+    /// Resume frames received.
     pub resumes: u32,
-    /// Scans that were aborted.
+    /// Scans aborted.
     pub aborts: u32,
     /// Column frames sent.
     pub columns_sent: u32,
-    /// Columns of the scan that was begun last.
+    /// Columns of the latest scan.
     pub columns: u32,
-    /// Connections that a fault has cut.
+    /// Connections cut by a fault.
     pub cuts: u32,
 }
 
-/// Counters of [`BridgeCounters`].
+/// Atomic form of [`BridgeCounters`].
 #[derive(Debug, Default)]
 pub(super) struct AtomicCounters {
     pub(super) connections: AtomicU32,
@@ -39,7 +39,7 @@ pub(super) struct AtomicCounters {
 }
 
 impl AtomicCounters {
-    /// As they stand now.
+    /// Returns the present values.
     pub(super) fn read(&self) -> BridgeCounters {
         let read = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
         BridgeCounters {
@@ -55,7 +55,7 @@ impl AtomicCounters {
     }
 }
 
-/// AtomicCounters one up.
+/// Increments a counter.
 pub(super) fn increment(counter: &AtomicU32) {
     counter.fetch_add(1, Ordering::Relaxed);
 }

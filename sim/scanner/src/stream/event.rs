@@ -1,14 +1,14 @@
-//! What happens to a connection: told by its reader, and by the scans that it listens to.
+//! Events of a connection, from its reader and from the scan being sent.
 
 use super::frame::Frame;
 
-/// What a connection waits for.
+/// Event of a connection.
 #[derive(Debug)]
 pub(super) enum Event {
-    /// The driver says this.
+    /// Frame received from the driver.
     Frame(Frame),
-    /// The driver has gone, or what it says is no frame.
+    /// Connection closed, or invalid frame received.
     Closed,
-    /// A scan has grown or ended.
+    /// New columns, or the end of the scan.
     ScanAdvanced,
 }

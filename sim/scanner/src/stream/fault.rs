@@ -1,4 +1,4 @@
-//! What goes wrong between scanner and host, by name.
+//! Faults of link, bridge and scanner, by name.
 
 use std::str::FromStr;
 
@@ -6,97 +6,97 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as Unknown;
 
-/// A fault of link, bridge or scanner. `number` is the column, the share (one in so many) or the milliseconds that the
-/// kind says; 1 where it says nothing.
+/// Fault of link, bridge or scanner. The parameter `number` is a column, a share (one in n) or milliseconds, as defined by the
+/// kind; 1 by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// Kind of fault.
     pub kind: FaultKind,
-    /// Where, how often or how long.
+    /// Parameter n of the kind.
     pub number: u32,
 }
 
-/// Kinds of faults. On the command line their names are written as `drop-mid-scan=17`.
+/// Kinds of faults with their parameter n. On the command line: `drop-mid-scan=17`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// The connection is cut before this many columns were sent, once.
+    /// Cuts the connection after n columns, once.
     DropMidScan,
-    /// Every connection is cut after so many columns.
+    /// Cuts every connection after n columns.
     DropOften,
-    /// The bridge dies before this many columns were sent and starts again without its scans.
+    /// Restarts the bridge after n columns, without its scans, once.
     BridgeKilled,
-    /// After a cut nobody is let in for so many milliseconds.
+    /// Refuses connections for n milliseconds after a cut.
     ReconnectTooFast,
-    /// The connection is cut when the first Start has come, before its answer.
+    /// Cuts the connection after the first Start, before its answer.
     ReplyLost,
-    /// Every column comes so many milliseconds late.
+    /// Delays every column by n milliseconds.
     Slow,
-    /// Once, in the middle of a scan, nothing is said for so many milliseconds.
+    /// Stops sending for n milliseconds in the middle of a scan, once.
     Stalled,
-    /// A bit flips in one of so many columns.
+    /// Flips a bit in the payload of one in n columns.
     CorruptFrame,
-    /// A bit flips in the first ScanEnd.
+    /// Flips a bit in the first ScanEnd.
     CorruptEnd,
-    /// A bit flips in the header before this column, once.
+    /// Flips a bit in a header before column n, once.
     CorruptHeader,
-    /// A frame of 2 MiB is announced before this column, once.
+    /// Announces a frame of 2 MiB before column n, once.
     Oversize,
-    /// One of so many columns is not sent the first time.
+    /// Omits one in n columns the first time.
     MissingColumn,
-    /// Columns come in random order within so many.
+    /// Shuffles columns within groups of n.
     Shuffled,
-    /// One of so many columns comes twice.
+    /// Sends one in n columns twice.
     Repeated,
-    /// Frames of another scan come between the columns.
+    /// Inserts frames of another scan between the columns.
     LateFrames,
-    /// A column without a payload comes before this column.
+    /// Sends a Column frame without payload before column n, once.
     ZeroLength,
-    /// A column comes again with other content.
+    /// Repeats a column with other content after n columns, once.
     TornColumn,
-    /// The digest is not that of the columns.
+    /// Sends a wrong digest in ScanEnd.
     WrongDigest,
-    /// ScanEnd never comes.
+    /// Never sends ScanEnd.
     EventLost,
-    /// A frame of an unknown type that may be skipped comes before this column.
+    /// Sends a non-critical frame of an unknown type before column n, once.
     UnknownFrame,
-    /// A frame of an unknown type that must be understood comes before this column.
+    /// Sends a critical frame of an unknown type before column n, once.
     UnknownCommand,
-    /// The bridge speaks version 2.
+    /// Sends frames of version 2.
     VersionMismatch,
-    /// Somebody else holds the lease for so many milliseconds.
+    /// Another client holds the lease for the first n milliseconds.
     LeaseStuck,
-    /// The scanner is off or starting up for so many milliseconds.
+    /// The scanner is off or starting up for the first n milliseconds.
     Asleep,
-    /// Capabilities come so many milliseconds late, the first time.
+    /// Delays the first Capabilities by n milliseconds.
     ConnectLate,
-    /// The mirror does not come up to speed so many times; after five the scanner gives up.
+    /// The mirror fails to reach its speed n times; the scan fails when n exceeds five.
     StartStall,
-    /// The status says `ready` at all times.
+    /// Status always reports `ready`.
     StaleStatus,
-    /// The progress stays at 0, then is 1.
+    /// The progress in Status stays at 0.
     ProgressJump,
-    /// The scanner takes another measuring rate than asked for.
+    /// The scanner sets half the requested measuring rate.
     ParamsAltered,
-    /// The bridge's disk holds so many kilobytes.
+    /// The bridge's disk is full after n kilobytes.
     Overflow,
     /// The vendor's library is not registered on the bridge's computer.
     SdkMissing,
-    /// There is no card in the scanner.
+    /// The scanner has no memory card.
     CardMissing,
-    /// The card is full after this many columns.
+    /// The memory card is full after n columns.
     StorageFull,
-    /// The battery is low: a warning.
+    /// Status warns of a low battery.
     BatteryLow,
-    /// It is 46 degrees warm: a warning.
+    /// Status warns of a temperature of 46 degrees C.
     Temperature,
-    /// The mirror is dirty: a warning.
+    /// Status warns of a contaminated mirror.
     Contamination,
-    /// The scanner is pushed after this many columns, notices and stops.
+    /// The scanner is moved after n columns, detects it and stops.
     Tilted,
-    /// Another scanner answers.
+    /// Another scanner, with another serial number, answers.
     WrongScanner,
-    /// The scanner's clock says 1970, and falls back to 0 in the middle.
+    /// The scanner's clock is at 1970 and falls back to 0 during the scan.
     ClockJump,
 }
 

@@ -1,14 +1,14 @@
-//! Frames on the wire and in recordings, section 1 of the protocol's page. Written from that page alone.
+//! Frames on the wire and in recordings: section 1 of the protocol's page, written from that page alone.
 
 use std::io::{ErrorKind, Read};
 
 /// Bytes before the payload.
 pub(super) const HEADER: usize = 32;
 
-/// Most bytes of a payload.
+/// Largest payload, bytes.
 pub(super) const MAX_PAYLOAD: usize = 1 << 20;
 
-/// The version spoken.
+/// Supported version.
 pub(super) const VERSION: [u8; 2] = [1, 0];
 
 pub(super) const HELLO: u16 = 0x8001;
@@ -24,10 +24,10 @@ pub(super) const ERROR: u16 = 0x800A;
 pub(super) const SCAN_BEGIN: u16 = 0x8010;
 pub(super) const COLUMN: u16 = 0x8011;
 pub(super) const SCAN_END: u16 = 0x8012;
-/// Who does not know a type with this bit must refuse it.
+/// Critical bit: a receiver that does not know the type must reject the frame.
 pub(super) const CRITICAL: u16 = 0x8000;
 
-/// One frame.
+/// Frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Frame {
     pub(super) kind: u16,
@@ -35,21 +35,21 @@ pub(super) struct Frame {
     pub(super) payload: Vec<u8>,
 }
 
-/// Why no further frame can be read.
+/// Error after which no further frame can be read.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum FrameError {
-    /// Nothing more comes.
-    #[error("the other side has gone")]
+    /// End of the stream.
+    #[error("the connection was closed")]
     Closed,
-    /// What came is no frame, and nothing behind it can be trusted.
+    /// Invalid frame; the rest of the stream cannot be trusted.
     #[error("{0}")]
     Invalid(&'static str),
-    /// The system refuses.
+    /// Error of the operating system.
     #[error("{0}")]
     Io(#[from] std::io::Error),
 }
 
-/// The 32 bytes before a payload, sealed.
+/// Encodes the 32 bytes before a payload, with their checksum.
 pub(super) fn header(kind: u16, scan: u32, sequence: u64, length: u32, major: u8) -> [u8; HEADER] {
     let mut bytes = [0; HEADER];
     bytes[..4].copy_from_slice(b"PSB1");
@@ -67,13 +67,13 @@ fn header_crc(header: &[u8; HEADER]) -> u32 {
     crc32c::crc32c_append(crc32c::crc32c(&header[..12]), &header[16..])
 }
 
-/// The bytes of a frame.
+/// Encodes a frame.
 pub(super) fn bytes(frame: &Frame, sequence: u64) -> Vec<u8> {
     let head = header(frame.kind, frame.scan, sequence, frame.payload.len() as u32, VERSION[0]);
     [&head[..], &frame.payload, &crc32c::crc32c(&frame.payload).to_le_bytes()].concat()
 }
 
-/// Reads the frame whose number is due; blocks until it is whole.
+/// Reads the frame with the expected sequence number; blocks until it is complete.
 pub(super) fn read(from: &mut impl Read, due: u64) -> Result<Frame, FrameError> {
     let mut head = [0; HEADER];
     fill(from, &mut head)?;

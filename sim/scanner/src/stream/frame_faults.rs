@@ -1,4 +1,4 @@
-//! What happens to frames on their way out.
+//! Fault injection into outgoing frames.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -10,45 +10,45 @@ use super::fault::{Fault, FaultKind};
 use super::frame::{self, Frame};
 use super::payload;
 
-/// What is done instead of just sending a frame.
+/// Step of sending a frame through the fault injection.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// It is sent.
+    /// Sends the frame.
     Send(Frame),
-    /// It is sent with this bit of its payload flipped on the way.
+    /// Sends the frame with this bit of its payload flipped.
     SendCorrupted(Frame, usize),
-    /// A header alone is sent, with this length, and with this bit flipped.
+    /// Sends a header alone, with this length, and with this bit flipped, if any.
     Header(u32, Option<usize>),
-    /// Nothing is said for so long.
+    /// Sends nothing for this time.
     Wait(Duration),
-    /// The connection is cut.
+    /// Cuts the connection.
     Cut,
-    /// The bridge dies.
+    /// Cuts the connection and discards all scans, as a restart of the bridge does.
     Die,
 }
 
-/// The faults that touch frames, and which of them have happened.
+/// Configured faults and their state.
 #[derive(Debug)]
 pub(super) struct FrameFaults {
     faults: Vec<Fault>,
     spent: BTreeSet<usize>,
-    /// Columns that were left out once.
-    left_out: BTreeSet<(u32, u32)>,
+    /// Columns already considered by `missing-column`.
+    considered: BTreeSet<(u32, u32)>,
     random: Pcg64,
 }
 
 impl FrameFaults {
     pub(super) fn new(faults: &[Fault], seed: u64) -> Self {
         let random = Pcg64::new(u128::from(seed), 7);
-        Self { faults: faults.to_vec(), spent: BTreeSet::new(), left_out: BTreeSet::new(), random }
+        Self { faults: faults.to_vec(), spent: BTreeSet::new(), considered: BTreeSet::new(), random }
     }
 
-    /// Number of a fault that lasts.
+    /// Returns the parameter of a persistent fault, if configured.
     pub(super) fn persistent(&self, kind: FaultKind) -> Option<u32> {
         self.faults.iter().find(|fault| fault.kind == kind).map(|fault| fault.number)
     }
 
-    /// Number of a fault that happens once, the first time that `now` holds.
+    /// Returns the parameter of a one-time fault the first time that `now` holds for it.
     pub(super) fn once(&mut self, kind: FaultKind, now: impl Fn(u32) -> bool) -> Option<u32> {
         let at = self.faults.iter().position(|fault| fault.kind == kind && now(fault.number))?;
         self.spent.insert(at).then(|| self.faults[at].number)
@@ -61,12 +61,12 @@ impl FrameFaults {
         }
     }
 
-    /// A random number below `end`.
+    /// Draws a random number below `end`.
     pub(super) fn below(&mut self, end: u32) -> u32 {
         (self.random.next_u64() % u64::from(end.max(1))) as u32
     }
 
-    /// The steps that a frame takes; `sent` columns went out on this connection before.
+    /// Returns the steps of sending a frame; `sent` columns were sent on this connection before.
     pub(super) fn apply(&mut self, frame: Frame, sent: u32) -> Vec<Step> {
         match frame.kind {
             frame::COLUMN => self.column(frame, sent),
@@ -92,7 +92,7 @@ impl FrameFaults {
         let number = payload::number(&frame.payload).unwrap_or(0);
         let mut steps = self.before(&frame, sent);
         if self.persistent(FaultKind::MissingColumn).is_some()
-            && self.left_out.insert((frame.scan, number))
+            && self.considered.insert((frame.scan, number))
             && self.one_in(FaultKind::MissingColumn)
         {
             return steps;
@@ -111,7 +111,7 @@ impl FrameFaults {
         steps
     }
 
-    /// What comes before a column.
+    /// Returns the faults injected before a column.
     fn before(&mut self, frame: &Frame, sent: u32) -> Vec<Step> {
         let mut steps = Vec::new();
         let mut once = |kind, step: Step| {
@@ -156,7 +156,7 @@ impl FrameFaults {
     }
 }
 
-/// A column that is sound and says something else.
+/// Returns the column with other content and a valid checksum.
 fn altered_copy(frame: &Frame) -> Frame {
     let mut payload = frame.payload.clone();
     if let Some(last) = payload.last_mut() {

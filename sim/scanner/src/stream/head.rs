@@ -1,4 +1,4 @@
-//! What a bridge scans with.
+//! Scanner behind a bridge: the trait of heads, and recordings replayed as one.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -6,44 +6,44 @@ use std::path::{Path, PathBuf};
 use super::message::{ScanLayout, ScanSettings};
 use super::{payload, spool};
 
-/// A scanner as its bridge sees it.
+/// Scanner head behind a bridge.
 pub trait Head: Send + Sync {
-    /// What a scan would be, and how long it would take; nothing moves.
+    /// Plans a scan with these settings; nothing moves.
     ///
     /// # Errors
-    /// Why it cannot scan so, and what to ask for instead.
+    /// Reason why the settings are impossible, with permitted values.
     fn plan(&self, settings: &ScanSettings) -> Result<Plan, String>;
 
-    /// Takes a planned scan, the `number`-th of the bridge: first `out.begin`, then columns in the order of their
-    /// time.
+    /// Takes a planned scan, the `number`-th of the bridge: calls `out.begin`, then `out.column` in the order of
+    /// measurement.
     ///
     /// # Errors
-    /// Why there is no scan, or why it stopped.
+    /// Reason why there is no scan, or why it stopped.
     fn scan(&self, plan: &Plan, number: u32, out: &mut dyn Receiver) -> Result<(), String>;
 }
 
-/// What will be done.
+/// Plan of a scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// As it will be.
+    /// Settings of the scan.
     pub settings: ScanSettings,
-    /// From the command to a scan that no longer changes, seconds.
+    /// Duration from the command to a scan that no longer changes, seconds.
     pub duration_s: f64,
-    /// What the computer takes by itself, however fast the scanner's time runs, seconds.
+    /// Computing time, a lower bound of the duration at any time scale, seconds.
     pub computing_s: f64,
-    /// What is not as asked for, and why.
+    /// Deviations from the requested settings, with reasons.
     pub altered: Vec<String>,
 }
 
-/// Who takes a scan.
+/// Receiver of a scan.
 pub trait Receiver {
-    /// The lattice is known.
+    /// Receives the lattice.
     fn begin(&mut self, begin: ScanLayout) -> ControlFlow<()>;
-    /// A column as its payload is sent; the device's time in it says when it is due.
+    /// Receives a column as its payload; the device time in it is the time at which it is due.
     fn column(&mut self, payload: Vec<u8>) -> ControlFlow<()>;
 }
 
-/// A recording as a scanner: every scan is the one in the file, whatever is asked for.
+/// Recording as a scanner: every scan is the recorded one, whatever is requested.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -51,10 +51,10 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads the file through once.
+    /// Opens a recording and reads it once to its end.
     ///
     /// # Errors
-    /// It is not there or holds no whole scan.
+    /// The file is missing or contains no complete scan.
     pub fn open(path: &Path) -> std::io::Result<Self> {
         let mut duration_s = 0.0_f64;
         spool::read_recording(

@@ -1,13 +1,13 @@
-//! The JSON messages of the protocol, sections 2 to 7 of its page.
+//! JSON messages of the protocol, sections 2 to 7 of its page.
 
 use serde::{Deserialize, Serialize};
 
-/// Part of the dome, radians.
+/// Angular window, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     /// First azimuth.
     pub azimuth_start: f64,
-    /// Towards growing azimuth.
+    /// Width towards increasing azimuth.
     pub azimuth_width: f64,
     /// Lowest elevation.
     pub elevation_min: f64,
@@ -15,17 +15,17 @@ pub struct Window {
     pub elevation_max: f64,
 }
 
-/// What is wanted of a scan, or what will be done.
+/// Settings of a scan, requested or planned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScanSettings {
     /// Resolution 1/divisor.
     pub divisor: u32,
     /// Thousands of points per second.
     pub rate_kpts: u32,
-    /// n: n^2 samples become one.
+    /// Averaging n: n^2 samples become one.
     #[serde(default = "one")]
     pub compression: u32,
-    /// Part of the dome; everything without.
+    /// Angular window; `None`: everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
 }
@@ -34,55 +34,55 @@ fn one() -> u32 {
     1
 }
 
-/// What is in a record of a column.
+/// Content of a record of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Values {
     /// Range and intensity.
     Range,
-    /// Range, intensity, and how far the beam is from the even lattice.
+    /// Range, intensity, and angular deviation of the beam from the regular lattice.
     Polar,
 }
 
-/// ScanBegin without its job: the lattice as it will be sent.
+/// ScanBegin without its job: the lattice in the order of transmission.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScanLayout {
-    /// Cells of a column.
+    /// Number of rows.
     pub rows: u32,
-    /// Columns.
+    /// Number of columns.
     pub columns: u32,
     /// Azimuth of column 0, radians.
     pub azimuth_start: f64,
-    /// Between columns.
+    /// Azimuth step, radians.
     pub azimuth_step: f64,
     /// Elevation of row 0, radians.
     pub elevation_start: f64,
-    /// Between rows.
+    /// Elevation step, radians.
     pub elevation_step: f64,
-    /// What a record holds.
+    /// Content of a record.
     pub values: Values,
-    /// Metres of one unit of range.
+    /// Unit of range, metres.
     pub range_unit_m: f64,
-    /// Least and greatest intensity.
+    /// Lowest and highest intensity.
     pub intensity: [u16; 2],
     /// First column of the back face.
     pub seam_column: Option<u32>,
-    /// So many columns of each face, from its first on, are not to be used.
+    /// Number of columns at the start of each face that must not be used.
     pub warm_up_columns: u32,
     /// `azimuth` or `time`.
     pub order: String,
-    /// Maker, model, serial number.
+    /// Manufacturer, model, serial number.
     pub instrument: String,
     /// Seconds since 1970, when known.
     pub acquired_unix_s: Option<f64>,
-    /// No real light was used.
+    /// True for a simulated scan.
     pub simulated: bool,
-    /// What is not as asked for.
+    /// Deviations from the requested settings.
     #[serde(default)]
     pub altered: Vec<String>,
 }
 
-/// ScanBegin.
+/// Message ScanBegin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ScanBegin {
     pub(super) job: String,
@@ -90,7 +90,7 @@ pub(super) struct ScanBegin {
     pub(super) begin: ScanLayout,
 }
 
-/// ScanEnd.
+/// Message ScanEnd.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ScanEnd {
     pub(super) outcome: Outcome,
@@ -101,7 +101,7 @@ pub(super) struct ScanEnd {
     pub(super) digest: u32,
 }
 
-/// How a scan ended.
+/// Outcome of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Outcome {
@@ -139,11 +139,11 @@ pub(super) struct Abort {
 #[derive(Debug, Deserialize)]
 pub(super) struct Resume {
     pub(super) job: String,
-    /// First and last of each run.
+    /// First and last column of each run.
     pub(super) missing: Vec<[u32; 2]>,
 }
 
-/// Error.
+/// Message Error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Refusal {
     pub(super) code: &'static str,

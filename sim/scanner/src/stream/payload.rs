@@ -1,4 +1,4 @@
-//! The binary payload of a Column frame, section 5 of the protocol's page.
+//! Binary payload of a Column frame, section 5 of the protocol's page.
 
 use crate::column::{SimColumn, SimState};
 
@@ -7,11 +7,11 @@ use super::message::{ScanLayout, Values};
 /// Bytes before the bitmap.
 pub(super) const FIXED: usize = 24;
 
-/// Place of the device's time, nanoseconds.
+/// Offset of the device time, nanoseconds.
 const TIME: usize = 16;
 
-/// The payload of a column. `number` is its place at the bridge, `time_s` when its first sample was taken. Rows before
-/// the first echo and after the last are left out.
+/// Encodes a column. `number` is its index at the bridge, `time_s` the device time of its first sample. Rows before
+/// the first echo and after the last are omitted.
 pub fn column_payload(column: &SimColumn, number: u32, begin: &ScanLayout, time_s: f64) -> Vec<u8> {
     let valid = |row: &usize| column.state[*row] == SimState::Valid;
     let rows = 0..column.state.len();
@@ -43,7 +43,7 @@ pub fn column_payload(column: &SimColumn, number: u32, begin: &ScanLayout, time_
     bytes
 }
 
-/// Seconds of the device at which a column's first sample was taken.
+/// Returns the device time of a column's first sample, seconds.
 pub(super) fn time_s(payload: &[u8]) -> f64 {
     match payload.get(TIME..FIXED).and_then(|bytes| <[u8; 8]>::try_from(bytes).ok()) {
         Some(bytes) => u64::from_le_bytes(bytes) as f64 * 1e-9,
@@ -51,20 +51,20 @@ pub(super) fn time_s(payload: &[u8]) -> f64 {
     }
 }
 
-/// The column's number.
+/// Returns the column's number.
 pub(super) fn number(payload: &[u8]) -> Option<u32> {
     let bytes = payload.get(..4)?.try_into().ok()?;
     Some(u32::from_le_bytes(bytes))
 }
 
-/// Records in the payload, counted by its bitmap.
+/// Returns the number of records in the payload, counted in its bitmap.
 pub(super) fn points(payload: &[u8]) -> u64 {
     let rows = payload.get(8..12).and_then(|bytes| bytes.try_into().ok()).map_or(0, u32::from_le_bytes);
     let bitmap = payload.get(FIXED..FIXED + (rows as usize).div_ceil(8)).unwrap_or(&[]);
     bitmap.iter().map(|byte| u64::from(byte.count_ones())).sum()
 }
 
-/// Sets the device's time to 0, as a clock that lost its battery.
+/// Sets the device time to 0, as after a loss of the clock's battery.
 pub(super) fn set_clock_back(payload: &mut [u8]) {
     if let Some(bytes) = payload.get_mut(TIME..FIXED) {
         bytes.fill(0);

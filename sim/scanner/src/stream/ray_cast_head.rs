@@ -1,4 +1,4 @@
-//! A simulated scanner in a press shop: the [`Head`] that casts rays.
+//! Simulated scanner in a press shop: the [`Head`] that casts rays.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::{ControlFlow, Range};
@@ -14,38 +14,38 @@ use super::head::{Head, Plan, Receiver};
 use super::message::{ScanLayout, ScanSettings, Values, Window};
 use super::payload::column_payload;
 
-/// Seeds of consecutive scans lie this far apart, so that no two bridges with neighbouring seeds share a scan.
+/// Distance of the seeds of consecutive scans, so that no two bridges with neighbouring seeds share a scan.
 const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Seconds that one core takes to cast one cell.
+/// Computing time of one cell on one core, seconds.
 const SECONDS_PER_CELL: f64 = 2e-6;
 
-/// Columns of a face that are cast, and handed over, at a time.
+/// Columns of a face that are cast and delivered at a time.
 const TURNS: u32 = 64;
 
-/// Who says what lies in the press: the plate, nothing, or why it cannot be said.
+/// Source of the plate's state: a plate, an empty press, or the reason why the state is unknown.
 pub type PlateSource = Box<dyn Fn() -> Result<Option<PlateState>, String> + Send + Sync>;
 
-/// Scanner and shop.
+/// Simulated scanner and the shop in which it stands.
 pub struct RayCastHead {
-    /// What lies in the press when a scan begins.
+    /// Source of the plate's state, queried at the start of each scan.
     pub plate: PlateSource,
-    /// What stands round it.
+    /// Surroundings of the plate.
     pub surroundings: Surroundings,
-    /// The scanner's errors. The standard deviation of its ranges is the device's where `noise` says nothing, and its
-    /// seed that of the first scan; faces are given by the window.
+    /// Error model of the scanner. Its `range_sigma` is replaced by `noise`, or by the device's where `noise` is `None`; its
+    /// seed is that of the first scan; its faces follow from the window.
     pub instrument: Instrument,
-    /// Standard deviation of a range at 10 m, metres; without it that of the device at its rate and compression.
+    /// Standard deviation of a range at 10 m, metres; `None`: that of the device at its rate and compression.
     pub noise: Option<f64>,
-    /// Collimation and trunnion errors of scans that need both faces, and how the scanner moves between them.
+    /// Errors of scans that need both faces.
     pub faces: Option<Faces>,
-    /// Without a window so much round the plate is scanned, radians; the whole dome without this.
+    /// Margin around the plate when no window is requested, radians; `None`: the whole dome.
     pub margin: Option<f64>,
-    /// What records hold.
+    /// Content of records.
     pub values: Values,
-    /// A head that turns clockwise; columns are counted so, and row 0 is at the bottom.
+    /// Clockwise rotation of the head: columns are counted clockwise, and row 0 is at the bottom.
     pub mirrored: bool,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
 }
 
@@ -56,7 +56,7 @@ impl std::fmt::Debug for RayCastHead {
 }
 
 impl RayCastHead {
-    /// A scanner with the errors of its device before this plate.
+    /// Creates a scanner with the errors of its device in front of this plate.
     pub fn new(plate: PlateSource) -> Self {
         Self {
             plate,
@@ -95,9 +95,9 @@ impl RayCastHead {
         }
     }
 
-    /// Instrument of a scan.
+    /// Returns the error model of a scan.
     fn instrument(&self, device: &Device, lattice: &SimLattice, number: u32) -> Instrument {
-        // Half a turn of the head sees everything once; what lies beyond is seen by the back face.
+        // Half a turn of the head covers everything once; columns beyond are measured by the back face.
         let half = (PI / lattice.azimuth_step).round() as u32;
         let both = half < lattice.n_columns;
         let seam = |half| if self.mirrored { lattice.n_columns - half } else { half };
@@ -116,7 +116,7 @@ fn device(settings: &ScanSettings) -> Result<Device, String> {
     Device::new(settings.divisor, settings.rate_kpts, settings.compression).map_err(|error| error.to_string())
 }
 
-/// Width and height of what is scanned, radians: of the window, or of a plate's surroundings, or all of it.
+/// Returns width and height of the scanned area, radians: of the window, of a plate's surroundings, or of the dome.
 fn extent(settings: &ScanSettings, margin: Option<f64>) -> (f64, f64) {
     match (settings.window, margin) {
         (Some(window), _) => (window.azimuth_width, window.elevation_max - window.elevation_min),
@@ -132,7 +132,7 @@ impl Head for RayCastHead {
         if let Some(w) = &settings.window {
             let reached = w.elevation_max > LOWEST_DEG.to_radians() && w.elevation_max > w.elevation_min;
             if !(reached && w.azimuth_width > 0.0) {
-                return Err("the window lies outside of what the scanner reaches, -62.5 to 90 degrees".into());
+                return Err("the window lies outside the scanner's elevations, -62.5 to 90 degrees".into());
             }
         }
         let (width, height) = extent(settings, self.margin);
@@ -153,7 +153,7 @@ impl Head for RayCastHead {
         }
         let scene = Scene::new(plate, &self.surroundings);
         let shot = PreparedScan { shop: self, device, scene, lattice, instrument, begin };
-        // Who broke off knows why.
+        // The receiver that breaks off records the reason.
         let _ = shot.take(out);
         Ok(())
     }
@@ -181,7 +181,7 @@ fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> ScanL
     }
 }
 
-/// The same lattice counted from the other ends.
+/// Reverses the order of rows and columns of the lattice.
 fn mirror(begin: &mut ScanLayout) {
     let last = |n: u32| f64::from(n - 1);
     begin.azimuth_start += begin.azimuth_step * last(begin.columns);
@@ -191,7 +191,7 @@ fn mirror(begin: &mut ScanLayout) {
     begin.seam_column = begin.seam_column.map(|seam| begin.columns - seam);
 }
 
-/// One scan about to be taken.
+/// Scan prepared to be taken.
 struct PreparedScan<'a> {
     shop: &'a RayCastHead,
     device: Device,
@@ -210,7 +210,7 @@ impl PreparedScan<'_> {
             (Some(faces), false) => [0..faces.seam_column, faces.seam_column..all],
             (Some(faces), true) => [faces.seam_column..all, 0..faces.seam_column],
         };
-        // Each turn of the mirror writes a column of either face.
+        // Each turn of the mirror writes a column of each face.
         let turns = front.len() as u32;
         for start in (0..turns).step_by(TURNS as usize) {
             let mut backs = self.turns(&back, start)?.into_iter();
@@ -224,7 +224,7 @@ impl PreparedScan<'_> {
         ControlFlow::Continue(())
     }
 
-    /// What one face measures in [`TURNS`] turns of the mirror, in the order of measuring.
+    /// Returns the columns that one face measures in [`TURNS`] turns of the mirror, in the order of measurement.
     fn turns(&self, face: &Range<u32>, start: u32) -> ControlFlow<(), Vec<SimColumn>> {
         let n = face.len() as u32;
         let [start, end] = [start, start + TURNS].map(|turn| turn.min(n));
@@ -242,7 +242,7 @@ impl PreparedScan<'_> {
         ControlFlow::Continue(columns)
     }
 
-    /// Hands a column over; the head turns past `turns` of them.
+    /// Delivers a column; `turns` is the number of mirror turns of the scan.
     fn deliver(&self, mut column: SimColumn, turns: u32, out: &mut dyn Receiver) -> ControlFlow<()> {
         let mut number = column.index;
         if self.shop.mirrored {

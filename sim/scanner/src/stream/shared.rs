@@ -1,4 +1,4 @@
-//! What all connections of a bridge share: its lease, and the scans that run or have run.
+//! State shared by the connections of a bridge: the lease, and the scans that run or have run.
 
 use std::collections::VecDeque;
 use std::net::{Shutdown, TcpStream};
@@ -16,23 +16,23 @@ use super::message::{Outcome, Refusal, ScanLayout};
 use super::payload;
 use super::spool::Spool;
 
-/// How long a lease lasts from each frame of its holder.
+/// Duration of a lease from each frame of its holder.
 const LEASE: Duration = Duration::from_secs(5);
 
-/// Longest sleep between two looks at whether a scan is still wanted.
+/// Longest sleep between two checks for an abort.
 const NAP: Duration = Duration::from_millis(20);
 
-/// Seconds between two tries to bring the mirror up to speed, and how many there are.
+/// Time of one attempt to bring the mirror to speed, seconds, and the number of attempts.
 const STALL: (f64, u32) = (45.0, 5);
 
-/// What all connections share.
+/// State shared by all connections.
 pub(super) struct Shared {
     pub(super) config: BridgeConfig,
     pub(super) head: Box<dyn Head>,
     pub(super) counts: AtomicCounters,
     pub(super) frame_faults: Mutex<FrameFaults>,
     pub(super) begun: Instant,
-    /// Scans are numbered from here on: numbers never return, even when a bridge starts again.
+    /// Start of the scan numbers, from the clock, so that numbers are not reused after a restart.
     first_number: u32,
     ending: AtomicBool,
     state: Mutex<State>,
@@ -49,7 +49,7 @@ struct State {
     lease: Option<Lease>,
     scans: VecDeque<Arc<Scan>>,
     scans_begun: u32,
-    /// Nobody is let in before.
+    /// Connections are refused until then.
     closed_until: Option<Instant>,
     open: Vec<(u32, TcpStream)>,
 }
@@ -61,7 +61,7 @@ struct Lease {
     until: Instant,
 }
 
-/// A scan that runs or has run.
+/// Scan that runs or has run.
 #[derive(Debug)]
 pub(super) struct Scan {
     pub(super) spool: Spool,
@@ -76,12 +76,12 @@ impl Scan {
         Self { spool, aborted: no(), overflowed: no(), stalls: AtomicU32::new(0) }
     }
 
-    /// True when the bridge's disk could not take all of it.
+    /// Returns true when the bridge's disk was full.
     pub(super) fn overflowed(&self) -> bool {
         self.overflowed.load(Ordering::Relaxed)
     }
 
-    /// How often the mirror has not come up to speed.
+    /// Returns the number of failed attempts to bring the mirror to speed.
     pub(super) fn stalls(&self) -> u32 {
         self.stalls.load(Ordering::Relaxed)
     }
@@ -102,11 +102,11 @@ impl Shared {
         }
     }
 
-    /// Ends every scan and connection.
+    /// Ends all scans and connections.
     pub(super) fn end(&self) {
         self.ending.store(true, Ordering::Relaxed);
         for (_, stream) in &self.state().open {
-            // One that has gone already needs no hanging up.
+            // An error means that it is closed already.
             let _ = stream.shutdown(Shutdown::Both);
         }
         for scan in &self.state().scans {
@@ -118,7 +118,7 @@ impl Shared {
         self.ending.load(Ordering::Relaxed)
     }
 
-    /// Numbers a connection; nobody is let in while the bridge is closed.
+    /// Registers a connection and returns its number; `None` while connections are refused.
     pub(super) fn admit(&self, stream: &TcpStream) -> Option<u32> {
         let mut state = self.state();
         if state.closed_until.is_some_and(|until| Instant::now() < until) {
@@ -130,7 +130,7 @@ impl Shared {
         Some(number)
     }
 
-    /// A connection has ended.
+    /// Removes a connection that has ended.
     pub(super) fn remove(&self, number: u32) {
         self.state().open.retain(|(open, _)| *open != number);
     }
@@ -143,18 +143,18 @@ impl Shared {
         self.frame_faults.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// True when this fault lasts.
+    /// Returns true when this persistent fault is configured.
     pub(super) fn is_active(&self, kind: FaultKind) -> bool {
         self.frame_faults().persistent(kind).is_some()
     }
 
-    /// True for the first so many milliseconds of the bridge that the fault says; gives what is left.
+    /// Returns the remaining time of a fault that lasts for the first n milliseconds of the bridge.
     pub(super) fn remaining_at_start(&self, kind: FaultKind) -> Option<Duration> {
         let ms = self.frame_faults().persistent(kind)?;
         Duration::from_millis(ms.into()).checked_sub(self.begun.elapsed())
     }
 
-    /// Gives the lease to a client, or says who holds it. The same client takes it over: its connection before is
+    /// Grants the lease to a client, or refuses it with the holder's name. The same client takes it over: its previous connection is
     /// closed.
     pub(super) fn lease(&self, client: &str, connection: u32) -> Result<(), Refusal> {
         if let Some(left) = self.remaining_at_start(FaultKind::LeaseStuck) {
@@ -169,7 +169,7 @@ impl Shared {
             if lease.client == client && lease.connection != connection {
                 let before = lease.connection;
                 for (_, stream) in state.open.iter().filter(|(open, _)| *open == before) {
-                    // One that has gone already needs no hanging up.
+                    // An error means that it is closed already.
                     let _ = stream.shutdown(Shutdown::Both);
                 }
             }
@@ -178,37 +178,37 @@ impl Shared {
         Ok(())
     }
 
-    /// A frame of this connection has come.
+    /// Renews the lease of a connection that has sent a frame.
     pub(super) fn renew_lease(&self, connection: u32) {
         if let Some(lease) = self.state().lease.as_mut().filter(|lease| lease.connection == connection) {
             lease.until = Instant::now() + LEASE;
         }
     }
 
-    /// The scan of a job.
+    /// Returns the scan of a job.
     pub(super) fn scan_of(&self, job: &str) -> Option<Arc<Scan>> {
         self.state().scans.iter().find(|scan| scan.spool.job == job).cloned()
     }
 
-    /// The scan that runs.
+    /// Returns the running scan.
     pub(super) fn running(&self) -> Option<Arc<Scan>> {
         self.state().scans.iter().find(|scan| !scan.spool.is_over()).cloned()
     }
 
-    /// The scan of a job, begun now when there is none.
+    /// Returns the scan of a job; starts it when there is none.
     pub(super) fn begin(self: &Arc<Self>, job: &str, plan: Plan) -> Result<Arc<Scan>, Refusal> {
         if let Some(scan) = self.scan_of(job) {
             return Ok(scan);
         }
         if let Some(running) = self.running() {
-            let text = format!("job {} runs", running.spool.job);
+            let text = format!("job {} is running", running.spool.job);
             return Err(Refusal::new("busy", text).retry(1000));
         }
         let failed = |error: std::io::Error| Refusal::new("scanner", format!("the bridge's disk: {error}"));
         let mut state = self.state();
         state.scans_begun += 1;
         let nth = state.scans_begun;
-        // Leaves a number free, so that frames of another scan have one that this bridge never used.
+        // Every second number stays unused, so that injected frames of another scan have one that no scan uses.
         let number = self.first_number.wrapping_add(2 * nth);
         let file = self.config.record.as_ref().map(|folder| folder.join(format!("scan-{nth:05}.psb")));
         let spool = Spool::new(job, number, file.as_deref(), !self.config.live).map_err(failed)?;
@@ -223,7 +223,7 @@ impl Shared {
         Ok(scan)
     }
 
-    /// Ends the scan of a job.
+    /// Aborts the scan of a job.
     pub(super) fn abort(&self, job: &str) {
         if let Some(scan) = self.scan_of(job).filter(|scan| !scan.spool.is_over()) {
             scan.aborted.store(true, Ordering::Relaxed);
@@ -231,7 +231,7 @@ impl Shared {
         }
     }
 
-    /// A connection was cut by a fault; the bridge forgets its scans when it died.
+    /// Records a connection cut by a fault; discards all scans when the bridge restarted (`died`).
     pub(super) fn connection_cut(&self, died: bool) {
         increment(&self.counts.cuts);
         let closed = self.frame_faults().persistent(FaultKind::ReconnectTooFast);
@@ -242,7 +242,7 @@ impl Shared {
         }
     }
 
-    /// Takes a scan to its end, which takes as long as with a real scanner.
+    /// Takes a scan to its end at the pace of a real scanner.
     fn run(&self, plan: &Plan, scan: &Scan, nth: u32) {
         let spool = &scan.spool;
         increment(&self.counts.scans);
@@ -278,7 +278,7 @@ fn busy(holder: &str, left: Duration) -> Refusal {
     Refusal::new("busy", format!("held by {holder} for {ms} ms")).retry(ms)
 }
 
-/// Puts what the head measures into the spool when a real scanner would have measured it.
+/// Receiver that writes columns to the spool at the times of a real scanner.
 struct PacedReceiver<'a> {
     shared: &'a Shared,
     scan: &'a Scan,
@@ -288,7 +288,7 @@ struct PacedReceiver<'a> {
 }
 
 impl PacedReceiver<'_> {
-    /// Waits for this second of the scanner's time; breaks when the scan was aborted.
+    /// Waits until this time of the scanner, seconds; breaks when the scan is aborted.
     fn wait_until(&self, second: f64) -> ControlFlow<()> {
         let due = Duration::from_secs_f64(self.shared.config.time_scale * second);
         loop {
@@ -303,7 +303,7 @@ impl PacedReceiver<'_> {
         }
     }
 
-    /// The mirror comes up to speed, sooner or later.
+    /// Simulates the spin-up of the mirror with its failed attempts.
     fn spin_up(&mut self) -> ControlFlow<()> {
         let stalls = self.shared.frame_faults().persistent(FaultKind::StartStall).unwrap_or(0);
         for stall in 1..=stalls.min(STALL.1) {
@@ -312,7 +312,7 @@ impl PacedReceiver<'_> {
             self.wait_until(STALL.0)?;
         }
         if stalls > STALL.1 {
-            self.why = Some(format!("the mirror did not come up to speed in {} tries", STALL.1));
+            self.why = Some(format!("the mirror did not reach its speed in {} attempts", STALL.1));
             return ControlFlow::Break(());
         }
         self.started = Instant::now();
@@ -324,12 +324,12 @@ impl PacedReceiver<'_> {
         ControlFlow::Break(())
     }
 
-    /// What stops a scanner before its next column.
+    /// Applies the faults that stop a scanner before its next column.
     fn injected_failure(&mut self) -> ControlFlow<()> {
         let (taken, bytes) = (self.taken, self.scan.spool.bytes());
         let at = |kind| self.shared.frame_faults().persistent(kind);
         if at(FaultKind::StorageFull).is_some_and(|column| taken >= column) {
-            return self.fail("the card is full");
+            return self.fail("the memory card is full");
         }
         if at(FaultKind::Tilted).is_some_and(|column| taken >= column) {
             return self.fail("the scanner was moved: its inclination changed by 0.4 degrees");

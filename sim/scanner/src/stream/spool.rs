@@ -1,5 +1,5 @@
-//! A scan on disk: the frames of ScanBegin, the columns in the order they were measured, and ScanEnd, as they go over
-//! the wire. What is kept for Resume and what is recorded for a replay are the same bytes.
+//! Spool: a scan on disk as the frames ScanBegin, Columns in the order of measurement, and ScanEnd, byte for byte as sent. The
+//! same format serves Resume and recordings.
 
 use std::fs::File;
 use std::io::{BufReader, Seek, Write};
@@ -13,7 +13,7 @@ use super::frame::{self, Frame};
 use super::message::{Outcome, ScanBegin, ScanEnd, ScanLayout};
 use super::payload;
 
-/// Where a column lies.
+/// Position of a column in the file.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     at: u64,
@@ -22,13 +22,13 @@ struct Place {
     points: u64,
 }
 
-/// One scan, growing or whole.
+/// Scan on disk, in progress or complete.
 #[derive(Debug)]
 pub(super) struct Spool {
     pub(super) job: String,
     pub(super) number: u32,
     file: File,
-    /// Nothing is shown before the scan has ended.
+    /// Columns are released only after the end of the scan.
     held_back: bool,
     inner: Mutex<Inner>,
 }
@@ -41,13 +41,13 @@ struct Inner {
     at: u64,
     sequence: u64,
     end: Option<ScanEnd>,
-    /// Why there will be no scan at all.
+    /// Reason why there will be no scan.
     refused: Option<String>,
     listeners: Vec<Sender<Event>>,
 }
 
 impl Spool {
-    /// An empty one; in `file`, or in a file without a name.
+    /// Creates an empty spool in `file`, or in an unnamed temporary file.
     pub(super) fn new(job: &str, number: u32, file: Option<&Path>, held_back: bool) -> std::io::Result<Self> {
         let file = match file {
             Some(path) => File::options().read(true).write(true).create(true).truncate(true).open(path)?,
@@ -60,12 +60,12 @@ impl Spool {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Tells `listener` of everything that comes from now on.
+    /// Notifies `listener` of all later changes.
     pub(super) fn listen(&self, listener: Sender<Event>) {
         self.inner().listeners.push(listener);
     }
 
-    /// The lattice is known.
+    /// Records the lattice.
     pub(super) fn begin(&self, begin: ScanLayout) -> std::io::Result<()> {
         let mut inner = self.inner();
         let message = ScanBegin { job: self.job.clone(), begin: begin.clone() };
@@ -76,7 +76,7 @@ impl Spool {
         Ok(())
     }
 
-    /// A column was measured.
+    /// Appends a column.
     pub(super) fn column(&self, bytes: Vec<u8>) -> std::io::Result<()> {
         let mut inner = self.inner();
         let Some(number) = payload::number(&bytes).filter(|n| (*n as usize) < inner.places.len()) else {
@@ -90,7 +90,7 @@ impl Spool {
         Ok(())
     }
 
-    /// The scan has ended.
+    /// Records the end of the scan.
     pub(super) fn end(&self, outcome: Outcome, reason: Option<String>) -> std::io::Result<()> {
         let mut inner = self.inner();
         let sound = inner.places.iter().flatten();
@@ -103,58 +103,58 @@ impl Spool {
         Ok(())
     }
 
-    /// There will be no scan.
+    /// Records that there will be no scan.
     pub(super) fn refuse(&self, why: String) {
         let mut inner = self.inner();
         inner.refused = Some(why);
         inner.notify();
     }
 
-    /// Why there will be no scan.
+    /// Returns the reason why there will be no scan.
     pub(super) fn refused(&self) -> Option<String> {
         self.inner().refused.clone()
     }
 
-    /// True when the lattice is known, whether or not it may be shown.
+    /// Returns true when the lattice is known, released or not.
     pub(super) fn has_begun(&self) -> bool {
         self.inner().begin.is_some()
     }
 
-    /// True when nothing more comes.
+    /// Returns true when the scan has ended or was refused.
     pub(super) fn is_over(&self) -> bool {
         let inner = self.inner();
         inner.end.is_some() || inner.refused.is_some()
     }
 
-    /// What was announced, once it may be shown.
+    /// Returns the lattice once it is released.
     pub(super) fn begun(&self) -> Option<ScanLayout> {
         let inner = self.inner();
         inner.begin.clone().filter(|_| !self.held_back || inner.end.is_some())
     }
 
-    /// How it ended.
+    /// Returns the end of the scan, if recorded.
     pub(super) fn ended(&self) -> Option<ScanEnd> {
         self.inner().end.clone()
     }
 
-    /// Share of the columns that was measured.
+    /// Returns the fraction of columns measured.
     pub(super) fn progress(&self) -> f64 {
         let inner = self.inner();
         inner.arrived.len() as f64 / inner.places.len().max(1) as f64
     }
 
-    /// Number of the `nth` column that came, once it may be shown.
+    /// Returns the number of the `nth` measured column once it is released.
     pub(super) fn arrival(&self, nth: usize) -> Option<u32> {
         let inner = self.inner();
         (!self.held_back || inner.end.is_some()).then(|| inner.arrived.get(nth).copied()).flatten()
     }
 
-    /// Bytes on disk.
+    /// Returns the size on disk, bytes.
     pub(super) fn bytes(&self) -> u64 {
         self.inner().at
     }
 
-    /// The payload of a column that came.
+    /// Reads the payload of a measured column.
     pub(super) fn payload(&self, number: u32) -> std::io::Result<Vec<u8>> {
         let place = self.inner().places.get(number as usize).copied().flatten();
         let place = place.ok_or_else(|| std::io::Error::other("the column is not there"))?;
@@ -165,7 +165,7 @@ impl Spool {
 }
 
 impl Inner {
-    /// Writes a frame and gives the place of its payload.
+    /// Appends a frame; returns the offset of its payload.
     fn append(&mut self, mut file: &File, kind: u16, scan: u32, payload: Vec<u8>) -> std::io::Result<u64> {
         let bytes = frame::bytes(&Frame { kind, scan, payload }, self.sequence);
         file.write_all(&bytes)?;
@@ -180,10 +180,10 @@ impl Inner {
     }
 }
 
-/// Reads a recording: what was announced, then every column to `column`.
+/// Reads a recording: calls `begun` with the lattice, then `column` for every column, until one returns false.
 ///
 /// # Errors
-/// The file is not there or holds no whole scan.
+/// The file is missing or contains no complete scan.
 pub(super) fn read_recording(
     path: &Path,
     mut begun: impl FnMut(ScanLayout) -> bool,
@@ -193,8 +193,9 @@ pub(super) fn read_recording(
     let mut file = BufReader::new(File::open(path).map_err(|error| broken(error.to_string()))?);
     file.rewind()?;
     for sequence in 0.. {
-        let frame = frame::read(&mut file, sequence)
-            .map_err(|error| broken(format!("frame {sequence}: {error}; this is no whole recording")))?;
+        let frame = frame::read(&mut file, sequence).map_err(|error| {
+            broken(format!("frame {sequence}: {error}; the recording is incomplete or invalid"))
+        })?;
         let going_on = match frame.kind {
             frame::SCAN_BEGIN => begun(serde_json::from_slice::<ScanBegin>(&frame.payload)?.begin),
             frame::COLUMN => column(frame.payload),
