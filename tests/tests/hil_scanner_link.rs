@@ -14,16 +14,16 @@
 //! | columns missing, shuffled, repeated | `missing_column`, `shuffled`, `repeated` | survived |
 //! | frames of another scan | `late_frames` | survived |
 //! | several of these together | `everything_at_once` | survived |
-//! | column without content | `zero_length` | "a column of 0 bytes has no beginning" |
-//! | column twice, different | `torn_column` | "came twice with different content" |
-//! | digest of other columns | `wrong_digest` | "it sent .. and says .." |
+//! | column without content | `zero_length` | "a column of 0 bytes is shorter than its fixed part" |
+//! | column twice, different | `torn_column` | "received twice with different content" |
+//! | digest of other columns | `wrong_digest` | "received .. but ScanEnd states .." |
 //! | unknown frame | `unknown_frames` | skipped, or "unknown to version 1.0" |
-//! | other version | `version_mismatch` | "speaks version 2.0 of the protocol, this driver 1.0" |
+//! | other version | `version_mismatch` | "uses version 2.0 of the protocol, this driver 1.0" |
 //! | scan's end never told | `event_lost` | "no scan in time" at the deadline |
 //! | lease held by a dead client | `lease_stuck` | survived, or "busy: held by press-4" at the deadline |
 //! | scanner off or starting | `asleep` | survived, or "the scanner is starting up" at the deadline |
 //! | connected late | `connect_late`, `connect_later_than_the_driver_waits` | survived |
-//! | mirror not up to speed | `start_stall` | survived, or "did not come up to speed in 5 tries" |
+//! | mirror not up to speed | `start_stall` | survived, or "did not reach its speed in 5 attempts" |
 //! | status stale, progress jumps | `stale_status_and_progress_jump` | survived |
 //! | parameters altered | `params_altered` | survived, noted in the scan |
 //! | impossible parameters | `impossible_settings_are_refused_with_what_is_possible` | "choose a lower rate" |
@@ -195,17 +195,20 @@ fn everything_at_once() {
 
 #[test]
 fn zero_length() {
-    fails(&["zero-length=5"], "the bridge is at fault: a column of 0 bytes has no beginning");
+    fails(
+        &["zero-length=5"],
+        "the bridge violates the protocol: a column of 0 bytes is shorter than its fixed part",
+    );
 }
 
 #[test]
 fn torn_column() {
-    fails(&["torn-column=5"], "came twice with different content");
+    fails(&["torn-column=5"], "received twice with different content");
 }
 
 #[test]
 fn wrong_digest() {
-    fails(&["wrong-digest"], "and says");
+    fails(&["wrong-digest"], "ScanEnd states");
 }
 
 #[test]
@@ -216,7 +219,7 @@ fn unknown_frames() {
 
 #[test]
 fn version_mismatch() {
-    fails(&["version-mismatch"], "the bridge speaks version 2.0 of the protocol, this driver 1.0");
+    fails(&["version-mismatch"], "the bridge uses version 2.0 of the protocol, this driver 1.0");
 }
 
 #[test]
@@ -256,7 +259,7 @@ fn start_stall() {
     survives_on(&scaled(&["start-stall=2"]));
     let bridge = scaled(&["start-stall=6"]);
     let error = scan(&driver(bridge.address(), COARSE), Some(&WINDOW), LIMIT).unwrap_err().to_string();
-    assert!(error.contains("(scanner): the mirror did not come up to speed in 5 tries"), "{error}");
+    assert!(error.contains("(scanner): the mirror did not reach its speed in 5 attempts"), "{error}");
 }
 
 #[test]
@@ -271,7 +274,7 @@ fn params_altered() {
     let (lattice, _) =
         scan(&driver(bridge.address(), "divisor = 16\nrate_kpts = 244"), Some(&WINDOW), LIMIT).unwrap();
     let notes = &lattice.header().notes;
-    assert!(notes.iter().any(|note| note.contains("244 was asked for, the scanner took 122")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("244 was requested, the scanner set 122")), "{notes:?}");
 }
 
 #[test]
@@ -279,7 +282,7 @@ fn impossible_settings_are_refused_with_what_is_possible() {
     let bridge = bridge(&[]);
     let error = scan(&driver(bridge.address(), "divisor = 32\nrate_kpts = 976"), Some(&WINDOW), LIMIT);
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("(config): 1/32 at 976 kpts/s needs a mirror of 762 Hz"), "{error}");
+    assert!(error.contains("(config): 1/32 at 976 kpts/s requires a mirror frequency of 762 Hz"), "{error}");
 }
 
 #[test]
@@ -299,7 +302,7 @@ fn card_missing() {
 
 #[test]
 fn storage_full() {
-    fails(&["storage-full=8"], "the scan ended as failed: the card is full");
+    fails(&["storage-full=8"], "the scan ended as failed: the memory card is full");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The lattice that ScanBegin announces, and columns of it in the order of `platen-scan`.
+//! Lattice announced by ScanBegin, and its columns converted to the order of `platen-scan`.
 
 use platen_scan::{Column, Face, ScanHeader, State, wrap_azimuth};
 
@@ -6,21 +6,21 @@ use crate::error::{Error, Result};
 use crate::message::{ScanBegin, Values};
 use crate::wire::{u16_at, u32_at};
 
-/// More rows or columns than any scanner has.
+/// Limit of rows and of columns, above that of any scanner.
 const MAX_LINES: u32 = 1 << 17;
 /// Bytes before the bitmap.
 const FIXED: usize = 24;
 /// Unit of angles in a record, radians.
 const NANORADIAN: f64 = 1e-9;
 
-/// A lattice as announced; checked.
+/// Checked lattice of a ScanBegin.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     begin: ScanBegin,
 }
 
 impl Layout {
-    /// Checks the announcement.
+    /// Checks the lattice of a ScanBegin.
     pub(crate) fn new(begin: ScanBegin) -> Result<Self> {
         let lines = 1..=MAX_LINES;
         let angle = |a: f64| a.is_finite() && a.abs() <= 7.0;
@@ -35,10 +35,14 @@ impl Layout {
             && begin.range_unit_m <= 1.0
             && begin.intensity.0 <= begin.intensity.1
             && begin.seam_column.is_none_or(|seam| seam < begin.columns);
-        if sound { Ok(Self { begin }) } else { Err(Error::Bridge(format!("no such lattice: {begin:?}"))) }
+        if sound {
+            Ok(Self { begin })
+        } else {
+            Err(Error::Bridge(format!("invalid lattice in ScanBegin: {begin:?}")))
+        }
     }
 
-    /// What was announced.
+    /// Returns the ScanBegin.
     pub(crate) fn begin(&self) -> &ScanBegin {
         &self.begin
     }
@@ -51,7 +55,7 @@ impl Layout {
         self.begin.elevation_step > 0.0
     }
 
-    /// The header of the scan, rows from the top and columns by increasing azimuth.
+    /// Returns the header of the scan, rows from the top and columns by increasing azimuth.
     pub(crate) fn header(&self, scanner: &str) -> ScanHeader {
         let b = &self.begin;
         let first = if self.columns_flipped() { b.columns - 1 } else { 0 };
@@ -81,30 +85,30 @@ impl Layout {
         }
     }
 
-    /// Warm-up columns that the host is to leave out at the start of each face.
+    /// Returns the number of warm-up columns at the start of each face that the host must ignore.
     pub(crate) fn warm_up_columns(&self) -> u32 {
         if self.columns_flipped() { 0 } else { self.begin.warm_up_columns }
     }
 
-    /// Empties a warm-up column that the host cannot leave out, because it comes last in its order.
-    pub(crate) fn leave_out_warm_up(&self, number: u32, column: &mut Column) {
+    /// Invalidates a warm-up column that the host cannot ignore, because it is last in the host's order.
+    pub(crate) fn invalidate_warm_up(&self, number: u32, column: &mut Column) {
         let start = self.begin.seam_column.filter(|seam| number >= *seam).unwrap_or(0);
         if self.columns_flipped() && number - start < self.begin.warm_up_columns {
             column.state.fill(State::NoReturn);
         }
     }
 
-    /// Number of a column at the bridge, and the column in our order.
+    /// Decodes a column; returns its number at the bridge and the column in the host's order.
     pub(crate) fn column(&self, payload: &[u8]) -> Result<(u32, Column)> {
         let fault = |what: &str| Error::Bridge(format!("a column of {} bytes {what}", payload.len()));
         if payload.len() < FIXED {
-            return Err(fault("has no beginning"));
+            return Err(fault("is shorter than its fixed part"));
         }
         let [number, first_row, n_rows, face] = [0, 4, 8, 12].map(|at| u32_at(payload, at));
         let b = &self.begin;
         let end = u64::from(first_row) + u64::from(n_rows);
         if number >= b.columns || end > u64::from(b.rows) || face > 1 {
-            return Err(fault("lies outside of the lattice"));
+            return Err(fault("lies outside the lattice"));
         }
         let n = n_rows as usize;
         let bitmap = payload.get(FIXED..FIXED + n.div_ceil(8)).ok_or_else(|| fault("has no bitmap"))?;
@@ -119,7 +123,7 @@ impl Layout {
             || !records.remainder().is_empty()
             || (n..bitmap.len() * 8).any(valid)
         {
-            return Err(fault("holds other records than its bitmap says"));
+            return Err(fault("contains records that do not match its bitmap"));
         }
 
         let mut column = Column {
@@ -137,7 +141,7 @@ impl Layout {
             let record = records.next().ok_or_else(|| fault("ends early"))?;
             let range = u32_at(record, 0);
             if range == 0 {
-                return Err(fault("holds a range of 0"));
+                return Err(fault("contains a range of 0"));
             }
             let off = |at: usize| match b.values {
                 Values::Range => 0.0,

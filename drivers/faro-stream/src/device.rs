@@ -1,4 +1,4 @@
-//! Socket and clock: connections come and go, the session goes on.
+//! Socket and clock: connections are made and lost, the session continues.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -12,36 +12,36 @@ use crate::message::{self, Settings};
 use crate::session::{Action, Request, Session, check_scanner, json, parse, refused};
 use crate::wire::{Decoder, Frame, VERSION, encode, kind};
 
-/// Longest wait for a byte before deadline, cancelling and heartbeat are looked at.
+/// Longest wait for a byte between two checks of deadline, cancellation and heartbeat.
 const TICK: Duration = Duration::from_millis(20);
-/// Longest time between two frames of ours.
+/// Longest interval between two frames sent.
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Longest silence of a bridge that must speak every second.
+/// Silence after which a connection counts as broken; the bridge sends Status every second.
 const SILENCE: Duration = Duration::from_secs(4);
-/// Longest wait for a connection.
+/// Time limit of connecting.
 const CONNECT: Duration = Duration::from_secs(2);
-/// Waits between two connections, doubling.
+/// First and longest wait between two connections (exponential back-off).
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(5));
-/// Time before the deadline that is kept for saying why there is no scan.
-const LAST_WORDS: Duration = Duration::from_millis(100);
+/// Time before the deadline reserved for reporting why there is no scan.
+const REPORT_TIME: Duration = Duration::from_millis(100);
 
-/// Who wants the scan.
+/// Host of a scan job.
 pub(crate) trait Host {
-    /// An error when the job was cancelled.
+    /// Returns an error when the job was cancelled.
     fn check(&self) -> Result<()>;
-    /// Time until the deadline.
+    /// Returns the time until the deadline.
     fn remaining(&self) -> Duration;
-    /// Says how far the work is.
+    /// Reports the progress.
     fn progress(&self, fraction: f64, phase: &str);
-    /// Takes what the session delivers.
+    /// Receives the header.
     fn begin(&mut self, header: &ScanHeader) -> Result<()>;
-    /// One column.
+    /// Receives a column.
     fn column(&mut self, column: &Column) -> Result<()>;
-    /// The end.
+    /// Receives the end.
     fn end(&mut self, end: &ScanEnd) -> Result<()>;
 }
 
-/// The host behind the plugin boundary.
+/// Host across the plugin boundary.
 pub(crate) struct ToHost<'a, 'j, 's> {
     pub(crate) job: &'a Job<'j>,
     pub(crate) out: &'a mut ScanSink<'s>,
@@ -73,13 +73,13 @@ impl Host for ToHost<'_, '_, '_> {
     }
 }
 
-/// A connection to a bridge.
+/// Connection to a bridge.
 struct Link {
     stream: TcpStream,
     decoder: Decoder,
     sequence: u64,
-    heard: Instant,
-    spoke: Instant,
+    last_received: Instant,
+    last_sent: Instant,
 }
 
 impl Link {
@@ -97,8 +97,8 @@ impl Link {
                         stream,
                         decoder: Decoder::default(),
                         sequence: 0,
-                        heard: now,
-                        spoke: now,
+                        last_received: now,
+                        last_sent: now,
                     });
                 }
                 Err(error) => last = broken(error),
@@ -110,20 +110,20 @@ impl Link {
     fn send(&mut self, kind: u16, scan: u32, payload: &[u8]) -> Result<()> {
         let bytes = encode(kind, scan, self.sequence, payload);
         self.sequence += 1;
-        self.spoke = Instant::now();
+        self.last_sent = Instant::now();
         self.stream.write_all(&bytes).map_err(|error| Error::Broken(error.to_string()))
     }
 
-    /// The next frame, `None` after a tick without one.
+    /// Returns the next frame, `None` after a tick without one.
     fn receive(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.decoder.next()? {
             return Ok(Some(frame));
         }
         let mut bytes = [0; 1 << 16];
         match self.stream.read(&mut bytes) {
-            Ok(0) => return Err(Error::Broken("the bridge closed it".to_owned())),
+            Ok(0) => return Err(Error::Broken("closed by the bridge".to_owned())),
             Ok(n) => {
-                self.heard = Instant::now();
+                self.last_received = Instant::now();
                 self.decoder.push(&bytes[..n]);
             }
             Err(error)
@@ -133,17 +133,17 @@ impl Link {
                 ) => {}
             Err(error) => return Err(Error::Broken(error.to_string())),
         }
-        if self.heard.elapsed() > SILENCE {
-            return Err(Error::Broken(format!("the bridge was silent for {} s", SILENCE.as_secs())));
+        if self.last_received.elapsed() > SILENCE {
+            return Err(Error::Broken(format!("no frame from the bridge for {} s", SILENCE.as_secs())));
         }
-        if self.spoke.elapsed() > HEARTBEAT {
+        if self.last_sent.elapsed() > HEARTBEAT {
             self.send(kind::HEARTBEAT, 0, &[])?;
         }
         self.decoder.next()
     }
 }
 
-/// Scans through the bridge at `address`; the host gets the columns as they come.
+/// Scans through the bridge at `address`; delivers columns to the host as they arrive.
 pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Result<()> {
     let mut session = Session::new(request);
     let mut wait = BACK_OFF.0;
@@ -154,7 +154,7 @@ pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Res
             Err(error @ (Error::Broken(_) | Error::Busy { .. })) => error,
             Err(error) => return Err(error),
         };
-        // A connection that held is no reason to wait longer for the next.
+        // The back-off restarts after a connection that lasted.
         wait = if started.elapsed() > SILENCE { BACK_OFF.0 } else { (wait * 2).min(BACK_OFF.1) };
         let pause = match &error {
             Error::Busy { retry_ms, .. } => Duration::from_millis(*retry_ms).min(BACK_OFF.1),
@@ -164,7 +164,7 @@ pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Res
     }
 }
 
-/// One connection, until the scan is whole or the connection fails.
+/// Runs one connection until the scan is complete or the connection fails.
 fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Result<()> {
     let mut link = Link::connect(address)?;
     session.connected();
@@ -180,12 +180,12 @@ fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Res
         }
         if let Err(cancelled) = host.check() {
             if let Action::Send(kind, scan, payload) = session.abort() {
-                // The job is over whether the bridge hears of it or not: its lease ends by itself.
+                // The job ends even when Abort is not delivered: the lease expires by itself.
                 let _ = link.send(kind, scan, &payload);
             }
             return Err(cancelled);
         }
-        if host.remaining() < LAST_WORDS {
+        if host.remaining() < REPORT_TIME {
             return Err(Error::TooLate("the scan was still running".to_owned()));
         }
         if let Some(frame) = link.receive()? {
@@ -198,7 +198,7 @@ fn pause_for(pause: Duration, host: &impl Host, error: &Error) -> Result<()> {
     let started = Instant::now();
     while started.elapsed() < pause {
         host.check()?;
-        if host.remaining() < LAST_WORDS {
+        if host.remaining() < REPORT_TIME {
             return Err(Error::TooLate(error.to_string()));
         }
         std::thread::sleep(TICK);
@@ -207,7 +207,7 @@ fn pause_for(pause: Duration, host: &impl Host, error: &Error) -> Result<()> {
     Ok(())
 }
 
-/// Asks a bridge whether it could scan so, and how long that takes, seconds.
+/// Asks a bridge whether the settings are possible; returns the duration of the scan, seconds.
 pub(crate) fn ask(address: &str, request: &Request, settings: &Settings) -> Result<Option<f64>> {
     let mut link = Link::connect(address)?;
     let hello = message::Hello { versions: [VERSION; 2], client: &request.client, role: "controller" };

@@ -1,67 +1,67 @@
-//! What can go wrong between driver and bridge, by who must act.
+//! Errors between driver and bridge, by who must act.
 
 use platen_sdk::ErrorKind;
 
-/// Result of talking to a bridge.
+/// Result of an exchange with a bridge.
 pub(crate) type Result<T> = std::result::Result<T, Error>;
 
-/// Why a scan did not come.
+/// Error of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum Error {
-    /// The connection is of no use any more; another may be.
+    /// Broken connection; reconnecting may help.
     #[error("the connection broke: {0}")]
     Broken(String),
-    /// The bridge will take the request later.
+    /// Request refused for now; retrying later may help.
     #[error("the bridge is busy: {text}")]
     Busy {
-        /// Its words.
+        /// Text of the bridge.
         text: String,
-        /// When to ask again, milliseconds.
+        /// Time until the next attempt, milliseconds.
         retry_ms: u64,
     },
-    /// Another generation of the protocol.
-    #[error("the bridge speaks version {}.{} of the protocol, this driver 1.0; update the older of the two", .bridge.0, .bridge.1)]
+    /// Another major version of the protocol.
+    #[error("the bridge uses version {}.{} of the protocol, this driver 1.0; update the older of the two", .bridge.0, .bridge.1)]
     Version {
-        /// Its version.
+        /// Version of the bridge.
         bridge: (u8, u8),
     },
-    /// Not the scanner of this press.
+    /// Another scanner than that of this press.
     #[error("scanner {found} answers, {expected} is expected; check the address, or the option serial")]
     WrongScanner {
-        /// Serial number that answers.
+        /// Serial number found.
         found: String,
-        /// Serial number in the plant file.
+        /// Serial number in the plant file, option `serial`.
         expected: String,
     },
-    /// The bridge or the scanner says no.
+    /// Request refused by bridge or scanner.
     #[error("the bridge refuses ({code}): {text}")]
     Refused {
         /// Code of the protocol.
         code: String,
-        /// Its words.
+        /// Text of the bridge.
         text: String,
     },
-    /// The scan ended by itself.
+    /// Scan ended by the bridge before it was complete.
     #[error("the scan ended as {outcome}: {reason}")]
     Ended {
         /// `aborted` or `failed`.
         outcome: String,
-        /// Its words.
+        /// Text of the bridge.
         reason: String,
     },
-    /// The bridge does not keep to the protocol: no second try helps.
-    #[error("the bridge is at fault: {0}; tell its maker")]
+    /// Violation of the protocol by the bridge; retrying does not help.
+    #[error("the bridge violates the protocol: {0}; report this to the supplier of the bridge")]
     Bridge(String),
-    /// The time is over.
+    /// Deadline passed.
     #[error("no scan in time: {0}")]
     TooLate(String),
-    /// The host's answer.
+    /// Error returned by the host.
     #[error("{0}")]
     Host(#[from] platen_sdk::Error),
 }
 
 impl Error {
-    /// The error as it crosses the boundary, with the bridge's address.
+    /// Converts the error to that of the plugin interface, with the bridge's address.
     pub(crate) fn at(self, address: &str) -> platen_sdk::Error {
         let kind = match &self {
             Self::Host(error) => return error.clone(),

@@ -1,13 +1,12 @@
-//! Scans through a bridge: a small server beside the scanner's own software that speaks the scan bridge protocol.
+//! Driver `faro-stream`: scans through a bridge, a small server beside the scanner's own software that implements the scan bridge
+//! protocol (`PROTOCOL.md` beside this crate, sufficient to write a bridge).
 //!
-//! # What it does
-//! It asks the bridge for one scan under a name of its own, so that a lost answer never leads to a second scan, and
-//! delivers columns as they arrive. A broken connection is made again and the scan goes on where it stopped; columns that
-//! came damaged are asked for again. The scan counts only when every column is there and the digest over all of
-//! them agrees: late, repeated, shuffled or damaged frames cannot make a torn lattice. Rows and columns are brought into the
-//! order of the host whichever way the scanner turns.
-//!
-//! The protocol is in `PROTOCOL.md` beside this crate; it is enough to write a bridge from.
+//! # Method
+//! The driver requests each scan under a job name of its own, so that a lost answer never causes a second scan, and
+//! delivers columns as they arrive. After a broken connection it reconnects and resumes the scan; damaged columns are requested
+//! again. A scan is complete only when every column has arrived and the CRC-32C digest over all of them agrees, so that late, repeated,
+//! shuffled or damaged frames cannot produce an inconsistent lattice. Rows and columns are brought into the host's order for either
+//! direction of rotation.
 //!
 //! # Example
 //! ```toml
@@ -25,8 +24,8 @@
 //! | `client` | name of this host at the bridge; one per press |
 //! | `divisor` | resolution 1/divisor |
 //! | `rate_kpts` | thousands of points per second |
-//! | `compression` | n: n^2 samples become one |
-//! | `serial` | serial number of the scanner that must answer |
+//! | `compression` | averaging n: n^2 samples become one |
+//! | `serial` | required serial number of the scanner |
 
 mod column;
 mod device;
@@ -44,28 +43,28 @@ use message::Settings;
 use session::Request;
 
 options! {
-    /// Options of the stream driver; the module head is their manual.
+    /// Options of the driver, documented in the module head.
     pub struct Options {
         /// Host and port of the bridge.
         address: String;
-        /// Name of this host at the bridge: one per press, the same over restarts.
+        /// Name of this host at the bridge: one per press, unchanged over restarts.
         client: String = "platen";
-        /// Resolution, as the divisor of the finest.
+        /// Resolution, as the divisor of the finest one.
         divisor: i64 = 4, min 1, max 32;
         /// Thousands of points per second.
         rate_kpts: i64 = 244, min 1, max 10000;
-        /// Averaging: n^2 samples become one.
+        /// Averaging n: n^2 samples become one.
         compression: i64 = 1, min 1, max 8;
-        /// Serial number of the scanner that must answer.
+        /// Required serial number of the scanner.
         serial: Option<String>;
     }
 }
 
-/// The driver.
+/// Driver `faro-stream`.
 #[derive(Debug)]
 pub struct FaroStream {
     options: Options,
-    /// Tells the jobs of this run from those of the runs before.
+    /// Start time, part of the job names of this run.
     run: u64,
 }
 
@@ -73,7 +72,7 @@ impl Scanner for FaroStream {
     const INFO: Info = Info::new(
         c"faro-stream",
         c"Scan bridge",
-        c"Scans through a bridge beside the scanner's own software; resumes after broken connections.",
+        c"Receives scans from a bridge beside the scanner's own software; resumes after broken connections.",
         c"0.1.0",
     )
     .hardware();

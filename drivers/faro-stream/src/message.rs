@@ -1,4 +1,4 @@
-//! The JSON messages of the protocol. What a bridge may leave out is an `Option` or has a default.
+//! JSON messages of the protocol, sections 2 to 7 of `PROTOCOL.md`. A member that a bridge may omit is an `Option` or has a default.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ pub(crate) struct Capabilities {
     pub(crate) serial: String,
 }
 
-/// What is wanted of a scan.
+/// Requested settings of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Settings {
     pub(crate) divisor: u32,
@@ -30,7 +30,7 @@ pub(crate) struct Settings {
     pub(crate) window: Option<Region>,
 }
 
-/// Part of the dome, radians.
+/// Angular window, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Region {
     azimuth_start: f64,
@@ -97,13 +97,13 @@ pub(crate) struct Refusal {
     pub(crate) retry_ms: Option<u64>,
 }
 
-/// What is in a record of a column.
+/// Content of a record of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Values {
-    /// Range and intensity; the beam lies on the even lattice.
+    /// Range and intensity; the beam lies on the regular lattice.
     Range,
-    /// Range, intensity, and how far the beam is from the even lattice.
+    /// Range, intensity, and angular deviation of the beam from the regular lattice.
     Polar,
 }
 

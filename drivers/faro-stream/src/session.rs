@@ -1,11 +1,11 @@
-//! One scan, told as what comes in and what goes out; pure, without a socket or a clock.
+//! Session: the protocol's state machine for one scan; a pure function of received frames, without socket or clock.
 //!
 //! ```text
 //! connected -> Hello; Capabilities -> Start, or Resume when the scan is known; ScanBegin; Columns;
-//! ScanEnd -> done, or Resume for the columns that are missing
+//! ScanEnd -> done, or Resume for the missing columns
 //! ```
-//! A broken connection loses nothing: the next one goes on. Columns are delivered once, whatever comes twice, late,
-//! out of order or damaged; the end is delivered when every column is there and the digest agrees.
+//! A broken connection loses nothing: the next one continues. Each column is delivered once, even if frames are repeated, late,
+//! out of order or damaged; the end is delivered when every column has arrived and the digest agrees.
 
 use std::collections::VecDeque;
 
@@ -16,51 +16,51 @@ use crate::error::{Error, Result};
 use crate::message::{self, Settings};
 use crate::wire::{Frame, VERSION, kind};
 
-/// Requests for the same columns that may bring none before the bridge is given up.
-const FRUITLESS: u32 = 3;
+/// Number of consecutive Resume requests without progress after which the scan fails.
+const MAX_FRUITLESS_RESUMES: u32 = 3;
 
-/// What the session wants done.
+/// Action to be executed by the connection.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Action {
-    /// Send a frame: type, scan, payload.
+    /// Sends a frame: type, scan, payload.
     Send(u16, u32, Vec<u8>),
-    /// Tell the host how far the scanner is.
+    /// Reports the scanner's progress to the host.
     Progress(f64, String),
-    /// Deliver the header.
+    /// Delivers the header.
     Begin(Box<ScanHeader>),
-    /// Deliver a column.
+    /// Delivers a column.
     Column(Box<Column>),
-    /// Deliver the end; the session is over.
+    /// Delivers the end; the session is over.
     End(ScanEnd),
 }
 
-/// Who asks for what.
+/// Request for a scan.
 #[derive(Debug, Clone)]
 pub(crate) struct Request {
     pub(crate) client: String,
     pub(crate) job: String,
     pub(crate) settings: Settings,
-    /// Serial number that must answer.
+    /// Required serial number of the scanner.
     pub(crate) serial: Option<String>,
 }
 
-/// What came of the scan so far.
+/// Received part of the scan.
 #[derive(Debug)]
 struct Scan {
     number: u32,
     layout: Layout,
-    /// Payload checksum of every column that came, by its number at the bridge.
+    /// Payload checksum of every received column, by its number at the bridge.
     columns: Vec<Option<u32>>,
-    /// Records that came.
+    /// Records received.
     points: u64,
     /// Cells delivered as valid.
     delivered: u64,
-    /// Columns that were missing at the end before.
+    /// Columns missing at the previous ScanEnd.
     missed: usize,
     fruitless: u32,
 }
 
-/// One scan.
+/// Session of one scan.
 #[derive(Debug)]
 pub(crate) struct Session {
     request: Request,
@@ -71,36 +71,36 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    /// Nothing sent yet.
+    /// Creates a session before its first connection.
     pub(crate) fn new(request: Request) -> Self {
         Self { request, greeted: false, scanner: String::new(), scan: None, actions: VecDeque::new() }
     }
 
-    /// The next thing to do.
+    /// Returns the next action.
     pub(crate) fn action(&mut self) -> Option<Action> {
         self.actions.pop_front()
     }
 
-    /// A connection stands: the first, or another one.
+    /// Starts a connection, the first or a later one.
     pub(crate) fn connected(&mut self) {
         self.greeted = false;
-        // What the connection before was to carry means nothing on this one.
+        // Frames queued for the previous connection are discarded.
         self.actions.retain(|action| !matches!(action, Action::Send(..)));
         let hello =
             message::Hello { versions: [VERSION; 2], client: &self.request.client, role: "controller" };
         self.actions.push_back(Action::Send(kind::HELLO, 0, json(&hello)));
     }
 
-    /// The frame that ends the scan at the bridge.
+    /// Returns the frame that aborts the scan at the bridge.
     pub(crate) fn abort(&self) -> Action {
         let number = self.scan.as_ref().map_or(0, |scan| scan.number);
         Action::Send(kind::ABORT, number, json(&message::Abort { job: &self.request.job }))
     }
 
-    /// Takes a frame.
+    /// Processes a received frame.
     ///
     /// # Errors
-    /// [`Error::Broken`] and [`Error::Busy`] when another connection may help, else what ends the scan.
+    /// [`Error::Broken`] and [`Error::Busy`] when reconnecting may help; all others end the scan.
     pub(crate) fn frame(&mut self, frame: &Frame) -> Result<()> {
         if frame.kind == kind::COLUMN {
             return self.column(frame);
@@ -120,9 +120,9 @@ impl Session {
             kind::ERROR => Err(refused(parse(frame)?)),
             kind::SCAN_BEGIN => self.scan_begin(frame.scan, parse(frame)?),
             kind::SCAN_END => self.scan_end(frame.scan, &parse(frame)?),
-            other if other & kind::MUST_UNDERSTAND == 0 => Ok(()),
+            other if other & kind::CRITICAL == 0 => Ok(()),
             other => {
-                Err(Error::Bridge(format!("it sends frames of type {other:#06x}, unknown to version 1.0")))
+                Err(Error::Bridge(format!("critical frames of type {other:#06x}, unknown to version 1.0")))
             }
         }
     }
@@ -130,7 +130,7 @@ impl Session {
     fn capabilities(&mut self, found: &message::Capabilities) -> Result<()> {
         check_scanner(found, self.request.serial.as_deref())?;
         if std::mem::replace(&mut self.greeted, true) {
-            return Err(Error::Bridge("it says its capabilities twice".to_owned()));
+            return Err(Error::Bridge("a second Capabilities frame".to_owned()));
         }
         self.scanner = format!("{} {}", found.model, found.serial).trim().to_owned();
         let next = match &self.scan {
@@ -157,7 +157,7 @@ impl Session {
 
     fn scan_begin(&mut self, number: u32, begin: message::ScanBegin) -> Result<()> {
         if begin.job != self.request.job {
-            return Ok(()); // The late beginning of another scan.
+            return Ok(()); // Late ScanBegin of another scan.
         }
         let layout = Layout::new(begin)?;
         match &self.scan {
@@ -178,26 +178,26 @@ impl Session {
             Some(scan) if scan.number == number && scan.layout == layout => Ok(()),
             Some(scan) => {
                 let before = scan.number;
-                Err(Error::Bridge(format!("it began scan {number} for the job of scan {before}")))
+                Err(Error::Bridge(format!("scan {number} started for the job of scan {before}")))
             }
         }
     }
 
     fn column(&mut self, frame: &Frame) -> Result<()> {
         let Some(scan) = self.scan.as_mut().filter(|scan| scan.number == frame.scan) else {
-            return Ok(()); // A late frame of another scan.
+            return Ok(()); // Late frame of another scan.
         };
         if !frame.sound() {
-            return Ok(()); // Missing, and asked for at the end.
+            return Ok(()); // Remains missing, and is requested after ScanEnd.
         }
         let (number, mut column) = scan.layout.column(&frame.payload)?;
         match &mut scan.columns[number as usize] {
             Some(before) if *before == frame.crc => Ok(()),
-            Some(_) => Err(Error::Bridge(format!("column {number} came twice with different content"))),
+            Some(_) => Err(Error::Bridge(format!("column {number} received twice with different content"))),
             slot => {
                 *slot = Some(frame.crc);
                 scan.points += valid(&column);
-                scan.layout.leave_out_warm_up(number, &mut column);
+                scan.layout.invalidate_warm_up(number, &mut column);
                 scan.delivered += valid(&column);
                 self.actions.push_back(Action::Column(Box::new(column)));
                 Ok(())
@@ -219,8 +219,10 @@ impl Session {
         }
         scan.fruitless = if missing < scan.missed { 0 } else { scan.fruitless + 1 };
         scan.missed = missing;
-        if scan.fruitless == FRUITLESS {
-            return Err(Error::Bridge(format!("{missing} columns do not come, asked for {FRUITLESS} times")));
+        if scan.fruitless == MAX_FRUITLESS_RESUMES {
+            return Err(Error::Bridge(format!(
+                "{missing} columns missing after {MAX_FRUITLESS_RESUMES} requests"
+            )));
         }
         let again = self.scan.as_ref().map(|scan| self.resume(scan));
         self.actions.extend(again);
@@ -229,7 +231,7 @@ impl Session {
 }
 
 impl Scan {
-    /// Runs of columns that did not come sound.
+    /// Returns the runs of columns that have not arrived intact.
     fn missing(&self) -> Vec<(u32, u32)> {
         let mut runs: Vec<(u32, u32)> = Vec::new();
         for (number, _) in (0..).zip(&self.columns).filter(|(_, column)| column.is_none()) {
@@ -241,14 +243,14 @@ impl Scan {
         runs
     }
 
-    /// The end, when the bridge sent what it says it sent.
+    /// Returns the end of the scan if columns, points and digest agree with the bridge's ScanEnd.
     fn close(&self, end: &message::ScanEnd) -> Result<ScanEnd> {
         let add = |digest, crc: &u32| crc32c::crc32c_append(digest, &crc.to_le_bytes());
         let digest = self.columns.iter().flatten().fold(0, add);
         let columns = self.layout.begin().columns;
         if (end.columns, end.points, end.digest) != (columns, self.points, digest) {
             let what = format!(
-                "it sent {columns} columns, {} points, digest {digest:#010x}, and says {} columns, {} points, digest {:#010x}",
+                "received {columns} columns, {} points, digest {digest:#010x}, but ScanEnd states {} columns, {} points, digest {:#010x}",
                 self.points, end.columns, end.points, end.digest
             );
             return Err(Error::Bridge(what));
@@ -266,7 +268,7 @@ fn valid(column: &Column) -> u64 {
     column.state.iter().filter(|state| **state == State::Valid).count() as u64
 }
 
-/// The scanner that answers must be the one of the plant file.
+/// Checks version and serial number of the scanner that answers.
 pub(crate) fn check_scanner(found: &message::Capabilities, serial: Option<&str>) -> Result<()> {
     if found.version.0 != VERSION.0 {
         return Err(Error::Version { bridge: found.version });
@@ -279,7 +281,7 @@ pub(crate) fn check_scanner(found: &message::Capabilities, serial: Option<&str>)
     }
 }
 
-/// An Error frame as an error.
+/// Converts an Error frame to an error.
 pub(crate) fn refused(refusal: message::Refusal) -> Error {
     match (refusal.code.as_str(), refusal.retry_ms) {
         ("busy", retry) => Error::Busy { text: refusal.text, retry_ms: retry.unwrap_or(1000) },
@@ -288,14 +290,14 @@ pub(crate) fn refused(refusal: message::Refusal) -> Error {
     }
 }
 
-/// The message in a frame.
+/// Parses the message in a frame.
 pub(crate) fn parse<T: serde::de::DeserializeOwned>(frame: &Frame) -> Result<T> {
     serde_json::from_slice(&frame.payload).map_err(|error| {
-        Error::Bridge(format!("a frame of type {:#06x} is not as agreed: {error}", frame.kind))
+        Error::Bridge(format!("invalid message in a frame of type {:#06x}: {error}", frame.kind))
     })
 }
 
-/// The bytes of a message. Its types hold nothing that JSON cannot.
+/// Encodes a message; its types contain nothing that JSON cannot represent.
 pub(crate) fn json(message: &impl serde::Serialize) -> Vec<u8> {
     serde_json::to_vec(message).unwrap_or_default()
 }

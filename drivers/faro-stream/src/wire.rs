@@ -1,16 +1,16 @@
-//! Bytes to frames and back; pure. Sections 1 and 5 of the protocol's page.
+//! Frame codec, sections 1 and 5 of `PROTOCOL.md`; pure functions.
 
 use crate::error::{Error, Result};
 
 /// `PSB1`.
 const MAGIC: u32 = u32::from_le_bytes(*b"PSB1");
-/// The version spoken.
+/// Supported version.
 pub(crate) const VERSION: (u8, u8) = (1, 0);
 const HEADER: usize = 32;
-/// Most bytes of a payload.
+/// Largest payload, bytes.
 pub(crate) const MAX_PAYLOAD: usize = 1 << 20;
 
-/// Types of frames.
+/// Frame types.
 pub(crate) mod kind {
     pub(crate) const HELLO: u16 = 0x8001;
     pub(crate) const CAPABILITIES: u16 = 0x8002;
@@ -25,15 +25,15 @@ pub(crate) mod kind {
     pub(crate) const SCAN_BEGIN: u16 = 0x8010;
     pub(crate) const COLUMN: u16 = 0x8011;
     pub(crate) const SCAN_END: u16 = 0x8012;
-    /// Who does not know a type with this bit must refuse it.
-    pub(crate) const MUST_UNDERSTAND: u16 = 0x8000;
+    /// Critical bit: a receiver that does not know the type must reject the frame.
+    pub(crate) const CRITICAL: u16 = 0x8000;
 }
 
-/// One frame as it came.
+/// Received frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
     pub(crate) kind: u16,
-    /// Scan that it belongs to, 0 for none.
+    /// Number of its scan, 0 for none.
     pub(crate) scan: u32,
     pub(crate) payload: Vec<u8>,
     /// Checksum of the payload as sent.
@@ -41,13 +41,13 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// False when the payload is not what was sent.
+    /// Returns whether the payload agrees with its checksum.
     pub(crate) fn sound(&self) -> bool {
         crc32c::crc32c(&self.payload) == self.crc
     }
 }
 
-/// The bytes of a frame.
+/// Encodes a frame.
 pub(crate) fn encode(kind: u16, scan: u32, sequence: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + payload.len() + 4);
     bytes.extend(MAGIC.to_le_bytes());
@@ -69,7 +69,7 @@ fn header_crc(header: &[u8]) -> u32 {
     crc32c::crc32c_append(crc32c::crc32c(&header[..12]), &header[16..HEADER])
 }
 
-/// Cuts frames out of what a connection brings.
+/// Decoder of the byte stream of a connection.
 #[derive(Debug, Default)]
 pub(crate) struct Decoder {
     held: Vec<u8>,
@@ -78,7 +78,7 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
-    /// Takes bytes as they come.
+    /// Appends received bytes.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         if self.given > MAX_PAYLOAD {
             self.held.drain(..self.given);
@@ -87,10 +87,10 @@ impl Decoder {
         self.held.extend_from_slice(bytes);
     }
 
-    /// The next whole frame.
+    /// Returns the next complete frame.
     ///
     /// # Errors
-    /// [`Error::Broken`] when nothing behind this place can be trusted.
+    /// [`Error::Broken`] when the rest of the stream cannot be trusted.
     pub(crate) fn next(&mut self) -> Result<Option<Frame>> {
         let rest = &self.held[self.given..];
         let Some(header) = rest.get(..HEADER) else { return Ok(None) };
@@ -108,25 +108,25 @@ impl Decoder {
         Ok(Some(frame))
     }
 
-    /// Length of the payload.
+    /// Checks a header; returns the length of the payload.
     fn check_header(&self, header: &[u8]) -> Result<usize> {
         let broken = |what: String| Err(Error::Broken(what));
         if u32_at(header, 0) != MAGIC {
-            return broken("the bytes are no frame (wrong magic)".to_owned());
+            return broken("invalid frame (wrong magic)".to_owned());
         }
         if u32_at(header, 12) != header_crc(header) {
-            return broken("the checksum of a frame's header is wrong".to_owned());
+            return broken("wrong checksum of a frame header".to_owned());
         }
         if header[4] != VERSION.0 {
             return Err(Error::Version { bridge: (header[4], header[5]) });
         }
         let length = u32_at(header, 8) as usize;
         if length > MAX_PAYLOAD {
-            return broken(format!("a frame of {length} bytes, at most {MAX_PAYLOAD} are allowed"));
+            return broken(format!("payload of {length} bytes, at most {MAX_PAYLOAD} are permitted"));
         }
         let sequence = u64::from(u32_at(header, 16)) | u64::from(u32_at(header, 20)) << 32;
         if sequence != self.sequence {
-            return broken(format!("frame {sequence} came where frame {} was due", self.sequence));
+            return broken(format!("frame {sequence} received, frame {} expected", self.sequence));
         }
         Ok(length)
     }

@@ -1,4 +1,4 @@
-//! From a plate to columns.
+//! One scan: from the plate's state to delivered columns.
 
 use crate::Options;
 use crate::error::Error;
@@ -18,13 +18,13 @@ use std::time::Instant;
 /// Period of the cyclic range error, metres.
 const CYCLIC_PERIOD: f64 = 1.2;
 
-/// Seeds of consecutive scans lie this far apart, so that no two runs with neighbouring seeds share a scan.
+/// Distance of the seeds of consecutive scans, so that no two runs with neighbouring seeds share a scan.
 const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Seconds that one core takes for one cell.
+/// Computing time of one cell on one core, seconds.
 const SECONDS_PER_CELL: f64 = 2e-6;
 
-/// Who takes the columns.
+/// Receiver of a scan.
 pub(crate) trait Receiver {
     fn check(&mut self, done: f64) -> Result<()>;
     fn begin(&mut self, header: &ScanHeader) -> Result<()>;
@@ -32,7 +32,7 @@ pub(crate) trait Receiver {
     fn end(&mut self, end: &ScanEnd) -> Result<()>;
 }
 
-/// The host.
+/// Receiver that forwards to the host.
 pub(crate) struct ToHost<'a, 'j, 's> {
     pub(crate) job: &'a Job<'j>,
     pub(crate) out: &'a mut ScanSink<'s>,
@@ -57,9 +57,9 @@ impl Receiver for ToHost<'_, '_, '_> {
     }
 }
 
-/// One scan about to be taken.
+/// Scan prepared to be taken.
 #[derive(Debug)]
-pub(crate) struct Shot {
+pub(crate) struct PreparedScan {
     scene: Scene,
     lattice: SimLattice,
     instrument: Instrument,
@@ -69,15 +69,15 @@ pub(crate) struct Shot {
     truth: Option<Truth>,
 }
 
-/// Where the truth goes, and the plate that it is about.
+/// Destination of the ground truth, and the plate.
 #[derive(Debug)]
 struct Truth {
     path: PathBuf,
     state: PlateState,
 }
 
-impl Shot {
-    /// The `number`-th scan of a run, of a plate or of an empty press, of all that is interesting or of a window.
+impl PreparedScan {
+    /// Prepares the `number`-th scan of a run, of a plate or an empty press; without a window, of the plate and its margin.
     pub(crate) fn new(
         options: &Options,
         state: Option<PlateState>,
@@ -101,7 +101,7 @@ impl Shot {
         })
     }
 
-    /// Takes it.
+    /// Takes the scan and delivers it to `out`.
     pub(crate) fn take(&self, out: &mut impl Receiver) -> Result<()> {
         let started = Instant::now();
         out.begin(&self.header())?;
@@ -138,7 +138,7 @@ impl Shot {
         })
     }
 
-    /// Hands a column over when it is due.
+    /// Delivers a column when it is due.
     fn deliver(&self, column: SimColumn, started: Instant, done: f64, out: &mut impl Receiver) -> Result<()> {
         if let Some(pace) = &self.pace {
             pace.wait_for_column(started, done, || out.check(done))?;
@@ -170,7 +170,7 @@ impl Shot {
     }
 }
 
-/// Seconds that a scan takes here; `None` when the options are at fault.
+/// Returns the estimated duration of a scan, seconds; `None` when the options are invalid.
 pub(crate) fn estimate_s(options: &Options, window: Option<&Window>) -> Option<f64> {
     let step = options.step_deg.to_radians();
     // Without a window: a plate of 5 m at 5 m distance.
@@ -195,7 +195,9 @@ fn lattice(
     };
     let (low, high) = (w.elevation_min.max(LOWEST_DEG.to_radians()), w.elevation_max.min(FRAC_PI_2));
     if high <= low {
-        return Err(Error::Options("the window lies below what the scanner reaches".into()));
+        return Err(Error::Options(
+            "the window lies outside the scanner's elevations, -62.5 to 90 degrees".into(),
+        ));
     }
     Ok(SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step).on_encoder())
 }
@@ -223,7 +225,7 @@ fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrumen
     }
 }
 
-/// Two faces, the back one from an azimuth on. A seam outside the window leaves one face.
+/// Returns the two faces, the back face starting at an azimuth. A seam outside the window leaves one face.
 fn faces(options: &Options, lattice: &SimLattice, azimuth_deg: f64) -> Faces {
     let ahead = (azimuth_deg.to_radians() - lattice.azimuth_start).rem_euclid(TAU);
     let seam_column = (ahead / lattice.azimuth_step).ceil() as u32;
@@ -237,7 +239,7 @@ fn threads(options: &Options) -> usize {
     }
 }
 
-/// The column in the product's terms. The direction of a lost echo is known.
+/// Converts a column to that of the plugin interface. The direction of a lost echo is known.
 fn converted(column: SimColumn) -> Column {
     let state = |state: &SimState| match state {
         SimState::Valid => State::Valid,

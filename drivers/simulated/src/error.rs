@@ -1,33 +1,33 @@
-//! What can keep a simulated plate from being scanned.
+//! Errors of the driver, by who must act.
 
 use platen_sdk::ErrorKind;
 use std::path::PathBuf;
 
-/// An error by who must act.
+/// Error of the driver.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// Options that contradict each other.
+    /// Invalid or contradictory options.
     #[error("{0}")]
     Options(String),
-    /// The simulated press is not there.
+    /// Simulated press not reachable.
     #[error("simulated press at {address}: {source}")]
     Cell { address: String, source: std::io::Error },
-    /// It does not speak as agreed.
+    /// Invalid answer of the press.
     #[error("simulated press at {address} answered `{line}`: {source}")]
     Answer { address: String, line: String, source: serde_json::Error },
-    /// It has no plate to show now.
+    /// Plate moving: no state available now.
     #[error("simulated press at {address}: {reason}")]
     Busy { address: String, reason: String },
-    /// The description file cannot be read.
+    /// Description file that cannot be read.
     #[error("{path}: {source}")]
     File { path: PathBuf, source: std::io::Error },
-    /// The truth cannot be written.
+    /// Ground truth that cannot be written.
     #[error("{path}: cannot be written: {source}")]
     Truth { path: PathBuf, source: std::io::Error },
-    /// The description file is wrong.
+    /// Invalid description file.
     #[error("{path}: {message}")]
     Description { path: PathBuf, message: String },
-    /// The plate cannot be built.
+    /// Description of an impossible plate.
     #[error(transparent)]
     Plate(#[from] platen_sim_plate::PlateError),
 }

@@ -1,13 +1,13 @@
-//! Scans simulated plates: the one that lies in the simulated press, or one of its own.
+//! Driver `simulated`: scans of a simulated plate by ray casting.
 //!
-//! # What it does
-//! On each trigger it asks where the plate comes from what shape the plate has now, puts it into a simulated press
-//! shop and casts the rays of a terrestrial scanner at it, with the errors of one. Without a window it scans the
-//! plate and `margin_deg` round it. Everything is reported as simulated.
+//! # Method
+//! Each trigger fetches the present shape of the plate, places it in a simulated press shop and casts the rays of a terrestrial laser
+//! scanner, with its errors (`platen-sim-scanner`). Without a window the plate and `margin_deg` around it are scanned. Scans are
+//! marked as simulated.
 //!
-//! The plate comes from one of three places: from a simulated press (`cell`), from a description file
-//! (`plate_file`), or from the options `shape`, `radius_mm`, `axis_deg` and the sizes. Each scan has noise of its own: the
-//! first scans of two runs with the same `seed` agree to the last bit, and so do the second ones.
+//! The plate comes from a simulated press (`cell`), from a description file (`plate_file`), or from the options `shape`, `radius_mm`,
+//! `axis_deg` and the dimensions. Each scan of a run has its own noise: the n-th scans of two runs with the same `seed` agree to
+//! the last bit.
 //!
 //! # Example
 //! ```toml
@@ -20,21 +20,21 @@
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `cell` | address where the simulated press says what its plate looks like |
+//! | `cell` | address of the simulated press's control port, which serves the plate |
 //! | `plate_file` | description of a plate: blank, shape, pose, in TOML |
-//! | `shape`, `radius_mm`, `axis_deg` | a plate without press and file |
-//! | `width_mm`, `height_mm`, `thickness_mm` | its size |
-//! | `scanner_m`, `scanner_yaw_deg` | where the scanner stands in the frame of the plate's pose, and how it is turned |
-//! | `step_deg`, `margin_deg` | angle between cells; what is scanned round the plate |
+//! | `shape`, `radius_mm`, `axis_deg` | plate without press and file |
+//! | `width_mm`, `height_mm`, `thickness_mm` | its dimensions |
+//! | `scanner_m`, `scanner_yaw_deg` | position and orientation of the scanner in the frame of the plate's pose |
+//! | `step_deg`, `margin_deg` | angle between cells; scanned margin around the plate |
 //! | `noise_mm`, `tail_dof` | standard deviation of a range at 10 m; degrees of freedom of heavy tails |
 //! | `footprint_mrad`, `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
-//! | `back_face_from_deg`, `collimation_urad` | where the back face begins, and what the faces disagree by |
-//! | `warm_up_columns` | columns before the laser is warm |
-//! | `hidden_by` | what stands before the plate |
-//! | `seed` | of all random numbers |
-//! | `time_scale`, `rate_kpts` | share of a real scanner's time that a scan takes, and the rate it would have |
-//! | `threads` | 0: one per core |
-//! | `truth_file` | where to write what a measurement of the scan should find, as JSON: for benches and tests |
+//! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
+//! | `warm_up_columns` | columns measured before the laser is warm |
+//! | `hidden_by` | object in front of the plate |
+//! | `seed` | seed of all random numbers |
+//! | `time_scale`, `rate_kpts` | duration of a scan relative to a real scanner, and the measuring rate it follows from |
+//! | `threads` | number of threads; 0: one per core |
+//! | `truth_file` | file for the ground truth of each scan, as JSON, for tests |
 
 mod capture;
 mod error;
@@ -49,17 +49,17 @@ use platen_scan::Window;
 use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
 
 options! {
-    /// Options of the driver; the module head is their manual.
+    /// Options of the driver, documented in the module head.
     pub struct Options {
-        /// Address of the simulated press's second port.
+        /// Address of the simulated press's control port.
         cell: Option<String>;
         /// Description of a plate in TOML.
         plate_file: Option<std::path::PathBuf>;
-        /// Shape of a plate without press and file.
+        /// Shape of the plate without press and file.
         shape: String = "flat", choices ["flat", "cylinder", "sphere"];
         /// Radius of its mid-surface, positive when the centre lies above the plate.
         radius_mm: f64 = 9000.0, unit "mm", min -1e6, max 1e6;
-        /// Direction of a cylinder's straight lines, from u towards v.
+        /// Direction of a cylinder's generators, from u towards v.
         axis_deg: f64 = 90.0, unit "deg", min -360.0, max 360.0;
         /// Extent of the plate along u.
         width_mm: f64 = 3000.0, unit "mm", min 100.0, max 20000.0;
@@ -69,46 +69,46 @@ options! {
         thickness_mm: f64 = 36.0, unit "mm", min 1.0, max 300.0;
         /// Position of the scanner in the frame of the plate's pose: x, y, z in metres.
         scanner_m: Option<Vec<f64>>;
-        /// Turn of the scanner about the vertical.
+        /// Rotation of the scanner about the vertical.
         scanner_yaw_deg: f64 = 0.0, unit "deg", min -360.0, max 360.0;
         /// Angle between neighbouring cells.
         step_deg: f64 = 0.05, unit "deg", min 0.005, max 5.0;
-        /// What is scanned round the plate when no window is asked for.
+        /// Margin around the plate that is scanned when no window is requested.
         margin_deg: f64 = 6.0, unit "deg", min 0.0, max 45.0;
         /// Standard deviation of a range at 10 m on mill scale.
         noise_mm: f64 = 0.5, unit "mm", min 0.0, max 20.0;
-        /// Degrees of freedom of the range error, for heavy tails; without it the error is normal.
+        /// Degrees of freedom of the range error (Student's t, heavy tails); without it the error is normal.
         tail_dof: Option<f64>, min 2.1, max 1000.0;
-        /// Width of the beam to 1/e^2.
+        /// Full width of the beam at 1/e^2 of its intensity.
         footprint_mrad: f64 = 0.3, unit "mrad", min 0.0, max 5.0;
-        /// Share of echoes lost by chance.
+        /// Probability that an echo is lost.
         dropout: f64 = 0.006, min 0.0, max 1.0;
         /// Amplitude of the cyclic range error, period 1.2 m.
         cyclic_mm: f64 = 0.0, unit "mm", min 0.0, max 20.0;
         /// Standard deviation of the reported angles.
         angular_noise_urad: f64 = 0.0, unit "urad", min 0.0, max 1000.0;
-        /// Azimuth from which on columns are measured on the back face; without it the scan has one face.
+        /// Azimuth from which columns are measured on the back face; without it the scan has one face.
         back_face_from_deg: Option<f64>, unit "deg", min -180.0, max 180.0;
-        /// Angle of the beam against the mirror's plane; its sign changes between the faces.
+        /// Collimation error; its sign changes between the faces.
         collimation_urad: f64 = 0.0, unit "urad", min -1000.0, max 1000.0;
-        /// Columns before the laser is warm.
+        /// Columns measured before the laser is warm.
         warm_up_columns: i64 = 10, min 0, max 1000;
-        /// What stands between scanner and plate.
+        /// Object between scanner and plate.
         hidden_by: String = "nothing", choices ["nothing", "person", "chain", "both"];
         /// Seed of all random numbers.
         seed: i64 = 1, min 0;
-        /// Share of a real scanner's time that a scan takes; 0: no longer than the computer needs.
+        /// Duration of a scan relative to a real scanner; 0: as fast as the computer allows.
         time_scale: f64 = 0.0, min 0.0, max 10.0;
-        /// Measuring rate that this time follows from, in thousands of points per second.
+        /// Measuring rate from which the duration follows, in thousands of points per second.
         rate_kpts: String = "122", choices ["122", "244", "488", "976"];
-        /// Threads; 0 takes one per core.
+        /// Number of threads; 0: one per core.
         threads: i64 = 0, min 0, max 256;
-        /// File that gets, after each scan, what a measurement of it should find, as JSON.
+        /// File for the ground truth of each scan, as JSON.
         truth_file: Option<std::path::PathBuf>;
     }
 }
 
-/// The driver.
+/// Driver `simulated`.
 #[derive(Debug)]
 pub struct Simulated {
     options: Options,
@@ -119,7 +119,7 @@ impl Scanner for Simulated {
     const INFO: Info = Info::new(
         c"simulated",
         c"Simulated scanner",
-        c"Casts rays at the plate of the simulated press, or at one of its own, with the errors of a real scanner.",
+        c"Simulates a terrestrial laser scanner by ray casting, on the plate of the simulated press or on one of its own.",
         c"0.1.0",
     );
     type Options = Options;
@@ -134,7 +134,7 @@ impl Scanner for Simulated {
 
     fn open(&mut self) -> Result<()> {
         match plate::fetch(&self.options) {
-            // The press is there; its plate will be at rest when it asks for a scan.
+            // The press answers; its plate will be at rest when a scan is requested.
             Ok(_) | Err(Error::Busy { .. }) => Ok(()),
             Err(error) => Err(error.into()),
         }
@@ -148,7 +148,7 @@ impl Scanner for Simulated {
         let state = plate::fetch(&self.options)?;
         let window = out.window().copied();
         self.scans += 1;
-        let shot = capture::Shot::new(&self.options, state, window.as_ref(), self.scans)?;
+        let shot = capture::PreparedScan::new(&self.options, state, window.as_ref(), self.scans)?;
         shot.take(&mut capture::ToHost { job, out })
     }
 }

@@ -1,4 +1,4 @@
-//! Takes the time that a real scanner would take, or a share of it.
+//! Timing of a scan as on a real scanner, scaled by a factor.
 
 use crate::Options;
 use crate::error::Error;
@@ -6,21 +6,21 @@ use platen_sdk::Result;
 use platen_sim_scanner::Device;
 use std::time::{Duration, Instant};
 
-/// Longest sleep between two looks at whether the scan is still wanted.
+/// Longest sleep between two checks for cancellation.
 const NAP: Duration = Duration::from_millis(40);
 
-/// A scan's timetable.
+/// Schedule of a scan.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pace {
     device: Device,
     /// Width of the window, radians.
     width: f64,
-    /// Share of the real time.
+    /// Factor to the real time.
     scale: f64,
 }
 
 impl Pace {
-    /// The timetable of a window; `None` when scans take no longer than they must.
+    /// Creates the schedule of a window; `None` when scans are not paced.
     pub(crate) fn new(options: &Options, width: f64) -> std::result::Result<Option<Self>, Error> {
         if options.time_scale == 0.0 {
             return Ok(None);
@@ -28,7 +28,7 @@ impl Pace {
         Ok(Some(Self { device: device(options)?, width, scale: options.time_scale }))
     }
 
-    /// Seconds from trigger to end.
+    /// Returns the duration from trigger to end, seconds.
     pub(crate) fn duration_s(&self) -> f64 {
         self.scale * self.device.duration_s(self.width)
     }
@@ -43,13 +43,13 @@ impl Pace {
         wait_until(started, self.scale * self.device.column_s(self.width, done), check)
     }
 
-    /// Waits until the scan is settled.
+    /// Waits until the scan's file would no longer change.
     pub(crate) fn wait_for_end(&self, started: Instant, check: impl FnMut() -> Result<()>) -> Result<()> {
         wait_until(started, self.duration_s(), check)
     }
 }
 
-/// The device whose step is nearest to the option's.
+/// Returns the scan mode whose step is nearest to the option `step_deg`.
 pub(crate) fn device(options: &Options) -> std::result::Result<Device, Error> {
     let wanted = options.step_deg.to_radians();
     let off = |divisor: &u32| (f64::from(*divisor) * std::f64::consts::TAU / 40_960.0 / wanted).ln().abs();

@@ -1,4 +1,4 @@
-//! Where the plate comes from.
+//! Source of the plate: simulated press, description file, or options.
 
 use crate::Options;
 use crate::error::Error;
@@ -8,10 +8,10 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// How long the simulated press may take for anything.
+/// Time limit of connecting, sending and receiving.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Longest answer that is read, bytes.
+/// Longest accepted reply, bytes.
 const LONGEST_ANSWER: u64 = 1 << 20;
 
 /// Refuses options that contradict each other.
@@ -20,12 +20,12 @@ pub(crate) fn check(options: &Options) -> Result<(), Error> {
         return Err(Error::Options("the options cell and plate_file are both set; remove one".into()));
     }
     if options.scanner_m.as_ref().is_some_and(|position| position.len() != 3) {
-        return Err(Error::Options("scanner_m needs three numbers: x, y, z in metres".into()));
+        return Err(Error::Options("scanner_m: write three numbers: x, y, z in metres".into()));
     }
     Ok(())
 }
 
-/// The plate as it lies now, in the scanner's frame; `None` when the press is empty.
+/// Fetches the present state of the plate in the scanner's frame; `None` when the press is empty.
 pub(crate) fn fetch(options: &Options) -> Result<Option<PlateState>, Error> {
     let state = match (&options.cell, &options.plate_file) {
         (Some(address), _) => ask(address)?,
@@ -41,12 +41,12 @@ pub(crate) fn fetch(options: &Options) -> Result<Option<PlateState>, Error> {
     Ok(state.map(|state| PlateState { pose: seen_from(options, &state.pose), ..state }))
 }
 
-/// A TOML error as one line: place and message.
+/// Returns a TOML error as one line: place and message.
 fn one_line(error: &toml::de::Error) -> String {
     error.to_string().lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The plate that the options describe.
+/// Returns the plate described by the options.
 fn own(options: &Options) -> PlateState {
     let Options { radius_mm, axis_deg, .. } = *options;
     let shape = match options.shape.as_str() {
@@ -57,7 +57,7 @@ fn own(options: &Options) -> PlateState {
     PlateState { shape, ..PlateState::flat(options.width_mm, options.height_mm, options.thickness_mm) }
 }
 
-/// The pose in the frame of a scanner that stands elsewhere.
+/// Transforms a pose to the frame of a scanner at another position.
 fn seen_from(options: &Options, pose: &Pose) -> Pose {
     let Some(&[x, y, z]) = options.scanner_m.as_deref().or(Some(&[0.0; 3])) else { return *pose };
     let turn = Vector3::z() * options.scanner_yaw_deg.to_radians();
@@ -67,7 +67,7 @@ fn seen_from(options: &Options, pose: &Pose) -> Pose {
     Pose::from_parts(&seen.rotation.to_rotation_matrix(), seen.translation.vector)
 }
 
-/// Asks the simulated press.
+/// Requests the plate from the simulated press.
 fn ask(address: &str) -> Result<Option<PlateState>, Error> {
     let failed = |source| Error::Cell { address: address.into(), source };
     let line = exchange(address).map_err(failed)?;
@@ -81,9 +81,9 @@ fn ask(address: &str) -> Result<Option<PlateState>, Error> {
     }
 }
 
-/// One request, one line back.
+/// Sends one request and returns the line of the reply.
 fn exchange(address: &str) -> std::io::Result<String> {
-    let nowhere = || std::io::Error::new(std::io::ErrorKind::NotFound, "the address leads nowhere");
+    let nowhere = || std::io::Error::new(std::io::ErrorKind::NotFound, "the name has no address");
     let resolved = address.to_socket_addrs()?.next().ok_or_else(nowhere)?;
     let mut stream = TcpStream::connect_timeout(&resolved, TIMEOUT)?;
     stream.set_read_timeout(Some(TIMEOUT))?;
@@ -95,7 +95,10 @@ fn exchange(address: &str) -> std::io::Result<String> {
     let mut line = String::new();
     BufReader::new(std::io::Read::take(stream, LONGEST_ANSWER)).read_line(&mut line)?;
     if line.is_empty() {
-        return Err(std::io::Error::new(std::io::ErrorKind::UnexpectedEof, "closed without an answer"));
+        return Err(std::io::Error::new(
+            std::io::ErrorKind::UnexpectedEof,
+            "the connection was closed without an answer",
+        ));
     }
     Ok(line)
 }

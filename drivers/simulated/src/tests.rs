@@ -1,6 +1,6 @@
 //! The driver without a host: plates from everywhere, windows, columns.
 
-use crate::capture::{Receiver, Shot};
+use crate::capture::{PreparedScan, Receiver};
 use crate::{Options, capture, plate};
 use platen_scan::{Column, Direction, Lattice, ScanEnd, ScanHeader, Window};
 use platen_sdk::{ErrorKind, Result};
@@ -77,7 +77,7 @@ impl Receiver for Keep {
 fn taken(options: &Options, window: Option<&Window>, number: u64) -> (Lattice, ScanEnd) {
     let mut keep = Keep::default();
     let state = plate::fetch(options).unwrap();
-    Shot::new(options, state, window, number).unwrap().take(&mut keep).unwrap();
+    PreparedScan::new(options, state, window, number).unwrap().take(&mut keep).unwrap();
     (keep.lattice.unwrap(), keep.end.unwrap())
 }
 
@@ -171,7 +171,7 @@ fn a_scanner_elsewhere_sees_the_same_plate() {
 #[test]
 fn a_stopped_scan_has_no_end() {
     let options = options();
-    let shot = Shot::new(&options, plate::fetch(&options).unwrap(), None, 1).unwrap();
+    let shot = PreparedScan::new(&options, plate::fetch(&options).unwrap(), None, 1).unwrap();
     let mut keep = Keep { stop_after: Some(3), ..Keep::default() };
     assert_eq!(shot.take(&mut keep).unwrap_err().kind(), ErrorKind::Cancelled);
     assert!(keep.columns == 3 && keep.end.is_none());
@@ -191,7 +191,7 @@ fn the_press_says_what_lies_in_it() {
     let (address, _served) = press("{\"plate\":null}\n");
     let options = Options { cell: Some(address), ..options() };
     let empty = plate::fetch(&options).unwrap();
-    assert!(empty.is_none() && Shot::new(&options, empty, None, 1).is_ok());
+    assert!(empty.is_none() && PreparedScan::new(&options, empty, None, 1).is_ok());
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn a_paced_scan_takes_its_share_of_the_real_time() {
     assert_eq!(end.columns as usize, lattice.n_columns());
     // Cancelled while the mirror spins up: at once.
     let slow = Options { time_scale: 10.0, ..options };
-    let shot = Shot::new(&slow, plate::fetch(&slow).unwrap(), None, 1).unwrap();
+    let shot = PreparedScan::new(&slow, plate::fetch(&slow).unwrap(), None, 1).unwrap();
     let mut keep = Keep { stop_after: Some(0), ..Keep::default() };
     assert!(shot.take(&mut keep).is_err() && keep.columns == 0);
     let impossible = Options { rate_kpts: "976".into(), ..slow };

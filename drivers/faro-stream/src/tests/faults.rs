@@ -138,7 +138,7 @@ fn late_frames_of_another_scan_are_passed_over() {
 
 #[test]
 fn a_torn_column_ends_the_scan() {
-    fails("column 2 came twice with different content", |frames| {
+    fails("column 2 received twice with different content", |frames| {
         let mut other = BRIDGE.column(2);
         other[30] ^= 1;
         frames.insert(FIRST + 5, frame(kind::COLUMN, SCAN, other));
@@ -148,7 +148,7 @@ fn a_torn_column_ends_the_scan() {
 #[test]
 fn a_digest_or_a_count_that_disagrees_ends_the_scan() {
     for member in ["digest", "points", "columns"] {
-        fails("and says", |frames| {
+        fails("ScanEnd states", |frames| {
             let mut end = BRIDGE.end();
             end[member] = json!(end[member].as_u64().unwrap() + 1);
             *frames.last_mut().unwrap() = text(kind::SCAN_END, SCAN, &end);
@@ -162,7 +162,7 @@ fn columns_that_never_come_end_the_scan() {
         frames.retain(|frame| frame.kind != kind::COLUMN || frame.payload[0] != 7);
         all(frames)
     });
-    assert!(stubborn.unwrap_err().to_string().contains("1 columns do not come, asked for 3 times"));
+    assert!(stubborn.unwrap_err().to_string().contains("1 columns missing after 3 requests"));
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn another_scan_for_the_same_job_ends_it() {
         frames.iter_mut().filter(|frame| frame.scan == SCAN).for_each(|frame| frame.scan = number);
         break_after(6, frames)
     });
-    assert!(restarted.unwrap_err().to_string().contains("began scan 42 for the job of scan 41"));
+    assert!(restarted.unwrap_err().to_string().contains("scan 42 started for the job of scan 41"));
 }
 
 #[test]
@@ -226,5 +226,5 @@ fn the_wrong_scanner_or_version_is_not_asked_for_a_scan() {
     let wrong = refuse(json!({"version": [1, 0], "serial": "S2"}), "S1");
     assert!(wrong.contains("scanner S2 answers, S1 is expected"), "{wrong}");
     let newer = refuse(json!({"version": [2, 1], "serial": "S1"}), "S1");
-    assert!(newer.contains("speaks version 2.1"), "{newer}");
+    assert!(newer.contains("uses version 2.1"), "{newer}");
 }

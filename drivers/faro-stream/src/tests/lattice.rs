@@ -55,11 +55,11 @@ fn a_column_that_does_not_keep_to_its_bitmap_is_refused() {
         payload[at] = byte;
         layout().column(&payload).unwrap_err().to_string()
     };
-    assert!(changed(0, 13).contains("outside of the lattice"));
-    assert!(changed(4, 3).contains("outside of the lattice"));
-    assert!(changed(8, 200).contains("outside of the lattice"));
-    assert!(changed(12, 2).contains("outside of the lattice"));
-    assert!(changed(26, whole[26] | 1).contains("than its bitmap says"));
+    assert!(changed(0, 13).contains("outside the lattice"));
+    assert!(changed(4, 3).contains("outside the lattice"));
+    assert!(changed(8, 200).contains("outside the lattice"));
+    assert!(changed(12, 2).contains("outside the lattice"));
+    assert!(changed(26, whole[26] | 1).contains("that do not match its bitmap"));
     let no_range = [&whole[..27], &[0; 4], &whole[31..]].concat();
     assert!(layout().column(&no_range).unwrap_err().to_string().contains("range of 0"));
 }
