@@ -9,6 +9,7 @@ use std::path::Path;
 use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Task, Template};
 
 use crate::document::{Document, Reported};
+use crate::unit::metres;
 use crate::{Error, Faults, TomlTable};
 use place::{Names, Rectangle};
 
@@ -221,14 +222,4 @@ fn read_station(
     let quantity = quantity.required();
     table.finish();
     Ok(Station { name: name?, at: at?, quantity: quantity? })
-}
-
-/// Converts millimetres of the file to metres.
-fn metres(mm: f64) -> f64 {
-    mm / 1000.0
-}
-
-/// Converts metres to millimetres for a message, rounded to a micrometre.
-fn millimetres(m: f64) -> f64 {
-    (m * 1e6).round() / 1000.0
 }

@@ -35,25 +35,10 @@ pub enum Dimension {
     Temperature,
 }
 
-impl Dimension {
-    /// Returns the name for messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Switch => "switch",
-            Self::Text => "text",
-            Self::Count => "count",
-            Self::Ratio => "ratio",
-            Self::Length => "length",
-            Self::Angle => "angle",
-            Self::Time => "time",
-            Self::Frequency => "frequency",
-            Self::Curvature => "curvature",
-            Self::Speed => "speed",
-            Self::Force => "force",
-            Self::Pressure => "pressure",
-            Self::Data => "amount of data",
-            Self::Temperature => "temperature",
-        }
+/// Formats as in messages: `length`.
+impl std::fmt::Display for Dimension {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&format!("{self:?}").to_lowercase())
     }
 }
 
@@ -193,8 +178,8 @@ impl Unit {
         if given.dimension != self.dimension {
             return Err(format!(
                 "found {text:?}, which is {}, expected {} in {}",
-                given.dimension.name(),
-                self.dimension.name(),
+                given.dimension,
+                self.dimension,
                 self.family()
             ));
         }
@@ -214,7 +199,17 @@ impl Unit {
     }
 }
 
-/// Bytes of the number that `text` begins with. An exponent needs its digits, so that "2 eV" or "3em" ends at the digit.
+/// Converts millimetres of a file to metres.
+pub(crate) fn metres(mm: f64) -> f64 {
+    mm / 1000.0
+}
+
+/// Converts metres to millimetres for a message, rounded to a micrometre.
+pub(crate) fn millimetres(m: f64) -> f64 {
+    (m * 1e6).round() / 1000.0
+}
+
+/// Returns the length of the number that `text` begins with. An exponent needs its digits, so that "2 eV" or "3em" ends at the digit.
 fn number_len(text: &str) -> usize {
     let plain =
         |from: &str| from.find(|c: char| !matches!(c, '0'..='9' | '.' | '+' | '-')).unwrap_or(from.len());

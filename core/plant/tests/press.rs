@@ -167,7 +167,7 @@ allow = ["100..=159"]
             "p.toml:11:9: press.map.in.abort: holding register 2 bit 1 is `trigger` already (built-in); move one",
             "p.toml:13:11: press.map.out.dev_min: holding register 110 is `dev_max` already (built-in); move one",
             "p.toml:14:9: press.map.out.owner: `owner` needs holding register 164, but its block ends with holding register 163",
-            "p.toml:15:20: press.map.out.result_stroke_id: the profile pph-1 cannot do without `result_stroke_id`",
+            "p.toml:15:20: press.map.out.result_stroke_id: the profile pph-1 requires `result_stroke_id`",
         ],
     );
 }

@@ -2,6 +2,7 @@
 
 use crate::TomlTable;
 use crate::document::Reported;
+use crate::unit::metres;
 
 /// Largest deviation from orthonormal of a rotation written with three digits.
 const ROTATION_SLACK: f64 = 2e-3;
@@ -125,8 +126,4 @@ fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
 fn unit(a: [f64; 3]) -> [f64; 3] {
     let length = dot(&a, &a).sqrt();
     a.map(|x| x / length)
-}
-
-fn metres(mm: f64) -> f64 {
-    mm / 1000.0
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::{metres, millimetres};
 use crate::document::Reported;
+use crate::unit::{metres, millimetres};
 use crate::{Place, TomlTable};
 
 /// Original rectangle of the plate, metres.

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use platen_model::{Facing, RadiusOf, Target, TargetShape};
 
 use super::place::Rectangle;
-use super::{metres, millimetres};
 use crate::document::Reported;
 use crate::key::Located;
+use crate::unit::{metres, millimetres};
 use crate::{Document, TomlTable};
 
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,11 @@
 
 use platen_model::{Centre, ReferenceLine, Seat, Template};
 
+use super::NamedLine;
 use super::place::Names;
-use super::{NamedLine, metres, millimetres};
 use crate::document::Reported;
 use crate::key::Located;
+use crate::unit::{metres, millimetres};
 use crate::{Document, TomlTable, nearest};
 
 /// Rule of the trade: default length, limit and source of a template.

@@ -6,9 +6,17 @@ use platen_model::Measure;
 
 use crate::Dimension;
 
+/// Names of the fields of one direction.
+pub(super) trait FieldName: Copy + Ord + 'static {
+    const INPUT: bool;
+    const ALL: &'static [Self];
+    fn name(self) -> &'static str;
+    fn dimension(self) -> Dimension;
+}
+
 /// Declares an enum with a name, a dimension and a meaning per variant.
 macro_rules! names {
-    ($(#[$outer:meta])* $kind:ident { $($variant:ident $name:literal $dimension:ident $meaning:literal)* }) => {
+    ($(#[$outer:meta])* $kind:ident, $input:literal { $($variant:ident $name:literal $dimension:ident $meaning:literal)* }) => {
         $(#[$outer])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum $kind { $(#[doc = $meaning] $variant,)* }
@@ -38,6 +46,19 @@ macro_rules! names {
             }
         }
 
+        impl FieldName for $kind {
+            const INPUT: bool = $input;
+            const ALL: &'static [Self] = Self::ALL;
+
+            fn name(self) -> &'static str {
+                self.name()
+            }
+
+            fn dimension(self) -> Dimension {
+                self.dimension()
+            }
+        }
+
         impl serde::Serialize for $kind {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.serialize_str(self.name())
@@ -61,7 +82,7 @@ macro_rules! names {
 
 names! {
     /// Field from the press to the host.
-    Input {
+    Input, true {
         MapVersion "map_version" Count "version of this map; the host stays off line when it differs"
         Heartbeat "heartbeat" Count "counts up while the press controller runs"
         Enable "enable" Switch "strokes are to be measured"
@@ -99,7 +120,7 @@ names! {
 
 names! {
     /// Field from the host to the press.
-    Output {
+    Output, false {
         MapVersion "map_version" Count "version of this map"
         Heartbeat "heartbeat" Count "counts up while the host runs; frozen for 2 s: ignore every result"
         StatusReady "status_ready" Switch "a stroke will be accepted"

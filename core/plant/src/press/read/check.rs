@@ -1,11 +1,12 @@
 //! Conflicts between the fields of a map, each reported with both fields.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
-use super::field::Name;
 use super::map::LocatedMap;
 use crate::Place;
 use crate::document::{Document, Reported};
+use crate::press::names::FieldName;
 use crate::press::{
     Block, Input, Output, Profile, RegisterField, RegisterPlace, RegisterTable, RegisterType, WriteAllow,
 };
@@ -13,24 +14,25 @@ use crate::press::{
 /// Reports every conflict of a map.
 pub(super) fn map(document: &Document, located: &LocatedMap, write: &WriteAllow) -> Result<(), Reported> {
     let map = &located.map;
-    let mut faults = Faults { document, located, found: None };
+    let faults = Conflicts { document, located, found: Cell::new(None) };
     faults.direction(&map.inputs, &located.inputs, &map.read);
     faults.direction(&map.outputs, &located.outputs, &map.write);
     faults.blocks();
     faults.allowed(write);
     faults.roles();
-    faults.found.map_or(Ok(()), Err)
+    faults.found.get().map_or(Ok(()), Err)
 }
 
-struct Faults<'a> {
+struct Conflicts<'a> {
     document: &'a Document,
     located: &'a LocatedMap,
-    found: Option<Reported>,
+    found: Cell<Option<Reported>>,
 }
 
-impl Faults<'_> {
-    fn add(&mut self, place: &Place, message: String) {
-        self.found = Some(self.document.fault(place, message));
+impl Conflicts<'_> {
+    /// Reports a fault at `place`, else at `[press.map]`.
+    fn add(&self, place: Option<&Place>, message: impl Into<String>) {
+        self.found.set(Some(self.document.fault(place.unwrap_or(&self.located.place), message)));
     }
 
     /// Returns kind and address of a register of a block, as the file counts.
@@ -40,8 +42,8 @@ impl Faults<'_> {
     }
 
     /// Reports fields that cross the end of their block or share a register.
-    fn direction<N: Name>(
-        &mut self,
+    fn direction<N: FieldName>(
+        &self,
         fields: &BTreeMap<N, RegisterField>,
         places: &BTreeMap<N, Place>,
         block: &Block,
@@ -51,10 +53,12 @@ impl Faults<'_> {
             let Some(offset) = field.place.offset() else { continue };
             let end = u32::from(offset) + u32::from(field.registers());
             if end > u32::from(block.count) {
-                let place = places.get(&name).unwrap_or(&self.located.place).clone();
                 let (needs, last) =
                     (self.register(block, end - 1), self.register(block, u32::from(block.count) - 1));
-                self.add(&place, format!("`{}` needs {needs}, but its block ends with {last}", name.name()));
+                self.add(
+                    places.get(&name),
+                    format!("`{}` needs {needs}, but its block ends with {last}", name.name()),
+                );
                 continue;
             }
             let bit = if let RegisterPlace::Bit(_, bit) = field.place { Some(bit) } else { None };
@@ -73,8 +77,8 @@ impl Faults<'_> {
     }
 
     /// Reports a shared register, at the later of the fields that the file gives.
-    fn clash<N: Name>(
-        &mut self,
+    fn clash<N: FieldName>(
+        &self,
         one: (N, Option<u8>),
         other: (N, Option<u8>),
         register: String,
@@ -88,27 +92,25 @@ impl Faults<'_> {
             Some(place) => self.document.locate(place),
             None => "built-in".to_owned(),
         };
-        let place = at(reported).unwrap_or(&self.located.place).clone();
-        self.add(&place, format!("{register}{bit} is `{}` already ({by}); move one", first.0.name()));
+        self.add(at(reported), format!("{register}{bit} is `{}` already ({by}); move one", first.0.name()));
     }
 
     /// Reports an overlap of the blocks: the host must not write registers of the press.
-    fn blocks(&mut self) {
+    fn blocks(&self) {
         let (read, write) = (self.located.map.read, self.located.map.write);
         let (ours, theirs) = (write.addresses(), read.addresses());
         let start = ours.start.max(theirs.start);
         if read.table == RegisterTable::Holding && start < ours.end.min(theirs.end) {
             let register = self.register(&read, start - theirs.start);
-            let place = self.located.write_place.clone();
             self.add(
-                &place,
+                Some(&self.located.write_place),
                 format!("{register} lies in the block that the press writes; the host must not write there"),
             );
         }
     }
 
     /// Reports outputs outside the allow-list.
-    fn allowed(&mut self, write: &WriteAllow) {
+    fn allowed(&self, write: &WriteAllow) {
         let block = self.located.map.write;
         for (name, field) in &self.located.map.outputs {
             let Some(offset) = field.place.offset() else { continue };
@@ -116,52 +118,38 @@ impl Faults<'_> {
                 && u32::from(offset) + u32::from(field.registers()) <= u32::from(block.count);
             if inside && write.check(block.start + offset, field.registers()).is_err() {
                 let register = self.register(&block, u32::from(offset));
-                let place = self.located.outputs.get(name).unwrap_or(&self.located.write_place).clone();
-                self.add(&place, format!("`{name}` at {register} is not in press.write.allow ({write})"));
+                let place = self.located.outputs.get(name).or(Some(&self.located.write_place));
+                self.add(place, format!("`{name}` at {register} is not in press.write.allow ({write})"));
             }
         }
     }
 
     /// Reports missing or unusable fields of the handshake.
-    fn roles(&mut self) {
-        let map = &self.located.map;
-        let needs_ids = map.profile == Profile::Pph1;
-        let inputs: &[Input] = if needs_ids { &[Input::Trigger, Input::StrokeId] } else { &[Input::Trigger] };
-        let outputs: &[Output] = if needs_ids {
-            &[Output::StatusBusy, Output::StatusResultValid, Output::AckStrokeId, Output::ResultStrokeId]
-        } else {
-            &[Output::StatusBusy, Output::StatusResultValid]
-        };
-        let profile = map.profile.name();
-        let missing_in = inputs
-            .iter()
-            .filter(|name| !map.inputs.contains_key(name))
-            .map(|&name| (name.name(), self.located.inputs.get(&name)));
-        let missing_out = outputs
-            .iter()
-            .filter(|name| !map.outputs.contains_key(name))
-            .map(|&name| (name.name(), self.located.outputs.get(&name)));
-        let missing: Vec<_> = missing_in
-            .chain(missing_out)
-            .map(|(name, place)| (name, place.unwrap_or(&self.located.place).clone()))
-            .collect();
+    fn roles(&self) {
+        let located = self.located;
+        let map = &located.map;
+        let numbered = map.profile == Profile::Pph1;
+        let inputs = &[Input::Trigger, Input::StrokeId][..if numbered { 2 } else { 1 }];
+        let outputs =
+            [Output::StatusBusy, Output::StatusResultValid, Output::AckStrokeId, Output::ResultStrokeId];
+        let outputs = &outputs[..if numbered { 4 } else { 2 }];
+        let missing_in = inputs.iter().filter(|name| !map.inputs.contains_key(name));
+        let missing_out = outputs.iter().filter(|name| !map.outputs.contains_key(name));
+        let missing = missing_in
+            .map(|name| (name.name(), located.inputs.get(name)))
+            .chain(missing_out.map(|name| (name.name(), located.outputs.get(name))));
         for (name, place) in missing {
-            self.add(&place, format!("the profile {profile} cannot do without `{name}`"));
+            self.add(place, format!("the profile {} requires `{name}`", map.profile.name()));
         }
-        let constant = map
-            .inputs
-            .get(&Input::Trigger)
-            .is_some_and(|field| matches!(field.place, RegisterPlace::Constant(_)));
-        if constant {
-            let place = self.located.inputs.get(&Input::Trigger).unwrap_or(&self.located.place).clone();
-            self.add(&place, "a trigger that never changes triggers nothing".to_owned());
+        let trigger = map.inputs.get(&Input::Trigger);
+        if trigger.is_some_and(|field| matches!(field.place, RegisterPlace::Constant(_))) {
+            self.add(located.inputs.get(&Input::Trigger), "a constant trigger starts no stroke");
         }
         for (name, field) in &map.outputs {
             let too_wide = *name == Output::ResultSeq && field.kind.registers() > 1;
             let text = matches!(field.kind, RegisterType::Ascii { .. });
             if too_wide || text {
-                let place = self.located.outputs.get(name).unwrap_or(&self.located.place).clone();
-                self.add(&place, format!("`{name}` must be a number in one register"));
+                self.add(located.outputs.get(name), format!("`{name}` must be a number in one register"));
             }
         }
     }

@@ -7,38 +7,11 @@ use platen_model::Measure;
 
 use crate::document::Reported;
 use crate::node::NodeKind;
-use crate::press::names::dimension_of;
+use crate::press::names::{FieldName, dimension_of};
 use crate::press::{
     AddressBase, Block, Counter, Input, Output, RegisterField, RegisterPlace, RegisterType, WordOrder,
 };
 use crate::{Dimension, Place, TomlTable, Unit};
-
-/// Field names of one direction.
-pub(super) trait Name: Copy + Ord + 'static {
-    const INPUT: bool;
-    fn name(self) -> &'static str;
-    fn dimension(self) -> Dimension;
-}
-
-impl Name for Input {
-    const INPUT: bool = true;
-    fn name(self) -> &'static str {
-        self.name()
-    }
-    fn dimension(self) -> Dimension {
-        self.dimension()
-    }
-}
-
-impl Name for Output {
-    const INPUT: bool = false;
-    fn name(self) -> &'static str {
-        self.name()
-    }
-    fn dimension(self) -> Dimension {
-        self.dimension()
-    }
-}
 
 /// Fields of one direction, with the places of those that the file gives.
 pub(super) struct Given<N> {
@@ -57,18 +30,17 @@ pub(super) struct FieldReader {
 
 impl FieldReader {
     /// Reads the fields of a direction: those of the profile with the changes of the file.
-    pub(super) fn fields<N: Name>(
+    pub(super) fn fields<N: FieldName>(
         &mut self,
         mut table: TomlTable<'_>,
         built_in: BTreeMap<N, RegisterField>,
-        all: &[N],
     ) -> Result<Given<N>, Reported> {
         let mut given = Given { fields: built_in, places: BTreeMap::new() };
         for field in given.fields.values_mut() {
             field.order = self.order;
         }
         let mut failed = None;
-        for &name in all {
+        for &name in N::ALL {
             match self.one(&mut table, name, given.fields.get(&name)) {
                 Ok(None) => {}
                 Ok(Some((field, place))) => {
@@ -86,7 +58,7 @@ impl FieldReader {
     }
 
     /// Reads one field: `None` if the file does not give it, `Some(None)` if it is `"none"`.
-    fn one<N: Name>(
+    fn one<N: FieldName>(
         &mut self,
         table: &mut TomlTable<'_>,
         name: N,
@@ -110,7 +82,7 @@ impl FieldReader {
         Ok(Some((Some(field), place)))
     }
 
-    fn table<N: Name>(
+    fn table<N: FieldName>(
         &mut self,
         mut table: TomlTable<'_>,
         name: N,
@@ -119,12 +91,10 @@ impl FieldReader {
     ) -> Result<RegisterField, Reported> {
         let document = table.document();
         let dimension = name.dimension();
+        let switch = dimension == Dimension::Switch;
         let default = built_in.cloned().unwrap_or_else(|| RegisterField {
             order: self.order,
-            ..RegisterField::register(
-                0,
-                if dimension == Dimension::Switch { RegisterType::Bool } else { RegisterType::U16 },
-            )
+            ..RegisterField::register(0, if switch { RegisterType::Bool } else { RegisterType::U16 })
         });
         let at = self.place(&mut table, name, built_in.map(|field| field.place));
         let kind = read_kind(&mut table, dimension, default.kind);
@@ -143,39 +113,32 @@ impl FieldReader {
         let invalid = read_invalid(&mut table).map(|given| given.or(default.invalid.filter(|_| same)));
         let (min, max) = (table.number("min").optional(), table.number("max").optional());
         let actives = [("high", false), ("low", true)];
-        let active_low = if dimension == Dimension::Switch {
-            table.choice("active", &actives).or(default.active_low)
-        } else {
-            Ok(false)
-        };
+        let active_low =
+            if switch { table.choice("active", &actives).or(default.active_low) } else { Ok(false) };
         let own = if N::INPUT {
             self.input_keys(&mut table, name.name(), &default)
         } else {
             output_keys(&mut table, name.name(), dimension, &default)
         };
         table.finish();
-        let own = own?;
         let field = RegisterField {
             place: at?,
             kind: kind?,
-            count: own.count,
             order: order?,
             scale: scale?,
             unit: unit?,
             invalid: invalid?,
-            expect: own.expect,
             min: min?,
             max: max?,
             active_low: active_low?,
-            debounce_reads: own.debounce_reads,
-            from: own.from,
+            ..own?
         };
         check_field(&field, dimension).map_err(|message| document.fault(place, message))?;
         Ok(field)
     }
 
     /// Reads `at = 3`, `at = "2.1"`, `at = "@1234"`, `at = "@1234.5"`, or `const = 1`.
-    fn place<N: Name>(
+    fn place<N: FieldName>(
         &self,
         table: &mut TomlTable<'_>,
         name: N,
@@ -242,7 +205,7 @@ impl FieldReader {
         table: &mut TomlTable<'_>,
         name: &str,
         default: &RegisterField,
-    ) -> Result<Own, Reported> {
+    ) -> Result<RegisterField, Reported> {
         let expect = table.integer("expect").optional();
         let debounce = if name == Input::Trigger.name() {
             table
@@ -261,29 +224,18 @@ impl FieldReader {
         if name == Input::Heartbeat.name() {
             self.heartbeat_in = super::ms(table, "timeout_ms", 100)?;
         }
-        Ok(Own {
-            expect: expect?.or(default.expect),
-            debounce_reads: debounce?,
-            count: default.count,
-            from: None,
-        })
+        let (expect, debounce_reads) = (expect?.or(default.expect), debounce?);
+        Ok(RegisterField { expect, debounce_reads, ..default.clone() })
     }
 }
 
-/// Keys that only one direction has.
-struct Own {
-    expect: Option<i64>,
-    debounce_reads: u8,
-    count: u16,
-    from: Option<Measure>,
-}
-
+/// Reads the keys that only fields of the host have.
 fn output_keys(
     table: &mut TomlTable<'_>,
     name: &str,
     dimension: Dimension,
     default: &RegisterField,
-) -> Result<Own, Reported> {
+) -> Result<RegisterField, Reported> {
     let count = if name == Output::Station.name() {
         table.integer("count").in_range(1..=100).map(|count| count as u16).or(default.count)
     } else {
@@ -301,7 +253,7 @@ fn output_keys(
     } else {
         Ok(None)
     };
-    Ok(Own { expect: None, debounce_reads: 1, count: count?, from: from?.or(default.from) })
+    Ok(RegisterField { count: count?, from: from?.or(default.from), ..default.clone() })
 }
 
 /// Reads the type; `None` for a text without a length.

@@ -84,11 +84,10 @@ pub(super) fn read_map(
         counter: Counter::default(),
         heartbeat_in: None,
     };
-    let inputs = table.section("in").and_then(|fields| reader.fields(fields, built_in.inputs, Input::ALL));
+    let inputs = table.section("in").and_then(|fields| reader.fields(fields, built_in.inputs));
     let (counter, heartbeat_in) = (reader.counter, reader.heartbeat_in);
     reader.block = block(write.as_ref().map(|(block, _)| *block).map_err(|reported| *reported));
-    let outputs =
-        table.section("out").and_then(|fields| reader.fields(fields, built_in.outputs, Output::ALL));
+    let outputs = table.section("out").and_then(|fields| reader.fields(fields, built_in.outputs));
     table.finish();
     let (address_base, read, (write, write_place)) = (base?, read?, write?);
     order?;
