@@ -144,6 +144,25 @@ fn an_option_is_checked_beside_a_fault_of_syntax() {
 }
 
 #[test]
+fn an_unknown_scanner_is_reported_beside_any_fault_of_syntax() {
+    let slips = [
+        "seed 7",
+        "seed = ",
+        "seed = [1, 2",
+        "name = \"North",
+        "name = \"\"\"North",
+        "seed = {a = 1",
+        "[press",
+        "seed",
+    ];
+    for slip in slips {
+        let found = faults(&format!("[plant]\n{slip}\n[scanner]\nplugin = \"simulatd\"\n"));
+        let scanner = found.iter().any(|fault| fault.starts_with("plant.toml:4:10: scanner.plugin: "));
+        assert!(scanner && found.len() == 2, "{slip}: {found:?}");
+    }
+}
+
+#[test]
 fn a_press_needs_its_folder_of_plates() {
     let press = "[press]\nname = \"P\"\npress_id = 1\n[press.link]\nhost = \"192.0.2.10\"\nunit = 1\n";
     let found = faults(&format!("{press}[plates]\nfolder = \"recipes\"\n"));

@@ -11,6 +11,10 @@ use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
 use crate::{Error, Fault, Faults, TomlTable};
 
+/// Limits of a text that may be TOML: errors of syntax that are reported, and lines after which it is parsed again.
+const MOST_ERRORS: usize = 500;
+const MOST_PARSES: usize = 20;
+
 /// Proof that a fault has been recorded. Only [`Document`] makes it, so no reader can refuse a file without a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reported(());
@@ -52,28 +56,42 @@ pub struct Document {
 impl Document {
     /// Parses `text`. Faults of syntax are kept until [`Document::finish`], and the rest of the file is read as well.
     ///
-    /// The parser recovers from an error and goes on, so one slip may have several errors and may hide keys. Of the errors
-    /// in one value or one line only the first is reported, the value is skipped, and no key is reported as missing.
+    /// The parser recovers from an error, but one slip may have several errors and may hide keys. Of the errors in one value
+    /// or one line only the first is reported, the value is skipped, and no key is reported as missing. Lines after which
+    /// the parser would lose the following tables are blanked, and the text is parsed again.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
         let mut source = Source { file: file.into(), text: text.into(), syntax_errors: Vec::new() };
-        let (table, mut errors) = DeTable::parse_recoverable(&source.text);
-        errors.sort_by_key(|error| span(error).start);
-        let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
-        let root = Node::from_document(&table, &spans);
+        let mut readable = source.text.clone();
         let mut faults = Vec::new();
-        let mut end = None;
-        for (error, at) in errors.iter().zip(&spans) {
-            if end.is_some_and(|end| at.start <= end) {
-                continue;
+        let root = 'parse: loop {
+            let (table, mut errors) = DeTable::parse_recoverable(&readable);
+            errors.sort_by_key(|error| span(error).start);
+            errors.truncate(MOST_ERRORS);
+            let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
+            let root = Node::from_document(&table, &spans);
+            let mut reported = Vec::new();
+            let mut end = None;
+            for (error, at) in errors.iter().zip(&spans) {
+                if end.is_some_and(|end| at.start <= end) {
+                    continue;
+                }
+                let fault =
+                    source.fault(&Place { key: String::new(), offset: at.start }, error.message().to_owned());
+                let (line, value) = (line_of(&readable, at.start), root.broken_at(at));
+                let hiding = lines_that_hide(&readable, &line, value.as_ref());
+                if let Some(lines) = hiding.filter(|_| faults.len() < MOST_PARSES) {
+                    faults.push(fault);
+                    source.syntax_errors.push(at.clone());
+                    readable = blanked(&readable, &lines);
+                    continue 'parse;
+                }
+                reported.push(fault);
+                end = Some(value.map_or(line.end, |value| value.end.max(line.end)));
             }
-            faults.push(
-                source.fault(&Place { key: String::new(), offset: at.start }, error.message().to_owned()),
-            );
-            let line = source.text.get(at.start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
-            let line_end = at.start + line.len();
-            end = Some(root.broken_at(at).map_or(line_end, |value| value.end.max(line_end)));
-        }
-        source.syntax_errors = spans;
+            faults.extend(reported);
+            source.syntax_errors.extend(spans);
+            break root;
+        };
         Self { source: Arc::new(source), path: String::new(), root, faults: RefCell::new(faults) }
     }
 
@@ -158,4 +176,46 @@ impl Document {
 
 fn span(error: &toml::de::Error) -> Range<usize> {
     error.span().unwrap_or(0..0)
+}
+
+/// Returns the bytes of the line that contains `offset`, without its line end.
+fn line_of(text: &str, offset: usize) -> Range<usize> {
+    let (before, after) = text.split_at_checked(offset).unwrap_or((text, ""));
+    let start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    start..before.len() + after.find('\n').unwrap_or(after.len())
+}
+
+/// Replaces the characters of `lines` by spaces, so that every other byte keeps its place.
+fn blanked(text: &str, lines: &Range<usize>) -> String {
+    let mut blanked = text[..lines.start].to_owned();
+    for letter in text[lines.clone()].chars() {
+        blanked.extend(std::iter::repeat_n(if letter == '\n' { '\n' } else { ' ' }, letter.len_utf8()));
+    }
+    blanked + &text[lines.end..]
+}
+
+/// Returns the lines because of which the parser loses the tables after an error in `line`: those of an unclosed `value` down
+/// to the next header, or a line that is neither a header nor a key with a value.
+fn lines_that_hide(text: &str, line: &Range<usize>, value: Option<&Range<usize>>) -> Option<Range<usize>> {
+    let header = |line: &str| {
+        let line = line.trim_start();
+        let name = line.trim_start_matches('[').trim_start();
+        line.starts_with('[')
+            && name.starts_with(|c: char| c.is_alphabetic() || c == '_')
+            && !line.contains(',')
+    };
+    match value {
+        None => {
+            let content = &text[line.clone()];
+            (!content.trim().is_empty() && !header(content)).then(|| line.clone())
+        }
+        Some(value) => {
+            let mut start = value.start;
+            let lost = text[value.clone()].split_inclusive('\n').find_map(|line| {
+                start += line.len();
+                text[start..].lines().next().is_some_and(header).then_some(start)
+            });
+            lost.filter(|&end| end < value.end).map(|end| line_of(text, value.start).start..end)
+        }
+    }
 }

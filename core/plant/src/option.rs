@@ -34,6 +34,22 @@ pub enum OptionType {
     Floats,
 }
 
+impl OptionType {
+    /// Returns the name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "true or false",
+            Self::Int => "whole number",
+            Self::Float => "number",
+            Self::String => "text",
+            Self::Choice => "choice",
+            Self::Path => "path",
+            Self::Duration => "duration",
+            Self::Floats => "list of numbers",
+        }
+    }
+}
+
 /// Declaration of one option by its plugin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptionDecl {
@@ -284,16 +300,7 @@ impl OptionDecl {
 /// Formats as `number in m, 0.6 to 130 m, default 30`.
 impl fmt::Display for OptionDecl {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self.kind {
-            OptionType::Bool => "true or false",
-            OptionType::Int => "whole number",
-            OptionType::Float => "number",
-            OptionType::String => "text",
-            OptionType::Choice => "choice",
-            OptionType::Path => "path",
-            OptionType::Duration => "duration",
-            OptionType::Floats => "list of numbers",
-        })?;
+        f.write_str(self.kind.name())?;
         if self.declared_unit() != Unit::ONE {
             write!(f, " in {}", self.declared_unit().symbol())?;
         }

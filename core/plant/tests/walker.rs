@@ -121,7 +121,14 @@ fn broken_syntax_hides_neither_itself_nor_the_rest() {
         "[plate\nid = 'A'\nwidth = 2\n[plait]\n",
         &["1:7: unclosed table, expected `]`", "4:2: plait: unknown key; did you mean \"plate\"?"],
     );
-    check("[plate]\nid 'A'\nwidth_mm = 4\n", &["2:4: key with no value, expected `=`"]);
+    check(
+        "[plate]\nid 'A'\nwidth_mm = 0\n",
+        &["2:4: key with no value, expected `=`", "3:12: plate.width_mm: found 0, must be above 0"],
+    );
+    check(
+        "plate\n[plate]\nid = 7\n",
+        &["1:6: key with no value, expected `=`", "3:6: plate.id: found 7, expected a text"],
+    );
     check(
         "[plate]\nid = 'A' width_mm = 0\nshape = 'spere'\n",
         &[
@@ -130,8 +137,12 @@ fn broken_syntax_hides_neither_itself_nor_the_rest() {
         ],
     );
     check(
-        "[plate]\nid = 'A'\nat_mm = [1, 2\nwidth_mm = 4\n[[marker]]\nnumber = 1\n",
-        &["4:1: missing comma between array elements, expected `,`"],
+        "[plate]\nid = 'A'\nat_mm = [1, 2\nwidth_mm = 4\n[[marker]]\nnumber = 0\n[[marker]]\nnumber = \"\"\"1\n",
+        &[
+            "4:1: missing comma between array elements, expected `,`",
+            "6:10: marker[1].number: found 0, allowed 1 to 9",
+            "9:1: invalid multi-line basic string, expected `\"`",
+        ],
     );
     check(
         "bevelled = 1\n[plate]\nid = 7\nat_mm = { x = 1, y = \nwidth_mm = 0\n",
