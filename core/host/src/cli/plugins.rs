@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use platen_plant::{OptionDecl, OptionType};
+use platen_plant::OptionDecl;
 use serde_json::{Value as Json, json};
 
 use super::{CliError, Common, output};
@@ -81,23 +81,10 @@ fn listed_json(listed: &Listed) -> Json {
     }
 }
 
-fn type_name(option: &OptionDecl) -> &'static str {
-    match option.kind {
-        OptionType::Bool => "true or false",
-        OptionType::Int => "whole number",
-        OptionType::Float => "number",
-        OptionType::String => "text",
-        OptionType::Choice => "choice",
-        OptionType::Path => "path",
-        OptionType::Duration => "duration",
-        OptionType::Floats => "list of numbers",
-    }
-}
-
 /// Returns type, unit, range and default of an option in one line.
 fn rules(option: &OptionDecl) -> String {
     let mut rules = match option.choices.as_slice() {
-        [] => type_name(option).to_owned(),
+        [] => option.kind.name().to_owned(),
         choices => choices.join(" | "),
     };
     if let Some(unit) = &option.unit {
@@ -130,7 +117,7 @@ fn describe(p: &Descriptor) -> Result<(), CliError> {
 
 fn describe_json(p: &Descriptor) -> Json {
     let option = |o: &OptionDecl| {
-        json!({ "name": o.name, "type": type_name(o), "unit": o.unit, "min": o.min, "max": o.max, "choices": o.choices,
+        json!({ "name": o.name, "type": o.kind.name(), "unit": o.unit, "min": o.min, "max": o.max, "choices": o.choices,
                 "default": o.default, "required": o.required, "secret": o.secret, "doc": o.doc })
     };
     json!({ "id": p.id, "kind": p.kind.name(), "name": p.name, "vendor": p.vendor, "version": p.version, "doc": p.doc,
