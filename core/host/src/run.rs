@@ -30,13 +30,13 @@ use platen_history::{Error as HistoryError, History};
 use platen_model::{Language, StrokeKey};
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
-use platen_press::{Order, PressLink, RunError, channels, run_press};
+use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
 pub use measurement_worker::StrokeReport;
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
-use measurement_worker::{MeasurementWorker, Task};
+use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue};
 
@@ -85,7 +85,7 @@ pub async fn run(
     let history = Arc::new(Mutex::new(history));
     let pipeline = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
-    let (tasks, inbox) = std::sync::mpsc::channel();
+    let (commands, inbox) = std::sync::mpsc::channel();
     let lost = Arc::default();
     let receivers =
         measurement_worker::Receivers { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
@@ -123,11 +123,11 @@ pub async fn run(
                     hung = Some(HostError::Worker("a plugin hangs or the measurement failed".into()));
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
-                dispatch(order, &tasks, &mut scanning, &history, &alarm);
+                dispatch(order, &commands, &mut scanning, &history, &alarm);
             }
         }
     };
-    drop(tasks);
+    drop(commands);
     if let Some((_, token)) = scanning {
         token.cancel();
     }
@@ -144,32 +144,34 @@ pub async fn run(
     hung.map_or(Ok(()), Err)
 }
 
-/// Passes an order on; a cancellation bypasses the worker's queue.
+/// Executes an order: commands to scan or evaluate go to the worker with the token that cancels them, a cancellation
+/// bypasses its queue.
 fn dispatch(
     order: Order,
-    tasks: &std::sync::mpsc::Sender<Task>,
+    commands: &std::sync::mpsc::Sender<(Command, CancelToken)>,
     scanning: &mut Option<(StrokeKey, CancelToken)>,
     history: &Arc<Mutex<History>>,
     newest: &status::NewestAlarm,
 ) {
     match order {
-        Order::StartScan { key, run_id, data } => {
-            let token = CancelToken::default();
-            *scanning = Some((key, token.clone()));
-            // The dispatcher notices a worker that has ended.
-            let _ = tasks.send(Task::Scan { key, run_id, data, token });
-        }
-        Order::Evaluate(key) => drop(tasks.send(Task::Evaluate(key))),
-        Order::Cancel(key) => {
+        Order::Command(Command::Cancel(key)) => {
             if let Some((_, token)) = scanning.take_if(|(running, _)| *running == key) {
                 token.cancel();
             }
         }
-        Order::PartEnd => {
+        Order::Command(Command::PartEnd) => {
             let ended = history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
             if let Err(error) = ended {
                 tracing::error!("end of part: {error}");
             }
+        }
+        Order::Command(command) => {
+            let token = CancelToken::default();
+            if let Command::Scan { key, .. } = &command {
+                *scanning = Some((*key, token.clone()));
+            }
+            // The dispatcher notices a worker that has ended.
+            let _ = commands.send((command, token));
         }
         Order::Alarm { code, stroke, detail } => {
             let alarm = code.alarm();

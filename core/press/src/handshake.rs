@@ -16,7 +16,7 @@ mod transitions;
 mod trigger_edges;
 mod work_region;
 
-pub use machine::{Config, Effect, Event, Handshake};
+pub use machine::{Command, Config, Effect, Event, Handshake};
 
 /// The link region: whether the press may be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

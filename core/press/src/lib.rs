@@ -12,7 +12,7 @@ mod replay;
 mod runner;
 
 pub use codec::{HostImage, PressImage, Torn, Wrong, describe_inputs, describe_outputs, saturates};
-pub use handshake::{Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
+pub use handshake::{Command, Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
 pub use journal::{Journal, MemoryJournal};
 pub use link::{
     Client, Consequence, Counts, Link, LinkError, ModbusLink, PressLink, ROUND_TRIP_LIMITS_MS, Request,

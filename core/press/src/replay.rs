@@ -146,11 +146,7 @@ impl Player {
                 replayed.transitions.push((now, transition, self.handshake.stroke()));
                 None
             }
-            Effect::StartScan { .. }
-            | Effect::Evaluate(_)
-            | Effect::Cancel(_)
-            | Effect::PartEnd
-            | Effect::Reconnect => None,
+            Effect::Command(_) | Effect::Reconnect => None,
         }
     }
 }

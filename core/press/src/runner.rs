@@ -19,28 +19,14 @@ pub use metrics::{Durations, Metrics};
 use crate::handshake::{Config, Handshake};
 use crate::reconcile::Reconciler;
 use crate::{
-    Client, Code, Counts, HostImage, Journal, Link, Measurement, PressImage, State, StrokeData, StrokeKey,
+    Client, Code, Command, Counts, HostImage, Journal, Link, Measurement, PressImage, State, StrokeKey,
 };
 
 /// Order of the press side to the host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// Scan a stroke; answer with [`Answer::Acquired`] or [`Answer::Failed`].
-    StartScan {
-        /// The stroke.
-        key: StrokeKey,
-        /// Key of its record.
-        run_id: u32,
-        /// Data of the press about it.
-        data: Box<StrokeData>,
-    },
-    /// Evaluate the scan of a stroke; answer with [`Answer::Result`] or [`Answer::Failed`]. Comes after
-    /// [`Answer::Acquired`], and after a restart for a stroke that was scanned before.
-    Evaluate(StrokeKey),
-    /// Abort scan and evaluation of a stroke.
-    Cancel(StrokeKey),
-    /// The plate is finished.
-    PartEnd,
+    /// Command of the handshake, unchanged.
+    Command(Command),
     /// An alarm, once per cause.
     Alarm {
         /// Alarm.

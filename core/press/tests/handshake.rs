@@ -9,7 +9,7 @@ use platen_model::Measure;
 use platen_model::{Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
 use platen_plant::press::{Input, Link, NoAck, OnInterrupted, OnMissed, OnStorageFull, Press};
 use platen_press::{
-    Config, Effect, Event, Handshake, HostImage, LinkState, PressImage, Transition, Work, Wrong,
+    Command, Config, Effect, Event, Handshake, HostImage, LinkState, PressImage, Transition, Work, Wrong,
 };
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -77,14 +77,14 @@ impl Harness {
     fn take(&mut self, effect: Effect) {
         match effect {
             Effect::Journal(record) => self.records.push_back(record),
-            Effect::StartScan { key, .. } => {
+            Effect::Command(Command::Scan { key, .. }) => {
                 let stored = self.accepted.get(&key) == Some(&true);
                 assert!(stored || self.degrade, "scan of {key} without a record");
                 assert!(self.scanned.insert(key), "{key} is scanned twice");
                 self.scanning = Some(key);
             }
-            Effect::Evaluate(key) => self.judging = Some(key),
-            Effect::Cancel(_) => (self.scanning, self.judging) = (None, None),
+            Effect::Command(Command::Evaluate(key)) => self.judging = Some(key),
+            Effect::Command(Command::Cancel(_)) => (self.scanning, self.judging) = (None, None),
             Effect::Transition(transition) => {
                 use Transition::*;
                 match transition {
@@ -99,7 +99,7 @@ impl Harness {
                 self.taken.insert(transition);
             }
             Effect::Alarm(code) => self.alarms.push(code),
-            Effect::PartEnd | Effect::Reconnect => {}
+            Effect::Command(Command::PartEnd) | Effect::Reconnect => {}
         }
     }
 

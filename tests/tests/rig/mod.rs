@@ -14,7 +14,7 @@ use std::time::Duration;
 use platen_model::Measure;
 use platen_model::{Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
 use platen_plant::press::{Link, Press};
-use platen_press::{Answer, Journal, Order, PressLink, Status, channels, run_press};
+use platen_press::{Answer, Command, Journal, Order, PressLink, Status, channels, run_press};
 use platen_sim_plate::Plan;
 use platen_sim_press::config::Timings;
 use platen_sim_press::forming_model::PlateConfig;
@@ -197,7 +197,7 @@ async fn desk(
     tell(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
     while let Some(order) = orders.recv().await {
         match order {
-            Order::StartScan { key, .. } => {
+            Order::Command(Command::Scan { key, .. }) => {
                 heard.scans.lock().unwrap().push(key);
                 let (answers, bends) = (answers.clone(), Arc::clone(&bends));
                 tokio::spawn(async move {
@@ -213,7 +213,7 @@ async fn desk(
                     let _ = answers.send(answer);
                 });
             }
-            Order::Evaluate(key) => {
+            Order::Command(Command::Evaluate(key)) => {
                 let seen = bends.lock().unwrap().get(&key).copied();
                 tell(match seen {
                     Some(strokes) => Answer::Result(key, Box::new(measurement(strokes))),
@@ -221,8 +221,8 @@ async fn desk(
                 });
             }
             Order::Alarm { code, .. } => heard.alarms.lock().unwrap().push(code),
-            Order::PartEnd => *heard.part_ends.lock().unwrap() += 1,
-            Order::Cancel(_) | Order::Seen(_) => {}
+            Order::Command(Command::PartEnd) => *heard.part_ends.lock().unwrap() += 1,
+            Order::Command(Command::Cancel(_)) | Order::Seen(_) => {}
         }
     }
 }

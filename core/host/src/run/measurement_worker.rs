@@ -17,7 +17,7 @@ use platen_history::History;
 use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey};
 use platen_plant::press::Press;
 use platen_plant::{PlantFile, PlateFile};
-use platen_press::Answer;
+use platen_press::{Answer, Command};
 use platen_report::result::{Context, ResultRecord};
 use platen_report::{history_view, output_folder, plate_report};
 use platen_scan::Window;
@@ -37,15 +37,6 @@ const LEAST_ESTIMATE: Duration = Duration::from_secs(10);
 const OPEN_LIMIT: Duration = Duration::from_secs(60);
 /// Time between two attempts to connect to a scanner.
 const RETRY: Duration = Duration::from_secs(2);
-
-/// A task of the worker.
-#[derive(Debug)]
-pub(super) enum Task {
-    /// Scan a stroke.
-    Scan { key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken },
-    /// Evaluate the stroke that was scanned last.
-    Evaluate(StrokeKey),
-}
 
 /// Outcome of one stroke, for the observer of a running host.
 #[derive(Debug, Clone)]
@@ -143,21 +134,23 @@ impl MeasurementWorker {
         }
     }
 
-    /// Executes tasks until the dispatcher closes the channel, or a plugin hangs.
-    pub(super) fn serve(mut self, tasks: &Receiver<Task>) {
+    /// Executes commands until the dispatcher closes the channel, or a plugin hangs.
+    pub(super) fn serve(mut self, commands: &Receiver<(Command, CancelToken)>) {
         loop {
             if self.scanner.is_none() {
                 self.connect();
             }
             self.report_readiness();
-            let task = match (&self.scanner, tasks.recv_timeout(RETRY)) {
-                (_, Ok(task)) => task,
-                (_, Err(std::sync::mpsc::RecvTimeoutError::Timeout)) => continue,
-                (_, Err(std::sync::mpsc::RecvTimeoutError::Disconnected)) => return,
+            let (command, token) = match commands.recv_timeout(RETRY) {
+                Ok(command) => command,
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => continue,
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => return,
             };
-            let hung = match task {
-                Task::Scan { key, run_id, data, token } => self.scan(key, run_id, data, token),
-                Task::Evaluate(key) => self.evaluate(key),
+            let hung = match command {
+                Command::Scan { key, run_id, data } => self.scan(key, run_id, data, token),
+                Command::Evaluate(key) => self.evaluate(key),
+                // Executed by the dispatcher.
+                Command::Cancel(_) | Command::PartEnd => false,
             };
             if hung {
                 return;

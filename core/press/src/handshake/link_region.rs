@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_plant::press::{Input, OnInterrupted};
 
-use super::machine::{ActiveStroke, Effect, Handshake};
+use super::machine::{ActiveStroke, Command, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 
@@ -16,7 +16,7 @@ impl Handshake {
         if matches!(self.work, Work::Accepted | Work::Scanning | Work::Evaluating)
             && let Some(active) = &self.active
         {
-            self.effects.push(Effect::Cancel(active.key));
+            self.effects.push(Effect::Command(Command::Cancel(active.key)));
         }
         self.link = LinkState::Stopped { writable: self.may_write() && self.connected };
         Transition::Stopped
@@ -100,7 +100,7 @@ impl Handshake {
                 Transition::StrokeResumed
             }
             Stage::Scanned if waits => {
-                self.effects.push(Effect::Evaluate(active.key));
+                self.effects.push(Effect::Command(Command::Evaluate(active.key)));
                 self.active = Some(ActiveStroke { acquired_at: Some(now), ..active });
                 self.work = Work::Evaluating;
                 Transition::InterruptedStrokeRecovered

@@ -103,26 +103,35 @@ pub enum Event {
     Tick,
 }
 
+/// Command of the handshake to the measurement, passed on unchanged by every part in between.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// Scan a stroke; answered with [`Answer::Acquired`](crate::Answer::Acquired) or
+    /// [`Answer::Failed`](crate::Answer::Failed).
+    Scan {
+        /// The stroke.
+        key: StrokeKey,
+        /// Key of its record.
+        run_id: u32,
+        /// Data of the press about it.
+        data: Box<StrokeData>,
+    },
+    /// Evaluate the scan of a stroke; answered with [`Answer::Result`](crate::Answer::Result) or
+    /// [`Answer::Failed`](crate::Answer::Failed). Follows the acquisition, and a restart between the two.
+    Evaluate(StrokeKey),
+    /// Abandon scan and evaluation of a stroke; later answers about it are ignored.
+    Cancel(StrokeKey),
+    /// Close the record of the plate: it is finished and leaves the press.
+    PartEnd,
+}
+
 /// Something to be done, in this order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Write to the journal and answer with [`Event::Journaled`].
     Journal(Record),
-    /// Scan a stroke and answer with [`Event::Acquired`] or [`Event::Failed`].
-    StartScan {
-        /// The stroke.
-        key: StrokeKey,
-        /// Key of its record.
-        run_id: u32,
-        /// What the press said about it.
-        data: Box<StrokeData>,
-    },
-    /// Judge the scan of a stroke and answer with [`Event::Measured`] or [`Event::Failed`]. Also after a restart.
-    Evaluate(StrokeKey),
-    /// Give up scan and evaluation of a stroke; its answers are of no use any more.
-    Cancel(StrokeKey),
-    /// The plate is finished and leaves.
-    PartEnd,
+    /// Pass a command on to the measurement.
+    Command(Command),
     /// Drop the connection and build it again after a pause.
     Reconnect,
     /// Tell people, once per cause.
@@ -435,7 +444,7 @@ impl Handshake {
             self.clear_latches();
         }
         if part_end {
-            self.effects.push(Effect::PartEnd);
+            self.effects.push(Effect::Command(Command::PartEnd));
         }
     }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_plant::press::OnStorageFull;
 
-use super::machine::{ActiveStroke, Effect, Handshake};
+use super::machine::{ActiveStroke, Command, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
 
@@ -101,7 +101,11 @@ impl Handshake {
             active.scan_started_at = Some(now);
             active.since = now;
             let data = Box::new(active.data.clone());
-            self.effects.push(Effect::StartScan { key: active.key, run_id: active.run_id, data });
+            self.effects.push(Effect::Command(Command::Scan {
+                key: active.key,
+                run_id: active.run_id,
+                data,
+            }));
         }
         self.work = Work::Scanning;
         Transition::ScanStarted
@@ -133,7 +137,7 @@ impl Handshake {
     pub(super) fn give_up(&mut self, now: Duration) -> Transition {
         let code = self.given_up(now).unwrap_or(Code::ScanFailed);
         if let (Work::Scanning, Some(key)) = (self.work, self.stroke()) {
-            self.effects.push(Effect::Cancel(key));
+            self.effects.push(Effect::Command(Command::Cancel(key)));
         }
         self.finish(Measurement::not_measured(code), Work::Aborted, now);
         Transition::ScanGivenUp
@@ -148,7 +152,7 @@ impl Handshake {
             active.acquired_at = Some(now);
             active.since = now;
             self.effects.push(Effect::Journal(Record::Scanned { key: active.key }));
-            self.effects.push(Effect::Evaluate(active.key));
+            self.effects.push(Effect::Command(Command::Evaluate(active.key)));
         }
         self.work = Work::Evaluating;
         Transition::ScanTaken
@@ -166,7 +170,7 @@ impl Handshake {
         if outcome.is_none()
             && let Some(key) = self.stroke()
         {
-            self.effects.push(Effect::Cancel(key));
+            self.effects.push(Effect::Command(Command::Cancel(key)));
         }
         let outcome = outcome.unwrap_or_else(|| Measurement::not_measured(Code::EvaluationTimeout));
         let measured = outcome.verdict() != Verdict::NotMeasured;

@@ -360,10 +360,7 @@ impl<L: Link> Runner<L> {
                     self.journaled(Done { key, stage, error, took: Duration::ZERO });
                 }
             }
-            Effect::StartScan { key, run_id, data } => self.order(Order::StartScan { key, run_id, data }),
-            Effect::Evaluate(key) => self.order(Order::Evaluate(key)),
-            Effect::Cancel(key) => self.order(Order::Cancel(key)),
-            Effect::PartEnd => self.order(Order::PartEnd),
+            Effect::Command(command) => self.order(Order::Command(command)),
             Effect::Alarm(code) => self.alarm(code, None),
             Effect::Reconnect => {
                 self.clock.lost.get_or_insert_with(Instant::now);

@@ -21,7 +21,7 @@ use platen_model::Measure;
 use platen_model::{
     Acknowledgement, Figures, Measurement, Publication, Recalled, Record, Stage, StrokeKey, Verdict,
 };
-use platen_press::{Answer, Journal, Order};
+use platen_press::{Answer, Command, Journal, Order};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 pub use plc::{Habits, Plc};
@@ -147,13 +147,15 @@ pub async fn host(
             });
         };
         match order {
-            Order::StartScan { key, .. } => {
+            Order::Command(Command::Scan { key, .. }) => {
                 scans.lock().unwrap().push(key);
                 later(scan, Answer::Acquired(key));
             }
-            Order::Evaluate(key) => later(judge, Answer::Result(key, Box::new(measurement(key)))),
+            Order::Command(Command::Evaluate(key)) => {
+                later(judge, Answer::Result(key, Box::new(measurement(key))))
+            }
             Order::Alarm { code, .. } => alarms.lock().unwrap().push(code),
-            Order::Cancel(_) | Order::PartEnd | Order::Seen(_) => {}
+            Order::Command(Command::Cancel(_) | Command::PartEnd) | Order::Seen(_) => {}
         }
     }
 }

@@ -9,7 +9,7 @@ use platen_model::Measure;
 use platen_model::{Code, Figures, Language, Measurement, StrokeKey, Verdict};
 use platen_plant::press::{Mode, Press};
 use platen_press::{
-    Answer, HostSide, LinkState, MemoryJournal, Order, PressLink, Status, channels, run_press,
+    Answer, Command, HostSide, LinkState, MemoryJournal, Order, PressLink, Status, channels, run_press,
 };
 use serde_json::json;
 use tokio::sync::mpsc;
@@ -52,13 +52,13 @@ pub async fn serve(
     answer(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(10)) });
     while let Some(order) = orders.recv().await {
         match order {
-            Order::StartScan { key, .. } => {
+            Order::Command(Command::Scan { key, .. }) => {
                 forward(Seen::Scan(key));
                 answer(Answer::Acquired(key));
             }
-            Order::Evaluate(key) => answer(Answer::Result(key, Box::new(stand_in(key)))),
+            Order::Command(Command::Evaluate(key)) => answer(Answer::Result(key, Box::new(stand_in(key)))),
             Order::Alarm { code, detail, .. } => forward(Seen::Alarm(code, detail)),
-            Order::Cancel(_) | Order::PartEnd | Order::Seen(_) => {}
+            Order::Command(Command::Cancel(_) | Command::PartEnd) | Order::Seen(_) => {}
         }
     }
 }
