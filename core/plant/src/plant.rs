@@ -88,7 +88,7 @@ pub struct Survey {
     pub plugins: Vec<(PluginRole, PluginUse)>,
     /// Folder of the plate files, and the fault to report, with a message, at its place.
     pub plates: Option<(PathBuf, Fault)>,
-    /// Whether the file describes a press, so that the folder of the plate files must exist.
+    /// The file describes a press, so that the folder of the plate files must exist.
     pub has_press: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Every file in `config/` loads, and the plate file of the manual says what the manual says.
+//! Every file in `config/` loads, and values arrive in the units of the model.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 

@@ -97,7 +97,7 @@ fn radius(table: &mut TomlTable<'_>, key: &str, plate: Option<Rectangle>) -> Res
 /// Refuses a radius of zero or less, or one that rolls the plate's shorter side into more than a full turn.
 fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), String> {
     if radius_mm <= 0.0 {
-        let advice = if found == 0.0 { "" } else { "; scanned_face says which way the plate bends" };
+        let advice = if found == 0.0 { "" } else { "; scanned_face decides which way the plate bends" };
         return Err(format!("found {found}, must be above 0{advice}"));
     }
     let Some(plate) = plate else { return Ok(()) };
