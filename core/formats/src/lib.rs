@@ -5,7 +5,7 @@
 //! columns in any order; the file appears under its name when it is whole.
 //!
 //! Limits: one scan is read at a time; poses are reported and not applied; files without a lattice are refused with the
-//! format to export instead. This crate knows no plugin, no press and no network.
+//! format to export instead. This crate has no plugin, press or network code.
 
 mod header_text;
 pub mod orient;

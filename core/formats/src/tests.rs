@@ -3,6 +3,7 @@
 mod collect;
 mod damage;
 mod faults;
+mod files;
 mod formats;
 mod samples;
 mod speed;

@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use platen_scan::{ScanHeader, wrap_azimuth};
+
 use super::fit::{self, Fit, Line};
 use super::intensity::Scale;
 use super::survey::{FAR, MIN_FILL, NEAR, stored_range};
 use super::{Expected, Mirror, OrientError, Survey, Turn};
-use platen_scan::{ScanHeader, wrap_azimuth};
 
 /// Least correlation of row with elevation and of column with azimuth.
 const MIN_CORRELATION: f64 = 0.99;

@@ -1,8 +1,9 @@
 //! Restoring the header of a scan from a file written by [`crate::ScanFile`], once the geometry confirms it.
 
+use platen_scan::{ScanHeader, wrap_azimuth};
+
 use super::survey::{MAX_INDEX, MIN_FILL};
 use super::{Mirror, Plan, Unit};
-use platen_scan::{ScanHeader, wrap_azimuth};
 
 /// Largest relative difference between a lattice's nominal step and the one fitted to its cells.
 const SAME_STEP: f64 = 0.01;

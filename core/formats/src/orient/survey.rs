@@ -1,8 +1,9 @@
 //! First pass: sums over the cells of a stored lattice.
 
+use platen_scan::State;
+
 use super::occupancy::{Inserted, Occupancy};
 use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
-use platen_scan::State;
 
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
 pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use platen_scan::{Direction, Lattice};
+
 use super::*;
 use crate::ReadError;
-use platen_scan::{Direction, Lattice};
 
 const ROWS: u32 = 30;
 const COLUMNS: u32 = 40;
@@ -13,7 +14,7 @@ const STEP: f64 = 0.01;
 const AZIMUTH: f64 = 3.0;
 const ELEVATION: f64 = 0.2;
 
-/// What the file does to the lattice before it stores it.
+/// Changes of the lattice on its way into the file.
 #[derive(Clone, Copy)]
 struct Stored {
     swap: bool,

@@ -9,7 +9,7 @@ use super::write::*;
 use crate::orient::{Expected, Mirror, Turn};
 use crate::{ReadError, header_text};
 
-/// Reads bytes under a name, with what the plant says of the scanner.
+/// Reads bytes under a name, with the declarations of the plant about the scanner.
 fn read_with(bytes: &[u8], name: &str, known: Expected) -> Result<Lattice, ReadError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -53,7 +53,7 @@ fn tail_zero_second_half_is_missing_and_said() {
 
 #[test]
 fn split_files_of_one_scan_are_not_measured_as_one() {
-    // Half of the columns are a sound lattice of their own: only the second file tells, see the watched folder.
+    // Half of the columns are a sound lattice of their own: only the second file shows the split, see the watched folder.
     let half = changed(|_, column, xyz| (column < COLUMNS / 2).then_some(xyz));
     let lattice = read_with(&half, "scan_1.xyz", Expected::default()).unwrap();
     assert_eq!(lattice.n_columns(), COLUMNS as usize / 2);

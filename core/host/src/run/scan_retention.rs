@@ -199,7 +199,7 @@ mod tests {
             path
         };
         let old = put("run-000001/scan.e57", 61);
-        let half = put("run-000002/scan.e57.1.part", 0);
+        let half = put("run-000002/scan.e57.1.a2B4c6.part", 0);
         let kept = [
             put("run-000002/scan.e57", 59),
             put("run-000001/result.json", 900),
