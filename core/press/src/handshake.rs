@@ -1,12 +1,18 @@
-//! The handshake with the press as a pure state machine.
+//! Handshake with the press: a pure state machine (Mealy machine).
 //!
-//! [`Handshake::step`] takes one event and the time and gives back effects; between two steps nothing happens. It knows
-//! no socket, no clock, no journal and no scanner, so it can be tried with any order of events in virtual time.
+//! [`Handshake::step`] maps state, one event and the time to the next state and a list of effects. It has no socket, clock,
+//! journal or scanner, so that any order of events can be tested in virtual time.
 //!
-//! Two things go on at once and are two regions of one state: the link to the press ([`LinkState`]) and the stroke in hand
-//! ([`Work`]). A cut link does not stop a scan; its result waits until the press is back. An event only changes what
-//! the machine has seen; then transitions are taken, one `match` ([`transitions`]), until none is due. What the registers
-//! shall say follows from the state ([`register_image`]) and is never edited by hand.
+//! The state has two orthogonal regions: the link to the press ([`LinkState`]) and the active stroke ([`Work`]). A lost link
+//! does not stop a scan; its result waits for the reconnection. One step runs in this order:
+//!
+//! 1. [`machine`] notes the event: it changes observations only.
+//! 2. [`transitions`] takes transitions in order of urgency until none is due. [`link_region`] and [`work_region`]
+//!    contain their actions, [`acceptance`] the conditions under which a stroke is accepted, blocked or missed.
+//!    For a press without stroke numbers, [`trigger_edges`] counts the strokes.
+//! 3. [`register_image`] derives the wanted registers from the state; they are never edited directly.
+//!
+//! The table of transitions with conditions, effects and deadlines is in the README of this crate.
 
 mod acceptance;
 mod link_region;
@@ -18,7 +24,7 @@ mod work_region;
 
 pub use machine::{Command, Config, Effect, Event, Handshake};
 
-/// The link region: whether the press may be read and written.
+/// Link region: whether the press may be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LinkState {
     /// Before the first step.
@@ -26,44 +32,44 @@ pub enum LinkState {
     Boot,
     /// No connection.
     Offline,
-    /// Connected, reading only: is it the right press, does another host write to it, where do its strokes stand?
+    /// Connected, reads only: checks press and map, looks for another host, reads the stroke counter.
     Sync,
-    /// In step with the press.
+    /// Synchronised with the press.
     Online,
     /// Latched until a reset.
     Fault(crate::Code),
-    /// The end; `told` says whether the safe registers may still be written.
+    /// Ended; only the safe registers may still be written.
     Stopped {
-        /// The press was in step at the end.
+        /// The press was connected and known at the end.
         writable: bool,
     },
 }
 
-/// The work region: the stroke in hand.
+/// Work region: the active stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Work {
-    /// None, ready for one.
+    /// No active stroke; the next one is accepted.
     #[default]
     Idle,
-    /// None, and none is accepted.
+    /// No active stroke; none is accepted.
     Blocked,
-    /// Seen; being journalled, then waiting for the press to be clear.
+    /// Accepted: being journalled, then waiting for `clear_to_scan`.
     Accepted,
-    /// The scanner is at work.
+    /// Acquisition by the scanner.
     Scanning,
-    /// The scan is being judged.
+    /// Evaluation of the scan.
     Evaluating,
-    /// Given up; that is being journalled.
+    /// Given up; the reason is being journalled.
     Aborted,
     /// The result is being journalled, then written.
     Publish,
-    /// The result stands in the registers until the press acknowledges.
+    /// The result is valid in the registers; waits for the acknowledgement.
     WaitAck,
-    /// Acknowledged; until the press takes its acknowledge back.
+    /// Acknowledged; waits until the press lowers its acknowledgement.
     Clear,
 }
 
-/// One of both regions, as one number for the register `host_state` and one word for people.
+/// State of both regions; one number in the register `host_state`, one word in logs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct State {
     /// The link region.
@@ -73,7 +79,7 @@ pub struct State {
 }
 
 impl State {
-    /// The number in `host_state`.
+    /// Returns the number in `host_state`.
     pub fn number(self) -> u16 {
         match (self.link, self.work) {
             (LinkState::Boot, _) => 0,
@@ -93,7 +99,7 @@ impl State {
         }
     }
 
-    /// The word for people, by [`number`](Self::number).
+    /// Words by [`number`](Self::number).
     pub const NAMES: [&'static str; 14] = [
         "boot",
         "offline",

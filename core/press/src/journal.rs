@@ -1,35 +1,34 @@
-//! The journal of the press side: a trait, and an implementation in memory for trials.
+//! Journal of strokes: write-ahead record of the handshake, as a trait and as an implementation in memory for trials.
 
 use crate::{Recalled, Record};
 
-/// Remembers strokes of one press. Opened by one process at a time: a second host must fail to open it.
+/// Journal of the strokes of one press. Exactly one process may open it: a second host must fail.
 ///
 /// Called on a thread that may block.
 pub trait Journal: Send + 'static {
-    /// Why something could not be remembered.
+    /// Reason why the journal cannot be read or written.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// What was remembered last.
+    /// Returns the state after the last record.
     ///
     /// # Errors
     /// When the journal cannot be read.
     fn recall(&mut self) -> Result<Recalled, Self::Error>;
 
-    /// Remembers one step; returns when it would survive a power cut.
-    ///
-    /// Recording the same step of the same stroke again is no error and changes nothing.
+    /// Writes one record and returns once it survives a power cut. Idempotent: the same stage of the same stroke may be
+    /// recorded again.
     ///
     /// # Errors
-    /// When it cannot be written. Later steps of the same stroke may still come.
+    /// When the record cannot be written. Later stages of the same stroke may follow.
     fn record(&mut self, record: &Record) -> Result<(), Self::Error>;
 }
 
-/// The journal of a trial: it remembers within this process only.
+/// Journal of a trial, lost at the end of the process.
 #[derive(Debug, Clone)]
 pub struct MemoryJournal(Recalled);
 
 impl MemoryJournal {
-    /// An empty one of the installation `owner`, not 0.
+    /// Makes an empty journal of the installation `owner`, which must not be 0.
     pub fn new(owner: u16) -> Self {
         Self(Recalled::empty(owner))
     }

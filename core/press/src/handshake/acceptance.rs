@@ -1,4 +1,7 @@
-//! What the press asks for, and whether it is granted.
+//! Conditions for accepting a stroke or a rescan, causes of a block, and missed strokes.
+//!
+//! A stroke is identified by session and number; the trigger is a level. Missed strokes are found from gaps in the
+//! numbers, modulo the wrap of the counter.
 
 use platen_plant::press::{NoAck, OnMissed, OnStorageFull};
 
@@ -7,7 +10,7 @@ use super::{Transition, Work};
 use crate::{Code, PressImage};
 
 impl Handshake {
-    /// Why no stroke is accepted, when something is wrong.
+    /// Returns the reason why no stroke is accepted.
     pub(super) fn obstacle(&self) -> Option<Code> {
         let policy = self.config.policy;
         let storage = !self.storage_ok && policy.on_storage_full == OnStorageFull::Stop;
@@ -22,13 +25,12 @@ impl Handshake {
         self.obstacle().is_some() || self.press.as_ref().is_some_and(|press| !press.enable)
     }
 
-    /// Whether a result that is not acknowledged keeps the next stroke waiting.
+    /// Returns whether the next stroke waits for the acknowledgement of a result.
     pub(super) fn held(&self) -> bool {
         self.work == Work::WaitAck && self.config.policy.no_ack == NoAck::Hold
     }
 
-    /// The press's image, when it asks for a stroke that it has not asked for before: the trigger has stood long
-    /// enough, and there is a stroke number.
+    /// Returns the image of the press if its trigger is debounced and there is a stroke number.
     pub(super) fn settled_trigger(&self) -> Option<&PressImage> {
         let needed = if self.config.counter.is_some() { self.config.debounce_reads } else { 1 };
         let none =
@@ -57,7 +59,7 @@ impl Handshake {
             .is_some_and(|press| Some(here(press)) != active && Some(here(press)) != self.counted)
     }
 
-    /// A stroke came while another was in hand: the plate has moved, it is not queued.
+    /// Counts a stroke that came while another was active. It is not queued, since the plate has moved.
     pub(super) fn record_missed(&mut self) -> Transition {
         if let Some(press) = &self.press {
             let here = (press.session_id, press.stroke_id);
@@ -68,7 +70,7 @@ impl Handshake {
         Transition::StrokeMissed
     }
 
-    /// Steps of the stroke counter from where it was last accounted for, and whether it went back; `None` in another
+    /// Returns the steps of the stroke counter since the last accounted stroke, and whether it went back; `None` in another
     /// session or without a counter.
     pub(super) fn steps_to(&self, (session, stroke): (u16, u16)) -> Option<(u32, bool)> {
         let counter = self.config.counter?;

@@ -1,4 +1,7 @@
-//! The link region: finding, losing and leaving the press.
+//! Actions of the link region: synchronisation with the press, faults and end.
+//!
+//! In order: begin synchronisation, reject a wrong press or a second host, go online with a resumed, waiting or no
+//! stroke; heartbeat supervision; end.
 
 use std::time::Duration;
 
@@ -8,7 +11,7 @@ use super::machine::{ActiveStroke, Command, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 
-/// A heartbeat of another host that stands still this long is that of a dead one.
+/// Time after which another host with an unchanged heartbeat counts as ended.
 const OWNER_WATCH: Duration = Duration::from_secs(2);
 
 impl Handshake {
@@ -50,7 +53,7 @@ impl Handshake {
         self.press.as_ref().is_some_and(|press| press.wrong.is_some())
     }
 
-    /// Nothing was written to it and nothing is; perhaps it is only starting.
+    /// Goes offline without a write and connects again later: the controller may be starting.
     pub(super) fn leave_wrong_press(&mut self) -> Transition {
         let wrong = self.press.take().and_then(|press| press.wrong);
         let code = if wrong.is_some_and(|wrong| wrong.input == Input::PressId) {
@@ -73,7 +76,8 @@ impl Handshake {
         self.press.is_some() && self.host_seen && alone
     }
 
-    /// From the first full picture of the press: what goes on, what waits, what is over.
+    /// Goes online after both blocks were read: resumes the recalled or active stroke, accepts a waiting one, or
+    /// becomes idle.
     pub(super) fn enter_online(&mut self, now: Duration) -> Transition {
         self.link = LinkState::Online;
         self.link_error = None;
@@ -87,7 +91,7 @@ impl Handshake {
         }
     }
 
-    /// A stroke of the time before the restart.
+    /// Resumes the last stroke of the journal after a restart.
     pub(super) fn resume(&mut self, stage: Stage, active: ActiveStroke, now: Duration) -> Transition {
         let waits = self.press_is_at(active.key);
         let may_rescan = self.config.policy.on_interrupted == OnInterrupted::Rescan
@@ -126,7 +130,7 @@ impl Handshake {
         }
     }
 
-    /// A stroke of the time before the link broke.
+    /// Continues the active stroke after a lost link.
     pub(super) fn carry_on(&mut self, now: Duration) -> Transition {
         let Some(key) = self.stroke() else { return self.become_idle(now) };
         let concluded = matches!(self.work, Work::Publish | Work::WaitAck) && self.journaled();
@@ -142,8 +146,8 @@ impl Handshake {
         Transition::StrokeResumed
     }
 
-    /// Strokes that went by in the same session meanwhile are counted when the next one comes; a press that has made
-    /// none yet stands before its first.
+    /// Becomes idle and sets the baseline of the stroke counter. Strokes missed in the same session are counted with the
+    /// next stroke.
     pub(super) fn become_idle(&mut self, now: Duration) -> Transition {
         self.work = Work::Idle;
         if let Some(press) = self.press.as_ref().filter(|press| !press.trigger) {
@@ -158,7 +162,7 @@ impl Handshake {
         Transition::Synchronised
     }
 
-    /// Ends a stroke that the press does not wait for any more.
+    /// Journals the acknowledgement of a stroke.
     pub(super) fn close(&mut self, key: StrokeKey, how: Acknowledgement) {
         self.effects.push(Effect::Journal(Record::Acked { key, how }));
         self.unacked = None;

@@ -1,4 +1,8 @@
-//! What the handshake knows, what it is told, what it asks for.
+//! State, events and effects of the handshake, and the step.
+//!
+//! An event is an observation: [`Handshake::step`] stores it, takes the transitions that are due and returns the effects in
+//! the order in which they must be carried out. Deadlines are compared with the time of the step, so the caller
+//! steps with [`Event::Tick`] while nothing else happens.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -12,12 +16,12 @@ use crate::{
     StrokeKey,
 };
 
-/// Longest scan when neither the plant file nor the scanner says.
+/// Limit of a scan without a limit in the plant file and without an estimate of the scanner.
 const SCAN_LIMIT: Duration = Duration::from_secs(180);
-/// Share by which a scan may be longer than the scanner's own estimate.
+/// Limit of a scan as a multiple of the scanner's estimate.
 const SCAN_MARGIN: f64 = 1.5;
 
-/// What the plant file says about the handshake.
+/// Parameters of the handshake from the plant file.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Plant number of the press.
@@ -26,18 +30,18 @@ pub struct Config {
     pub simulated: bool,
     /// Time limits.
     pub timeouts: Timeouts,
-    /// What to do when things go wrong.
+    /// Policies for missed strokes, restarts, storage and acknowledgement.
     pub policy: Policy,
-    /// The stroke counter; `None` when the press does not count.
+    /// Stroke counter; `None` for a press without stroke numbers.
     pub counter: Option<Counter>,
-    /// The press counts requests for a rescan.
+    /// Whether the press numbers its requests for a rescan.
     pub counts_attempts: bool,
-    /// Equal reads before a trigger counts.
+    /// Equal reads before a trigger is valid.
     pub debounce_reads: u8,
 }
 
 impl Config {
-    /// What the plant file says.
+    /// Returns the parameters in the plant file.
     pub fn new(press: &Press) -> Self {
         Self {
             press: press.press_id,
@@ -51,40 +55,40 @@ impl Config {
     }
 }
 
-/// Something that happened.
+/// Observation of the handshake.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// A connection stands.
+    /// A connection is open.
     Connected,
-    /// The connection is gone.
+    /// The connection is lost.
     Disconnected,
-    /// The press block was read, whole or, while nothing happens, its fast part.
+    /// The press block was read; on a serial line between strokes only its fast part.
     Press(Box<PressImage>),
     /// The host block was read back.
     Host {
-        /// Who wrote there; `None` where the map has no such field.
+        /// Installation number there; `None` where the map has no such field.
         owner: Option<u16>,
         /// The heartbeat there; `None` where the map has no such field.
         heartbeat: Option<u16>,
-        /// Whether this host may have written both.
+        /// Whether both may have been written by this host.
         mine: bool,
     },
-    /// Every word of the present image has been echoed by the press.
+    /// Every word of the wanted registers was echoed by the press.
     Written,
-    /// The journal has, or could not, put a record on the disk.
+    /// A record was written by the journal, or could not be.
     Journaled {
         /// The stroke.
         key: StrokeKey,
-        /// The record.
+        /// Stage of the record.
         stage: Stage,
-        /// Whether it would survive a power cut.
+        /// Whether the record survives a power cut.
         ok: bool,
     },
-    /// Whether the scanner can take a scan, and how long it would take.
+    /// Readiness of the scanner.
     Scanner {
-        /// What is wrong with it.
+        /// Reason why no scan is possible.
         ready: Result<(), Code>,
-        /// Its estimate of one scan.
+        /// Estimated duration of one scan.
         estimate: Option<Duration>,
     },
     /// The scan of a stroke is complete.
@@ -93,11 +97,11 @@ pub enum Event {
     Measured(StrokeKey, Box<Measurement>),
     /// Scan or evaluation of a stroke failed.
     Failed(StrokeKey, Code),
-    /// The press refuses to talk, or a write was refused: a fault until reset.
+    /// An exception of the controller or a refused write: a fault until reset.
     Fault(Code),
     /// The operator resets faults.
     Reset,
-    /// The host is going to end.
+    /// The host ends.
     Stop,
     /// Time has passed.
     Tick,
@@ -125,37 +129,37 @@ pub enum Command {
     PartEnd,
 }
 
-/// Something to be done, in this order.
+/// Action of the caller, to be carried out in the order of the list.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
-    /// Write to the journal and answer with [`Event::Journaled`].
+    /// Write a record; answered with [`Event::Journaled`].
     Journal(Record),
     /// Pass a command on to the measurement.
     Command(Command),
-    /// Drop the connection and build it again after a pause.
+    /// Drop the connection and connect again after a pause.
     Reconnect,
-    /// Tell people, once per cause.
+    /// Raise an alarm, once per cause.
     Alarm(Code),
-    /// A transition was taken, for log and tests.
+    /// Log a transition that was taken.
     Transition(Transition),
 }
 
-/// The stroke in hand.
+/// Active stroke.
 #[derive(Debug, Clone)]
 pub(super) struct ActiveStroke {
     pub(super) key: StrokeKey,
     pub(super) run_id: u32,
     pub(super) data: StrokeData,
-    /// When it entered its present state.
+    /// Time of entry into the present work state.
     pub(super) since: Duration,
     pub(super) accepted_at: Duration,
     pub(super) scan_started_at: Option<Duration>,
     pub(super) acquired_at: Option<Duration>,
-    /// The record that its present state waits for is done with: `Some(true)` when it is on the disk.
+    /// Outcome of the record that the present state waits for; `Some(true)` when it is on the disk.
     pub(super) journaled: Option<bool>,
-    /// The scan is complete; not yet acted upon.
+    /// Acquisition complete, no transition taken yet.
     pub(super) acquired: bool,
-    /// The result, or why there is none; not yet acted upon.
+    /// Result or reason why there is none, no transition taken yet.
     pub(super) outcome: Option<Measurement>,
     pub(super) publication: Option<Publication>,
 }
@@ -184,7 +188,7 @@ impl ActiveStroke {
     }
 }
 
-/// Another host's block, seen before the first write.
+/// Registers of another host, read before the first write.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OtherHost {
     pub(super) heartbeat: Option<u16>,
@@ -192,7 +196,7 @@ pub(super) struct OtherHost {
     pub(super) alive: bool,
 }
 
-/// The handshake.
+/// Handshake with one press.
 #[derive(Debug, Clone)]
 pub struct Handshake {
     pub(super) config: Config,
@@ -200,20 +204,20 @@ pub struct Handshake {
     pub(super) work: Work,
     pub(super) active: Option<ActiveStroke>,
 
-    /// The last stroke accepted, and the press's count of rescan requests then.
+    /// Last accepted stroke, and the number of its rescan request.
     pub(super) last: Option<StrokeKey>,
     pub(super) asked: u16,
-    /// Where the press's stroke counter stood when it was last accounted for.
+    /// Session and stroke number up to which strokes are accounted for.
     pub(super) counted: Option<(u16, u16)>,
     /// Highest attempt per stroke of the session of `last`.
     pub(super) attempts: BTreeMap<u16, u16>,
     pub(super) result_seq: u16,
     pub(super) run_id: u32,
     pub(super) owner: u16,
-    /// The journal's last stroke, until the first synchronisation has dealt with it.
+    /// Last stroke of the journal, until the first synchronisation.
     pub(super) recalled: Option<Entry>,
 
-    // What was seen.
+    // Observations.
     pub(super) connected: bool,
     pub(super) press: Option<PressImage>,
     pub(super) held_reads: u8,
@@ -232,16 +236,16 @@ pub struct Handshake {
     pub(super) rescan_rose: bool,
     pub(super) trigger_edges: Option<EdgeCounter>,
 
-    // Latched until reset.
+    // Latches, cleared by a reset.
     pub(super) missed_count: u16,
     pub(super) missed_total: u64,
     pub(super) missed: bool,
     pub(super) warning: Option<Code>,
 
     pub(super) link_error: Option<Code>,
-    /// The result that stands in the registers and is not acknowledged.
+    /// Stroke of the valid result that is not acknowledged.
     pub(super) unacked: Option<StrokeKey>,
-    /// The acknowledge was seen low since the last one.
+    /// Whether the acknowledgement was read low after the previous one.
     pub(super) ack_was_low: bool,
     pub(super) image: HostImage,
 
@@ -249,7 +253,7 @@ pub struct Handshake {
 }
 
 impl Handshake {
-    /// A handshake that goes on where the journal ends.
+    /// Makes a handshake that continues after the last record of the journal.
     pub fn new(config: Config, recalled: Recalled) -> Self {
         let trigger_edges =
             config.counter.is_none().then(|| EdgeCounter::new(config.debounce_reads, &recalled));
@@ -300,7 +304,7 @@ impl Handshake {
         }
     }
 
-    /// Takes note of an event, then every transition that is due. `now` never goes back.
+    /// Notes an event, takes every transition that is due and returns the effects. `now` is monotonic.
     pub fn step(&mut self, event: Event, now: Duration) -> Vec<Effect> {
         self.note(event, now);
         while let Some(transition) = self.advance(now) {
@@ -313,18 +317,18 @@ impl Handshake {
         std::mem::take(&mut self.effects)
     }
 
-    /// What the registers of the host shall say.
+    /// Returns the wanted registers of the host.
     pub fn image(&self) -> &HostImage {
         &self.image
     }
 
-    /// Both regions of the state.
+    /// Returns both regions of the state.
     pub fn state(&self) -> State {
         State { link: self.link, work: self.work }
     }
 
-    /// Whether the registers of the host may be written now: never before the press is known to be the right one and
-    /// to have no other host.
+    /// Returns whether the registers of the host may be written: only after the press was identified and no other host
+    /// was found.
     pub fn may_write(&self) -> bool {
         match self.link {
             LinkState::Online | LinkState::Stopped { writable: true } => true,
@@ -336,7 +340,7 @@ impl Handshake {
         }
     }
 
-    /// What is wrong with the link, for `status` and log: it may not stand in the registers.
+    /// Returns the error of the link for status and log; it may be missing in the registers.
     pub fn link_error(&self) -> Option<Code> {
         match self.link {
             LinkState::Fault(code) => Some(code),
@@ -344,12 +348,12 @@ impl Handshake {
         }
     }
 
-    /// The stroke in hand.
+    /// Returns the active stroke.
     pub fn stroke(&self) -> Option<StrokeKey> {
         self.active.as_ref().map(|active| active.key)
     }
 
-    /// Strokes missed since the start, whatever was reset.
+    /// Returns the number of strokes missed since the start, independent of resets.
     pub fn missed_total(&self) -> u64 {
         self.missed_total
     }
@@ -396,7 +400,7 @@ impl Handshake {
         }
     }
 
-    /// The stroke in hand if it is this one; an answer about another one comes too late.
+    /// Returns the active stroke if it has this key; an answer about another stroke is late and ignored.
     fn active_mut(&mut self, key: StrokeKey) -> Option<&mut ActiveStroke> {
         self.active.as_mut().filter(|active| active.key == key)
     }
@@ -479,7 +483,7 @@ impl Handshake {
         self.effects.push(Effect::Alarm(code));
     }
 
-    /// A warning that stays until reset.
+    /// Latches a warning.
     pub(super) fn warn(&mut self, code: Code) {
         self.warning = Some(code);
         self.alarm(code);

@@ -1,4 +1,7 @@
-//! What the registers say in each state: nothing but a function of it.
+//! Wanted registers of the host as a function of the state.
+//!
+//! Derived after every step. Until the acceptance of a stroke is journalled, the registers about the stroke keep
+//! their former values: an echo is a promise.
 
 use std::time::Duration;
 
@@ -11,14 +14,14 @@ use super::{LinkState, Work};
 use crate::{Code, Figures, HostImage, Publication, Severity};
 
 impl Work {
-    /// Whether a stroke is in hand: another one would be missed.
+    /// Returns whether a stroke is active, so that another one is missed.
     pub(super) fn is_busy(self) -> bool {
         matches!(self, Self::Accepted | Self::Scanning | Self::Evaluating | Self::Aborted | Self::Publish)
     }
 }
 
 impl ActiveStroke {
-    /// Adds the times that the machine itself knows, where the host has not given better ones.
+    /// Adds the times of the state machine where the evaluation has given none.
     pub(super) fn add_times(&self, figures: &mut Figures, now: Duration) {
         let mut add = |measure, from: Option<Duration>, to: Option<Duration>| {
             if let (Some(from), Some(to)) = (from, to) {
@@ -32,8 +35,8 @@ impl ActiveStroke {
 }
 
 impl Handshake {
-    /// Follows the state. A stroke whose acceptance is not on the disk yet is not promised: until then the registers
-    /// keep what they say about the stroke before.
+    /// Updates the image from the state. While the acceptance of a stroke is not journalled, the fields of the stroke
+    /// before are kept.
     pub(super) fn refresh_image(&mut self) {
         let present = self.present_image();
         let promised = self.work != Work::Accepted || self.journaled();
@@ -91,20 +94,20 @@ impl Handshake {
         }
     }
 
-    /// Without a stroke counter READY waits until the trigger has settled low: a press that raises it at once again,
-    /// between two readings, would bend a plate that nobody measures.
+    /// Returns whether the next stroke will be detected. Without stroke numbers, ready waits until the debounced trigger is
+    /// low: a press that raises it again between two reads would bend a plate without a measurement.
     fn sees_the_next_stroke(&self) -> bool {
         self.trigger_edges.as_ref().is_none_or(EdgeCounter::armed)
     }
 
-    /// The result that may stand in the registers: the last one, once it is journalled.
+    /// Returns the result that may be in the registers: the last one, once it is journalled.
     fn result(&self) -> Option<&Publication> {
         let pending = self.work == Work::Aborted || self.work == Work::Publish && !self.journaled();
         self.active.as_ref().filter(|_| !pending)?.publication.as_ref()
     }
 
-    /// The most urgent error: a fault; as long as its result is `valid`, why the stroke was not measured, so that no
-    /// code of another matter stands under its number; what keeps the host from being ready.
+    /// Returns the most urgent error, in this order: fault; while the result is `valid`, the reason why the stroke was
+    /// not measured, so that no unrelated code appears beside its number; cause of the block; missed stroke.
     fn error(&self, result: Option<&Publication>, valid: bool) -> Option<Code> {
         let fault = if let LinkState::Fault(code) = self.link { Some(code) } else { None };
         let obstacle = self.obstacle().filter(|code| code.alarm().severity == Severity::Error);

@@ -1,4 +1,7 @@
-//! The transitions of the handshake: one `match`, in the order of their urgency.
+//! Transition function of the handshake: one `match` over both regions, in order of urgency.
+//!
+//! Order: end of the host, link, faults, identity of the press, other hosts, heartbeat, missed strokes; then the
+//! active stroke with the press online; then its steps that need no link.
 
 use std::time::Duration;
 
@@ -7,8 +10,8 @@ use super::{LinkState, Transition, Work};
 use crate::Code;
 
 impl Handshake {
-    /// Takes one transition that is due, if there is one. What the press wants counts only on line; the stroke in hand
-    /// lives on without a link.
+    /// Takes the most urgent transition that is due. Requests of the press need an online link; scan and evaluation go
+    /// on without one.
     pub(super) fn advance(&mut self, now: Duration) -> Option<Transition> {
         use Transition::*;
         match (self.link, self.work) {

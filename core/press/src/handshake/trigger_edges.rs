@@ -1,8 +1,10 @@
-//! Strokes of a press that does not count them: each rising trigger is one.
+//! Stroke numbers for a press that has none: debounced rising edges of the trigger.
+//!
+//! Used by the profiles without stroke numbers. A missed edge cannot be detected.
 
 use crate::{PressImage, Recalled, Stage};
 
-/// Counts rising triggers. A level counts once it has been read so many times in a row.
+/// Counter of rising edges. A level is valid after `needed_reads` equal reads.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeCounter {
     needed_reads: u8,
@@ -15,7 +17,7 @@ pub(super) struct EdgeCounter {
 }
 
 impl EdgeCounter {
-    /// Counts on from the last stroke of the journal.
+    /// Makes a counter that continues after the last stroke of the journal.
     pub(super) fn new(needed_reads: u8, recalled: &Recalled) -> Self {
         let last = recalled.last.as_ref();
         Self {
@@ -29,8 +31,8 @@ impl EdgeCounter {
         }
     }
 
-    /// Puts the settled trigger and the number of its stroke into an image. A trigger that stands at the first reading
-    /// is the journal's last stroke if that one is not done with, else a new one.
+    /// Writes the debounced trigger and its stroke number into an image. A trigger that is up at the first read is the
+    /// last stroke of the journal if that is not acknowledged, else a new stroke.
     pub(super) fn number(&mut self, image: &mut PressImage) {
         self.reads = if image.trigger == self.candidate { self.reads.saturating_add(1) } else { 1 };
         self.candidate = image.trigger;
@@ -46,7 +48,7 @@ impl EdgeCounter {
         image.stroke_id = self.stroke;
     }
 
-    /// Whether the trigger is known to be low: only then can the next stroke be seen to begin.
+    /// Returns whether the debounced trigger is low, so that the next rising edge will be detected.
     pub(super) fn armed(&self) -> bool {
         self.level == Some(false)
     }
@@ -80,7 +82,7 @@ mod tests {
         assert_eq!(numbers, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 2]);
         assert!(seen[6].0, "one low reading is a bounce");
         strokes(&mut counter, &[0]);
-        assert!(!counter.armed(), "a stroke that came now would be taken for a bounce");
+        assert!(!counter.armed(), "a rising edge now is a bounce");
         strokes(&mut counter, &[0]);
         assert!(counter.armed());
     }

@@ -1,4 +1,7 @@
-//! The stroke in hand: from its acceptance to the press's acknowledge.
+//! Actions of the work region: the active stroke from its acceptance to the acknowledgement.
+//!
+//! In order: accept, start the scan, begin the evaluation, conclude, publish, acknowledge; give up from accepted or
+//! scanning. Each promise to the press waits for its record in the journal.
 
 use std::time::Duration;
 
@@ -8,7 +11,7 @@ use super::machine::{ActiveStroke, Command, Effect, Handshake};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, PressImage, Publication, Record, StrokeKey, Verdict};
 
-/// A journal that has not answered after this long counts as failed for this record.
+/// Limit of one record of the journal; after it the record counts as failed.
 const JOURNAL_LIMIT: Duration = Duration::from_secs(10);
 
 impl Handshake {
@@ -60,7 +63,7 @@ impl Handshake {
         self.work = Work::Accepted;
     }
 
-    /// Strokes ahead of the counter are those of its last turn: they may come again.
+    /// Forgets attempts of the previous turn of the stroke counter, whose numbers come again.
     pub(super) fn forget_old_lap(&mut self, stroke: u16) {
         if let Some(counter) = self.config.counter {
             let half = u32::from(counter.wrap) / 2;
@@ -85,7 +88,7 @@ impl Handshake {
         self.storage_failed();
     }
 
-    /// The press is clear, and the acceptance is on the disk, or the plant goes on without a journal.
+    /// Returns whether the scan may start: press clear, and acceptance journalled or storage degraded by policy.
     pub(super) fn clear_to_start(&self) -> bool {
         let stored = self.active.as_ref().and_then(|active| active.journaled);
         let may = stored == Some(true) || stored.is_some() && !self.storage_stops();
@@ -111,8 +114,8 @@ impl Handshake {
         Transition::ScanStarted
     }
 
-    /// Why the scan of the stroke in hand must not go on, or not begin. A stroke whose acceptance is still on its way to
-    /// the disk is not given up: it would be echoed.
+    /// Returns the reason why the scan must not start or continue. A stroke whose acceptance is still being journalled
+    /// is not given up, since it will be echoed.
     pub(super) fn given_up(&self, now: Duration) -> Option<Code> {
         let active = self.active.as_ref()?;
         let scanning = self.work == Work::Scanning;
@@ -178,7 +181,7 @@ impl Handshake {
         if measured { Transition::StrokeMeasured } else { Transition::StrokeNotMeasured }
     }
 
-    /// Makes the result final and journals it; it is written once that is done.
+    /// Makes the result final and journals it; the registers follow after the record.
     pub(super) fn finish(&mut self, mut measurement: Measurement, next: Work, now: Duration) {
         let Some(active) = &mut self.active else { return };
         if let Some(code) = measurement.reason() {
@@ -210,7 +213,8 @@ impl Handshake {
         Transition::ResultPublished
     }
 
-    /// An acknowledge that stood before the result did belongs to another one.
+    /// Returns whether the press acknowledges this result. An acknowledgement older than the result belongs to another
+    /// one.
     pub(super) fn acknowledged(&self) -> bool {
         let ack = self.press.as_ref().is_some_and(|press| press.ack);
         ack && self.ack_was_low && self.unacked.is_some()
@@ -233,7 +237,7 @@ impl Handshake {
         if self.held() { self.reset } else { waited >= self.config.timeouts.ack }
     }
 
-    /// The result stays in the registers; the next stroke will acknowledge it.
+    /// Stops waiting; the result stays in the registers, the next stroke acknowledges it.
     pub(super) fn go_on_without_ack(&mut self, _now: Duration) -> Transition {
         self.warn(Code::AckTimeout);
         self.work = Work::Idle;
