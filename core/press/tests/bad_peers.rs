@@ -1,4 +1,4 @@
-//! Peers that answer wrongly: every such answer drops the connection, none is taken for a right one.
+//! Protocol faults of Modbus TCP peers: every wrong answer drops the connection and none is accepted.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -12,7 +12,7 @@ use tokio::net::{TcpListener, TcpStream};
 const BLOCK: platen_plant::press::Block =
     platen_plant::press::Block { table: RegisterTable::Holding, start: 0, count: 3 };
 
-/// A peer that answers each request frame of each connection with what `answer` makes of it.
+/// Connects a client to a peer that answers each request frame by `answer(connection, frame)`.
 async fn peer(
     answer: impl Fn(usize, &[u8]) -> Vec<u8> + Send + Sync + Clone + 'static,
 ) -> Client<ModbusLink> {
@@ -43,7 +43,7 @@ async fn serve(mut stream: TcpStream, connection: usize, answer: impl Fn(usize, 
     }
 }
 
-/// A right answer to a read: `words` behind the request's own header.
+/// Returns a correct answer to a read: `words` behind the request's own header.
 fn words(request: &[u8], words: &[u16]) -> Vec<u8> {
     let mut frame = request[..4].to_vec();
     frame.extend((3 + 2 * words.len() as u16).to_be_bytes());
@@ -52,7 +52,7 @@ fn words(request: &[u8], words: &[u16]) -> Vec<u8> {
     frame
 }
 
-/// The first connection answers wrongly, the next one rightly.
+/// Asserts that a wrong answer drops the first connection, and that the next connection works.
 async fn poisons(bad: impl Fn(&[u8]) -> Vec<u8> + Send + Sync + Clone + 'static) {
     let answer = move |connection: usize, request: &[u8]| {
         if connection == 0 { bad(request) } else { words(request, &[7, 8, 9]) }
@@ -119,9 +119,9 @@ async fn an_exception_keeps_the_connection() {
     assert!(client.connected());
 }
 
-/// The example of the Modbus Application Protocol V1.1b3, 6.21: function 43, type 14, basic, three objects.
+/// Example of MODBUS Application Protocol V1.1b3, section 6.21: function 43, type 14, basic, three objects.
 #[tokio::test]
-async fn a_controller_says_who_it_is() {
+async fn a_controller_is_identified() {
     let who = |_, request: &[u8]| {
         assert_eq!(request[7..], [0x2B, 0x0E, 1, 0]);
         let objects: [&[u8]; 3] = [b"ACME", b"PC-7", b"V2.1"];
@@ -148,7 +148,7 @@ async fn a_write_outside_the_allow_list_is_never_sent() {
     assert_eq!((client.counts().writes_refused, client.counts().requests), (6, 0));
 }
 
-/// A full backlog never answers the second connection; the wait is limited.
+/// Connection limit: a full backlog never answers another connection.
 #[tokio::test]
 async fn a_listener_that_does_not_accept() {
     let socket = tokio::net::TcpSocket::new_v4().unwrap();

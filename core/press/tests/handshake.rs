@@ -1,4 +1,7 @@
-//! The handshake alone, under events in any order and virtual time.
+//! Property tests of the handshake alone: random event sequences in virtual time.
+//!
+//! After every event the harness checks the invariants of the README: no scan twice or without a record, no result
+//! without a record, no write before the press is known.
 
 #![allow(clippy::panic, reason = "helpers of tests")]
 
@@ -15,7 +18,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::RngSeed;
 
-/// The handshake with the world round it: the journal, the scanner, and what they owe it.
+/// Handshake with simulated journal and scanner, and their outstanding answers.
 struct Harness {
     machine: Handshake,
     now: Duration,
@@ -58,7 +61,7 @@ impl Harness {
         }
     }
 
-    /// Another process on the same journal. A scan whose record could not be written is forgotten, and told so before.
+    /// Restarts the host on the same journal. Scans without a written record are not recalled.
     fn restarted(self, config: Config) -> Self {
         let stored = |key: &StrokeKey| self.accepted.get(key) == Some(&true);
         let scanned = self.scanned.iter().copied().filter(stored).collect();
@@ -140,7 +143,7 @@ impl Harness {
         }
     }
 
-    /// The journal answers its oldest record.
+    /// Answers the oldest outstanding record.
     fn journal(&mut self, ok: bool) {
         let Some(record) = self.records.pop_front() else { return };
         if ok {
@@ -170,7 +173,7 @@ impl Harness {
         self.now += Duration::from_millis(ms);
     }
 
-    /// One cycle of a press that does everything right and has no new stroke.
+    /// Runs one cycle of a correct press without a new stroke.
     fn calm_cycle(&mut self, beat: u16) {
         self.pass(100);
         self.step(Event::Connected);
@@ -213,11 +216,11 @@ fn config() -> Config {
     Config::new(&Press::pph1("P", 3, Link::tcp("x", 502, 1)))
 }
 
-/// One thing that happens.
+/// One action of the random sequence.
 #[derive(Debug, Clone)]
 enum Act {
     Press(Box<PressImage>),
-    /// The press restarts or another part comes: a number that was never used before.
+    /// New session: restart of the press or another part.
     Session,
     Host {
         owner: u16,
@@ -255,7 +258,7 @@ fn press() -> impl Strategy<Value = PressImage> {
                 clear_to_scan,
                 part_end,
                 rescan,
-                // Near the wrap, so that the counter goes over it both ways.
+                // On both sides of the wrap of the counter.
                 stroke_id: [0, 65_534, 65_535, 1, 2, 40][usize::from(stroke_id)],
                 session_id: 0,
                 attempt,
@@ -266,7 +269,7 @@ fn press() -> impl Strategy<Value = PressImage> {
     )
 }
 
-/// Now and then the registers of a press that is only starting.
+/// Press registers, sometimes those of a controller that is starting.
 fn press_or_ruin() -> impl Strategy<Value = PressImage> {
     (press(), prop::bool::weighted(0.03)).prop_map(|(image, ruin)| {
         let wrong = ruin.then_some(Wrong { input: Input::MapVersion, found: 0, expected: 1 });
@@ -349,7 +352,7 @@ fn perform(harness: &mut Harness, act: Act) {
     }
 }
 
-/// From wherever it is, a press that behaves brings the handshake back to idle.
+/// Asserts that a correct press brings the handshake back to idle from any state.
 fn comes_to_rest(harness: &mut Harness) {
     harness.step(Event::Scanner { ready: Ok(()), estimate: None });
     let mut beat = 100;
@@ -370,8 +373,7 @@ fn comes_to_rest(harness: &mut Harness) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, rng_seed: RngSeed::Fixed(0x5EED), ..ProptestConfig::default() })]
 
-    /// No scan twice, none without a record, no result without a record, no write and no ready before the press is
-    /// known, and a way out of every state.
+    /// Invariants hold in any order of events, and idle is reachable from every state.
     #[test]
     fn any_order_of_events(config in configs(), acts in prop::collection::vec(act(), 0..120)) {
         let mut harness = Harness::new(config);
@@ -385,7 +387,7 @@ proptest! {
         assert!(matches!(harness.machine.state().link, LinkState::Stopped { writable: true }));
     }
 
-    /// The same with a restart in the middle: what the journal has is all that is left.
+    /// The same with a restart of the host in between: only the journal survives.
     #[test]
     fn any_order_of_events_with_a_restart(
         config in configs(),
@@ -411,7 +413,7 @@ proptest! {
     }
 }
 
-/// The properties above are worth something only if every transition is taken on the way.
+/// Coverage of the random sequences: every transition is taken.
 #[test]
 fn every_transition_is_taken() {
     let mut runner = proptest::test_runner::TestRunner::deterministic();
@@ -436,8 +438,8 @@ fn every_transition_is_taken() {
     assert!(never.is_empty(), "never taken: {never:?}");
 }
 
-/// The link breaks while a result waits for its acknowledge. The press takes it and makes the next stroke; its
-/// acknowledge still stands when the link is back, and belongs to the result before.
+/// Link lost while a result waits for its acknowledgement. The press acknowledges it and makes the next stroke; the
+/// acknowledgement is still up after the reconnection and belongs to the former result.
 #[test]
 fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
     let mut harness = Harness::new(config());
@@ -471,10 +473,10 @@ fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
     assert!(!harness.machine.image().valid, "its own acknowledge");
 }
 
-/// The host comes back before its scanner does: what the press reads under the stroke's number is why that stroke was
-/// not measured; that the scanner is not ready keeps READY low, and is said once the result is taken.
+/// Restart of the host with a scanner that is not ready: `error_code` beside the interrupted stroke is its own reason;
+/// the scanner's code follows after the acknowledgement, with ready low.
 #[test]
-fn an_interrupted_stroke_says_so_while_the_scanner_is_not_ready() {
+fn an_interrupted_stroke_keeps_its_reason_while_the_scanner_is_not_ready() {
     let mut harness = Harness::new(config());
     harness.step(Event::Scanner { ready: Ok(()), estimate: None });
     harness.calm_cycle(1);

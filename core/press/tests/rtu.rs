@@ -1,4 +1,4 @@
-//! RTU frames: through a gateway that hands late answers to whoever is connected, and on a pseudo terminal.
+//! RTU frames: through a gateway that passes late answers to the next connection, and on a pseudo terminal.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
@@ -18,7 +18,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpListener;
 use tokio::net::tcp::OwnedWriteHalf;
 
-/// CRC of an RTU frame, bit by bit, low byte first.
+/// Returns the CRC-16/MODBUS of a frame, computed bit by bit, low byte first.
 fn crc(frame: &[u8]) -> [u8; 2] {
     let mut crc = 0xFFFFu16;
     for byte in frame {
@@ -30,7 +30,7 @@ fn crc(frame: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
-/// The answer of unit 1 to a whole frame; `None` while the frame is not whole.
+/// Returns the answer of unit 1 to a complete frame; `None` for an incomplete frame.
 fn answer(plc: &SharedPlc, frame: &[u8]) -> Option<Vec<u8>> {
     let word = |at: usize| Some(u16::from_be_bytes([*frame.get(at)?, *frame.get(at + 1)?]));
     let (start, count) = (word(2)?, word(4)?);
@@ -65,8 +65,8 @@ fn random(state: &mut u64) -> u64 {
     *state
 }
 
-/// A gateway with one line behind it: what comes late goes to the connection of that moment. `late` of 1000 answers
-/// come after 200 ms.
+/// Serves a gateway to one line: a late answer goes to the connection then open. `late` of 1000 answers come after
+/// 200 ms.
 async fn gateway(plc: SharedPlc, late: u64, seed: u64) -> u16 {
     let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
     let port = listener.local_addr().unwrap().port();
@@ -97,8 +97,8 @@ async fn gateway(plc: SharedPlc, late: u64, seed: u64) -> u16 {
     port
 }
 
-/// Answers on the press's side of a pseudo terminal until the test ends. A thread of its own: a terminal that nobody
-/// has open is hung up, which an event loop would report for ever after.
+/// Answers on the PLC's side of a pseudo terminal until the test ends. On a thread: an event loop would report the hang-up
+/// of a closed terminal without end.
 fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
     let (mut frame, mut bytes) = (Vec::new(), [0; 260]);
     line.set_timeout(Duration::from_millis(10)).unwrap();
@@ -106,7 +106,7 @@ fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
         match line.read(&mut bytes) {
             Ok(n) => frame.extend(&bytes[..n]),
             Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
-            // Nobody has the other side open.
+            // The other side is closed.
             Err(_) => std::thread::sleep(Duration::from_millis(10)),
         }
         if let Some(reply) = answer(plc, &frame) {
@@ -116,7 +116,7 @@ fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
     }
 }
 
-/// Runs strokes over a link and checks that each has its own result; returns how often the link was poisoned.
+/// Runs strokes over a link and asserts that each has its own result; returns the number of poisoned connections.
 async fn strokes(link: Link, plc: SharedPlc, strokes: usize) -> u64 {
     tokio::spawn(simulated_plc::run_plc(plc.clone()));
     let press = Press::pph1("Press 3", 3, link);
@@ -178,7 +178,7 @@ async fn strokes_over_a_pseudo_terminal() {
     thread.join().unwrap();
 }
 
-/// Blocks of one length, so that a late answer could pass for the next one.
+/// Blocks of equal length, so that a late answer has the form of the next one.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn no_read_returns_what_another_asked_for() {
     let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, 0)));

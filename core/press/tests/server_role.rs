@@ -1,4 +1,4 @@
-//! A press that asks: the host is the Modbus server.
+//! Server role: the press is the Modbus client.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -20,7 +20,7 @@ async fn ask(host: SocketAddr) -> Context {
     tcp::connect_slave(host, Slave(1)).await.unwrap()
 }
 
-/// The client blocks of a press: writes its own block and reads the host's, every 10 ms.
+/// Client of the press: writes its own block and reads the host's every 10 ms.
 async fn exchange(plc: SharedPlc, host_at: SocketAddr) {
     let mut context = ask(host_at).await;
     loop {
@@ -37,12 +37,12 @@ async fn exchange(plc: SharedPlc, host_at: SocketAddr) {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn thirty_strokes_of_a_press_that_asks() {
+async fn thirty_strokes_with_the_host_as_server() {
     let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, 0)));
     let mut press = Press::pph1("Press 3", 3, Link::tcp("127.0.0.1", 0, 1));
     press.role = Role::Server;
     let mut link = PressLink::new(&press);
-    let PressLink::Served(served) = &mut link else { unreachable!("it is the press that asks") };
+    let PressLink::Served(served) = &mut link else { unreachable!("the role is server") };
     let host_at = served.listen().await.unwrap();
     let (host, side) = channels();
     let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
@@ -62,7 +62,7 @@ async fn thirty_strokes_of_a_press_that_asks() {
     plc.lock().unwrap().to_do = 30;
     simulated_plc::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
 
-    // What is not its own the press may not write, and other functions and units it may not use.
+    // Refused: writes outside the press block, other functions, other units.
     let mut stranger = ask(host_at).await;
     let refused = stranger.write_multiple_registers(110, &[1, 2]).await.unwrap();
     assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress));

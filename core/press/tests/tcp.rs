@@ -1,4 +1,4 @@
-//! The host against a press on a real socket.
+//! Whole press side against the simulated PLC over Modbus TCP on loopback.
 
 mod simulated_plc;
 

@@ -1,4 +1,4 @@
-//! The host against a press in memory, in virtual time: bad habits of presses, bad links, restarts.
+//! Whole press side against the simulated PLC in virtual time: faults of the PLC program, of the link, restarts.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot continue must fail")]
 
@@ -18,7 +18,7 @@ use tokio::task::JoinHandle;
 
 const MS: fn(u64) -> Duration = Duration::from_millis;
 
-/// A press, a journal and a host that can be killed and started again.
+/// Simulated PLC and journal, with hosts that can be killed and started again.
 struct Cell {
     plc: SharedPlc,
     journal: Memory,
@@ -77,14 +77,14 @@ impl Cell {
         Host { run, scanner, answers, status, reachable, reset_next, lose_withdrawal }
     }
 
-    /// Lets the press do `strokes` more and waits until it is done with them.
+    /// Makes `strokes` more strokes and waits until the PLC has finished them.
     async fn strokes(&self, strokes: usize) {
         self.plc().to_do = strokes;
         simulated_plc::until(Duration::from_secs(600 * strokes as u64), "strokes", || self.plc().idle())
             .await;
     }
 
-    /// What must always hold, as the press saw it; returns the numbers of results and scans.
+    /// Asserts the invariants on the PLC's side; returns the numbers of results and scans.
     fn check(&self) -> (usize, usize) {
         let plc = self.plc();
         assert_eq!(plc.outside, 0, "writes outside the allowed registers");
@@ -116,7 +116,7 @@ impl Host {
         self.run.await.unwrap().unwrap();
     }
 
-    /// A power cut: nothing is written any more.
+    /// Kills the host without a last write.
     async fn kill(self) {
         self.run.abort();
         self.scanner.abort();
@@ -183,7 +183,7 @@ async fn a_press_that_moves_during_the_scan_gets_not_measured() {
     assert_eq!(errors, [Code::NotClear.number(); 3]);
 }
 
-/// 10,000 strokes with 1 % late answers, 0.5 % resets and 0.5 % lost answers to requests that were carried out.
+/// Soak test: 10,000 strokes with 1 % late answers, 0.5 % resets and 0.5 % lost answers to requests that were carried out.
 #[tokio::test(start_paused = true)]
 async fn ten_thousand_strokes_on_a_bad_link() {
     let seed = 0x5EED;
@@ -200,7 +200,7 @@ async fn ten_thousand_strokes_on_a_bad_link() {
     assert!(status.counts.poisoned > 1000, "the link was bad: {:?}", status.counts);
 }
 
-/// The host is killed again and again, in all states; each stroke is delivered or reported as not measured.
+/// Repeated kills of the host in all states: each stroke is delivered or reported as not measured.
 #[tokio::test(start_paused = true)]
 async fn a_host_that_is_killed_loses_no_stroke() {
     for seed in 1..=40u64 {
@@ -270,7 +270,7 @@ async fn a_result_that_could_not_be_withdrawn_is_withdrawn_before_the_next_one()
     let cell = Cell::habits(0, Habits { no_ack: true, ..Habits::default() });
     let host = cell.start();
     cell.strokes(3).await;
-    // The third result still stands when the fourth stroke is measured without a link.
+    // The third result is still valid when the fourth stroke is measured without a link.
     host.lose_withdrawal.store(true, Ordering::SeqCst);
     cell.plc().to_do = 1;
     simulated_plc::until(MS(20_000), "the lost link", || !host.reachable.load(Ordering::SeqCst)).await;
@@ -282,7 +282,7 @@ async fn a_result_that_could_not_be_withdrawn_is_withdrawn_before_the_next_one()
     assert_eq!(cell.check(), (4, 4));
 }
 
-/// In step again, in virtual time after `change`.
+/// Returns the virtual time from `change` to the next ready state.
 async fn in_step_after(host: &mut Host, change: impl FnOnce(&mut Host)) -> Duration {
     let connects = host.status.borrow().counts.connects;
     change(host);
@@ -316,14 +316,14 @@ async fn a_single_reset_costs_little() {
     for _ in 0..20 {
         tokio::time::sleep(MS(1000)).await;
         let took = in_step_after(&mut host, |host| host.reset_next.store(true, Ordering::SeqCst)).await;
-        // A poll and a status report until it is noticed, then at once.
+        // One poll and one status report until detection; reconnection without a pause.
         assert!(took <= MS(20 + 200 + 30), "{took:?}");
     }
     host.stop().await;
     cell.check();
 }
 
-/// The bar of a clean link: 99 % within three polls and 20 ms, on the press's clock.
+/// Response time on a clean link: 99 % within three polls and 20 ms, on the PLC's clock.
 #[tokio::test(start_paused = true)]
 async fn trigger_to_busy_on_a_clean_link() {
     let cell = Cell::new(0);
@@ -341,7 +341,7 @@ async fn trigger_to_busy_on_a_clean_link() {
     assert!(p99 <= 3 * 20 + 20, "{p99} ms");
 }
 
-/// The host dies just before and just after each record of a stroke's journal is on the disk.
+/// Kill of the host just before and just after each record of a stroke is written.
 #[tokio::test(start_paused = true)]
 async fn a_host_killed_round_each_record_of_the_journal() {
     for dies_before in [true, false] {

@@ -1,4 +1,4 @@
-//! A link in memory with faults, for virtual time.
+//! Link in memory with injected faults, for virtual time.
 
 use std::time::Duration;
 
@@ -6,12 +6,12 @@ use platen_press::{Link, Request, Response, TransportError};
 
 use super::SharedPlc;
 
-/// Chances per request, in thousandths.
+/// Fault probabilities per request, in thousandths.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Chaos {
     pub late: u32,
     pub reset: u32,
-    /// The answer is lost although the request was carried out.
+    /// The request is carried out and its answer is lost.
     pub lost: u32,
 }
 
@@ -22,9 +22,9 @@ pub struct MemoryLink {
     random: u64,
     connected: bool,
     pub reachable: std::sync::Arc<std::sync::atomic::AtomicBool>,
-    /// The next request meets a reset connection.
+    /// The next request fails with a connection reset.
     pub reset_next: std::sync::Arc<std::sync::atomic::AtomicBool>,
-    /// The next write that withdraws a result is lost, and the press is out of reach from then on.
+    /// The next write that withdraws a result is lost; the press is unreachable afterwards.
     pub lose_withdrawal: std::sync::Arc<std::sync::atomic::AtomicBool>,
 }
 
@@ -35,14 +35,14 @@ impl MemoryLink {
         Self { plc, chaos, random: seed | 1, connected: false, reachable, reset_next, lose_withdrawal }
     }
 
-    /// Whether this request is the one that is to be lost.
+    /// Returns whether this request is the planned lost one.
     fn withdraws(&self, request: &Request) -> bool {
         let Request::Write { start, words } = request else { return false };
         self.plc.lock().unwrap().would_withdraw(*start, words)
             && self.lose_withdrawal.swap(false, std::sync::atomic::Ordering::SeqCst)
     }
 
-    /// xorshift64*
+    /// Returns a number below 1000 from xorshift64*.
     fn chance(&mut self) -> u32 {
         self.random ^= self.random >> 12;
         self.random ^= self.random << 25;

@@ -1,4 +1,4 @@
-//! A press, a host and a journal for tests, from nothing but the pages of the map and the handshake.
+//! Simulated PLC of a press with the host's scanner and journal, for real sockets and for virtual time.
 
 #![allow(
     dead_code,
@@ -28,12 +28,12 @@ pub use plc::{Habits, Plc};
 
 pub type SharedPlc = Arc<Mutex<Plc>>;
 
-/// A journal in memory that outlives the host.
+/// Journal in memory that outlives the host.
 #[derive(Debug, Clone)]
 pub struct Memory {
     pub records: Arc<Mutex<Vec<Record>>>,
     pub full: Arc<Mutex<bool>>,
-    /// The power cut that is to come: before or after this record.
+    /// Planned power cut: index of the record, and whether the cut precedes it.
     cut: Arc<Mutex<Option<(usize, bool)>>>,
     dead: Arc<AtomicBool>,
     owner: u16,
@@ -49,7 +49,7 @@ impl Memory {
         Self { records, full, cut, dead, owner }
     }
 
-    /// Power fails just before or just after the record with this number, counted from 0, is on the disk.
+    /// Plans a power cut just before or just after the record with this index is written.
     pub fn dies_at(&self, record: usize, before: bool) {
         *self.cut.lock().unwrap() = Some((record, before));
     }
@@ -58,13 +58,13 @@ impl Memory {
         self.dead.load(Ordering::SeqCst)
     }
 
-    /// Power is back.
+    /// Ends the power cut.
     pub fn revive(&self) {
         *self.cut.lock().unwrap() = None;
         self.dead.store(false, Ordering::SeqCst);
     }
 
-    /// The last publication of each stroke.
+    /// Returns the last publication of each stroke.
     pub fn publications(&self) -> BTreeMap<StrokeKey, Publication> {
         let records = self.records.lock().unwrap();
         let publications = records.iter().filter_map(|record| match record {
@@ -101,7 +101,7 @@ impl Journal for Memory {
         }
         let mut records = self.records.lock().unwrap();
         let cut = self.cut.lock().unwrap().filter(|(at, _)| *at == records.len());
-        // After the cut nothing reaches the disk, and nobody hears of it.
+        // After the cut nothing is written and no answer is sent.
         let lost = self.died() || cut.is_some_and(|(_, before)| before);
         if !lost {
             records.push(record.clone());
@@ -109,14 +109,14 @@ impl Journal for Memory {
         drop(records);
         if lost || cut.is_some() {
             self.dead.store(true, Ordering::SeqCst);
-            // A panic without a message: it is meant.
+            // An intended panic, without a message.
             std::panic::resume_unwind(Box::new("the power is cut"));
         }
         Ok(())
     }
 }
 
-/// The figure that the fake scanner finds for a stroke: its number in hundredths of a millimetre.
+/// Returns the measurement of the simulated scanner: the stroke number in hundredths of a millimetre.
 pub fn measurement(key: StrokeKey) -> Measurement {
     let figure = f64::from(key.stroke % 30_000) * 1e-5;
     Measurement {
@@ -127,7 +127,7 @@ pub fn measurement(key: StrokeKey) -> Measurement {
     }
 }
 
-/// A host that scans and judges after fixed times, and remembers what it scanned.
+/// Runs a host that scans and evaluates after fixed times and lists the scanned strokes.
 pub async fn host(
     mut orders: UnboundedReceiver<Order>,
     answers: UnboundedSender<Answer>,
@@ -160,7 +160,7 @@ pub async fn host(
     }
 }
 
-/// Runs the program of a press every 5 ms.
+/// Runs one cycle of the PLC program every 5 ms.
 pub async fn run_plc(plc: SharedPlc) {
     let start = tokio::time::Instant::now();
     let mut interval = tokio::time::interval(Duration::from_millis(5));
@@ -171,7 +171,7 @@ pub async fn run_plc(plc: SharedPlc) {
     }
 }
 
-/// Waits until something holds, at most `limit`.
+/// Waits until the condition holds, at most `limit`.
 pub async fn until(limit: Duration, what: &str, mut holds: impl FnMut() -> bool) {
     let waited = tokio::time::timeout(limit, async {
         while !holds() {

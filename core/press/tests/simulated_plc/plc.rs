@@ -1,30 +1,30 @@
-//! A press controller written from the map's page, not from the host's code: registers and the reference program.
+//! PLC of a press: registers and reference program, written from the printed register map, independent of the host's code.
 
 use std::time::Duration;
 
 pub const P: usize = 0;
 pub const H: usize = 100;
 
-/// What this press does wrong.
+/// Faults of the PLC program.
 #[derive(Debug, Clone, Default)]
 pub struct Habits {
-    /// Falls back to no trigger for every other program cycle while it waits.
+    /// Lowers the trigger in every other cycle while it waits.
     pub bounce: bool,
-    /// Leaves the trigger standing until the result is there.
+    /// Keeps the trigger up until the result is valid.
     pub keeps_trigger: bool,
     /// Never acknowledges.
     pub no_ack: bool,
-    /// Counts two up before this stroke (by order).
+    /// Increments the stroke number by two before the stroke with this index.
     pub jump_at: Option<usize>,
-    /// Sets the counter back to 1 and changes the session before this stroke.
+    /// Sets the stroke number to 1 and changes the session before the stroke with this index.
     pub back_at: Option<usize>,
-    /// Leaves the tail of its block behind for some cycles at each stroke.
+    /// Delays the tail of its block by this many cycles at each stroke.
     pub torn_cycles: u32,
-    /// Takes clear_to_scan away so many ms after acceptance.
+    /// Lowers `clear_to_scan` this many ms after acceptance.
     pub unclear_after_ms: Option<u64>,
 }
 
-/// A result as this press read it.
+/// Result as read by the PLC.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Result {
     pub stroke: u16,
@@ -44,10 +44,10 @@ pub struct Plc {
     pub gave_up: Vec<u16>,
     pub writes: usize,
     pub outside: usize,
-    /// Writes that put another result in the place of a valid one.
+    /// Writes that replaced a valid result by another one.
     pub swapped: usize,
     pub now_ms: u64,
-    /// Time from the trigger to its acceptance as this program sees it.
+    /// Times from the trigger to its acceptance, on the clock of the PLC.
     pub accept_ms: Vec<u64>,
     waiting: bool,
     accepted: bool,
@@ -100,7 +100,7 @@ impl Plc {
         self.to_do == 0 && !self.waiting && self.regs[P + 2] & 0b100 == 0
     }
 
-    /// A power cut: registers lost, another session; a stroke that waited is forgotten.
+    /// Restarts the PLC: registers lost, new session, a waiting stroke forgotten.
     pub fn restart(&mut self, session: u16) {
         let press_id = self.regs[P + 7];
         let stroke = self.regs[P + 3];
@@ -132,13 +132,13 @@ impl Plc {
         true
     }
 
-    /// Whether this write would take the valid bit back.
+    /// Returns whether this write lowers the valid bit.
     pub fn would_withdraw(&self, start: u16, words: &[u16]) -> bool {
         let status = (H + 2).checked_sub(usize::from(start)).and_then(|at| words.get(at));
         self.valid_result().is_some() && status.is_some_and(|status| status & 1 << 2 == 0)
     }
 
-    /// Stroke, sequence number and its copy, while a result is valid.
+    /// Returns stroke, sequence number and its copy while a result is valid.
     fn valid_result(&self) -> Option<[u16; 3]> {
         (self.regs[H + 2] & 1 << 2 != 0).then(|| [4, 8, 53].map(|word| self.regs[H + word]))
     }
@@ -164,7 +164,7 @@ impl Plc {
         self.regs[P + 31] = if self.torn_left > 0 { id ^ 0x4000 } else { id };
     }
 
-    /// One cycle of the reference program. The host works while `now - host_beat_ms <= 2000`.
+    /// Runs one cycle of the reference program. The host is alive while `now - host_beat_ms <= 2000`.
     pub fn cycle(&mut self, now: Duration) {
         self.now_ms = now.as_millis() as u64;
         self.cycle += 1;

@@ -1,4 +1,4 @@
-//! The press on a real socket.
+//! Modbus TCP server of the simulated PLC.
 
 use std::future::{Ready, ready};
 
@@ -34,7 +34,7 @@ impl tokio_modbus::server::Service for Service {
     }
 }
 
-/// Serves a press on a port that the system chooses; returns the port.
+/// Serves the PLC on a free port; returns the port.
 pub async fn serve(plc: SharedPlc) -> u16 {
     let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
     let port = listener.local_addr().unwrap().port();
