@@ -11,7 +11,7 @@ use crate::{
     Sample, Vec3,
 };
 
-/// The paper's harmonic map.
+/// Harmonic map (Masuda et al., 4.3).
 pub(super) struct Harmonic;
 
 impl Flatten for Harmonic {

@@ -1,4 +1,5 @@
-//! The paper's harmonic map, as a flattening without its plugin.
+//! Harmonic map of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", as a flattening
+//! without its plugin.
 
 #![allow(unreachable_pub, reason = "test code")]
 
