@@ -6,7 +6,7 @@
 //! The state has two orthogonal regions: the link to the press ([`LinkState`]) and the active stroke ([`Work`]). A lost link
 //! does not stop a scan; its result waits for the reconnection. One step runs in this order:
 //!
-//! 1. [`machine`] notes the event: it changes observations only.
+//! 1. [`machine`] notes the event ([`messages`]): it changes observations only.
 //! 2. [`transitions`] takes transitions in order of urgency until none is due. [`link_region`] and [`work_region`]
 //!    contain their actions, [`acceptance`] the conditions under which a stroke is accepted, blocked or missed.
 //!    For a press without stroke numbers, [`trigger_edges`] counts the strokes.
@@ -17,12 +17,14 @@
 mod acceptance;
 mod link_region;
 mod machine;
+mod messages;
 mod register_image;
 mod transitions;
 mod trigger_edges;
 mod work_region;
 
-pub use machine::{Command, Config, Effect, Event, Handshake};
+pub use machine::{Config, Handshake};
+pub use messages::{Command, Effect, Event};
 
 /// Link region: whether the press may be read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use platen_plant::press::{Input, OnInterrupted};
 
-use super::machine::{ActiveStroke, Command, Effect, Handshake};
+use super::machine::{ActiveStroke, Handshake};
+use super::messages::{Command, Effect};
 use super::{LinkState, Transition, Work};
 use crate::{Acknowledgement, Code, Measurement, Record, Stage, StrokeKey};
 

@@ -1,4 +1,4 @@
-//! State, events and effects of the handshake, and the step.
+//! State of the handshake and the step.
 //!
 //! An event is an observation: [`Handshake::step`] stores it, takes the transitions that are due and returns the effects in
 //! the order in which they must be carried out. Deadlines are compared with the time of the step, so the caller
@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use platen_plant::press::{Counter, Input, Mode, Policy, Press, Timeouts};
 
+use super::messages::{Command, Effect, Event};
 use super::trigger_edges::EdgeCounter;
-use super::{LinkState, State, Transition, Work};
+use super::{LinkState, State, Work};
 use crate::{
-    Code, Entry, HostImage, Measurement, PressImage, Publication, Recalled, Record, Stage, StrokeData,
-    StrokeKey,
+    Code, Entry, HostImage, Measurement, PressImage, Publication, Recalled, Stage, StrokeData, StrokeKey,
 };
 
 /// Limit of a scan without a limit in the plant file and without an estimate of the scanner.
@@ -53,95 +53,6 @@ impl Config {
             debounce_reads: press.map.input(Input::Trigger).map_or(1, |field| field.debounce_reads),
         }
     }
-}
-
-/// Observation of the handshake.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Event {
-    /// A connection is open.
-    Connected,
-    /// The connection is lost.
-    Disconnected,
-    /// The press block was read; on a serial line between strokes only its fast part.
-    Press(Box<PressImage>),
-    /// The host block was read back.
-    Host {
-        /// Installation number there; `None` where the map has no such field.
-        owner: Option<u16>,
-        /// The heartbeat there; `None` where the map has no such field.
-        heartbeat: Option<u16>,
-        /// Whether both may have been written by this host.
-        mine: bool,
-    },
-    /// Every word of the wanted registers was echoed by the press.
-    Written,
-    /// A record was written by the journal, or could not be.
-    Journaled {
-        /// The stroke.
-        key: StrokeKey,
-        /// Stage of the record.
-        stage: Stage,
-        /// Whether the record survives a power cut.
-        ok: bool,
-    },
-    /// Readiness of the scanner.
-    Scanner {
-        /// Reason why no scan is possible.
-        ready: Result<(), Code>,
-        /// Estimated duration of one scan.
-        estimate: Option<Duration>,
-    },
-    /// The scan of a stroke is complete.
-    Acquired(StrokeKey),
-    /// The result of a stroke.
-    Measured(StrokeKey, Box<Measurement>),
-    /// Scan or evaluation of a stroke failed.
-    Failed(StrokeKey, Code),
-    /// An exception of the controller or a refused write: a fault until reset.
-    Fault(Code),
-    /// The operator resets faults.
-    Reset,
-    /// The host ends.
-    Stop,
-    /// Time has passed.
-    Tick,
-}
-
-/// Command of the handshake to the measurement, passed on unchanged by every part in between.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Command {
-    /// Scan a stroke; answered with [`Answer::Acquired`](crate::Answer::Acquired) or
-    /// [`Answer::Failed`](crate::Answer::Failed).
-    Scan {
-        /// The stroke.
-        key: StrokeKey,
-        /// Key of its record.
-        run_id: u32,
-        /// Data of the press about it.
-        data: Box<StrokeData>,
-    },
-    /// Evaluate the scan of a stroke; answered with [`Answer::Result`](crate::Answer::Result) or
-    /// [`Answer::Failed`](crate::Answer::Failed). Follows the acquisition, and a restart between the two.
-    Evaluate(StrokeKey),
-    /// Abandon scan and evaluation of a stroke; later answers about it are ignored.
-    Cancel(StrokeKey),
-    /// Close the record of the plate: it is finished and leaves the press.
-    PartEnd,
-}
-
-/// Action of the caller, to be carried out in the order of the list.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Effect {
-    /// Write a record; answered with [`Event::Journaled`].
-    Journal(Record),
-    /// Pass a command on to the measurement.
-    Command(Command),
-    /// Drop the connection and connect again after a pause.
-    Reconnect,
-    /// Raise an alarm, once per cause.
-    Alarm(Code),
-    /// Log a transition that was taken.
-    Transition(Transition),
 }
 
 /// Active stroke.
