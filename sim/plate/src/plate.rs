@@ -8,7 +8,7 @@ use crate::material::MaterialMap;
 use crate::profile::Profile;
 use crate::shape::{band_profile, curvature, step_profile};
 use crate::swept_surface::SweptSurface;
-use crate::{Blank, Jet, PlateError, PlateState, Shape, Vec3};
+use crate::{Jet, PlateError, PlateState, Shape, Vec3};
 use nalgebra::Isometry3;
 
 /// Side face of a plate.
@@ -53,7 +53,6 @@ enum Surface {
 /// Bent plate: map from material points (u, v, h) to points in space; h is counted from the mid-surface along the upper normal.
 #[derive(Debug, Clone)]
 pub struct Plate {
-    blank: Blank,
     cut: Option<CuttingError>,
     width: f64,
     height: f64,
@@ -73,7 +72,7 @@ impl Plate {
     /// [`PlateError::Description`] with the key at fault.
     pub fn new(state: &PlateState) -> Result<Self, PlateError> {
         state.check()?;
-        let blank = state.blank.clone();
+        let blank = &state.blank;
         let (width, height) = (blank.width_mm * 1e-3, blank.height_mm * 1e-3);
         let (surface, axis) = surface(&state.shape, width, height)?;
         let mut plate = Self {
@@ -81,8 +80,7 @@ impl Plate {
             height,
             thickness: blank.thickness_mm * 1e-3,
             markers: blank.markers_mm.iter().map(|m| m.map(|c| c * 1e-3)).collect(),
-            cut: CuttingError::new(&blank),
-            blank,
+            cut: CuttingError::new(blank),
             surface,
             axis,
             map: MaterialMap::identity(),
@@ -109,11 +107,6 @@ impl Plate {
     /// Returns the thickness, metres.
     pub fn thickness(&self) -> f64 {
         self.thickness
-    }
-
-    /// Returns the blank as described.
-    pub fn blank(&self) -> &Blank {
-        &self.blank
     }
 
     /// Returns the painted markers (u, v), metres.
@@ -235,28 +228,6 @@ impl Plate {
             mean: (l * g - 2.0 * m * f + n * e) / (2.0 * area),
             gauss: (l * n - m * m) / area,
         }
-    }
-
-    /// Samples the upper face at `nu` x `nv` equally spaced material points, u outer.
-    pub fn grid(&self, nu: usize, nv: usize) -> Vec<Vec<Vec3>> {
-        let at = |i: usize, n: usize, length: f64| length * i as f64 / (n.max(2) - 1) as f64;
-        (0..nu)
-            .map(|i| (0..nv).map(|j| self.top(at(i, nu, self.width), at(j, nv, self.height))).collect())
-            .collect()
-    }
-
-    /// Samples `n` points of the upper face along the straight line in (u, v) between two material points.
-    pub fn line(&self, from: [f64; 2], to: [f64; 2], n: usize) -> Vec<Vec3> {
-        let mix = |k: usize, share: f64| from[k] + (to[k] - from[k]) * share;
-        (0..n)
-            .map(|i| i as f64 / (n.max(2) - 1) as f64)
-            .map(|share| self.top(mix(0, share), mix(1, share)))
-            .collect()
-    }
-
-    /// Returns the displacement of the material point (u, v) of the upper face since `before`, scanner frame.
-    pub fn displacement(&self, before: &Self, u: f64, v: f64) -> Vec3 {
-        self.top(u, v) - before.top(u, v)
     }
 }
 

@@ -123,12 +123,6 @@ impl Counters {
         }
     }
 
-    /// Returns the number of accepted results of a cause.
-    #[must_use]
-    pub fn results(&self, cause: Cause) -> usize {
-        self.taken.iter().filter(|taken| taken.cause == cause).count()
-    }
-
     /// Checks the words of a result that is about to be accepted.
     pub fn check_result(&mut self, host: &HBlock, recipe_id: u16) {
         let stroke = host.word(h::RESULT_STROKE_ID);

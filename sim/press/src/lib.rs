@@ -39,6 +39,7 @@ mod server;
 mod shared;
 
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -94,25 +95,18 @@ impl SimPress {
                 Some(address)
             }
             LinkConfig::Rtu { device, baud } => {
-                let device = device.display().to_string();
-                let serial = modbus_relay::open_serial(&device, *baud)
-                    .map_err(|source| Error::Serial { device: device.clone(), source })?;
-                let serve = modbus_relay::serve_serial(
-                    serial,
-                    device,
-                    *baud,
-                    config.unit,
-                    server,
-                    Arc::clone(&shared),
-                );
+                let (name, baud) = (device.display().to_string(), *baud);
+                let open = move || modbus_relay::open_serial(&name, baud);
+                let first = open().map_err(|source| serial_error(device, source))?;
+                let serve = modbus_relay::serve_serial(first, open, config.unit, server, Arc::clone(&shared));
                 tasks.spawn(forever(serve));
                 None
             }
             LinkConfig::Pty { device } => {
-                let refused = |source| Error::Serial { device: device.display().to_string(), source };
-                let first = pty::plug(device).map_err(refused)?;
-                let serve =
-                    modbus_relay::serve_pty(first, device.clone(), config.unit, server, Arc::clone(&shared));
+                let path = device.clone();
+                let open = move || pty::plug(&path);
+                let first = open().map_err(|source| serial_error(device, source))?;
+                let serve = modbus_relay::serve_serial(first, open, config.unit, server, Arc::clone(&shared));
                 tasks.spawn(forever(serve));
                 None
             }
@@ -184,6 +178,10 @@ impl SimPress {
             Some(Ok(ended)) = self.tasks.join_next() => ended,
         }
     }
+}
+
+fn serial_error(device: &Path, source: std::io::Error) -> Error {
+    Error::Serial { device: device.display().to_string(), source }
 }
 
 async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr)> {

@@ -5,11 +5,10 @@
 
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, WriteHalf};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, WriteHalf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Mutex;
 use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBits};
@@ -17,7 +16,6 @@ use tokio_serial::{DataBits, Parity, SerialPortBuilderExt, SerialStream, StopBit
 use crate::answer_faults::{Answer, apply_fault, exception};
 use crate::faults::LineFault;
 use crate::frame::{Framing, Message, Split, split_tcp};
-use crate::pty;
 use crate::shared::Shared;
 
 /// Silence after which a serial slave discards an incomplete frame.
@@ -60,30 +58,10 @@ pub(crate) fn open_serial(device: &str, baud: u32) -> io::Result<SerialStream> {
         .open_native_async()?)
 }
 
-/// Serves a serial line until the process ends; reopens it by name when it fails.
-pub(crate) async fn serve_serial(
-    first: SerialStream,
-    device: String,
-    baud: u32,
-    unit: u8,
-    server: SocketAddr,
-    shared: Arc<Shared>,
-) {
-    let mut serial = Some(first);
-    loop {
-        if let Some(serial) = serial.take() {
-            let ended = Relay::new(serial, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
-            tracing::debug!(?ended, "serial line closed, reopening");
-        }
-        tokio::time::sleep(RETRY).await;
-        serial = open_serial(&device, baud).ok();
-    }
-}
-
-/// Serves a pseudo terminal until the process ends; after an unplug a new terminal is created behind the same link.
-pub(crate) async fn serve_pty(
-    first: DuplexStream,
-    device: PathBuf,
+/// Serves a serial line until the process ends; reopens it with `reopen` when it fails or is unplugged.
+pub(crate) async fn serve_serial<S: AsyncRead + AsyncWrite + Send + 'static>(
+    first: S,
+    reopen: impl Fn() -> io::Result<S>,
     unit: u8,
     server: SocketAddr,
     shared: Arc<Shared>,
@@ -92,11 +70,11 @@ pub(crate) async fn serve_pty(
     loop {
         if let Some(line) = line.take() {
             let ended = Relay::new(line, Framing::Rtu, unit, Arc::clone(&shared)).run(server).await;
-            tracing::debug!(?ended, "serial adapter unplugged");
+            tracing::debug!(?ended, "serial line closed, reopening");
         }
         tokio::time::sleep(RETRY).await;
         shared.plugged_in().await;
-        line = pty::plug(&device).inspect_err(|error| tracing::debug!(%error, "no pseudo terminal")).ok();
+        line = reopen().inspect_err(|error| tracing::debug!(%error, "serial line not available")).ok();
     }
 }
 

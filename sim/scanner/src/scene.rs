@@ -45,11 +45,6 @@ impl Scene {
         self.plate.as_ref()
     }
 
-    /// Returns all objects except the plate.
-    pub fn solids(&self) -> &[(Label, Solid)] {
-        &self.solids
-    }
-
     /// Returns the nearest hit within `reach` metres. Hits on the plate are exact to 1e-11 m.
     pub fn cast(&self, ray: &Ray, reach: f64) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;

@@ -27,13 +27,6 @@ impl Default for Surroundings {
     }
 }
 
-impl Surroundings {
-    /// Returns surroundings without press and people.
-    pub fn bare() -> Self {
-        Self { press: false, bystander: false, ..Self::default() }
-    }
-}
-
 /// Radius of the round head of a die, metres.
 const DIE_RADIUS: f64 = 0.07;
 
