@@ -1,6 +1,5 @@
 //! `platen bench`: accuracy, time and memory of the method on simulated scans, and the tables of Masuda et al.
 
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -18,11 +17,8 @@ use platen_engine::plugin::{Catalogue, Flattening};
 /// Time limit of flattening one mesh, far beyond a press's, for slow plugins and large meshes.
 const FLATTENING_LIMIT: Duration = Duration::from_secs(120);
 
-/// File that marks a folder as made by a benchmark.
-const MARK: &str = ".platen-bench";
-
 pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCode, CliError> {
-    prepare(&arguments.out)?;
+    output::fresh_folder(&arguments.out, "bench")?;
     let catalogue = common.catalogue();
     let machine = Machine::here();
     if !common.json {
@@ -43,20 +39,6 @@ pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCod
         output::json(&document)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Makes an empty folder, replacing an earlier benchmark only.
-fn prepare(out: &Path) -> Result<(), CliError> {
-    if out.exists() {
-        if !out.join(MARK).is_file() {
-            let text =
-                format!("{}: exists and was not made by `platen bench`; give another --out", out.display());
-            return Err(CliError::Usage(text));
-        }
-        std::fs::remove_dir_all(out)?;
-    }
-    std::fs::create_dir_all(out)?;
-    Ok(std::fs::write(out.join(MARK), "made by `platen bench`, which may replace this folder\n")?)
 }
 
 /// Loads the flattening plugins of these names with their default options.

@@ -5,10 +5,11 @@ use serde_json::{Map, Value as Json, json};
 use crate::accuracy::Accuracy;
 use platen_model::units::mm;
 
-/// Figure of accuracy: name in documents, head in tables, value in the unit of the name, digits after the point.
-type Figure = (&'static str, &'static str, fn(&Accuracy) -> f64, usize);
+/// Figure of errors of type `E`: name in documents, head in tables, value in the unit of the name, digits after the point.
+pub(super) type Figure<E> = (&'static str, &'static str, fn(&E) -> f64, usize);
 
-const FIGURES: [Figure; 9] = [
+/// Figures of a measurement.
+pub(super) const OF_MEASUREMENT: [Figure<Accuracy>; 9] = [
     ("corners_rms_mm", "corners", |a| mm(a.corners), 2),
     ("markers_mean_mm", "markers", |a| mm(a.markers_mean), 2),
     ("markers_worst_mm", "worst", |a| mm(a.markers_worst), 2),
@@ -21,19 +22,19 @@ const FIGURES: [Figure; 9] = [
 ];
 
 /// Returns the heads of the columns, after those of the row's name.
-pub(super) fn head(of: &[&str]) -> Vec<String> {
-    of.iter().copied().chain(FIGURES.map(|(_, head, ..)| head)).map(str::to_owned).collect()
+pub(super) fn head<E>(figures: &[Figure<E>], of: &[&str]) -> Vec<String> {
+    of.iter().copied().chain(figures.iter().map(|(_, head, ..)| *head)).map(str::to_owned).collect()
 }
 
 /// Returns one measurement as a row.
-pub(super) fn row(of: &[&str], accuracy: &Accuracy) -> Vec<String> {
-    let cells = FIGURES.map(|(_, _, value, digits)| format!("{:.digits$}", value(accuracy)));
-    of.iter().map(|cell| (*cell).to_owned()).chain(cells).collect()
+pub(super) fn row(of: &str, accuracy: &Accuracy) -> Vec<String> {
+    let cells = OF_MEASUREMENT.map(|(_, _, value, digits)| format!("{:.digits$}", value(accuracy)));
+    std::iter::once(of.to_owned()).chain(cells).collect()
 }
 
-/// Returns many measurements as a row of mean / worst.
-pub(super) fn row_of_many(of: &[&str], all: &[Accuracy]) -> Vec<String> {
-    let cells = FIGURES.map(|(_, _, value, digits)| {
+/// Returns many errors as a row of mean / worst.
+pub(super) fn row_of_many<E>(figures: &[Figure<E>], of: &[&str], all: &[E]) -> Vec<String> {
+    let cells = figures.iter().map(|(_, _, value, digits)| {
         let [mean, worst] = mean_and_worst(all.iter().map(value));
         format!("{mean:.digits$} / {worst:.digits$}")
     });
@@ -42,20 +43,21 @@ pub(super) fn row_of_many(of: &[&str], all: &[Accuracy]) -> Vec<String> {
 
 /// Returns one measurement as a document.
 pub(super) fn document(accuracy: &Accuracy) -> Map<String, Json> {
-    FIGURES.iter().map(|(name, _, value, _)| ((*name).to_owned(), json!(value(accuracy)))).collect()
+    OF_MEASUREMENT.iter().map(|(name, _, value, _)| ((*name).to_owned(), json!(value(accuracy)))).collect()
 }
 
-/// Returns many measurements as a document: `{"mean": .., "worst": ..}` for each figure.
-pub(super) fn document_of_many(all: &[Accuracy]) -> Map<String, Json> {
-    let entry = |(name, _, value, _): &Figure| {
+/// Returns many errors as a document: `{"mean": .., "worst": ..}` for each figure, after the entries `of`.
+pub(super) fn document_of_many<E>(figures: &[Figure<E>], of: Json, all: &[E]) -> Json {
+    let mut document = of;
+    for (name, _, value, _) in figures {
         let [mean, worst] = mean_and_worst(all.iter().map(value));
-        ((*name).to_owned(), json!({ "mean": mean, "worst": worst }))
-    };
-    FIGURES.iter().map(entry).collect()
+        document[*name] = json!({ "mean": mean, "worst": worst });
+    }
+    document
 }
 
 /// Returns mean and largest absolute value.
-pub(super) fn mean_and_worst(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+fn mean_and_worst(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     let n = values.clone().count().max(1) as f64;
     [values.clone().map(f64::abs).sum::<f64>() / n, values.map(f64::abs).fold(0.0, f64::max)]
 }

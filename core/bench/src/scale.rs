@@ -159,17 +159,9 @@ fn here(
 
 fn print(rows: &[Row]) -> Result<(), CliError> {
     output::line("\nFrom a table scan to a full dome, columns streamed (CPU ms, MB)")?;
-    let head = [
-        "lattice",
-        "cells",
-        "on the plate",
-        "columns ms",
-        "extract ms",
-        "measure ms",
-        "raw lattice MB",
-        "peak MB",
-    ];
-    let mut table = vec![head.map(str::to_owned).to_vec()];
+    let mut table = vec![output::head(
+        "lattice | cells | on the plate | columns ms | extract ms | measure ms | raw lattice MB | peak MB",
+    )];
     for row in rows {
         let peak = row.peak_mb.map_or("-".to_owned(), |mb| format!("{mb:.0}"));
         let times = [row.columns_ms, row.extract_ms, row.measure_ms].map(|ms| format!("{ms:.0}"));

@@ -5,12 +5,13 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Value as Json, json};
 
 use crate::accuracy::Accuracy;
 use crate::bench;
+use crate::figures::OF_MEASUREMENT;
 use crate::scene::{Scene, Setting};
-use crate::strokes::{self, StrokeErrors};
+use crate::strokes::{self, OF_STROKE, StrokeErrors};
 use crate::{figures, stages};
 use platen_engine::plugin::{Catalogue, Flattening};
 use platen_engine::stroke::NotMeasured;
@@ -168,28 +169,25 @@ fn shared<C: Sync, T, R: Send>(
 
 fn print(rows: &[Row], pairs: &[PairRow], n: usize) -> Result<(), CliError> {
     output::line(&format!("\nAccuracy over {n} simulated scans each, mean / worst (mm, degrees, 1/m)"))?;
-    let mut table = vec![figures::head(&["plate", "noise mm", "flattening"])];
+    let mut table = vec![figures::head(&OF_MEASUREMENT, &["plate", "noise mm", "flattening"])];
     for row in rows {
         let of = [&row.scene, &format!("{}", row.noise_mm), &row.flattening];
-        table.push(figures::row_of_many(&of.map(String::as_str), &row.errors));
+        table.push(figures::row_of_many(&OF_MEASUREMENT, &of.map(String::as_str), &row.errors));
     }
     output::table(&table)?;
     output::line(&format!("\nStrokes: {n} pairs of scans each, mean / worst"))?;
-    let mut table = vec![strokes::head()];
-    table.extend(pairs.iter().map(|row| strokes::row(row.noise_mm, &row.errors)));
+    let mut table = vec![figures::head(&OF_STROKE, &["noise mm"])];
+    table.extend(
+        pairs.iter().map(|row| figures::row_of_many(&OF_STROKE, &[&row.noise_mm.to_string()], &row.errors)),
+    );
     output::table(&table)
 }
 
 fn document(row: &Row) -> Json {
-    let mut document: Map<String, Json> = figures::document_of_many(&row.errors);
-    document.insert("plate".into(), json!(row.scene));
-    document.insert("noise_mm".into(), json!(row.noise_mm));
-    document.insert("flattening".into(), json!(row.flattening));
-    Json::Object(document)
+    let of = json!({ "plate": row.scene, "noise_mm": row.noise_mm, "flattening": row.flattening });
+    figures::document_of_many(&OF_MEASUREMENT, of, &row.errors)
 }
 
 fn pair_document(row: &PairRow) -> Json {
-    let mut document = strokes::document(&row.errors);
-    document.insert("noise_mm".into(), json!(row.noise_mm));
-    Json::Object(document)
+    figures::document_of_many(&OF_STROKE, json!({ "noise_mm": row.noise_mm }), &row.errors)
 }

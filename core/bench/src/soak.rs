@@ -5,14 +5,14 @@
 //! detected.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::{Answer, Durations, HostSide, MemoryJournal, PressLink, channels, run_press};
 use serde::Deserialize;
-use serde_json::{Value as Json, json};
+use serde_json::json;
 use tokio::sync::mpsc;
 
 use platen_host::cli::bench::{Line, SoakArguments};
@@ -60,15 +60,6 @@ struct Counts {
     line_faults: std::collections::BTreeMap<String, u64>,
 }
 
-/// Result as the press accepted it.
-#[derive(Debug, Deserialize)]
-struct AcceptedResult {
-    stroke_id: u16,
-    session_id: u16,
-    accepted_ms: u64,
-    words: Vec<u16>,
-}
-
 /// Outcome of a run.
 struct Outcome {
     counts: Counts,
@@ -112,11 +103,11 @@ pub(crate) fn run(common: &Common, arguments: &SoakArguments) -> Result<ExitCode
 }
 
 fn soak_strokes(common: &Common, arguments: &SoakArguments) -> Result<ExitCode, Failure> {
-    let folder = Folder::new()?;
+    let folder = tempfile::Builder::new().prefix("platen-soak-").tempdir()?;
     let per_part = PER_PART.min(arguments.strokes);
     let parts = arguments.strokes.div_ceil(per_part);
-    let device = folder.0.join("adapter");
-    let config = folder.0.join("press.toml");
+    let device = folder.path().join("adapter");
+    let config = folder.path().join("press.toml");
     std::fs::write(&config, press_file(arguments, per_part, parts, &device))?;
     let mut cell = Cell::start(&config, &[])?;
     let press = plant(arguments, &cell, &device);
@@ -124,24 +115,6 @@ fn soak_strokes(common: &Common, arguments: &SoakArguments) -> Result<ExitCode, 
     progress::done();
     report(common, arguments, &outcome)?;
     Ok(ExitCode::from(u8::from(!outcome.good())))
-}
-
-/// Temporary folder, removed on drop.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Result<Self, CliError> {
-        let path = std::env::temp_dir().join(format!("platen-soak-{}", std::process::id()));
-        std::fs::create_dir_all(&path)?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // The system clears its temporary folder.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// Returns the configuration of the simulated press.
@@ -178,10 +151,6 @@ fn plant(arguments: &SoakArguments, cell: &Cell, device: &Path) -> Press {
     press
 }
 
-fn read<T: serde::de::DeserializeOwned>(document: Json) -> Result<T, CliError> {
-    serde_json::from_value(document).map_err(|e| CliError::Failed(format!("simulated press: {e}")))
-}
-
 async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let (HostSide { orders, answers, status }, side) = channels();
@@ -196,7 +165,7 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
             () = tokio::time::sleep(INTERVAL) => {}
             _ = stop.changed() => break true,
         }
-        let counts: Counts = read(cell.ask(r#"{"get":"counts"}"#)?["counts"].take())?;
+        let counts: Counts = cell.read(r#"{"get":"counts"}"#, "/counts")?;
         if counts.done {
             break false;
         }
@@ -212,11 +181,11 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
         }
         progress::phase(&format!("{newest} of {strokes} strokes, {} connections", counts.connections));
     };
-    let counts: Counts = read(cell.ask(r#"{"get":"counts"}"#)?["counts"].take())?;
+    let counts: Counts = cell.read(r#"{"get":"counts"}"#, "/counts")?;
     // The host may have ended by itself.
     let _ = answers.send(Answer::Stop);
     let _ = host.await;
-    let accepted: Vec<AcceptedResult> = read(cell.ask(r#"{"get":"stats"}"#)?["stats"]["taken"].take())?;
+    let accepted = cell.accepted_results()?;
     let mut outcome = Outcome {
         counts,
         wrong_figures: 0,
@@ -230,7 +199,7 @@ async fn soak(press: Press, cell: &mut Cell, strokes: u64) -> Result<Outcome, Fa
         let [high, low] = it.session_id.to_be_bytes().map(u16::from);
         let figures = [it.words.get(55), it.words.get(57), it.words.get(58)].map(Option::<&u16>::copied);
         outcome.wrong_figures += u64::from(figures != [Some(it.stroke_id % 60_000), Some(low), Some(high)]);
-        outcome.trigger_to_busy.add(Duration::from_millis(it.accepted_ms));
+        outcome.trigger_to_busy.add(Duration::from_millis(it.accepted_ms as u64));
     }
     let mut scanned = BTreeSet::new();
     while let Ok(what) = seen.try_recv() {

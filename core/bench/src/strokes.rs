@@ -6,15 +6,14 @@
 use std::path::Path;
 use std::time::Duration;
 
-use serde_json::{Map, Value as Json, json};
-
 use platen_model::{Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template};
 use platen_plant::Value;
 use platen_shape::{Placement, Surface, Vec3};
 
 use crate::accuracy::{Truth, rms};
+use crate::figures::Figure;
 use crate::scene::{Scene, Setting, Shot};
-use crate::{bench, figures, stages};
+use crate::{bench, stages};
 use platen_engine::pipeline;
 use platen_engine::plugin::{Catalogue, Comparison, Flattening, Surfaces};
 use platen_host::cli::CliError;
@@ -51,35 +50,14 @@ pub(super) struct StrokeErrors {
     false_change: f64,
 }
 
-type StrokeFigure = (&'static str, &'static str, fn(&StrokeErrors) -> f64, usize);
-
-const FIGURES: [StrokeFigure; 5] = [
+/// Figures of a pair of scans.
+pub(super) const OF_STROKE: [Figure<StrokeErrors>; 5] = [
     ("displacement_normal_rms_mm", "displacement normal mm", |e| mm(e.displacement_normal), 3),
     ("displacement_vector_rms_mm", "vector mm", |e| mm(e.displacement_vector), 3),
     ("band_angle_error_deg", "bend angle deg", |e| e.angle.to_degrees(), 4),
     ("template_gap_error_mm", "template gap mm", |e| mm(e.gap), 3),
     ("false_change_share", "null pair above LoD", |e| e.false_change, 3),
 ];
-
-pub(super) fn head() -> Vec<String> {
-    std::iter::once("noise mm").chain(FIGURES.map(|(_, head, ..)| head)).map(str::to_owned).collect()
-}
-
-pub(super) fn row(noise_mm: f64, all: &[StrokeErrors]) -> Vec<String> {
-    let cells = FIGURES.map(|(_, _, value, digits)| {
-        let [mean, worst] = figures::mean_and_worst(all.iter().map(value));
-        format!("{mean:.digits$} / {worst:.digits$}")
-    });
-    std::iter::once(format!("{noise_mm}")).chain(cells).collect()
-}
-
-pub(super) fn document(all: &[StrokeErrors]) -> Map<String, Json> {
-    let entry = |(name, _, value, _): &StrokeFigure| {
-        let [mean, worst] = figures::mean_and_worst(all.iter().map(value));
-        ((*name).to_owned(), json!({ "mean": mean, "worst": worst }))
-    };
-    FIGURES.iter().map(entry).collect()
-}
 
 /// Returns the `[shape]` table of a plate with these bands.
 pub(super) fn bands(at_mm: &[f64]) -> String {

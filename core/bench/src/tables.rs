@@ -227,8 +227,8 @@ fn print(
     output::line(
         "\nTable 4: cells of a lattice drawn on the plate, and other errors against the true shape (mm, degrees, 1/m)",
     )?;
-    let mut rows = vec![figures::head(&["flattening"])];
-    rows.extend(outcomes.iter().map(|f| figures::row(&[&f.name], &f.accuracy)));
+    let mut rows = vec![figures::head(&figures::OF_MEASUREMENT, &["flattening"])];
+    rows.extend(outcomes.iter().map(|f| figures::row(&f.name, &f.accuracy)));
     for (name, [du, dv, angle]) in PAPER_CELLS {
         let cells = [
             name.to_owned(),

@@ -30,7 +30,10 @@ use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use platen_engine::pipeline::PipelineError;
 use platen_engine::plugin::{Catalogue, PluginError};
 use platen_formats::WriteError;
+use platen_history::Error as HistoryError;
 use platen_report::output_folder::FilesError;
+use platen_report::plate_report::ReportError;
+use platen_report::sequence::SequenceError;
 
 /// Measure plates on a press, stroke by stroke
 #[derive(Debug, Parser)]
@@ -110,11 +113,16 @@ pub enum CliError {
     Failed(String),
 }
 
-impl From<PluginError> for CliError {
-    fn from(error: PluginError) -> Self {
-        Self::Failed(error.to_string())
-    }
+/// Makes these errors exit with 1.
+macro_rules! failed {
+    ($($error:ty),*) => { $(impl From<$error> for CliError {
+        fn from(error: $error) -> Self {
+            Self::Failed(error.to_string())
+        }
+    })* };
 }
+
+failed!(PluginError, FilesError, HistoryError, ReportError, SequenceError, std::io::Error);
 
 impl From<platen_plant::Error> for CliError {
     fn from(error: platen_plant::Error) -> Self {
@@ -137,18 +145,6 @@ impl From<WriteError> for CliError {
             WriteError::Format(_) | WriteError::Exists(_) => Self::Usage(error.to_string()),
             failed => Self::Failed(failed.to_string()),
         }
-    }
-}
-
-impl From<FilesError> for CliError {
-    fn from(error: FilesError) -> Self {
-        Self::Failed(error.to_string())
-    }
-}
-
-impl From<std::io::Error> for CliError {
-    fn from(error: std::io::Error) -> Self {
-        Self::Failed(error.to_string())
     }
 }
 

@@ -246,7 +246,7 @@ fn artefact(
 }
 
 fn print(summary: &Summary) -> Result<(), CliError> {
-    let mut rows = vec![["scans", "differ by mm", "stated mm"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("scans | differ by mm | stated mm")];
     for pair in &summary.pairs {
         let [a, b] = pair.scans;
         rows.push(vec![

@@ -8,6 +8,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value as Json;
 
 use super::CliError;
@@ -24,21 +26,25 @@ pub struct Cell {
 }
 
 /// Result as the press accepted it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Deserialize)]
 pub struct AcceptedResult {
-    stroke: u16,
-    session: u16,
+    /// Stroke number.
+    pub stroke_id: u16,
+    /// Session of the stroke.
+    pub session_id: u16,
     attempt: u16,
     /// From trigger to the host's echo, milliseconds, on the press's clock.
     pub accepted_ms: f64,
-    /// From trigger to the result.
+    /// From trigger to the result, milliseconds.
     pub result_ms: f64,
+    /// Words of the host's block.
+    pub words: Vec<u16>,
 }
 
 impl AcceptedResult {
     /// Returns whether it is the result of this stroke.
     pub fn is(&self, stroke: u16, session: u16, attempt: u16) -> bool {
-        (self.stroke, self.session, self.attempt) == (stroke, session, attempt)
+        (self.stroke_id, self.session_id, self.attempt) == (stroke, session, attempt)
     }
 }
 
@@ -99,28 +105,23 @@ impl Cell {
         Ok(self.ask(r#"{"get":"stats"}"#)?["stats"]["done"] == true)
     }
 
+    /// Sends a line to the control port and reads the part of the answer at a JSON pointer.
+    ///
+    /// # Errors
+    /// The control port does not answer, or not with such a part.
+    pub fn read<T: DeserializeOwned>(&mut self, question: &str, pointer: &str) -> Result<T, CliError> {
+        let part = self.ask(question)?.pointer_mut(pointer).map(Json::take).unwrap_or_default();
+        serde_json::from_value(part).map_err(|e| CliError::Failed(format!("simulated press: {e}")))
+    }
+
     /// Returns the host's block of registers.
     pub fn registers(&mut self) -> Result<Vec<u16>, CliError> {
-        let answer = self.ask(r#"{"get":"registers"}"#)?;
-        let words = answer["registers"]["h"].as_array().cloned().unwrap_or_default();
-        Ok(words.iter().filter_map(|word| u16::try_from(word.as_u64()?).ok()).collect())
+        self.read(r#"{"get":"registers"}"#, "/registers/h")
     }
 
     /// Returns the results that the press accepted, in order.
     pub fn accepted_results(&mut self) -> Result<Vec<AcceptedResult>, CliError> {
-        let answer = self.ask(r#"{"get":"stats"}"#)?;
-        let all = answer["stats"]["taken"].as_array().cloned().unwrap_or_default();
-        let word = |result: &Json, name: &str| u16::try_from(result[name].as_u64()?).ok();
-        let one = |result: &Json| {
-            Some(AcceptedResult {
-                stroke: word(result, "stroke_id")?,
-                session: word(result, "session_id")?,
-                attempt: word(result, "attempt")?,
-                accepted_ms: result["accepted_ms"].as_f64()?,
-                result_ms: result["result_ms"].as_f64()?,
-            })
-        };
-        Ok(all.iter().filter_map(one).collect())
+        self.read(r#"{"get":"stats"}"#, "/stats/taken")
     }
 }
 

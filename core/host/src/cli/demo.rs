@@ -104,20 +104,9 @@ fn summary(
     after_stop: Vec<u16>,
     elapsed: Duration,
 ) -> Result<ExitCode, CliError> {
-    let mut rows = vec![
-        [
-            "stroke",
-            "trigger to busy ms",
-            "scan ms",
-            "evaluation ms",
-            "stroke to result ms",
-            "gap before mm",
-            "gap after mm",
-            "verdict",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    ];
+    let mut rows = vec![output::head(
+        "stroke | trigger to busy ms | scan ms | evaluation ms | stroke to result ms | gap before mm | gap after mm | verdict",
+    )];
     let mut documents = Vec::new();
     let mut before = None;
     for report in reports {

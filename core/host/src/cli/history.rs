@@ -9,13 +9,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
+use platen_history::{Archive, Filter, Stroke};
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
 use pick::RunRef;
 use platen_model::units::mm;
-use platen_report::plate_report::{self, ReportError};
+use platen_report::plate_report;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \
@@ -69,18 +69,6 @@ enum Verb {
     },
 }
 
-impl From<HistoryError> for CliError {
-    fn from(error: HistoryError) -> Self {
-        Self::Failed(error.to_string())
-    }
-}
-
-impl From<ReportError> for CliError {
-    fn from(error: ReportError) -> Self {
-        Self::Failed(error.to_string())
-    }
-}
-
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     match &command.verb {
         Verb::List { plant, plate, newest } => {
@@ -132,19 +120,9 @@ fn length(stroke: &Stroke, figure: &str) -> String {
 }
 
 fn list(strokes: &[Stroke]) -> Result<(), CliError> {
-    let head = [
-        "run",
-        "accepted",
-        "plate",
-        "session",
-        "stroke",
-        "attempt",
-        "verdict",
-        "gap mm",
-        "+- mm",
-        "acknowledged",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head(
+        "run | accepted | plate | session | stroke | attempt | verdict | gap mm | +- mm | acknowledged",
+    )];
     for stroke in strokes {
         rows.push(vec![
             stroke.run_id.to_string(),

@@ -149,7 +149,7 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     if let Some(outline) = &record.outline {
         output::line(&format!("outline: {}", outline.words()))?;
     }
-    let mut rows = vec![["place", "u mm", "v mm", "x m", "y m", "z m", "+- mm"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("place | u mm | v mm | x m | y m | z m | +- mm")];
     let (w, h) = record.extent_mm();
     let ordered = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
     let corners_mm = record.outline.as_ref().map_or(ordered, |outline| outline.corners_mm);
@@ -167,7 +167,7 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     }
     output::table(&rows)?;
     let checks = record.shape_checks.rows();
-    let mut rows = vec![["check", "value", "+- (95 %)", "unit", "seen"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("check | value | +- (95 %) | unit | seen")];
     rows.extend(checks.iter().map(|(name, check, unit)| {
         let digits = if *unit == "mm" { 1 } else { 3 };
         let number = |value: f64| format!("{value:.digits$}");

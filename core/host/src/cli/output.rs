@@ -1,6 +1,7 @@
 //! Output of the verbs: lines, JSON and tables on stdout, errors on stderr.
 
 use std::io::Write as _;
+use std::path::Path;
 
 use super::CliError;
 
@@ -16,6 +17,11 @@ pub fn line(text: &str) -> Result<(), CliError> {
 pub fn json(document: &impl serde::Serialize) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(document).map_err(|e| CliError::Failed(e.to_string()))?;
     line(&text)
+}
+
+/// Splits the head of a table at ` | `.
+pub fn head(cells: &str) -> Vec<String> {
+    cells.split(" | ").map(str::to_owned).collect()
 }
 
 /// Prints a table: columns as wide as their widest cell, the first row is the head.
@@ -37,4 +43,24 @@ pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
 pub fn error(text: &str) {
     // Nowhere is left to report a failing stderr.
     let _ = writeln!(std::io::stderr(), "platen: {text}");
+}
+
+/// Makes an empty folder for the files of a verb, replacing only one that an earlier run of the verb made.
+///
+/// # Errors
+/// The folder exists and is not marked with `.platen-VERB`, or the system refuses.
+pub fn fresh_folder(folder: &Path, verb: &str) -> Result<(), CliError> {
+    let mark = folder.join(format!(".platen-{verb}"));
+    if folder.exists() {
+        if !mark.is_file() {
+            let text = format!(
+                "{}: exists and was not made by `platen {verb}`; give another --out",
+                folder.display()
+            );
+            return Err(CliError::Usage(text));
+        }
+        std::fs::remove_dir_all(folder)?;
+    }
+    std::fs::create_dir_all(folder)?;
+    Ok(std::fs::write(mark, format!("made by `platen {verb}`, which may replace this folder\n"))?)
 }

@@ -59,7 +59,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 }
 
 fn list(listed: &[Listed]) -> Result<(), CliError> {
-    let mut rows = vec![["plugin", "kind", "version", "state"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("plugin | kind | version | state")];
     for Listed { path, plugin } in listed {
         rows.push(match plugin {
             Ok(p) => vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()],

@@ -154,8 +154,8 @@ fn summarize(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarke
 }
 
 fn print(summary: &Summary) -> Result<(), CliError> {
-    let head = ["marker", "u mm", "v mm", "off along u", "along v", "distance mm", "known to mm", "disc"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![output::head("marker | u mm | v mm | off along u | along v | distance mm | known to mm | disc")];
     let number =
         |value: Option<f64>, digits: usize| value.map(|v| format!("{v:.digits$}")).unwrap_or_default();
     for marker in &summary.markers {

@@ -3,28 +3,17 @@
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
-use crate::cli::CliError;
-
-/// File that marks a folder as made by a demo.
-const MARK: &str = ".platen-demo";
+use crate::cli::{CliError, output};
 
 const PRESS: &str = include_str!("../../../../../config/sim-press.toml");
 const PLANT: &str = include_str!("../../../../../config/sim-plant.toml");
 const PLATE: &str = include_str!("../../../../../config/plates/plate-009.toml");
 
-/// Makes an empty folder, replacing an earlier demo only.
+/// Makes the demo's folder with its plate file, replacing an earlier demo only.
 pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
-    if out.exists() {
-        if !out.join(MARK).is_file() {
-            let text = format!("{}: exists and is no earlier demo; give another --out", out.display());
-            return Err(CliError::Usage(text));
-        }
-        std::fs::remove_dir_all(out)?;
-    }
-    std::fs::create_dir_all(out.join("plates"))?;
-    std::fs::write(out.join(MARK), "made by `platen demo`, which may replace this folder\n")?;
-    std::fs::write(out.join("plates/plate-009.toml"), PLATE)?;
-    Ok(())
+    output::fresh_folder(out, "demo")?;
+    std::fs::create_dir(out.join("plates"))?;
+    Ok(std::fs::write(out.join("plates/plate-009.toml"), PLATE)?)
 }
 
 /// Writes the configuration of the simulated press.

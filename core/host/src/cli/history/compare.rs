@@ -80,8 +80,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     for sentence in reports.iter().flat_map(|report| &report.findings.says) {
         output::line(&format!("  {sentence}"))?;
     }
-    let mut rows =
-        vec![["figure in m, rad, s, 1/m", "first", "second", "change"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("figure in m, rad, s, 1/m | first | second | change")];
     for difference in figures {
         let number = |value: Option<f64>| value.map(|value| format!("{value:.5}")).unwrap_or_default();
         let change = difference.first.zip(difference.second).map(|(a, b)| b - a);

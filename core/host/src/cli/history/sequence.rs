@@ -12,7 +12,7 @@ use platen_shape::Surface;
 use super::open;
 use crate::cli::{CliError, Common, output};
 use crate::progress;
-use platen_report::sequence::{Bend, Sequence, SequenceError, SequenceStroke, Summary};
+use platen_report::sequence::{Bend, Sequence, SequenceStroke, Summary};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  platen history sequence config/plant-north.toml 12\n\n\
@@ -24,12 +24,6 @@ pub(super) struct Command {
     plant: PathBuf,
     /// The plate's number in the history
     plate: u32,
-}
-
-impl From<SequenceError> for CliError {
-    fn from(error: SequenceError) -> Self {
-        Self::Failed(error.to_string())
-    }
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
@@ -44,22 +38,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     if common.json {
         return output::json(&sequence);
     }
-    let head = [
-        "stroke",
-        "die",
-        "force kN",
-        "ram mm",
-        "gap mm",
-        "overshoot mm",
-        "energy left",
-        "beyond",
-        "bend deg",
-        "at u, v mm",
-        "direction",
-        "feed mm",
-        "note",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head(
+        "stroke | die | force kN | ram mm | gap mm | overshoot mm | energy left | beyond | bend deg | at u, v mm | direction | feed mm | note",
+    )];
     for stroke in &sequence.strokes {
         let bends = stroke.bends.as_deref().unwrap_or_default();
         rows.push(row(stroke, bends.first()));
@@ -125,6 +106,6 @@ fn summary(summary: &Summary) -> Result<(), CliError> {
     let left =
         summary.energy_left_share.map(|s| format!("; energy left {:.1} %", 100.0 * s)).unwrap_or_default();
     let dies: Vec<String> = summary.die_sets.iter().map(u16::to_string).collect();
-    let dies = if dies.is_empty() { "not told".to_owned() } else { dies.join(", ") };
+    let dies = if dies.is_empty() { "unknown".to_owned() } else { dies.join(", ") };
     output::line(&format!("bent too far after {overshoots} strokes{most}{feed}{left}; die sets: {dies}"))
 }

@@ -93,7 +93,7 @@ pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     if !press.map.counts_strokes() {
         output::line("this press has no stroke counter: a missed stroke cannot be detected")?;
     }
-    let mut rows = vec![["exchange", "function", "registers", "line"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("exchange | function | registers | line")];
     rows.extend(exchanges.iter().map(|it| {
         let line = line_ms(it).map_or_else(|| "-".into(), |ms| format!("{ms:.0} ms"));
         vec![it.what.into(), it.function.to_string(), it.registers.to_string(), line]
@@ -206,13 +206,14 @@ pub(super) fn scan_units(common: &Common, press: &Press, units: &Units) -> Resul
     }
     progress::done();
     if common.json {
-        let rows: Vec<_> = found.iter().map(|(unit, says)| json!({ "unit": unit, "says": says })).collect();
+        let rows: Vec<_> =
+            found.iter().map(|(unit, answer)| json!({ "unit": unit, "says": answer })).collect();
         output::json(&json!({ "units": rows }))?;
     } else if found.is_empty() {
         output::line(&format!("no unit from {} to {} answers", units.start(), units.end()))?;
     } else {
-        for (unit, says) in &found {
-            output::line(&format!("unit {unit} answers: {says}"))?;
+        for (unit, answer) in &found {
+            output::line(&format!("unit {unit} answers: {answer}"))?;
         }
     }
     Ok(ExitCode::from(u8::from(found.is_empty())))

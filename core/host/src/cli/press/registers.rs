@@ -76,7 +76,7 @@ pub(super) fn dump(
     }
     let mut rows = Vec::new();
     if as_words {
-        rows.push(["block", "address", "word", "hex"].map(str::to_owned).to_vec());
+        rows.push(output::head("block | address | word | hex"));
         for (side, block, words) in
             [("press", &press.map.read, &blocks.press), ("host", &press.map.write, &blocks.host)]
         {
@@ -86,7 +86,7 @@ pub(super) fn dump(
             rows.extend(raw(block, words).into_iter().map(row));
         }
     } else {
-        rows.push(["block", "field", "value"].map(str::to_owned).to_vec());
+        rows.push(output::head("block | field | value"));
         rows.extend(
             fields(press, &blocks).into_iter().map(|(side, name, value)| vec![side.to_owned(), name, value]),
         );
@@ -128,7 +128,7 @@ fn dump_range(common: &Common, range: &Range, words: &[(u32, u16)]) -> Result<()
     if common.json {
         return Ok(output::json(&json!({ "words": words }))?);
     }
-    let mut rows = vec![["address", "word", "hex"].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("address | word | hex")];
     rows.extend(
         words
             .iter()
@@ -194,7 +194,7 @@ pub(super) fn probe_order(common: &Common, press: &Press, at: u16, expect: f64) 
         output::json(&json!({ "expect": expect, "readings": all.iter().map(row).collect::<Vec<_>>() }))?;
         return Ok(ExitCode::from(u8::from(right.is_empty())));
     }
-    let mut rows = vec![["address", "words", "type", "order", "number", ""].map(str::to_owned).to_vec()];
+    let mut rows = vec![output::head("address | words | type | order | number | ")];
     rows.extend(all.iter().map(|it| {
         let [a, b] = it.words;
         let sign = if it.is(expect) { "<- match" } else { "" };

@@ -111,7 +111,7 @@ pub(super) fn run(
         let steps: Vec<_> = report.steps.iter().map(row).collect();
         output::json(&json!({ "press": press.name, "steps": steps, "good": report.good() }))?;
     } else {
-        let mut rows = vec![["step", "seen", "limit", ""].map(str::to_owned).to_vec()];
+        let mut rows = vec![output::head("step | seen | limit | ")];
         let verdict = |good: bool| if good { "good" } else { "NOT GOOD" }.to_owned();
         rows.extend(
             report

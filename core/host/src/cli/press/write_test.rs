@@ -51,7 +51,7 @@ pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
         let row = |it: &Written| json!({ "field": it.field.name(), "shows": it.shows, "read_back": it.read_back, "confirmed": it.confirmed });
         output::json(&json!({ "fields": written.iter().map(row).collect::<Vec<_>>(), "good": good }))?;
     } else {
-        let mut rows = vec![["field", "written", "read back", "on the screen"].map(str::to_owned).to_vec()];
+        let mut rows = vec![output::head("field | written | read back | on the screen")];
         let yes = |it: bool| if it { "yes" } else { "NO" }.to_owned();
         rows.extend(written.iter().map(|it| {
             let confirmed = it.confirmed.map_or_else(|| "-".into(), yes);
@@ -95,7 +95,7 @@ async fn reach(press: &Press, client: &mut Client<ModbusLink>) -> Result<(), Fai
     let words = client.read(&press.map.read, press.map.read.count).await?;
     match PressImage::decode(&press.map, press.press_id, &words).map(|image| image.wrong) {
         Ok(Some(wrong)) => Err(Failure::Handshake(format!(
-            "{}: {} is {}, the plant file says {}: is this the right press?",
+            "{}: {} is {}, the plant file has {}: is this the right press?",
             client.peer(),
             wrong.input,
             wrong.found,
