@@ -2,14 +2,11 @@
 //!
 //! Needs pymodbus (a Python that has it in `PLATEN_PYTHON`, else `python3`) and mbpoll. Where they are missing the test
 //! says so and ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod cell;
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
 
-use cell::{Host, plant};
+use crate::cell::{Host, plant};
 use serde_json::Value as Json;
 
 fn python() -> String {
@@ -45,7 +42,7 @@ fn a_pymodbus_press_gets_twenty_right_results() {
     let mut host = Host::start(&plant);
 
     // While it runs, mbpoll reads the words that stand in the press's registers for the host's newest result.
-    let words = cell::until("mbpoll", || {
+    let words = crate::cell::until("mbpoll", || {
         let output =
             Command::new(peers.join("mbpoll_words.sh")).args([&address, "100", "64"]).output().unwrap();
         let words: Vec<u64> = serde_json::from_slice(&output.stdout).ok()?;

@@ -1,7 +1,6 @@
-//! Accuracy over many simulated scans, and the paper's tables: what `platen bench` finds, held against the bounds.
+//! Accuracy over many simulated scans: the figures of `platen bench accuracy`, held against their bounds.
 //!
 //! `PLATEN_SEEDS` sets how many scans of each plate are measured.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use serde_json::Value as Json;
 
@@ -133,36 +132,4 @@ fn plates_and_strokes_are_measured_within_the_bounds() {
         );
     }
     assert!(failures.is_empty(), "{failures:#?}");
-}
-
-#[test]
-fn the_papers_tables_stand_beside_our_figures() {
-    let arguments =
-        ["--step-deg", "0.1", "--meshes", "1000", "--repeat", "1", "--flattening", "elastic,harmonic"];
-    let found = bench(&arguments);
-    assert!(found.pointer("/machine/processor").is_some_and(Json::is_string));
-    assert_eq!(found.pointer("/tables/table_1/paper/plate_points"), Some(&Json::from(277_721)));
-    let points = number(&found, "/tables/table_1/here/plate_points");
-    // A coarser lattice: the number of points falls with the square of its step.
-    let expected = 277_721.0 * (360.0 / 10_240.0 / 0.1_f64).powi(2);
-    assert!((points / expected - 1.0).abs() < 0.05, "{points} points, {expected} expected");
-    let steps = found.pointer("/tables/table_2").and_then(Json::as_array).unwrap();
-    for step in steps {
-        assert!(number(step, "/here_ms/elastic") > 0.0 && number(step, "/paper_ms/harmonic") > 0.0, "{step}");
-    }
-    assert!(number(&found, "/tables/table_3/here/0/here_ms/harmonic") > 0.0);
-    for flattening in ["elastic", "harmonic"] {
-        let side = number(&found, &format!("/tables/table_4/here/{flattening}/d_u_std_mm"));
-        assert!(side < number(&found, "/tables/table_4/paper/0/d_u_std_mm"), "{flattening}: d_u {side} mm");
-    }
-}
-
-#[test]
-fn the_same_seed_gives_the_same_figures_on_any_number_of_threads() {
-    let figures = |threads| {
-        let arguments =
-            ["--step-deg", "0.12", "--meshes", "500", "--repeat", "1", "--seed", "3", "--threads", threads];
-        bench(&arguments)["tables"]["table_4"]["here"].clone()
-    };
-    assert_eq!(figures("1"), figures("2"));
 }

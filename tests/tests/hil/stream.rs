@@ -1,5 +1,4 @@
 //! The reference bridge of the simulator, and the real driver library loaded by the host's loader, over a real socket.
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use std::net::SocketAddr;
 use std::time::Duration;

@@ -1,5 +1,4 @@
 //! A simulated press and the real host as processes, over real sockets.
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpStream;

@@ -34,16 +34,13 @@
 //! | clock wrong, jumps | `clock_jump` | survived |
 //! | another scanner | `wrong_scanner` | "SIM9999 answers, SIM0001 is expected" |
 //! | no bridge | `nobody_there` | "no scan in time: the connection broke" |
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod stream;
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 use platen_engine::plugin::PluginError;
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeCounters};
-use stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 
 type Cells = Vec<(Option<u64>, Option<[u64; 2]>, u16)>;
 

@@ -2,8 +2,6 @@
 //!
 //! The scanner asks the press's second port what plate lies there and reports the number of its bends as a gap: a
 //! result under the wrong stroke shows in the press's own count. Everything is asserted on the press's side.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a rig that fails fails its test")]
-#![allow(dead_code, reason = "each test program uses a part of the rig")]
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;

@@ -2,7 +2,6 @@
 //!
 //! The files come from the simulator's own writers and go through the real driver library. Verdicts come from
 //! `platen measure`. What `platen convert` writes must give the same cells again.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -1,9 +1,5 @@
 //! A cell as in a plant: the real host, a simulated press on Modbus, and a scanner behind the scan bridge protocol, all
 //! of them processes that know each other by sockets only. What counts is what stands in the press's registers.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod cell;
-mod stream;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -11,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use cell::{Host, Press, assert_clean, until};
+use crate::cell::{Host, Press, assert_clean, until};
 use nalgebra::Vector3;
 use platen_sim_plate::{Plate, PlateState, Reply};
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
@@ -250,7 +246,7 @@ fn a_plate_that_left_its_window_is_scanned_again_once() {
     // where it was not seen at all.
     let scans = AtomicU32::new(0);
     let moving = move || {
-        let mut state = stream::plate();
+        let mut state = crate::stream::plate();
         let aside = match scans.fetch_add(1, Ordering::Relaxed) {
             0..2 => 0.0,
             2..5 => -1000.0,

@@ -2,19 +2,15 @@
 //!
 //! After each run the press has all its results, each under its own stroke, each scanned once.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod rig;
-
 use std::time::Duration;
 
+use crate::rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, done, quick, tcp};
 use platen_model::Code;
 use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::LinkState;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::faults::LineFaults;
 use platen_sim_press::{Command, Config, Counters, SimPress};
-use rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, done, quick, tcp};
 
 const SCAN: Duration = Duration::from_millis(5);
 
@@ -58,7 +54,8 @@ fn with(fault: (&'static str, Set), others: LineFaults) -> (&'static str, LineFa
 async fn each_fault_on_tcp() {
     beside_each_other(FAULTS.map(|fault| async move {
         let (name, line_faults) = with(fault, LineFaults::default());
-        let (_press, host, tally) = rig::run(Config { strokes: 8, line_faults, ..quick() }, SCAN).await;
+        let (_press, host, tally) =
+            crate::rig::run(Config { strokes: 8, line_faults, ..quick() }, SCAN).await;
         assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
         assert_all(name, &tally, 8);
         host.stop().await;
@@ -87,7 +84,7 @@ async fn each_fault_on_rtu_through_tcp() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn late_answers_and_resets_on_many_strokes() {
     let line_faults = LineFaults { late: 0.01, reset: 0.005, reset_after: 0.005, ..LineFaults::default() };
-    let (_press, host, tally) = rig::run(Config { strokes: 15, line_faults, ..quick() }, SCAN).await;
+    let (_press, host, tally) = crate::rig::run(Config { strokes: 15, line_faults, ..quick() }, SCAN).await;
     assert_all("mixed", &tally, 15);
     assert!(tally.connections > 2, "{} connections", tally.connections);
     host.stop().await;
@@ -196,7 +193,8 @@ async fn a_lasting_exception_is_a_fault_until_reset() {
 async fn exceptions_that_pass_cost_no_stroke() {
     beside_each_other([4, 5, 6, 7, 8, 9, 10, 11].map(|exception_code| async move {
         let line_faults = LineFaults { exception: 0.05, exception_code, ..LineFaults::default() };
-        let (_press, host, tally) = rig::run(Config { strokes: 6, line_faults, ..quick() }, SCAN).await;
+        let (_press, host, tally) =
+            crate::rig::run(Config { strokes: 6, line_faults, ..quick() }, SCAN).await;
         assert!(!tally.line_faults.is_empty(), "{exception_code}: the seed hits nothing");
         assert_all(&format!("exception {exception_code:02X}"), &tally, 6);
         assert_eq!(tally.connections, 1, "{exception_code:02X}: an exception keeps the connection");

@@ -1,5 +1,4 @@
 //! Bad input to `platen measure` and `platen check`: one sentence each, the right exit code, nothing left behind.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

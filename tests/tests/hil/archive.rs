@@ -1,12 +1,9 @@
 //! Scans that the host keeps: measured again they give the same result, and they go when they are old.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod cell;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use cell::{Host, Press, plant};
+use crate::cell::{Host, Press, plant};
 use serde_json::Value as Json;
 
 fn runs(folder: &Path) -> Vec<PathBuf> {
@@ -76,7 +73,7 @@ fn a_kept_scan_measured_again_gives_the_same_result() {
     let text = std::fs::read_to_string(&plant).unwrap();
     std::fs::write(&plant, format!("{text}keep_scans = \"60 d\"\n")).unwrap();
     let mut host = Host::start(&plant);
-    cell::until("the old scan to go", || (!first.exists()).then_some(()));
+    crate::cell::until("the old scan to go", || (!first.exists()).then_some(()));
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     assert!(blank.exists() && scan(2).exists() && runs[1].join("result.json").exists());
 }
@@ -96,7 +93,7 @@ fn a_scan_that_finds_no_room_costs_no_result() {
     let stats = press.wait_done();
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     let log = host.log();
-    cell::assert_clean(&stats, &log);
+    crate::cell::assert_clean(&stats, &log);
     let taken = stats["taken"].as_array().unwrap();
     // Register 55 is gap.max, 0xFFFF where nothing was measured.
     assert!(taken.len() == 2 && taken.iter().all(|result| result["words"][55] != 0xFFFF), "{stats:#}\n{log}");

@@ -1,5 +1,4 @@
 //! A blank that was cut off its rectangle: the plate bent of it, with and without a scan of the blank.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::fmt::Write as _;
 use std::path::Path;

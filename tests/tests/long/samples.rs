@@ -3,7 +3,6 @@
 //!
 //! A sample is one draw of noise and of where the lattice falls on the edges, so it is held against the range of many
 //! draws: its figures must lie within that range, widened by a factor on both sides.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -16,12 +16,10 @@
 //! | seam of the two faces across the plate | `seam_across_the_plate`, `seam_of_a_head_that_turns_clockwise` | 3 mm, 0.8 mm |
 //! | a person and a chain before the plate | `stray_and_occluded` | 6 mm, 0.5 mm |
 //! | seen under more than 75 degrees | `grazing` | refused: "scan: .." or "plate: .." |
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod stream;
 
 use std::f64::consts::PI;
 
+use crate::stream::{LIMIT, driver, plate, start};
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{Catalogue, JobSpec};
 use platen_engine::stroke::{self, Baseline, NotMeasured};
@@ -31,7 +29,6 @@ use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 use platen_sim_plate::{Plate, PlateState, Pose};
 use platen_sim_scanner::stream::{BridgeConfig, RayCastHead};
 use platen_sim_scanner::{Cyclic, Faces, Instrument, Surroundings};
-use stream::{LIMIT, driver, plate, start};
 
 /// What is wrong: with the scanner, the shop or how the plate lies.
 struct Scene {

@@ -1,7 +1,5 @@
 //! `platen check` over the real program: every fault of a plant at once, each at its place, whatever else is wrong.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
-
 use std::path::Path;
 
 use serde_json::Value;

@@ -2,14 +2,11 @@
 //!
 //! The press holds the host at the point by what it does, so no point is hit by luck. `PLATEN_KILLS=500` sets the number
 //! of random kills.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod cell;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use cell::{Host, Press, assert_clean, plant, until};
+use crate::cell::{Host, Press, assert_clean, plant, until};
 use serde_json::Value as Json;
 
 /// `error_code` of a stroke that a restart interrupted.

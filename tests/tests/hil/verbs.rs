@@ -1,12 +1,9 @@
 //! `platen press` and `platen status` against a simulated press in a process of its own.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod cell;
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-use cell::{Host, Press, plant, until};
+use crate::cell::{Host, Press, plant, until};
 use serde_json::Value as Json;
 
 /// `platen press VERB PLANT ...`.
@@ -134,7 +131,7 @@ fn a_guided_handshake_keeps_every_step() {
         assert!(names.contains(&step), "{step} is not in {steps:#}");
     }
     let stats = press.stats();
-    cell::assert_clean(&stats, "");
+    crate::cell::assert_clean(&stats, "");
     // The bit `simulated` stood with every result.
     for taken in stats["taken"].as_array().unwrap() {
         assert_ne!(taken["words"][2].as_u64().unwrap() & 1 << 9, 0, "{taken}");

@@ -1,9 +1,6 @@
 //! The real `platen run` against the simulated press: every check is made on the press's side or on the record.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-mod cell;
-
-use cell::{Host, Press, assert_clean, plant, until};
+use crate::cell::{Host, Press, assert_clean, plant, until};
 
 /// More than the journal of one stroke writes, less than its result files.
 const RESULT_BLOCKS: u32 = 400;

@@ -1,6 +1,5 @@
 //! What makes a measurement trustworthy, from scan files: a plate that came back turned is refused, painted markers verify the
 //! virtual ones, a calibration is written and used.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::path::{Path, PathBuf};
 use std::process::Output;

@@ -2,19 +2,16 @@
 //!
 //! The peers and what they need are in `tests/peers/README.md`. Where one is not installed its test says so and
 //! ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
-
-mod rig;
 
 use std::io::{BufRead, BufReader, Lines};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
+use crate::rig::{Host, Memory, assert_clean, done, quick, tcp};
 use platen_plant::press::{Link, Parity, Press, Serial};
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Command as Order, Config, SimPress};
-use rig::{Host, Memory, assert_clean, done, quick, tcp};
 use serde_json::Value;
 
 const STROKES: usize = 20;
@@ -105,7 +102,7 @@ async fn serve(peer: Peer) -> Value {
 }
 
 async fn serve_on(peer: Peer, plant: Press) -> Value {
-    let cell = platen_sim_press::Config { automatic: false, ..rig::quick() };
+    let cell = platen_sim_press::Config { automatic: false, ..crate::rig::quick() };
     let cell = platen_sim_press::SimPress::start(cell).await.unwrap();
     let host = Host::start(plant, Memory::new(7), cell.control(), Duration::from_millis(10));
     let Ok(summary) = tokio::task::spawn_blocking(|| peer.summary()).await else {
@@ -152,8 +149,11 @@ async fn mbpoll_reads_the_words_of_the_result() {
     if !installed("sh", &["-c", "command -v mbpoll"]) {
         return;
     }
-    let (press, host, tally) =
-        rig::run(platen_sim_press::Config { strokes: 3, ..rig::quick() }, Duration::from_millis(5)).await;
+    let (press, host, tally) = crate::rig::run(
+        platen_sim_press::Config { strokes: 3, ..crate::rig::quick() },
+        Duration::from_millis(5),
+    )
+    .await;
     let peer = press.modbus().unwrap().to_string();
     let read = Command::new(peers().join("mbpoll_words.sh")).args([&peer, "100", "64"]).output().unwrap();
     assert!(read.status.success(), "{read:?}");

@@ -1,5 +1,4 @@
 //! `platen measure` on plates with known truth, made by an independent generator.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::io::Write as _;
 use std::path::Path;

@@ -1,20 +1,17 @@
 //! The example plants of `config/`: each is loaded and run against a press of its kind; only the way to the press
 //! is the test's own.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod rig;
 
 use std::future::{Ready, ready};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::rig::{Host, Memory, assert_clean, done, quick};
 use platen_plant::PlantFile;
 use platen_plant::press::{Link, Mode, Press, Role, Serial, Transport};
 use platen_press::PressLink;
 use platen_sim_press::config::LinkConfig;
 use platen_sim_press::{Config, SimPress};
-use rig::{Host, Memory, assert_clean, done, quick};
 use tokio::net::TcpListener;
 use tokio_modbus::client::tcp;
 use tokio_modbus::prelude::*;

@@ -1,7 +1,6 @@
 //! Memory and growth from a table scan to a full dome, columns as they come.
 //!
 //! `PLATEN_DOME` adds the 44 million cells of a full dome, which take a minute to cast.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use serde_json::Value as Json;
 

@@ -1,15 +1,13 @@
 //! Strokes over real sockets: the press counts, the press asserts.
 
-mod rig;
-
 use std::time::Duration;
 
+use crate::rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, quick, run, tcp};
 use platen_model::Code;
 use platen_press::LinkState;
 use platen_sim_press::faults::StrokeFaults;
 use platen_sim_press::registers::status;
 use platen_sim_press::{Cause, Command, Config, SimPress};
-use rig::{Host, LIMIT, Memory, assert_clean, beside_each_other, quick, run, tcp};
 
 const fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)

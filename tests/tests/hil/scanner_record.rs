@@ -1,8 +1,5 @@
 //! Frames recorded and replayed, scanners that count the other way, two faces, and a whole dome in little memory: the
 //! driver library as the host loads it against the simulator's bridge.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
-
-mod stream;
 
 use std::f64::consts::PI;
 use std::io::{BufRead as _, BufReader};
@@ -10,13 +7,13 @@ use std::net::SocketAddr;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 use platen_engine::plugin::JobSpec;
 use platen_scan::{Face, Lattice, Window};
 use platen_sim_scanner::stream::{
     Bridge, BridgeConfig, Head, Plan, RayCastHead, Receiver, ScanLayout, ScanSettings, Values, column_payload,
 };
 use platen_sim_scanner::{Faces, Instrument, Label, SimColumn, SimState, TruthCell};
-use stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
 
 fn lattice_of(bridge: &Bridge, options: &str, window: &Window) -> Lattice {
     scan(&driver(bridge.address(), options), Some(window), LIMIT).unwrap().0
@@ -174,7 +171,7 @@ fn a_dome_is_streamed_in_bounded_memory() {
     let bridge = Bridge::start(BridgeConfig::default(), Box::new(Dome { rows, columns })).unwrap();
     // A process of its own, so that the driver's and the host's memory are counted and the bridge's is not.
     let output = Command::new(std::env::current_exe().unwrap())
-        .args(["a_dome_is_streamed_in_bounded_memory", "--exact", "--nocapture"])
+        .args(["scanner_record::a_dome_is_streamed_in_bounded_memory", "--exact", "--nocapture"])
         .env(DOME_BRIDGE, bridge.address().to_string())
         .output()
         .unwrap();

@@ -1,0 +1,7 @@
+//! Figures of `platen measure` and `platen bench` against known truth.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+mod bench;
+mod blank;
+mod plates;
+mod trust;

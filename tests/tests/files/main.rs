@@ -1,0 +1,6 @@
+//! Files as a user has them: every format, damaged scans, faulty plants.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+mod check;
+mod formats;
+mod refusals;

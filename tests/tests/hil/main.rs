@@ -1,0 +1,21 @@
+//! Hardware in the loop, the hardware simulated: the product's press side, its host and its scanner driver on real sockets
+//! and lines, most as processes of their own.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
+
+mod cell;
+mod rig;
+mod stream;
+
+mod archive;
+mod kill;
+mod line;
+mod peer_run;
+mod peers;
+mod plants;
+mod press;
+mod run;
+mod scanner_cell;
+mod scanner_light;
+mod scanner_link;
+mod scanner_record;
+mod verbs;
