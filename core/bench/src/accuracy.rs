@@ -5,12 +5,10 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
-
+use platen_model::units::metres;
 use platen_shape::measure::Measurement;
 use platen_shape::{Surface, Vec3};
-
-use platen_model::units::metres;
+use serde::Deserialize;
 
 /// Width of the strip along the edges whose surface errors are counted apart, metres.
 pub const EDGE_STRIP: f64 = 0.1;

@@ -1,21 +1,13 @@
 //! `platen bench`: accuracy, time and memory of the method on simulated scans, and the tables of Masuda et al.
 
 use std::process::ExitCode;
-use std::time::Duration;
-
-use platen_plant::PluginUse;
-use serde_json::json;
 
 use platen_host::cli::bench::{BenchArguments, Part};
 use platen_host::cli::{CliError, Common, output};
+use serde_json::json;
 
 use crate::machine::Machine;
 use crate::{scale, seeds, tables};
-use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, Flattening};
-
-/// Time limit of flattening one mesh, far beyond a press's, for slow plugins and large meshes.
-const FLATTENING_LIMIT: Duration = Duration::from_secs(120);
 
 pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCode, CliError> {
     output::fresh_folder(&arguments.out, "bench")?;
@@ -39,13 +31,4 @@ pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCod
         output::json(&document)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Loads the flattening plugins of these names with their default options.
-pub(crate) fn flattenings(catalogue: &Catalogue, names: &[String]) -> Result<Vec<Flattening>, CliError> {
-    let load = |name: &String| {
-        let (library, values) = pipeline::load(catalogue, &PluginUse::by_default(name))?;
-        Ok(Flattening::create(&library, &values, FLATTENING_LIMIT)?)
-    };
-    names.iter().map(load).collect()
 }

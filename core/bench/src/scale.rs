@@ -8,6 +8,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::ValueEnum;
+use platen_engine::plugin::{Catalogue, JobSpec};
+use platen_host::cli::bench::{BenchArguments, Cells, QUARTER_DEG};
+use platen_host::cli::{CliError, Common, output};
+use platen_host::progress;
 use platen_scan::{Column, Window};
 use platen_shape::extract::Extractor;
 use platen_shape::measure::measure;
@@ -16,12 +20,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value as Json, json};
 
 use crate::scene::{SCAN_LIMIT, Setting};
-use crate::stages::ms;
-use crate::{bench, machine, tables};
-use platen_engine::plugin::{Catalogue, JobSpec};
-use platen_host::cli::bench::{BenchArguments, Cells, QUARTER_DEG};
-use platen_host::cli::{CliError, Common, output};
-use platen_host::progress;
+use crate::stages::{self, ms};
+use crate::{machine, tables};
 
 fn name(cells: Cells) -> String {
     cells.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
@@ -116,7 +116,7 @@ fn here(
         seed: arguments.seed,
         threads: arguments.threads,
     };
-    let mut flattenings = bench::flattenings(catalogue, &arguments.flattening)?;
+    let mut flattenings = stages::flattenings(catalogue, &arguments.flattening)?;
     let Some(flattening) = flattenings.first_mut() else {
         return Err(CliError::Usage("give at least one --flattening".into()));
     };

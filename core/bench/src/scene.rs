@@ -7,17 +7,17 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
+use platen_engine::stroke::NotMeasured;
+use platen_host::cli::CliError;
+use platen_model::units::metres;
 use platen_plant::Value;
 use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
 use platen_shape::{Patch, PlateSpec, Vec3};
 
 use crate::accuracy::Truth;
-use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, Scanner};
-use platen_engine::stroke::NotMeasured;
-use platen_host::cli::CliError;
-use platen_model::units::metres;
 
 /// Time limit of a scan; a full dome takes minutes on a slow machine.
 pub(super) const SCAN_LIMIT: Duration = Duration::from_secs(3600);

@@ -5,19 +5,18 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use serde_json::{Value as Json, json};
-
-use crate::accuracy::Accuracy;
-use crate::bench;
-use crate::figures::OF_MEASUREMENT;
-use crate::scene::{Scene, Setting};
-use crate::strokes::{self, OF_STROKE, StrokeErrors};
-use crate::{figures, stages};
 use platen_engine::plugin::{Catalogue, Flattening};
 use platen_engine::stroke::NotMeasured;
 use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
+use serde_json::{Value as Json, json};
+
+use crate::accuracy::Accuracy;
+use crate::figures::{self, OF_MEASUREMENT};
+use crate::scene::{Scene, Setting};
+use crate::stages;
+use crate::strokes::{self, OF_STROKE, StrokeErrors};
 
 /// Returns plates of a shop, 7 m away, scanned face concave.
 pub(super) fn scenes() -> Vec<Scene> {
@@ -82,7 +81,7 @@ pub(super) fn accuracy(
         .flat_map(|scene| arguments.noise_mm.iter().map(move |noise| (scene, *noise)))
         .flat_map(|(scene, noise)| seeds.iter().map(move |seed| (scene, noise, *seed)))
         .collect();
-    let load = || bench::flattenings(catalogue, &arguments.flattening);
+    let load = || stages::flattenings(catalogue, &arguments.flattening);
     let errors = shared(&cases, arguments.threads, load, |flattenings, (scene, noise_mm, seed)| {
         progress::phase(&format!("{} at {noise_mm} mm, seed {seed}", scene.name));
         let shot = scene.scan(catalogue, folder, Setting::of_accuracy(*noise_mm, *seed))?;

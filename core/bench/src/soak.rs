@@ -9,12 +9,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
-use platen_press::{Answer, Durations, HostSide, MemoryJournal, PressLink, channels, run_press};
-use serde::Deserialize;
-use serde_json::json;
-use tokio::sync::mpsc;
-
 use platen_host::cli::bench::{Line, SoakArguments};
 use platen_host::cli::cell::Cell;
 use platen_host::cli::press::trial::{Seen, serve};
@@ -22,6 +16,11 @@ use platen_host::cli::press::{self, Failure};
 use platen_host::cli::run::{runtime, stop_signal};
 use platen_host::cli::{CliError, Common, output};
 use platen_host::progress;
+use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
+use platen_press::{Answer, Durations, HostSide, MemoryJournal, PressLink, channels, run_press};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::sync::mpsc;
 
 /// Strokes on one plate; the next part follows in a new session.
 const PER_PART: u64 = 50;

@@ -2,14 +2,20 @@
 
 use std::time::Duration;
 
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Flattening};
+use platen_engine::stroke::NotMeasured;
+use platen_host::cli::CliError;
+use platen_plant::PluginUse;
 use platen_shape::Patch;
 use platen_shape::measure::{Measurement, Timings, measure};
 use platen_shape::outline::{Outline, outline};
 
 use crate::machine::cpu_time;
 use crate::scene::Shot;
-use platen_engine::plugin::Flattening;
-use platen_engine::stroke::NotMeasured;
+
+/// Time limit of flattening one mesh, far beyond a press's, for slow plugins and large meshes.
+const FLATTENING_LIMIT: Duration = Duration::from_secs(120);
 
 /// Processor time of each stage.
 #[derive(Debug, Clone, Copy, Default)]
@@ -85,4 +91,13 @@ pub(super) fn median(mut times: Vec<Duration>) -> Duration {
 /// Returns milliseconds, rounded to microseconds.
 pub(super) fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// Loads the flattening plugins of these names with their default options.
+pub(crate) fn flattenings(catalogue: &Catalogue, names: &[String]) -> Result<Vec<Flattening>, CliError> {
+    let load = |name: &String| {
+        let (library, values) = pipeline::load(catalogue, &PluginUse::by_default(name))?;
+        Ok(Flattening::create(&library, &values, FLATTENING_LIMIT)?)
+    };
+    names.iter().map(load).collect()
 }

@@ -6,19 +6,21 @@
 use std::path::Path;
 use std::time::Duration;
 
-use platen_model::{Centre, Facing, RadiusOf, ReferenceLine, Seat, Target, TargetShape, Task, Template};
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Comparison, Flattening, Surfaces};
+use platen_host::cli::CliError;
+use platen_model::units::{metres, mm};
+use platen_model::{
+    Centre, Facing, Field, NodeState, RadiusOf, ReferenceLine, Report, Seat, Target, TargetShape, Task,
+    Template,
+};
 use platen_plant::Value;
 use platen_shape::{Placement, Surface, Vec3};
 
 use crate::accuracy::{Truth, rms};
 use crate::figures::Figure;
 use crate::scene::{Scene, Setting, Shot};
-use crate::{bench, stages};
-use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, Comparison, Flattening, Surfaces};
-use platen_host::cli::CliError;
-use platen_model::units::{metres, mm};
-use platen_model::{Field, NodeState, Report};
+use crate::stages;
 
 /// Extent and thickness of the plates, millimetres.
 const SIZE_MM: [f64; 3] = [3000.0, 2500.0, 36.0];
@@ -77,7 +79,7 @@ pub(super) struct Tools {
 impl Tools {
     /// Loads the first of the flattenings and the comparisons; single nodes count as changed, not only patches.
     pub(super) fn load(catalogue: &Catalogue, names: &[String]) -> Result<Self, CliError> {
-        let flattening = bench::flattenings(catalogue, names)?.into_iter().next();
+        let flattening = stages::flattenings(catalogue, names)?.into_iter().next();
         let comparison = |name: &str, option: Option<(&str, Value)>| -> Result<Comparison, CliError> {
             let (library, values) = pipeline::load_with(catalogue, name, option)?;
             Ok(Comparison::create(&library, &values, COMPARISON_LIMIT)?)

@@ -6,20 +6,19 @@
 use std::path::Path;
 use std::time::Duration;
 
-use platen_shape::DiskMesh;
-use platen_shape::mesh::SmoothFace;
-use serde_json::{Value as Json, json};
-
-use crate::accuracy::Accuracy;
-use crate::bench;
-use crate::scene::{Scene, Setting, Shot};
-use crate::stages::{Run, Stages, median, ms, run};
-use crate::{figures, machine};
 use platen_engine::plugin::{Catalogue, Flattening};
 use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
 use platen_model::units::mm;
+use platen_shape::DiskMesh;
+use platen_shape::mesh::SmoothFace;
+use serde_json::{Value as Json, json};
+
+use crate::accuracy::Accuracy;
+use crate::scene::{Scene, Setting, Shot};
+use crate::stages::{self, Run, Stages, median, ms, run};
+use crate::{figures, machine};
 
 /// Margin scanned round the plate, degrees: the lattice at quarter resolution then has 1.6 million cells.
 pub(super) const MARGIN_DEG: f64 = 9.0;
@@ -78,7 +77,7 @@ pub(super) fn tables(
     let (step_deg, threads) = (arguments.step_deg, arguments.threads);
     let setting = Setting { step_deg, margin_deg: MARGIN_DEG, noise_mm, seed: arguments.seed, threads };
     let shot = scene.scan(catalogue, folder, setting)?;
-    let mut flattenings = bench::flattenings(catalogue, &arguments.flattening)?;
+    let mut flattenings = stages::flattenings(catalogue, &arguments.flattening)?;
     let mut outcomes = Vec::new();
     let mut last = None;
     for flattening in &mut flattenings {
