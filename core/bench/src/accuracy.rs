@@ -8,6 +8,7 @@ use std::path::Path;
 use platen_model::units::metres;
 use platen_shape::measure::Measurement;
 use platen_shape::{Surface, Vec3};
+
 use serde::Deserialize;
 
 /// Width of the strip along the edges whose surface errors are counted apart, metres.

@@ -4,10 +4,11 @@ use std::process::ExitCode;
 
 use platen_host::cli::bench::{BenchArguments, Part};
 use platen_host::cli::{CliError, Common, output};
-use serde_json::json;
 
 use crate::machine::Machine;
 use crate::{scale, seeds, tables};
+
+use serde_json::json;
 
 pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCode, CliError> {
     output::fresh_folder(&arguments.out, "bench")?;

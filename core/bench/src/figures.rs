@@ -1,9 +1,10 @@
 //! Figures of accuracy as table rows and as JSON.
 
 use platen_model::units::mm;
-use serde_json::{Map, Value as Json, json};
 
 use crate::accuracy::Accuracy;
+
+use serde_json::{Map, Value as Json, json};
 
 /// Figure of errors of type `E`: name in documents, head in tables, value in the unit of the name, digits after the point.
 pub(super) type Figure<E> = (&'static str, &'static str, fn(&E) -> f64, usize);

@@ -16,12 +16,13 @@ use platen_scan::{Column, Window};
 use platen_shape::extract::Extractor;
 use platen_shape::measure::measure;
 use platen_shape::outline::outline;
-use serde::{Deserialize, Serialize};
-use serde_json::{Value as Json, json};
 
 use crate::scene::{SCAN_LIMIT, Setting};
 use crate::stages::{self, ms};
 use crate::{machine, tables};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value as Json, json};
 
 fn name(cells: Cells) -> String {
     cells.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()

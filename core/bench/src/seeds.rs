@@ -10,13 +10,14 @@ use platen_engine::stroke::NotMeasured;
 use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
-use serde_json::{Value as Json, json};
 
 use crate::accuracy::Accuracy;
 use crate::figures::{self, OF_MEASUREMENT};
 use crate::scene::{Scene, Setting};
 use crate::stages;
 use crate::strokes::{self, OF_STROKE, StrokeErrors};
+
+use serde_json::{Value as Json, json};
 
 /// Returns plates of a shop, 7 m away, scanned face concave.
 pub(super) fn scenes() -> Vec<Scene> {

@@ -18,6 +18,7 @@ use platen_host::cli::{CliError, Common, output};
 use platen_host::progress;
 use platen_plant::press::{Link, Press, Quiet, Serial, Transport};
 use platen_press::{Answer, Durations, HostSide, MemoryJournal, PressLink, channels, run_press};
+
 use serde::Deserialize;
 use serde_json::json;
 use tokio::sync::mpsc;

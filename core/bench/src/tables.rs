@@ -13,12 +13,13 @@ use platen_host::progress;
 use platen_model::units::mm;
 use platen_shape::DiskMesh;
 use platen_shape::mesh::SmoothFace;
-use serde_json::{Value as Json, json};
 
 use crate::accuracy::Accuracy;
 use crate::scene::{Scene, Setting, Shot};
 use crate::stages::{self, Run, Stages, median, ms, run};
 use crate::{figures, machine};
+
+use serde_json::{Value as Json, json};
 
 /// Margin scanned round the plate, degrees: the lattice at quarter resolution then has 1.6 million cells.
 pub(super) const MARGIN_DEG: f64 = 9.0;

@@ -10,10 +10,9 @@ use ply_rs_bw::ply::{
 };
 use ply_rs_bw::writer::Writer;
 
-use platen_shape::Surface;
-
 use platen_model::units::{mm, mm_pair, readable};
 use platen_model::{Field, NodeState, Report};
+use platen_shape::Surface;
 
 /// Nodes along u and v, as in the fields of our comparisons.
 const NODES: [usize; 2] = [101, 101];

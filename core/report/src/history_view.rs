@@ -4,12 +4,12 @@ use std::path::Path;
 
 use platen_history::{Archive, Error, Filter, Stroke};
 use platen_model::Verdict;
+use platen_model::units::mm;
 use platen_plant::PlateFile;
 use platen_shape::Blank;
 
 use crate::picture::StripPoint;
 use crate::result::{OutlineRecord, ResultRecord, TemplateRecord};
-use platen_model::units::mm;
 
 /// Returns the strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have
 /// it yet.

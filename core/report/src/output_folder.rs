@@ -6,6 +6,8 @@ use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
+use platen_model::Report;
+use platen_sdk::exchange::{AlignedBuffer, Decode, Encode};
 use platen_shape::Surface;
 
 use crate::field_export::PlateTable;
@@ -14,8 +16,6 @@ use crate::{
     picture,
     picture::{Caption, PictureError, StripPoint},
 };
-use platen_model::Report;
-use platen_sdk::exchange::{AlignedBuffer, Decode, Encode};
 
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";

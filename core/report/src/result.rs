@@ -22,13 +22,11 @@ use std::fmt::Display;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json, json};
 
-use platen_model::{Figure, Task, Verdict};
+use platen_model::units::{mm, mm_pair, readable};
+use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
 use platen_shape::{EXPANDED, Measured, Scanned, ShapeChecks, Vec3};
-
-use platen_model::Report;
-use platen_model::units::{mm, mm_pair, readable};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.result/1";

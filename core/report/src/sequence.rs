@@ -18,13 +18,13 @@ use jiff::Timestamp;
 use serde::Serialize;
 
 use platen_history::{Archive, Error as HistoryError, Filter, Stroke};
+use platen_model::units::{mm, mm_pair};
 use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::{PlantFile, PlateFile};
 use platen_shape::{BendingEnergy, Surface, TargetSurface};
 
 use crate::picture::PictureScale;
 use crate::{history_view, output_folder};
-use platen_model::units::{mm, mm_pair};
 
 /// Failure to make a sequence.
 #[derive(Debug, thiserror::Error)]

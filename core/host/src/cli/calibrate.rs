@@ -10,19 +10,20 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jiff::Timestamp;
-use platen_plant::{PlantFile, PlateFile, PluginUse};
-use platen_shape::inspection::calibration::{ArtefactGap, Pooled, artefact_gaps, covering};
-use platen_shape::{Surface, TargetSurface};
-use serde::Serialize;
-
-use super::{CliError, Common, measure, output};
-use crate::progress;
 use platen_engine::calibration::Calibration;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{PluginError, Surfaces};
 use platen_engine::stroke::Baseline;
 use platen_model::units::mm;
+use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_report::output_folder;
+use platen_shape::inspection::calibration::{ArtefactGap, Pooled, artefact_gaps, covering};
+use platen_shape::{Surface, TargetSurface};
+
+use super::{CliError, Common, measure, output};
+use crate::progress;
+
+use serde::Serialize;
 
 /// Largest plausible difference of scans of an untouched plate, one sigma, metres; beyond it the plate was bent or moved on
 /// its supports.

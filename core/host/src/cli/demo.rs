@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use platen_model::Verdict;
 use platen_plant::PlantFile;
-use tokio::sync::{mpsc, watch};
 
 use super::cell::{AcceptedResult, Cell};
 use super::run::{runtime, stop_signal};
 use super::{CliError, Common, output};
 use crate::progress;
 use crate::run::{self, StrokeReport, Watcher};
+
+use tokio::sync::{mpsc, watch};
 
 /// Longest time of a demo that is not stuck.
 const LIMIT: Duration = Duration::from_secs(300);

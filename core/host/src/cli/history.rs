@@ -10,12 +10,13 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use platen_history::{Archive, Filter, Stroke};
+use platen_model::units::mm;
 use platen_plant::PlantFile;
+use platen_report::plate_report;
 
 use super::{CliError, Common, output};
+
 use pick::RunRef;
-use platen_model::units::mm;
-use platen_report::plate_report;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \

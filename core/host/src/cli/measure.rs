@@ -6,20 +6,20 @@ use std::time::Instant;
 
 use clap::Args;
 use jiff::Timestamp;
+use platen_engine::calibration::{self, Calibration};
+use platen_engine::pipeline::Pipeline;
+use platen_engine::plugin::{Catalogue, JobSpec, Surfaces};
+use platen_engine::stroke::{self, Baseline, PreviousPose};
 use platen_plant::PlateFile;
+use platen_report::output_folder;
+use platen_report::result::{Context, ResultRecord};
 use platen_shape::Surface;
+use platen_shape::{Measured, Scanned};
 
 use super::scan_source::{self, READ_LIMIT};
 use super::setup::Setup;
 use super::{CliError, Common, output};
 use crate::progress;
-use platen_engine::calibration::{self, Calibration};
-use platen_engine::pipeline::Pipeline;
-use platen_engine::plugin::{Catalogue, JobSpec, Surfaces};
-use platen_engine::stroke::{self, Baseline, PreviousPose};
-use platen_report::output_folder;
-use platen_report::result::{Context, ResultRecord};
-use platen_shape::{Measured, Scanned};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \

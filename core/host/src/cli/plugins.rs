@@ -3,11 +3,12 @@
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
+use platen_engine::plugin::{Descriptor, Listed};
 use platen_plant::OptionDecl;
-use serde_json::{Value as Json, json};
 
 use super::{CliError, Common, output};
-use platen_engine::plugin::{Descriptor, Listed};
+
+use serde_json::{Value as Json, json};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen plugins list\n  platen plugins describe faro-file\n  \

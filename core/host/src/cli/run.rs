@@ -6,10 +6,11 @@ use std::process::ExitCode;
 use clap::Args;
 use platen_model::Verdict;
 use platen_plant::PlantFile;
-use tokio::sync::{mpsc, watch};
 
 use super::{CliError, Common, output};
 use crate::run::{self, HostError, StrokeReport, Watcher};
+
+use tokio::sync::{mpsc, watch};
 
 #[derive(Debug, Args)]
 #[command(

@@ -6,18 +6,19 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use platen_engine::pipeline::Pipeline;
+use platen_engine::stroke::Baseline;
+use platen_model::units::{metres, mm};
 use platen_plant::PlateFile;
+use platen_report::output_folder;
 use platen_shape::inspection::marker_detection::{DetectedMarker, NoMarker, detect_marker};
-use serde::Serialize;
+use platen_shape::{Measured, Scanned};
 
 use super::setup::Setup;
 use super::{CliError, Common, measure, output};
 use crate::progress;
-use platen_engine::pipeline::Pipeline;
-use platen_engine::stroke::Baseline;
-use platen_model::units::{metres, mm};
-use platen_report::output_folder;
-use platen_shape::{Measured, Scanned};
+
+use serde::Serialize;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen verify scan.e57 --plate painted.toml\n  \

@@ -5,8 +5,9 @@
 
 use std::fmt::Write as _;
 
-use super::PlateTable;
 use platen_model::units::mm;
+
+use super::PlateTable;
 
 /// Cell type of a triangle in VTK.
 const TRIANGLE: u32 = 5;

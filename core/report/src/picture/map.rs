@@ -1,6 +1,6 @@
 //! Map of a field over the plate's rectangle (u, v).
 
-use platen_model::Verdict;
+use platen_model::{Field, NodeState, Verdict};
 
 use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE};
@@ -8,7 +8,6 @@ use super::scale::{Scale, nice_ceiling};
 use super::shades::{self, Shades};
 use super::{Caption, PictureError, PictureScale};
 use crate::result::PlateRecord;
-use platen_model::{Field, NodeState};
 
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: u32 = 1200;

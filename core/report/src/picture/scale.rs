@@ -5,10 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use platen_model::units::{metres, mm};
 use platen_model::{Target, TargetShape};
 use platen_plant::PlateFile;
-
-use platen_model::units::{metres, mm};
 
 /// Limit and chord of a template where the plate file has none, millimetres: the trade's 3 mm on 2 m.
 const USUAL: [f64; 2] = [3.0, 2000.0];

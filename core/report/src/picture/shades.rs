@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use plotters::style::RGBColor;
 
+use platen_model::{Field, NodeState};
+
 use super::PictureError;
 use super::canvas::{At, Canvas};
 use super::colour::{self, PALE, PAPER};
 use super::scale::Scale;
-use platen_model::{Field, NodeState};
 
 /// Number of shades from one anchor of the scale to the next.
 const PER_STEP: i32 = 4;

@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use platen_shape::evaluate::{self, GRID};
-use platen_shape::measure::Measurement;
-
 use platen_model::units::mm;
 use platen_model::{Field, NodeState, Report};
+use platen_shape::evaluate::{self, GRID};
+use platen_shape::measure::Measurement;
 
 /// Even grid over the plate; null where unseen.
 #[derive(Debug, Clone, Serialize, Deserialize)]

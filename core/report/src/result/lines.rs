@@ -2,14 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use platen_model::{Seat, TemplateFinding, Verdict};
+use platen_model::units::{mm, mm_pair};
+use platen_model::{Report, Seat, TemplateFinding, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::Surface;
 use platen_shape::evaluate;
 use platen_shape::measure::Measurement;
-
-use platen_model::Report;
-use platen_model::units::{mm, mm_pair};
 
 /// Reference line.
 #[derive(Debug, Clone, Serialize, Deserialize)]

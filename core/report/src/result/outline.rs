@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use platen_shape::Blank;
-
 use platen_model::units::{metres, mm, mm_pair};
+use platen_shape::Blank;
 
 /// Edges of the plate in (u, v), and their source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

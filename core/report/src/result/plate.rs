@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use platen_model::units::mm;
 use platen_model::{Facing, RadiusOf, Target, TargetShape};
 use platen_plant::PlateFile;
 use platen_shape::{Surface, Vec3};
 
 use crate::picture::PictureScale;
-use platen_model::units::mm;
 
 /// Plate file at a stroke.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

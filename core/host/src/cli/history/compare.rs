@@ -3,22 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use platen_engine::calibration::Calibration;
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Comparison, Surfaces};
 use platen_history::Stroke;
+use platen_model::units::mm;
+use platen_model::{Report, Verdict};
 use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_report::picture::Caption;
+use platen_report::result::{PlateRecord, figure};
+use platen_report::{history_view, output_folder};
 use platen_shape::Surface;
-use serde_json::json;
 
 use super::{RunRef, open};
 use crate::cli::{CliError, Common, output};
 use crate::progress;
-use platen_engine::calibration::Calibration;
-use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, Comparison, Surfaces};
-use platen_model::units::mm;
-use platen_model::{Report, Verdict};
-use platen_report::picture::Caption;
-use platen_report::result::{PlateRecord, figure};
-use platen_report::{history_view, output_folder};
+
+use serde_json::json;
 
 /// The comparisons that need two surfaces.
 const COMPARISONS: [&str; 2] = ["displacement", "curvature"];

@@ -3,9 +3,9 @@
 use std::str::FromStr;
 
 use platen_history::{Archive, Filter, Stroke};
+use platen_report::history_view;
 
 use crate::cli::CliError;
-use platen_report::history_view;
 
 /// Reference to a stroke: run id, or `plate:stroke`.
 #[derive(Debug, Clone, PartialEq, Eq)]

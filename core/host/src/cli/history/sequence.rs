@@ -7,12 +7,12 @@ use platen_engine::pipeline;
 use platen_engine::plugin::Surfaces;
 use platen_model::Task;
 use platen_plant::PluginUse;
+use platen_report::sequence::{Bend, Sequence, SequenceStroke, Summary};
 use platen_shape::Surface;
 
 use super::open;
 use crate::cli::{CliError, Common, output};
 use crate::progress;
-use platen_report::sequence::{Bend, Sequence, SequenceStroke, Summary};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  platen history sequence config/plant-north.toml 12\n\n\

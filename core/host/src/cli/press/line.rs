@@ -6,11 +6,12 @@ use std::time::{Duration, Instant};
 
 use platen_plant::press::{Block, Press, Role, Transport};
 use platen_press::{LinkError, ROUND_TRIP_LIMITS_MS};
-use serde_json::json;
 
 use super::super::run::runtime;
 use super::{Common, Failure, client, output};
 use crate::progress;
+
+use serde_json::json;
 
 /// Range of unit ids.
 pub(super) type Units = RangeInclusive<u8>;

@@ -10,12 +10,13 @@ use std::time::{Duration, Instant};
 
 use platen_plant::press::{Block, Press, RegisterTable};
 use platen_press::{Client, LinkError, ModbusLink, Sample, Side};
-use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 use super::super::run::{runtime, stop_signal};
 use super::{CliError, Common, Failure, output};
 use crate::progress;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 /// Read with changed contents, or a failed one.
 #[derive(Debug, Serialize, Deserialize)]

@@ -5,10 +5,11 @@ use std::time::Instant;
 
 use platen_plant::press::{Block, Press, RegisterTable};
 use platen_press::{Client, LinkError, ModbusLink, Reading, describe_inputs, describe_outputs, readings};
-use serde_json::{Map, Value as Json, json};
 
 use super::super::run::{runtime, stop_signal};
 use super::{CliError, Common, Failure, output};
+
+use serde_json::{Map, Value as Json, json};
 
 /// Registers in one read of a range: few, so that a missing one hides few others.
 const CHUNK: u32 = 8;

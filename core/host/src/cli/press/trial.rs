@@ -5,18 +5,18 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use platen_model::Measure;
-use platen_model::{Code, Figures, Language, Measurement, StrokeKey, Verdict};
+use platen_model::{Code, Figures, Language, Measure, Measurement, StrokeKey, Verdict};
 use platen_plant::press::{Mode, Press};
 use platen_press::{
     Answer, Command, HostSide, LinkState, MemoryJournal, Order, PressLink, Status, channels, run_press,
 };
-use serde_json::json;
-use tokio::sync::mpsc;
 
 use super::super::run::{runtime, stop_signal};
 use super::{Common, Failure, output};
 use crate::progress;
+
+use serde_json::json;
+use tokio::sync::mpsc;
 
 /// Returns a result whose figures identify its stroke: the number as gap, the session as its place.
 pub fn stand_in(key: StrokeKey) -> Measurement {

@@ -10,10 +10,11 @@ use std::time::Duration;
 use platen_model::{Figures, Measurement, Publication, StrokeKey, Verdict};
 use platen_plant::press::{Mode, Output, Press};
 use platen_press::{Client, HostImage, LinkError, ModbusLink, PressImage, describe_outputs};
-use serde_json::json;
 
 use super::super::run::runtime;
 use super::{CliError, Common, Failure, output};
+
+use serde_json::json;
 
 /// Time of watching for a running host: two heartbeats at least.
 const WATCH: Duration = Duration::from_millis(1500);
