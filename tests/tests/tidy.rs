@@ -1,7 +1,8 @@
-//! What may know what: the dependency direction, read from `cargo metadata`.
+//! Rules of the repository: the direction of dependencies, manifests, links of pages, heads of modules.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Workspace crates that each kind of crate may use in its library or program (not in its tests).
@@ -121,5 +122,119 @@ fn every_crate_takes_the_lints_and_the_licence_of_the_workspace() {
         let manifest = std::fs::read_to_string(package["manifest_path"].as_str().unwrap()).unwrap();
         assert!(manifest.contains("[lints]\nworkspace = true"), "{}: lints", package["name"]);
         assert_eq!(package["license"], "MIT OR Apache-2.0", "{}: licence", package["name"]);
+        assert!(package["description"].is_string(), "{}: description", package["name"]);
+        assert!(package["readme"].is_string(), "{}: readme", package["name"]);
+    }
+}
+
+/// Files of the repository whose names end so, without what git ignores.
+fn files(ending: &str) -> Vec<PathBuf> {
+    let root = platen_tests::repository();
+    let (mut found, mut folders) = (Vec::new(), vec![root.clone()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap().flatten() {
+            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+            if !path.is_dir() {
+                found.extend(name.ends_with(ending).then_some(path));
+            } else if !name.starts_with('.') && !["target", "corpus", "artifacts"].contains(&&*name) {
+                // Folders of results beside the sources, as of `platen demo`.
+                folders.extend((!path.join("history.sqlite").exists()).then_some(path));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Text of a page outside its blocks of code.
+fn prose(page: &Path) -> String {
+    let text = std::fs::read_to_string(page).unwrap();
+    text.split("```").step_by(2).collect()
+}
+
+/// Anchors of a page's headings as GitHub makes them: lower case, spaces as `-`, no punctuation; a repeated one is numbered.
+fn anchors(page: &Path) -> BTreeSet<String> {
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let text = prose(page);
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    let anchor = |line: &str| {
+        let title = line.trim_start_matches('#').trim().to_lowercase();
+        let kept = title.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+        let anchor: String = kept.map(|c| if c == ' ' { '-' } else { c }).collect();
+        let n = seen.entry(anchor.clone()).or_default();
+        *n += 1;
+        if *n > 1 { format!("{anchor}-{}", *n - 1) } else { anchor }
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn every_link_in_every_page_resolves() {
+    let mut broken = Vec::new();
+    let mut n_links = 0;
+    for page in files(".md") {
+        let text = prose(&page);
+        let ends = text.match_indices("](").map(|(at, _)| &text[at + 2..]);
+        for link in ends.filter_map(|rest| rest.split_once(')')).map(|(link, _)| link) {
+            if link.contains("://") || link.starts_with("mailto:") {
+                continue;
+            }
+            n_links += 1;
+            let (file, anchor) = link.split_once('#').map_or((link, None), |(file, a)| (file, Some(a)));
+            let target = if file.is_empty() { page.clone() } else { page.with_file_name(file) };
+            let target = if anchor.is_some() && target.is_dir() { target.join("README.md") } else { target };
+            let resolves = target.exists() && anchor.is_none_or(|a| anchors(&target).contains(a));
+            if !resolves {
+                broken.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+    assert!(n_links > 20, "only {n_links} links found");
+}
+
+#[test]
+fn the_front_page_is_short_and_every_folder_has_its_page() {
+    let root = platen_tests::repository();
+    let lines = std::fs::read_to_string(root.join("README.md")).unwrap().lines().count();
+    assert!(
+        lines <= 130,
+        "README.md has {lines} lines; the front page has at most 130, the rest is in the folders"
+    );
+    for folder in ["config", "core", "drivers", "plugins", "sim", "tests"] {
+        assert!(root.join(folder).join("README.md").exists(), "{folder} has no README.md");
+    }
+    for file in ["CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"] {
+        assert!(root.join(file).exists(), "{file} is missing");
+    }
+}
+
+#[test]
+fn module_heads_begin_with_the_subject() {
+    let mut faults = Vec::new();
+    for file in files(".rs") {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let first = text.lines().find_map(|line| line.strip_prefix("//! ")).unwrap_or_default();
+        let word = first.split([' ', ',']).next().unwrap_or_default();
+        if ["What", "Who", "Those", "Something"].contains(&word) {
+            faults.push(format!("{}: {first}", file.display()));
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn transitions_of_the_handshake_have_names() {
+    let numbered = |word: &str| {
+        let digits = word.strip_prefix('T').unwrap_or_default();
+        (1..=2).contains(&digits.len()) && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    for file in [files(".rs"), files(".md")].concat() {
+        if file.strip_prefix(platen_tests::repository()).unwrap().starts_with("core/press") {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+            let found: Vec<&str> = words.filter(|word| numbered(word)).collect();
+            assert!(found.is_empty(), "{}: {found:?}", file.display());
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What makes a measurement trustworthy, from scan files: a plate that came back turned is refused, painted markers verify the
+//! Trust in a measurement, from scan files: a plate that came back turned is refused, painted markers verify the
 //! virtual ones, a calibration is written and used.
 
 use std::path::{Path, PathBuf};
