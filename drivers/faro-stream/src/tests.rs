@@ -1,4 +1,4 @@
-//! The session against a bridge written from the page, in memory; the socket once.
+//! Tests of the session against a bridge in memory, written from the protocol's page, and of the socket.
 
 mod bridge;
 mod faults;

@@ -1,4 +1,4 @@
-//! The driver without a host: plates from everywhere, windows, columns.
+//! Tests of the driver without a host: sources of plates, windows, columns.
 
 use crate::capture::{PreparedScan, Receiver};
 use crate::{Options, capture, plate};
@@ -40,7 +40,7 @@ fn options() -> Options {
     }
 }
 
-/// Keeps what it gets, until told to stop.
+/// Receiver that stores the scan and may stop it.
 #[derive(Default)]
 struct Keep {
     lattice: Option<Lattice>,
@@ -205,7 +205,7 @@ fn every_fault_of_the_press_is_one_sentence() {
     assert!(moving.to_string().contains("the ram is down"));
     assert_eq!(answered("HTTP/1.1 400 Bad Request\n").kind(), ErrorKind::BadData);
     assert_eq!(answered("").kind(), ErrorKind::Disconnected);
-    // A port that nobody listens on: bound, then closed.
+    // A port without a listener: bound, then closed.
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     assert_eq!(refusal(&Options { cell: Some(closed), ..options() }).kind(), ErrorKind::Disconnected);
 }

@@ -1,4 +1,4 @@
-//! Press and scanner together, with a host of a few lines that speaks Modbus by hand.
+//! Press and scanner together, with a minimal Modbus host written by hand.
 #![expect(clippy::unwrap_used, reason = "a test that cannot start its program must fail")]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Modbus TCP, unit 1.
+/// Modbus TCP client, unit 1.
 struct Modbus(TcpStream);
 
 impl Modbus {
@@ -22,13 +22,13 @@ impl Modbus {
         answer
     }
 
-    /// The press's 32 words.
+    /// Reads the 32 words of the P block.
     fn read(&mut self) -> Vec<u16> {
         let answer = self.call(&[3, 0, 0, 0, 32]);
         answer[2..].chunks(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()
     }
 
-    /// Words of the host's block from its start.
+    /// Writes words of the H block from its start.
     fn write(&mut self, words: &[u16]) {
         let n = words.len() as u8;
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
@@ -36,7 +36,7 @@ impl Modbus {
     }
 }
 
-/// Cells of the one scan in a file.
+/// Returns the number of cells of the scan in a file.
 fn cells(path: &Path) -> u64 {
     let reader = e57::E57Reader::from_file(path).unwrap();
     reader.pointclouds()[0].records
@@ -80,7 +80,7 @@ fn each_accepted_stroke_drops_one_whole_scan() {
         if p[2] & 2 != 0 && p[3] != accepted {
             accepted = p[3];
         }
-        // Accepting is all this host does: it never answers, and the press goes on after its limit.
+        // This host only accepts strokes: it publishes no result, and the press continues after its limit.
         press.write(&[1, heartbeat, if accepted == 0 { 0 } else { BUSY }, accepted, 0, p[4]]);
         let found = files(&drop);
         let whole = found.iter().filter(|path| path.extension().is_some_and(|end| end == "e57")).count();
@@ -89,7 +89,7 @@ fn each_accepted_stroke_drops_one_whole_scan() {
             let newest = &found[scans - 1];
             assert!(newest.to_str().unwrap().ends_with(&format!("{accepted:05}-0.e57")), "{newest:?}");
             assert!(cells(newest) > 1000);
-            // The next stroke, whatever the press waits for.
+            // The next stroke, whatever the state of the press.
             let mut line = TcpStream::connect(ready["plate"].as_str().unwrap()).unwrap();
             line.write_all(b"{\"do\":\"stroke\"}\n").unwrap();
             BufReader::new(line).read_line(&mut String::new()).unwrap();

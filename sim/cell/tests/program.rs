@@ -1,4 +1,4 @@
-//! The program as others start it.
+//! The program as started by other programs.
 #![expect(clippy::unwrap_used, reason = "a test that cannot start its program must fail")]
 
 use platen_sim_plate::{Reply, Shape};
@@ -12,7 +12,7 @@ fn program(arguments: &[&str]) -> Command {
     command
 }
 
-/// A running press, and where it serves.
+/// Running press and its addresses.
 fn press(arguments: &[&str]) -> (Child, BufReader<ChildStdout>, String, String) {
     let mut child = program(&[&["press", "--with-parent"], arguments].concat()).spawn().unwrap();
     let mut out = BufReader::new(child.stdout.take().unwrap());
@@ -32,7 +32,7 @@ fn ask(address: &str, line: &str) -> String {
     reply
 }
 
-/// Exit code and log of a program that is expected to end.
+/// Returns exit code and log of a program that is expected to end.
 fn refused(arguments: &[&str]) -> (Option<i32>, String) {
     let output = program(arguments).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
@@ -45,7 +45,7 @@ fn it_says_where_it_serves_and_shows_the_plate() {
     let reply: Reply = serde_json::from_str(&ask(&plate, r#"{"get":"plate"}"#)).unwrap();
     let Reply::Plate(Some(state)) = reply else { panic!("{reply:?}") };
     assert_eq!((state.shape, state.strokes), (Shape::Flat, 0));
-    // Without its parent it ends by itself.
+    // The end of its standard input ends it.
     drop(child.stdin.take());
     assert!(child.wait().unwrap().success());
 }

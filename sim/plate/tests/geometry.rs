@@ -40,7 +40,7 @@ fn all() -> Vec<Shape> {
     developable().into_iter().chain(doubly_curved()).collect()
 }
 
-/// Material points all over the plate, away from its edges.
+/// Returns material points all over the plate, away from its edges.
 fn points(plate: &Plate) -> impl Iterator<Item = (f64, f64)> {
     let (width, height) = (plate.width(), plate.height());
     (0..7).flat_map(move |i| {
@@ -48,7 +48,7 @@ fn points(plate: &Plate) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// Central differences of `f` with a step that balances truncation and rounding.
+/// Returns central differences of `f` with a step that balances truncation and rounding.
 fn differences(f: impl Fn(f64, f64) -> Vec3, u: f64, v: f64) -> [Vec3; 2] {
     let h = 2e-4;
     let fourth =
@@ -116,10 +116,10 @@ fn curvatures_are_those_of_the_shape() {
     };
     check(Shape::Cylinder { radius_mm: 5000.0, axis_deg: 110.0 }, 0.3, 2.0, [0.2, 0.0]);
     check(Shape::Sphere { radius_mm: -8000.0 }, 0.1, 2.4, [-0.125, -0.125]);
-    // A torus has its two radii on the middle lines.
+    // A torus has its nominal radii on the middle lines.
     let torus = Shape::Torus { axis_deg: 0.0, radius_mm: 10_000.0, cross_radius_mm: 5000.0 };
     check(torus, 1.5, 1.25, [0.1, 0.2]);
-    // The radius of a cone grows evenly along the middle straight line (here: along u, 3 m).
+    // The radius of a cone grows evenly along the middle generator (here: along u, 3 m).
     let cone = Shape::Cone { axis_deg: 0.0, radius_start_mm: 5000.0, radius_end_mm: 8000.0 };
     check(cone.clone(), 0.0, 1.25, [0.2, 0.0]);
     check(cone.clone(), 3.0, 1.25, [0.125, 0.0]);

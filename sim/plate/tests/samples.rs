@@ -1,11 +1,11 @@
-//! The same plates by an independent generator: its truth against ours, point by point.
+//! Comparison with the ground truth of an independent generator of the same plates, point by point.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its samples must fail")]
 
 use nalgebra::{Matrix3, Rotation3};
 use platen_sim_plate::{CurvatureStep, Plate, PlateState, Pose, Shape, Vec3};
 use serde_json::Value;
 
-/// Truth of a sample: the small set and the large one have the same.
+/// Reads the ground truth of a sample; it is the same in the small and the large set.
 fn truth(name: &str) -> Value {
     let path = platen_tests::samples::each("plates").remove(0).join(name).join("truth.json");
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
@@ -15,7 +15,7 @@ fn vector(value: &Value) -> Vec3 {
     Vec3::from_fn(|k, _| value[k].as_f64().unwrap())
 }
 
-/// Largest distance and rms of our upper face and mid-surface curvature from the sample's 50 mm grid, metres.
+/// Returns largest distance and rms of our upper face and mid-surface curvature from the sample's 50 mm grid, metres.
 fn distance(truth: &Value, shape: Shape) -> (f64, f64) {
     let number = |pointer: &str| truth.pointer(pointer).unwrap().as_f64().unwrap();
     let mut state =

@@ -46,7 +46,7 @@ fn every_stroke_bends_by_what_springback_leaves() {
     let angle = |u: f64| after.normal(u, 1.0).angle(&before.normal(u, 1.0)).to_degrees();
     assert!((after.normal(0.0, 1.0).angle(&after.normal(3.0, 1.0)).to_degrees() - 1.5).abs() < 1e-9);
     assert!(angle(0.0) < 1e-6 && (angle(3.0) - 1.5).abs() < 1e-9);
-    // What lies left of the band has not moved.
+    // The part left of the band has not moved.
     assert!((after.top(0.5, 2.0) - before.top(0.5, 2.0)).norm() < 1e-12);
     assert!((after.top(2.9, 2.0) - before.top(2.9, 2.0)).norm() > 0.02);
     assert_eq!(state.strokes, 1);

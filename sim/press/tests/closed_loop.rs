@@ -1,4 +1,4 @@
-//! The press bends by what it is told until the template fits; the telling is done here from the closed-form plate.
+//! Closed loop: the press bends by the results until the template fits; the results are computed from the closed-form plate.
 #![expect(clippy::unwrap_used, reason = "a plate that cannot be bent must fail the test")]
 
 use platen_sim_plate::{Plan, Plate, Shape};
@@ -8,10 +8,10 @@ use platen_sim_press::registers::{h, status};
 
 const CHORD: f64 = 2.0;
 const LIMIT: f64 = 0.003;
-/// Places on each half of a board: every 50 mm, between which the plates here rise by less than 0.05 mm.
+/// Points on each half of a template: every 50 mm, between which the plates here rise by less than 0.05 mm.
 const N: i32 = 20;
 
-/// A board of the target's radius on one place of the plate: its largest gap, where along the line, and the sense.
+/// Contact of a template of the target's radius at one place of the plate: largest gap, its position along the line, and the sense.
 #[derive(Clone, Copy, Debug)]
 struct Gap {
     gap: f64,
@@ -19,8 +19,8 @@ struct Gap {
     sense: i16,
 }
 
-/// Lays the board on `surface(s)` (height over the line, metres) from -CHORD/2 to CHORD/2. It rests on the edge of
-/// the upper hull that lies under its middle.
+/// Places the template on `surface(s)` (height over the line, metres) from -CHORD/2 to CHORD/2. It rests on the edge of
+/// the upper convex hull below its middle.
 fn lay(radius: f64, surface: impl Fn(f64) -> f64) -> Gap {
     let points: Vec<(f64, f64)> = (-N..=N)
         .map(|i| {
@@ -49,7 +49,7 @@ fn lay(radius: f64, surface: impl Fn(f64) -> f64) -> Gap {
     Gap { gap: gap(worst), at: worst.0, sense }
 }
 
-/// The worst board on lines along u and along v through the plate's middle, centred at `centres`.
+/// Returns the result of the worst template on lines along u and along v through the plate's middle, centred at `centres`.
 fn measure(model: &FormingModel, radii: [Option<f64>; 2], centres: &[f64]) -> HBlock {
     let plate = Plate::new(model.state()).unwrap();
     let half = 2.0;
@@ -78,7 +78,7 @@ fn measure(model: &FormingModel, radii: [Option<f64>; 2], centres: &[f64]) -> HB
     HBlock(words)
 }
 
-/// Bends until the press leaves the plate; strokes made and gaps in millimetres on the way.
+/// Bends until the press ends the part; returns the number of strokes and the gaps in millimetres.
 fn press(config: &PlateConfig, radii: [Option<f64>; 2], centres: &[f64]) -> (bool, Vec<f64>) {
     let mut model = FormingModel::new(config, Strategy::ClosedLoop).unwrap();
     let mut gaps = Vec::new();
@@ -120,7 +120,7 @@ fn the_press_bends_until_the_template_fits() {
                     centres.len(),
                     gaps.len() - 1
                 );
-                assert!(fits, "{name}, {share} of the target, {} boards: {tail:.2?}", centres.len());
+                assert!(fits, "{name}, {share} of the target, {} templates: {tail:.2?}", centres.len());
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The three links and the faults on them.
+//! Links of the press and faults on them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod host;
@@ -16,9 +16,9 @@ use tokio_modbus::prelude::*;
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
 const LIMIT: Duration = Duration::from_secs(30);
-/// Transaction 7, unit 1, one register from 7: the number of the press.
+/// Request: transaction 7, unit 1, one register from 7, the number of the press.
 const READ: [u8; 12] = [0, 7, 0, 0, 0, 6, 1, 3, 0, 7, 0, 1];
-/// Its answer: press 3.
+/// Answer to [`READ`]: press 3.
 const ANSWER: [u8; 11] = [0, 7, 0, 0, 0, 5, 1, 3, 2, 0, 3];
 
 fn quick() -> Config {
@@ -106,7 +106,7 @@ async fn rtu_through_tcp_carries_the_handshake() {
     host.abort();
 }
 
-/// A press on a pseudo terminal, and the host's end of it.
+/// Starts a press on a pseudo terminal; returns it with the host's end.
 async fn serial(config: Config) -> (SimPress, SerialStream, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let device = folder.path().join("adapter");
@@ -134,7 +134,7 @@ async fn a_pulled_adapter_comes_back_behind_its_link() {
     press.command(Command::PullMs(0)).unwrap();
     let ended = timeout(LIMIT, line.read(&mut [0; 16])).await.unwrap();
     assert!(matches!(ended, Ok(0) | Err(_)), "{ended:?}");
-    // The line ended after its link was gone: what is there now is the next terminal, whatever its number.
+    // The terminal was closed after its link was removed: the link now leads to the next terminal, whatever its number.
     let back = async {
         while !device.exists() {
             tokio::time::sleep(Duration::from_millis(5)).await;
@@ -145,7 +145,7 @@ async fn a_pulled_adapter_comes_back_behind_its_link() {
     assert_eq!(ask(&mut line).await, [1, 3, 2, 0, 3]);
 }
 
-/// The answer to a request for the number of the press, without its check sum.
+/// Returns the answer to a request for the number of the press, without its checksum.
 async fn ask(line: &mut SerialStream) -> [u8; 5] {
     let mut request = vec![1, 3, 0, 7, 0, 1];
     request.extend(platen_sim_press::frame::crc16(&request).to_le_bytes());

@@ -1,4 +1,4 @@
-//! The press side of the handshake in time that the test makes: no clock, no socket.
+//! Press side of the handshake in virtual time: no clock, no socket.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::Duration;
@@ -17,7 +17,7 @@ const fn ms(ms: u64) -> Duration {
 const LIMITS: Limits =
     Limits { accept: ms(500), result: ms(5_000), host: ms(2_000), heartbeat: ms(250), ack_delay: ms(0) };
 
-/// A program that waits for stroke 1 of session 9, and a host block that is alive and has accepted it.
+/// Returns a program that waits for stroke 1 of session 9, and the H block of a live host that has accepted it.
 fn waiting() -> (Program, HBlock) {
     let mut program = Program::new(LIMITS, 9, ms(0));
     let mut host = HBlock([0; 64]);
@@ -122,7 +122,7 @@ fn a_rescan_is_accepted_by_a_host_that_is_busy_or_done_with_it() {
     assert!(matches!(program.step(&host, ms(50))[..], [Event::ResultAccepted(..)]));
 }
 
-/// A press and its registers, with a host that is alive and echoes, but never publishes.
+/// Press and its registers, with a live host that echoes but never publishes.
 struct Bench {
     press: Press,
     table: Table,

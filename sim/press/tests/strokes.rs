@@ -1,4 +1,4 @@
-//! The press against the plainest host, over real sockets.
+//! The press against a minimal host, over real sockets.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod host;
@@ -33,7 +33,7 @@ async fn connect(press: &SimPress) -> Context {
     tcp::connect_slave(press.modbus().unwrap(), Slave(1)).await.unwrap()
 }
 
-/// Runs the plainest host against `config` until the press is done.
+/// Runs the minimal host against `config` until the press is done.
 async fn run(config: Config) -> (SimPress, Counters) {
     let press = SimPress::start(config).await.unwrap();
     let host = Host::on(connect(&press).await);

@@ -1,4 +1,4 @@
-//! Rays against exact geometry: what is aimed at is hit, where it lies.
+//! Rays against exact geometry: every ray hits its target, at the right range.
 #![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{Band, Plate, PlateState, Pose, Shape, Side, Vec3};
@@ -32,7 +32,7 @@ fn towards(point: Vec3) -> Ray {
     Ray { origin: Vec3::zeros(), direction: point.normalize() }
 }
 
-/// Height above the mid-surface at which a label's face lies; sides have none.
+/// Returns the height of a label's face above the mid-surface; sides have none.
 fn height(plate: &Plate, label: Label) -> Option<f64> {
     match label {
         Label::PlateTop => Some(plate.thickness() / 2.0),
@@ -60,7 +60,7 @@ fn every_hit_lies_on_its_face_and_on_its_ray() {
             );
             let off = match height(&plate, hit.label) {
                 Some(h) => (plate.jet(u, v, h).point - ray.at(hit.range)).norm(),
-                // On a side the material point is known but for its height.
+                // On a side the height of the material point is unknown.
                 None => (ray.at(hit.range) - plate.mid(u, v)).cross(&plate.normal(u, v)).norm(),
             };
             assert!(off < 1e-9, "{shape:?} {:?} at {u} {v}: {off:e} m", hit.label);
@@ -103,7 +103,7 @@ fn material_points_in_view_are_found_again() {
 fn no_ray_slips_between_the_faces() {
     let plate = plate(Shape::Cylinder { radius_mm: 4000.0, axis_deg: 110.0 });
     let scene = Scene::of(Some(plate.clone()), Vec::new());
-    // Rays at the very edges and corners: inside by a nanometre they must hit something.
+    // Rays at edges and corners: a nanometre inside they must hit the plate.
     for side in Side::ALL {
         for i in 0..=200 {
             let [u, v] = plate.side_uv(side, f64::from(i) / 200.0);

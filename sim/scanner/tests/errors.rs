@@ -1,4 +1,4 @@
-//! Every error of the instrument, alone, against what it should be.
+//! Each error of the instrument alone, against its model.
 #![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{Plate, PlateState, Pose, Vec3};
@@ -7,12 +7,12 @@ use platen_sim_scanner::{
 };
 use std::ops::ControlFlow;
 
-/// A flat plate `distance` metres in front of the scanner, turned away from it by `incidence_deg`.
+/// Returns a flat plate `distance` metres in front of the scanner, rotated by the incidence `incidence_deg`.
 fn target(distance: f64, incidence_deg: f64) -> Scene {
     marked(distance, incidence_deg, Vec::new())
 }
 
-/// The same with markers painted on it.
+/// Returns the same with painted markers.
 fn marked(distance: f64, incidence_deg: f64, markers_mm: Vec<[f64; 2]>) -> Scene {
     let mut state = PlateState::flat(2000.0, 2000.0, 20.0);
     let middle = [1e3 * distance, 0.0, 0.0];
@@ -21,13 +21,13 @@ fn marked(distance: f64, incidence_deg: f64, markers_mm: Vec<[f64; 2]>) -> Scene
     Scene::of(Some(Plate::new(&state).unwrap()), Vec::new())
 }
 
-/// Two degrees round the x axis.
+/// Returns a lattice of two degrees around the x axis.
 fn narrow(step_deg: f64) -> SimLattice {
     let half = 1_f64.to_radians();
     SimLattice::covering(-half, 2.0 * half, -half, half, step_deg.to_radians())
 }
 
-/// (truth, measured) of all valid cells on the plate's upper face that are not mixed.
+/// Returns (true, measured) ranges of all valid cells on the plate's upper face that are not mixed.
 fn ranges(columns: &[SimColumn]) -> Vec<(f64, f64)> {
     let cells = columns.iter().flat_map(|c| (0..c.state.len()).map(move |i| (c, i)));
     let sound = |c: &SimColumn, i: usize| {
@@ -37,7 +37,7 @@ fn ranges(columns: &[SimColumn]) -> Vec<(f64, f64)> {
     cells.filter(|(c, i)| sound(c, *i)).map(|(c, i)| (c.truth[i].range, f64::from(c.range_m[i]))).collect()
 }
 
-/// Mean, standard deviation and kurtosis of measured minus true.
+/// Returns mean, standard deviation and kurtosis of measured minus true.
 fn moments(columns: &[SimColumn]) -> (f64, f64, f64) {
     let errors: Vec<f64> = ranges(columns).iter().map(|(truth, measured)| measured - truth).collect();
     let n = errors.len() as f64;
@@ -116,7 +116,7 @@ fn cyclic_error_has_its_period() {
 fn angular_noise_shows_as_range_noise_on_a_tilted_plate() {
     let instrument = Instrument { range_sigma: 0.0, angular_sigma: 0.1e-3, ..Instrument::default() };
     let columns = scan_all(&target(10.0, 60.0), &narrow(0.02), &instrument, 2);
-    // The reported direction misses the beam's by 0.1 mrad: 1 mm across the beam, tan(60) of it along.
+    // The reported direction deviates from the beam's by 0.1 mrad: 1 mm across the beam, tan(60) of it along.
     let mut sum = 0.0;
     let mut n = 0.0;
     for column in &columns {

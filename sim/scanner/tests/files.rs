@@ -1,4 +1,4 @@
-//! Files hold what was scanned, each in its own way.
+//! Files of every format contain the scan.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its file must fail")]
 
 use e57::{CartesianCoordinate, E57Reader, SphericalCoordinate};
@@ -25,7 +25,7 @@ fn written(scan: &SimScan, name: &str, format: FileFormat, order: FileOrder) -> 
     (folder, path)
 }
 
-/// The point that a file should hold at (row, column) in the usual order.
+/// Returns the point that a file must contain at (row, column) in the default order.
 fn point(scan: &SimScan, row: usize, column: usize) -> Option<Vec3> {
     let source = &scan.columns[scan.columns.len() - 1 - column];
     let (az, el) = (source.azimuth[row], source.elevation[row]);

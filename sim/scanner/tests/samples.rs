@@ -1,4 +1,4 @@
-//! The same scenes by an independent generator: the same plate in the same lattice must look alike.
+//! Comparison with an independent generator of the same scenes: the same plate in the same lattice has similar error statistics.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its samples must fail")]
 
 use e57::{CartesianCoordinate, E57Reader};
@@ -60,7 +60,7 @@ impl Sample {
     }
 }
 
-/// What is compared.
+/// Statistics compared.
 #[derive(Debug, Default)]
 struct Figures {
     plate_cells: f64,
@@ -89,7 +89,7 @@ fn ours(scene: &Scene, lattice: &SimLattice, instrument: &Instrument) -> Figures
     figures
 }
 
-/// Standard deviation along the beam of the sample's points on the plate, 30 mm from its edges, and how many
+/// Returns the standard deviation along the beam of the sample's points on the plate, 30 mm from its edges, and how many
 /// lie farther than 10 mm from it.
 fn residual_of_file(path: &Path, plate: &Plate) -> (f64, usize) {
     let mut reader = E57Reader::from_file(path).unwrap();
@@ -135,7 +135,7 @@ fn check_one(sample: &Sample, shape: Shape) {
     let (lattice, instrument) = (sample.lattice(), sample.instrument());
     let figures = ours(&scene, &lattice, &instrument);
 
-    // Geometry: the same cells see the plate, but for a few at its very edge.
+    // Geometry: the same cells see the plate, except for a few at its edge.
     assert!((figures.plate_cells - sample.number("/counts/plate_top_cells")).abs() <= 3.0, "{figures:?}");
     within_factor("valid cells", figures.valid, sample.number("/counts/valid_cells"));
     let lost = |cells: f64, valid: f64| cells - valid;
@@ -149,7 +149,7 @@ fn check_one(sample: &Sample, shape: Shape) {
         figures.plate_valid - figures.plate_unmixed,
         sample.number("/counts/plate_top_valid") - sample.number("/counts/plate_top_valid_unmixed"),
     );
-    // Mixed cells elsewhere are not comparable: other things stand there.
+    // Mixed cells elsewhere are not comparable: the surroundings differ.
     // Distance from the points to the truth: ours from our scan, theirs from their file and our geometry.
     let (theirs, far) = residual_of_file(&sample.folder.join("scan.e57"), &plate);
     within_factor("sigma, mm", 1e3 * (figures.sum_of_squares / figures.plate_unmixed).sqrt(), 1e3 * theirs);

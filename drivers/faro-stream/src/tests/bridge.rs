@@ -1,4 +1,4 @@
-//! A bridge in memory, written from the protocol's page and not from the driver.
+//! Bridge in memory, written from the protocol's page and not from the driver.
 
 use platen_scan::{Column, Lattice, ScanEnd, State};
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use crate::wire::{Frame, kind};
 
 pub(super) const SCAN: u32 = 41;
 
-/// A scan kept by the bridge.
+/// Scan kept by the bridge.
 #[derive(Clone)]
 pub(super) struct Bridge {
     pub(super) rows: u32,
@@ -23,12 +23,12 @@ pub(super) struct Bridge {
 pub(super) const BRIDGE: Bridge =
     Bridge { rows: 21, columns: 13, azimuth_step: -0.01, elevation_step: 0.02, polar: true };
 
-/// True where nothing was measured; column 5 is empty.
+/// Returns true for a cell without measurement; column 5 is empty.
 pub(super) fn missing(row: u32, column: u32) -> bool {
     (row + 3 * column).is_multiple_of(4) || column == 5
 }
 
-/// Units of range, intensity, and offsets in nanoradians.
+/// Returns range in units, intensity, and angular deviations in nanoradians.
 pub(super) fn record(row: u32, column: u32) -> (u32, u16, i32, i32) {
     (5_000_000 + 1000 * row + column, (row * 10) as u16, 1000 * row as i32 - 7000, -500 * column as i32)
 }
@@ -81,7 +81,7 @@ impl Bridge {
         })
     }
 
-    /// What the bridge sends when it gets a frame.
+    /// Returns the bridge's answer to a frame.
     pub(super) fn answer(&self, kind: u16, payload: &[u8]) -> Vec<Frame> {
         let asked: Value = serde_json::from_slice(payload).unwrap();
         let scan = |columns: Vec<u32>| {
@@ -129,7 +129,7 @@ pub(super) fn request() -> Request {
     }
 }
 
-/// What the host got.
+/// Scan received by the host.
 #[derive(Debug)]
 pub(super) struct Got {
     pub(super) lattice: Lattice,
@@ -138,8 +138,8 @@ pub(super) struct Got {
     pub(super) connections: usize,
 }
 
-/// Runs a session to its end. `spoil` gets the number of the connection and the frames that answer one request, and
-/// gives what arrives; the connection breaks where it gives `None`.
+/// Runs a session to its end. `spoil` receives the number of the connection and the frames that answer one request, and
+/// returns the frames that arrive; the connection breaks at a `None`.
 pub(super) fn run(
     bridge: &Bridge,
     mut spoil: impl FnMut(usize, Vec<Frame>) -> Vec<Option<Frame>>,
@@ -184,12 +184,12 @@ pub(super) fn run(
     Err(Error::TooLate("50 connections".to_owned()))
 }
 
-/// Every cell must be where the bridge measured it.
+/// Asserts that every cell is where the bridge measured it.
 #[track_caller]
 pub(super) fn check(bridge: &Bridge, got: &Got) {
     let lattice = &got.lattice;
     assert_eq!(got.columns.len() as u32, bridge.columns);
-    // Where columns run clockwise, those of the warm-up come last in the host's order: they come empty.
+    // Where columns run clockwise, warm-up columns are last in the host's order and are delivered empty.
     let clockwise = bridge.azimuth_step < 0.0;
     let empty = |column: u32| clockwise && column < 3;
     let seen = |row: u32, column: u32| row >= 2 && !missing(row, column) && !empty(column);

@@ -1,4 +1,4 @@
-//! Everything that happens between a bridge and a driver: the scan comes whole, or fails with the reason.
+//! Faults between bridge and driver: the scan is complete, or fails with the reason.
 
 use serde_json::json;
 
@@ -11,7 +11,7 @@ fn all(frames: Vec<Frame>) -> Vec<Option<Frame>> {
     frames.into_iter().map(Some).collect()
 }
 
-/// The greeting passes; of anything longer so many frames come before the connection breaks.
+/// Passes the greeting; breaks the connection after `n` frames of any longer answer.
 fn break_after(n: usize, frames: Vec<Frame>) -> Vec<Option<Frame>> {
     if frames.len() == 1 {
         return all(frames);
@@ -19,7 +19,7 @@ fn break_after(n: usize, frames: Vec<Frame>) -> Vec<Option<Frame>> {
     frames.into_iter().take(n).map(Some).chain([None]).collect()
 }
 
-/// The frames that answer the first Start, or the first of a later request, changed by `change`.
+/// Runs a session in which `change` alters the frames that answer the first request for columns.
 fn spoiled(change: impl Fn(&mut Vec<Frame>)) -> Result<Got, Error> {
     let mut done = false;
     run(&BRIDGE, |_, mut frames| {
@@ -43,7 +43,7 @@ fn fails(sentence: &str, change: impl Fn(&mut Vec<Frame>)) {
     assert!(error.contains(sentence), "{error}");
 }
 
-/// Place of a column among the frames: Status and ScanBegin come before.
+/// Index of a column among the frames, after Status and ScanBegin.
 const FIRST: usize = 2;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Columns in every direction and value type, and payloads that are none.
+//! Columns in every direction and value type, and invalid payloads.
 
 use proptest::prelude::*;
 

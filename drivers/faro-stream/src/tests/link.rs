@@ -1,4 +1,4 @@
-//! The socket: a bridge on a port of the system's choice.
+//! Socket: a bridge on a port chosen by the system.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -13,7 +13,7 @@ use crate::device::{Host, ask, scan};
 use crate::error::{Error, Result};
 use crate::wire::{Decoder, encode, kind};
 
-/// A bridge that takes one connection and answers each frame as `answer` says; it hangs up on `None`.
+/// Starts a bridge that accepts one connection and answers each frame by `answer`; it closes on `None`.
 fn serve(answer: impl Fn(u16, &Value) -> Option<(u16, Value)> + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -26,7 +26,7 @@ fn serve(answer: impl Fn(u16, &Value) -> Option<(u16, Value)> + Send + 'static) 
             while let Some(frame) = decoder.next().unwrap() {
                 let asked = serde_json::from_slice(&frame.payload).unwrap_or(Value::Null);
                 let Some((kind, value)) = answer(frame.kind, &asked) else { return };
-                // Byte by byte: frames need not come in one piece.
+                // Byte by byte: frames need not arrive in one piece.
                 for byte in encode(kind, 0, sequence, &serde_json::to_vec(&value).unwrap()) {
                     stream.write_all(&[byte]).unwrap();
                 }
@@ -61,7 +61,7 @@ fn a_bridge_that_refuses_or_hangs_up_is_told_apart() {
     assert!(matches!(ask(&nobody, &request(), &request().settings), Err(Error::Broken(_))));
 }
 
-/// A host with a deadline, which may cancel after some columns.
+/// Host with a deadline, which may cancel after some columns.
 struct Taker {
     until: Instant,
     cancel_after: usize,
@@ -102,7 +102,7 @@ impl Host for Taker {
     }
 }
 
-/// Serves the scan; the first connections break after so many frames each, the rest hold.
+/// Serves the scan; the first connections break after the given numbers of frames, later ones do not.
 fn bridge(breaks: Vec<usize>) -> (String, std::sync::mpsc::Receiver<u16>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -116,7 +116,7 @@ fn bridge(breaks: Vec<usize>) -> (String, std::sync::mpsc::Receiver<u16>) {
     (address, asked)
 }
 
-/// One connection, until `left` frames were sent or the driver hangs up.
+/// Serves one connection until `left` frames were sent or the driver closes it.
 fn serve_scan(mut stream: TcpStream, mut left: usize, heard: &std::sync::mpsc::Sender<u16>) {
     let (mut decoder, mut sequence) = (Decoder::default(), 0);
     let mut bytes = [0; 1000];

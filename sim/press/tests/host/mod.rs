@@ -1,5 +1,5 @@
-//! The plainest host that can take strokes: it trusts the link, keeps no journal and measures nothing. It says how
-//! often the plate was bent, as a gap, so that a result under the wrong stroke shows.
+//! Minimal host for strokes: it trusts the link, keeps no journal and measures nothing. It publishes the bend index as a gap, so that
+//! a result under the wrong stroke is detected.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ pub(crate) struct Host {
     link: Context,
     h: [u16; 64],
     taken: Option<(u16, u16, u16)>,
-    /// The acknowledge bit was low since the last result: only now does a high one mean this result.
+    /// The acknowledge bit was low since the last result, so that a high one refers to this result.
     armed: bool,
 }
 
@@ -34,7 +34,7 @@ impl Host {
         self.link.write_multiple_registers(H_BASE + offset as u16, words).await.unwrap().unwrap();
     }
 
-    /// Runs until it is dropped; `figures` turns the bend index into gap, place and sense.
+    /// Runs until it is dropped; `figures` converts the bend index to gap, position and sense.
     pub(crate) async fn run(mut self, figures: impl Fn(u16) -> Figures) {
         self.read_p().await;
         self.link.read_holding_registers(H_BASE, 64).await.unwrap().unwrap();
@@ -88,18 +88,18 @@ impl Host {
     }
 }
 
-/// What the host says of a plate.
+/// Figures published by the host.
 #[derive(Clone, Copy)]
 pub(crate) struct Figures {
-    /// 0.01 mm.
+    /// Gap, 0.01 mm.
     pub(crate) gap: u16,
-    /// mm.
+    /// Position (u, v), mm.
     pub(crate) at: [i16; 2],
-    /// -1 not bent enough, 0 within, +1 bent too far.
+    /// Sense: -1 not bent enough, 0 within the limits, +1 bent too far.
     pub(crate) sense: i16,
 }
 
-/// A gap that names the bend it belongs to; it never passes.
+/// Returns a gap equal to the bend index; it never passes.
 pub(crate) fn counted(bends: u16) -> Figures {
     Figures { gap: 1000 + bends, at: [2000, 2000], sense: -1 }
 }
