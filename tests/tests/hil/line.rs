@@ -37,11 +37,14 @@ const FAULTS: [(&str, Set); 14] = [
     ("twice", |it| it.twice = 0.03),
 ];
 
-fn assert_all(what: &str, tally: &Counters, strokes: usize) {
-    println!("{what}: {:?}, {} connections, {} writes", tally.line_faults, tally.connections, tally.writes);
-    assert_clean(tally);
-    assert_eq!((tally.taken.len(), tally.missed_reported), (strokes, 0), "{what}");
-    assert_eq!(tally.plates_served, strokes as u64, "{what}: scans");
+fn assert_all(what: &str, counters: &Counters, strokes: usize) {
+    println!(
+        "{what}: {:?}, {} connections, {} writes",
+        counters.line_faults, counters.connections, counters.writes
+    );
+    assert_clean(counters);
+    assert_eq!((counters.taken.len(), counters.missed_reported), (strokes, 0), "{what}");
+    assert_eq!(counters.plates_served, strokes as u64, "{what}: scans");
 }
 
 fn with(fault: (&'static str, Set), others: LineFaults) -> (&'static str, LineFaults) {
@@ -54,10 +57,10 @@ fn with(fault: (&'static str, Set), others: LineFaults) -> (&'static str, LineFa
 async fn each_fault_on_tcp() {
     beside_each_other(FAULTS.map(|fault| async move {
         let (name, line_faults) = with(fault, LineFaults::default());
-        let (_press, host, tally) =
+        let (_press, host, counters) =
             crate::rig::run(Config { strokes: 8, line_faults, ..quick() }, SCAN).await;
-        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
-        assert_all(name, &tally, 8);
+        assert!(!counters.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &counters, 8);
         host.stop().await;
     }))
     .await;
@@ -73,9 +76,9 @@ async fn each_fault_on_rtu_through_tcp() {
         let plant =
             Press::pph1("Press 3", 3, Link::rtu_over_tcp(address.ip().to_string(), address.port(), 1));
         let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
-        let tally = done(&press, &host).await;
-        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
-        assert_all(name, &tally, 4);
+        let counters = done(&press, &host).await;
+        assert!(!counters.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &counters, 4);
         host.stop().await;
     }))
     .await;
@@ -84,9 +87,10 @@ async fn each_fault_on_rtu_through_tcp() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn late_answers_and_resets_on_many_strokes() {
     let line_faults = LineFaults { late: 0.01, reset: 0.005, reset_after: 0.005, ..LineFaults::default() };
-    let (_press, host, tally) = crate::rig::run(Config { strokes: 15, line_faults, ..quick() }, SCAN).await;
-    assert_all("mixed", &tally, 15);
-    assert!(tally.connections > 2, "{} connections", tally.connections);
+    let (_press, host, counters) =
+        crate::rig::run(Config { strokes: 15, line_faults, ..quick() }, SCAN).await;
+    assert_all("mixed", &counters, 15);
+    assert!(counters.connections > 2, "{} connections", counters.connections);
     host.stop().await;
 }
 
@@ -110,9 +114,9 @@ async fn each_fault_on_a_serial_line() {
         let (name, line_faults) = with(fault, LineFaults { late_ms: LATE_MS, ..LineFaults::default() });
         let (press, plant, _folder) = serial(Config { strokes: 4, line_faults, ..quick() }).await;
         let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
-        let tally = done(&press, &host).await;
-        assert!(!tally.line_faults.is_empty(), "{name}: the seed hits nothing");
-        assert_all(name, &tally, 4);
+        let counters = done(&press, &host).await;
+        assert!(!counters.line_faults.is_empty(), "{name}: the seed hits nothing");
+        assert_all(name, &counters, 4);
         host.stop().await;
     }))
     .await;
@@ -124,8 +128,8 @@ async fn fifty_strokes_on_a_serial_line_with_late_answers_and_pulled_adapters() 
     let (press, mut plant, _folder) = serial(Config { strokes: 50, line_faults, ..quick() }).await;
     plant.link.poll = Duration::from_millis(10);
     let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
-    let tally = done(&press, &host).await;
-    assert_all("serial line", &tally, 50);
+    let counters = done(&press, &host).await;
+    assert_all("serial line", &counters, 50);
     host.stop().await;
 }
 
@@ -137,9 +141,9 @@ async fn an_adapter_that_hears_itself() {
         serial.echo = true;
     }
     let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
-    let tally = done(&press, &host).await;
-    assert_clean(&tally);
-    assert_eq!((tally.taken.len(), tally.plates_served), (5, 5));
+    let counters = done(&press, &host).await;
+    assert_clean(&counters);
+    assert_eq!((counters.taken.len(), counters.plates_served), (5, 5));
     host.stop().await;
 }
 
@@ -150,13 +154,13 @@ async fn an_adapter_that_is_pulled_is_found_under_its_name() {
     for n in 1..=3 {
         host.until("ready", |status| status.host.ready).await;
         press.command(Command::Stroke).unwrap();
-        press.until("the scan", LIMIT, |tally| tally.plates_served == n).await.unwrap();
+        press.until("the scan", LIMIT, |counters| counters.plates_served == n).await.unwrap();
         press.command(Command::PullMs(500)).unwrap();
-        press.until("the result", LIMIT, |tally| tally.taken.len() as u64 == n).await.unwrap();
+        press.until("the result", LIMIT, |counters| counters.taken.len() as u64 == n).await.unwrap();
     }
-    let tally = press.counters();
-    assert_all("pulled", &tally, 3);
-    assert!(tally.connections > 3, "{} connections", tally.connections);
+    let counters = press.counters();
+    assert_all("pulled", &counters, 3);
+    assert!(counters.connections > 3, "{} connections", counters.connections);
     assert!(host.heard.alarmed(Code::LinkBroken));
     host.stop().await;
 }
@@ -182,8 +186,8 @@ async fn a_lasting_exception_is_a_fault_until_reset() {
         host.reset();
         host.until("ready again", |status| status.host.ready).await;
         press.command(Command::Automatic(true)).unwrap();
-        let tally = done(&press, &host).await;
-        assert_all(&code.to_string(), &tally, 4);
+        let counters = done(&press, &host).await;
+        assert_all(&code.to_string(), &counters, 4);
         host.stop().await;
     }))
     .await;
@@ -193,11 +197,11 @@ async fn a_lasting_exception_is_a_fault_until_reset() {
 async fn exceptions_that_pass_cost_no_stroke() {
     beside_each_other([4, 5, 6, 7, 8, 9, 10, 11].map(|exception_code| async move {
         let line_faults = LineFaults { exception: 0.05, exception_code, ..LineFaults::default() };
-        let (_press, host, tally) =
+        let (_press, host, counters) =
             crate::rig::run(Config { strokes: 6, line_faults, ..quick() }, SCAN).await;
-        assert!(!tally.line_faults.is_empty(), "{exception_code}: the seed hits nothing");
-        assert_all(&format!("exception {exception_code:02X}"), &tally, 6);
-        assert_eq!(tally.connections, 1, "{exception_code:02X}: an exception keeps the connection");
+        assert!(!counters.line_faults.is_empty(), "{exception_code}: the seed hits nothing");
+        assert_all(&format!("exception {exception_code:02X}"), &counters, 6);
+        assert_eq!(counters.connections, 1, "{exception_code:02X}: an exception keeps the connection");
         host.stop().await;
     }))
     .await;
@@ -213,8 +217,8 @@ async fn a_press_that_comes_back_is_found_again() {
     host.until("loss", |status| status.state.link == LinkState::Offline).await;
     let link = LinkConfig::Tcp { port: address.port() };
     let back = SimPress::start(Config { automatic: false, link, ..quick() }).await.unwrap();
-    let tally = back.until("a read", LIMIT, |tally| tally.reads > 0).await.unwrap();
-    println!("found again after {} ms", tally.now_ms);
+    let counters = back.until("a read", LIMIT, |counters| counters.reads > 0).await.unwrap();
+    println!("found again after {} ms", counters.now_ms);
     host.until("ready again", |status| status.host.ready).await;
     assert_eq!(back.counters().writes_before_sync, 0);
     host.stop().await;

@@ -149,7 +149,7 @@ async fn mbpoll_reads_the_words_of_the_result() {
     if !installed("sh", &["-c", "command -v mbpoll"]) {
         return;
     }
-    let (press, host, tally) = crate::rig::run(
+    let (press, host, counters) = crate::rig::run(
         platen_sim_press::Config { strokes: 3, ..crate::rig::quick() },
         Duration::from_millis(5),
     )
@@ -158,7 +158,7 @@ async fn mbpoll_reads_the_words_of_the_result() {
     let read = Command::new(peers().join("mbpoll_words.sh")).args([&peer, "100", "64"]).output().unwrap();
     assert!(read.status.success(), "{read:?}");
     let words: Vec<u16> = serde_json::from_slice(&read.stdout).unwrap();
-    let last = &tally.taken.last().unwrap().words;
+    let last = &counters.taken.last().unwrap().words;
     // Heartbeat, status and host state go on after the result was taken; the warning and its check sum may.
     let stable = |words: &[u16]| [&words[3..7], &words[8..52], &words[53..54], &words[55..64]].concat();
     assert_eq!(stable(&words), stable(last));
@@ -197,9 +197,9 @@ async fn a_serial_line_that_is_pulled_and_put_back() {
     host.until("loss", |status| status.state.link == platen_press::LinkState::Offline).await;
     let _line = Socat::line(folder.path());
     press.command(Order::Automatic(true)).unwrap();
-    let tally = done(&press, &host).await;
-    assert_clean(&tally);
-    assert_eq!((tally.taken.len(), tally.plates_served), (10, 10));
+    let counters = done(&press, &host).await;
+    assert_clean(&counters);
+    assert_eq!((counters.taken.len(), counters.plates_served), (10, 10));
     host.stop().await;
 }
 
@@ -215,8 +215,8 @@ async fn a_serial_line_behind_a_gateway() {
     let (_gateway, port) = Socat::gateway(&device);
     let plant = Press::pph1("Press 3", 3, Link::rtu_over_tcp("127.0.0.1", port, 1));
     let host = Host::start(plant, Memory::new(7), press.control(), Duration::from_millis(10));
-    let tally = done(&press, &host).await;
-    assert_clean(&tally);
-    assert_eq!((tally.taken.len(), tally.plates_served), (20, 20));
+    let counters = done(&press, &host).await;
+    assert_clean(&counters);
+    assert_eq!((counters.taken.len(), counters.plates_served), (20, 20));
     host.stop().await;
 }

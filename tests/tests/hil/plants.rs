@@ -34,9 +34,9 @@ async fn run(press: Press, sim: SimPress) {
 }
 
 async fn judge(host: Host, sim: SimPress) {
-    let tally = done(&sim, &host).await;
-    assert_clean(&tally);
-    assert_eq!((tally.taken.len(), tally.plates_served), (STROKES as usize, u64::from(STROKES)));
+    let counters = done(&sim, &host).await;
+    assert_clean(&counters);
+    assert_eq!((counters.taken.len(), counters.plates_served), (STROKES as usize, u64::from(STROKES)));
     host.stop().await;
     assert_eq!(sim.h_block().word(2), 0, "safe after the stop");
 }

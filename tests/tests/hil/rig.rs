@@ -248,19 +248,19 @@ fn measurement(strokes: u32) -> Measurement {
 }
 
 /// What must hold of every run, whatever was done to it.
-pub(crate) fn assert_clean(tally: &Counters) {
-    assert_eq!(tally.wrong, Vec::<String>::new());
+pub(crate) fn assert_clean(counters: &Counters) {
+    assert_eq!(counters.wrong, Vec::<String>::new());
     let counts = [
-        ("writes outside the H block", tally.writes_outside),
-        ("writes before both blocks were read", tally.writes_before_sync),
-        ("writes to registers that are not the map's", tally.writes_while_void),
-        ("results published twice", tally.duplicates),
-        ("results that changed", tally.changed),
+        ("writes outside the H block", counters.writes_outside),
+        ("writes before both blocks were read", counters.writes_before_sync),
+        ("writes to registers that are not the map's", counters.writes_while_void),
+        ("results published twice", counters.duplicates),
+        ("results that changed", counters.changed),
     ];
     for (what, count) in counts {
-        assert_eq!(count, 0, "{what}: {tally:?}");
+        assert_eq!(count, 0, "{what}: {counters:?}");
     }
-    for taken in &tally.taken {
+    for taken in &counters.taken {
         if taken.verdict == platen_sim_press::registers::Verdict::NotMeasured {
             continue;
         }
@@ -275,14 +275,14 @@ pub(crate) fn assert_clean(tally: &Counters) {
 pub(crate) async fn run(config: Config, scan: Duration) -> (SimPress, Host, Counters) {
     let press = SimPress::start(config).await.unwrap();
     let host = Host::start(tcp(press.modbus().unwrap()), Memory::new(7), press.control(), scan);
-    let tally = done(&press, &host).await;
-    (press, host, tally)
+    let counters = done(&press, &host).await;
+    (press, host, counters)
 }
 
 /// Waits until all strokes are made.
 pub(crate) async fn done(press: &SimPress, host: &Host) -> Counters {
-    match press.until("all strokes", LIMIT, |tally| tally.done).await {
-        Ok(tally) => tally,
+    match press.until("all strokes", LIMIT, |counters| counters.done).await {
+        Ok(counters) => counters,
         Err(late) => {
             let (p, h, alarms) = (press.p_block(), press.h_block().0, host.heard.alarms.lock().unwrap());
             panic!("{late}; P {p:?}, H {h:?}, alarms {alarms:?}, {}", host.status.borrow().state)

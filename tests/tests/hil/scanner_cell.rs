@@ -255,8 +255,8 @@ fn a_plate_that_left_its_window_is_scanned_again_once() {
         state.pose.centre_mm[1] += aside;
         Ok(Some(state))
     };
-    let shop = RayCastHead { threads: 2, ..RayCastHead::new(Box::new(moving)) };
-    let bridge = Bridge::start(BridgeConfig::default(), Box::new(shop)).unwrap();
+    let head = RayCastHead { threads: 2, ..RayCastHead::new(Box::new(moving)) };
+    let bridge = Bridge::start(BridgeConfig::default(), Box::new(head)).unwrap();
     let mut press = Press::start(folder.path(), "strokes = 5\nwait_ready = true");
     let plant = plant(folder.path(), &press.modbus, &bridge.address().to_string(), |text| text);
     let mut host = Host::start(&plant);

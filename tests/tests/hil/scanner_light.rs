@@ -61,7 +61,7 @@ struct Found {
 
 fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let state = scene.plate.clone();
-    let shop = RayCastHead {
+    let head = RayCastHead {
         surroundings: scene.surroundings,
         instrument: scene.instrument,
         noise: Some(scene.instrument.range_sigma),
@@ -70,7 +70,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
         threads: 2,
         ..RayCastHead::new(Box::new(move || Ok(Some(state.clone()))))
     };
-    let bridge = start(&[], BridgeConfig::default(), shop);
+    let bridge = start(&[], BridgeConfig::default(), head);
     let scanner = driver(bridge.address(), "divisor = 8\nrate_kpts = 122");
     let text =
         "[plant]\nname = 't'\n[flattening]\nplugin = 'harmonic'\n[[comparison]]\nplugin = 'template'\n";

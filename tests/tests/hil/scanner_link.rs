@@ -38,7 +38,7 @@
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
+use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, head, scan, start};
 use platen_engine::plugin::PluginError;
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeCounters};
 
@@ -63,9 +63,9 @@ fn survives_on(bridge: &Bridge) -> BridgeCounters {
     let (reference, columns, points) = undisturbed();
     assert_eq!((end.columns, end.points), (*columns, *points));
     assert!(cells(&lattice) == *reference, "another lattice");
-    let tally = bridge.counters();
-    assert_eq!(tally.scans, 1, "{tally:?}");
-    tally
+    let counters = bridge.counters();
+    assert_eq!(counters.scans, 1, "{counters:?}");
+    counters
 }
 
 #[track_caller]
@@ -94,16 +94,16 @@ fn fails_within(limit: Duration, faults: &[&str], sentence: &str) {
 fn drop_mid_scan_at_every_column() {
     let columns = undisturbed().1;
     for column in 0..=columns {
-        let tally = survives(&[&format!("drop-mid-scan={column}")]);
-        assert_eq!((tally.cuts, tally.connections), (1, 2), "cut before column {column}: {tally:?}");
-        assert!(tally.columns_sent == columns, "none is sent twice: {tally:?}");
+        let counters = survives(&[&format!("drop-mid-scan={column}")]);
+        assert_eq!((counters.cuts, counters.connections), (1, 2), "cut before column {column}: {counters:?}");
+        assert!(counters.columns_sent == columns, "none is sent twice: {counters:?}");
     }
 }
 
 #[test]
 fn drop_often() {
-    let tally = survives(&["drop-often=7"]);
-    assert!(tally.cuts >= 4 && tally.starts == 1, "{tally:?}");
+    let counters = survives(&["drop-often=7"]);
+    assert!(counters.cuts >= 4 && counters.starts == 1, "{counters:?}");
 }
 
 #[test]
@@ -114,14 +114,14 @@ fn sdk_crash_bridge_killed() {
 
 #[test]
 fn reconnect_too_fast() {
-    let tally = survives(&["drop-mid-scan=9", "reconnect-too-fast=700"]);
-    assert_eq!(tally.cuts, 1);
+    let counters = survives(&["drop-mid-scan=9", "reconnect-too-fast=700"]);
+    assert_eq!(counters.cuts, 1);
 }
 
 #[test]
 fn double_start_when_the_reply_is_lost() {
-    let tally = survives(&["reply-lost"]);
-    assert_eq!((tally.starts, tally.scans), (2, 1));
+    let counters = survives(&["reply-lost"]);
+    assert_eq!((counters.starts, counters.scans), (2, 1));
 }
 
 #[test]
@@ -131,14 +131,14 @@ fn slow() {
 
 #[test]
 fn stalled_longer_than_the_driver_waits() {
-    let tally = survives(&["stalled=5000"]);
-    assert!(tally.connections >= 2, "{tally:?}");
+    let counters = survives(&["stalled=5000"]);
+    assert!(counters.connections >= 2, "{counters:?}");
 }
 
 #[test]
 fn corrupt_frame() {
-    let tally = survives(&["corrupt-frame=3"]);
-    assert!(tally.resumes >= 1 && tally.connections == 1, "{tally:?}");
+    let counters = survives(&["corrupt-frame=3"]);
+    assert!(counters.resumes >= 1 && counters.connections == 1, "{counters:?}");
 }
 
 #[test]
@@ -158,8 +158,8 @@ fn oversize() {
 
 #[test]
 fn missing_column() {
-    let tally = survives(&["missing-column=4"]);
-    assert_eq!((tally.resumes, tally.connections), (1, 1));
+    let counters = survives(&["missing-column=4"]);
+    assert_eq!((counters.resumes, counters.connections), (1, 1));
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn connect_later_than_the_driver_waits() {
 
 /// A hundredth of a real scanner's time.
 fn scaled(faults: &[&str]) -> Bridge {
-    start(faults, BridgeConfig { time_scale: 0.01, ..BridgeConfig::default() }, shop())
+    start(faults, BridgeConfig { time_scale: 0.01, ..BridgeConfig::default() }, head())
 }
 
 #[test]
@@ -330,9 +330,9 @@ fn wrong_scanner() {
 
 #[test]
 fn a_bridge_that_sends_after_the_fact_gives_the_same_scan() {
-    survives_on(&start(&[], BridgeConfig { live: false, ..BridgeConfig::default() }, shop()));
+    survives_on(&start(&[], BridgeConfig { live: false, ..BridgeConfig::default() }, head()));
     let cut = BridgeConfig { live: false, time_scale: 0.01, ..BridgeConfig::default() };
-    survives_on(&start(&["drop-mid-scan=13"], cut, shop()));
+    survives_on(&start(&["drop-mid-scan=13"], cut, head()));
 }
 
 #[test]

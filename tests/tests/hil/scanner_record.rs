@@ -7,7 +7,7 @@ use std::net::SocketAddr;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, scan, shop, start};
+use crate::stream::{COARSE, LIMIT, WINDOW, bridge, cells, driver, head, scan, start};
 use platen_engine::plugin::JobSpec;
 use platen_scan::{Face, Lattice, Window};
 use platen_sim_scanner::stream::{
@@ -23,7 +23,7 @@ fn lattice_of(bridge: &Bridge, options: &str, window: &Window) -> Lattice {
 fn a_recording_replays_to_the_last_bit() {
     let folder = tempfile::tempdir().unwrap();
     let config = BridgeConfig { record: Some(folder.path().into()), ..BridgeConfig::default() };
-    let recording = start(&[], config, shop());
+    let recording = start(&[], config, head());
     let recorded = lattice_of(&recording, COARSE, &WINDOW);
     let file = folder.path().join("scan-00001.psb");
     assert!(file.metadata().unwrap().len() > 1000);
@@ -66,11 +66,11 @@ fn a_recording_replays_to_the_last_bit() {
 
 #[test]
 fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
-    let warm = || Instrument { warm_up_columns: 0, ..shop().instrument };
+    let warm = || Instrument { warm_up_columns: 0, ..head().instrument };
     for values in [Values::Range, Values::Polar] {
         let [plain, mirrored] = [false, true].map(|mirrored| {
-            let shop = RayCastHead { values, mirrored, instrument: warm(), ..shop() };
-            lattice_of(&start(&[], BridgeConfig::default(), shop), COARSE, &WINDOW)
+            let head = RayCastHead { values, mirrored, instrument: warm(), ..head() };
+            lattice_of(&start(&[], BridgeConfig::default(), head), COARSE, &WINDOW)
         });
         assert_eq!((plain.n_rows(), plain.n_columns()), (mirrored.n_rows(), mirrored.n_columns()));
         assert!(plain.n_valid() > 700 && plain.n_valid() == mirrored.n_valid());
@@ -86,8 +86,8 @@ fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
 #[test]
 fn a_window_of_more_than_half_a_turn_is_scanned_with_both_faces() {
     let faces = Faces { seam_column: 0, collimation: 0.0, trunnion: 0.0, moved: [0.0; 3] };
-    let shop = RayCastHead { faces: Some(faces), ..shop() };
-    let bridge = start(&["shuffled=12"], BridgeConfig::default(), shop);
+    let head = RayCastHead { faces: Some(faces), ..head() };
+    let bridge = start(&["shuffled=12"], BridgeConfig::default(), head);
     let around = Window { azimuth_start: -0.6 * PI, azimuth_width: 1.2 * PI, ..WINDOW };
     let lattice = lattice_of(&bridge, COARSE, &around);
     let seam = lattice.header().seam_column.unwrap() as usize;

@@ -20,18 +20,18 @@ pub(crate) fn plate() -> PlateState {
 }
 
 /// A scanner before that plate.
-pub(crate) fn shop() -> RayCastHead {
+pub(crate) fn head() -> RayCastHead {
     RayCastHead { threads: 2, ..RayCastHead::new(Box::new(|| Ok(Some(plate())))) }
 }
 
 /// A bridge with these faults, its seed fixed.
 pub(crate) fn bridge(faults: &[&str]) -> Bridge {
-    start(faults, BridgeConfig::default(), shop())
+    start(faults, BridgeConfig::default(), head())
 }
 
-pub(crate) fn start(faults: &[&str], config: BridgeConfig, shop: RayCastHead) -> Bridge {
+pub(crate) fn start(faults: &[&str], config: BridgeConfig, head: RayCastHead) -> Bridge {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-    Bridge::start(BridgeConfig { faults, ..config }, Box::new(shop)).unwrap()
+    Bridge::start(BridgeConfig { faults, ..config }, Box::new(head)).unwrap()
 }
 
 /// The driver as a plant file asks for it; `options` are further lines.
