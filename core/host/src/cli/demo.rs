@@ -23,7 +23,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  platen demo\n\n\
-                        Only steel and light are simulated: platen-sim bends the plate and serves Modbus, the simulated scanner casts rays,\n\
+                        Only steel and light are simulated: platen-sim bends the plate and serves Modbus, the simulated scanner casts rays, \
                         the host measures with the plugin libraries beside the program and writes the results to the press.")]
 pub(super) struct Command {
     /// Folder for the results; an earlier demo there is replaced

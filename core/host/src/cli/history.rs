@@ -25,7 +25,7 @@ use pick::RunRef;
                         platen history sequence config/plant-north.toml 12\n  \
                         platen history export config/plant-north.toml --out strokes.parquet\n  \
                         platen history report config/plant-north.toml 12\n\n\
-                        A stroke is named by its run id (1042) or as plate:stroke (12:3, 12:blank); plates have the numbers of the list.\n\
+                        A stroke is named by its run id (1042) or as plate:stroke (12:3, 12:blank); plates have the numbers of the list. \
                         All verbs only read and may run beside a host.")]
 pub(super) struct Command {
     #[command(subcommand)]

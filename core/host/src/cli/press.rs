@@ -32,8 +32,8 @@ use super::{CliError, Common, output};
                         platen press write-test plant.toml --i-know\n  \
                         platen press test plant.toml --strokes 5  the handshake, step by step, with simulated results\n  \
                         platen press soak -n 10000                against a simulated press; needs no plant file\n\n\
-                        check, map, ping, dump, watch, probe-order, scan-unit and record only read; they may run beside the\n\
-                        host where the press allows two connections. With --json an error has a cause: config, link, protocol,\n\
+                        check, map, ping, dump, watch, probe-order, scan-unit and record only read; they may run beside the \
+                        host where the press allows two connections. With --json an error has a cause: config, link, protocol, \
                         handshake or system.")]
 pub(super) struct Command {
     #[command(subcommand)]

@@ -111,9 +111,9 @@ fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Co
 }
 
 fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
-    let refused = |why: &str| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
-    let document = stroke.document.as_deref().ok_or_else(|| refused("was not measured"))?;
-    output_folder::surface_beside(document).map_err(|_| refused("its surface file is missing"))
+    let refused = |why: String| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
+    let document = stroke.document.as_deref().ok_or_else(|| refused("was not measured".into()))?;
+    output_folder::surface_beside(document).map_err(refused)
 }
 
 /// Refuses plates of different size: their (u, v) do not name the same places.

@@ -12,7 +12,7 @@ use crate::cli::{CliError, Common, output};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history export config/plant-north.toml > strokes.csv\n  \
                         platen history export config/plant-north.toml --out strokes.parquet\n\n\
-                        One row a stroke: identity, times, verdict, data of the press (press.die_id, press.force, ...; newtons, metres, radians)\n\
+                        One row a stroke: identity, times, verdict, data of the press (press.die_id, press.force, ...; newtons, metres, radians) \
                         and every figure (gap.max, deviation.rms, ...; metres, radians, seconds, shares of one). Unknown values are empty.")]
 pub(super) struct Command {
     /// Plant file

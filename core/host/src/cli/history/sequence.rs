@@ -16,8 +16,8 @@ use crate::progress;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  platen history sequence config/plant-north.toml 12\n\n\
-                        feed: distance across the straight lines from the strongest bend of the previous stroke. re-hit: a bend on an\n\
-                        earlier one. overshoot: gap under a template that is bent too far. energy left: elastic energy from the\n\
+                        feed: distance across the straight lines from the strongest bend of the previous stroke. re-hit: a bend on an \
+                        earlier one. overshoot: gap under a template that is bent too far. energy left: elastic energy from the \
                         measured to the target's curvature, as a share of the first stroke's. Formulas: platen_report::sequence.")]
 pub(super) struct Command {
     /// Plant file
