@@ -11,11 +11,8 @@ use platen_sdk::exchange::{AlignedBuffer, Decode, Encode};
 use platen_shape::Surface;
 
 use crate::field_export::PlateTable;
+use crate::picture::{self, Caption, PictureError, StripPoint};
 use crate::result::{LineRecord, PlateRecord, ResultRecord};
-use crate::{
-    picture,
-    picture::{Caption, PictureError, StripPoint},
-};
 
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";

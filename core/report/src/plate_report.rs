@@ -12,12 +12,9 @@ use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord, Stroke
 use platen_model::Verdict;
 
 use crate::history_view;
+use crate::output_folder::{self, FilesError};
+use crate::picture::{self, Caption, StripPoint};
 use crate::result::{CalibrationRecord, ResultRecord};
-use crate::{output_folder, output_folder::FilesError};
-use crate::{
-    picture,
-    picture::{Caption, StripPoint},
-};
 
 const STYLE: &str = include_str!("plate_report/style.css");
 
