@@ -63,14 +63,11 @@ impl ShapeChecksRecord {
         let edges = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
         let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];
         let mut rows = Vec::new();
-        let lengths: [(&str, fn(&EdgeRecord) -> CheckRecord); 3] = [
-            ("along the mid-surface", |edge| edge.mid_mm),
-            ("tape on the face", |edge| edge.face_mm),
-            ("straight", |edge| edge.chord_mm),
-        ];
-        for (how, length) in lengths {
-            let row = |(name, edge)| (format!("{name}, {how}"), length(edge), "mm");
-            rows.extend(edges.iter().zip(&self.edges).map(row));
+        for (k, how) in ["along the mid-surface", "tape on the face", "straight"].into_iter().enumerate() {
+            for (name, edge) in edges.iter().zip(&self.edges) {
+                let length = [edge.mid_mm, edge.face_mm, edge.chord_mm][k];
+                rows.push((format!("{name}, {how}"), length, "mm"));
+            }
         }
         rows.push(("diagonal (0, 0) to (W, H)".into(), self.diagonals_mm[0], "mm"));
         rows.push(("diagonal (W, 0) to (0, H)".into(), self.diagonals_mm[1], "mm"));
