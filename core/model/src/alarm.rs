@@ -1,18 +1,18 @@
-//! The table of alarms: the one source of code, text and remedy for registers, log, `status` and the HMI's list.
+//! Table of alarms: the only source of code, text and remedy for registers, log, `status` and the list of the HMI.
 
 use serde::{Deserialize, Serialize};
 
-/// How bad it is.
+/// Severity of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// Measuring is affected: goes to `error_code`, latched until reset.
+    /// Measuring is affected: `error_code`, latched until reset.
     Error,
-    /// To be looked at: goes to `warning_code`.
+    /// Attention required: `warning_code`.
     Warning,
 }
 
 impl Severity {
-    /// In one word.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Error => "error",
@@ -31,24 +31,24 @@ pub enum Language {
     Ja,
 }
 
-/// One row of the table.
+/// A row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Alarm {
-    /// Which one.
+    /// Number.
     pub code: Code,
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     text: [&'static str; 2],
     remedy: [&'static str; 2],
 }
 
 impl Alarm {
-    /// What is wrong.
+    /// Returns the fault.
     pub fn text(&self, language: Language) -> &'static str {
         self.text[language as usize]
     }
 
-    /// What to do.
+    /// Returns the remedy.
     pub fn remedy(&self, language: Language) -> &'static str {
         self.remedy[language as usize]
     }
@@ -66,7 +66,7 @@ macro_rules! alarms {
             /// All of them, by number.
             pub const ALL: &'static [Self] = &[$(Self::$code,)*];
 
-            /// Its row of the table.
+            /// Returns its row of the table.
             pub fn alarm(self) -> &'static Alarm {
                 match self {
                     $(Self::$code => &Alarm {
@@ -151,7 +151,7 @@ alarms! {
 }
 
 impl Code {
-    /// The number in the registers.
+    /// Returns the number in the registers.
     pub fn number(self) -> u16 {
         self as u16
     }

@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 /// The measures from one list: variant, name and meaning.
 macro_rules! measures {
     ($($variant:ident $name:literal $meaning:literal)*) => {
-        /// A figure of a measurement, as the host hands it over: metres, radians, seconds, shares of one.
+        /// A figure of a measurement, in the units inside: metres, radians, seconds, shares of one.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         pub enum Measure { $(#[doc = $meaning] #[serde(rename = $name)] $variant,)* }
 
         impl Measure {
-            /// All of them.
+            /// Every measure.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
             /// Returns the name in findings, in the plant file and in the record.

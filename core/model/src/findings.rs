@@ -47,9 +47,9 @@ pub struct TemplateFinding {
     pub max_gap: f64,
     /// Its expanded uncertainty (95 %), metres.
     pub uncertainty: f64,
-    /// Where it is.
+    /// Its place.
     pub max_gap_at: [f64; 2],
-    /// Where the template touches.
+    /// Contacts.
     pub contacts: Vec<Contact>,
     /// Place of the template's first end along the line, metres.
     pub start: f64,
@@ -57,7 +57,7 @@ pub struct TemplateFinding {
     pub gap: Vec<f64>,
     /// Largest gap that passes, metres.
     pub limit: f64,
-    /// -1 not bent enough, 0 within, 1 bent too far.
+    /// -1 under-bent, 0 within the limit, 1 over-bent.
     pub sense: i8,
     /// Judgement.
     pub verdict: Verdict,

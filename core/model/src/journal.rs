@@ -18,7 +18,7 @@ pub enum Record {
         key: StrokeKey,
         /// Key of its record.
         run_id: u32,
-        /// What the press said about it.
+        /// Data of the press about it.
         data: Box<StrokeData>,
     },
     /// The scan is taken.
@@ -28,17 +28,17 @@ pub enum Record {
     },
     /// The result is going to be published.
     Finished(Box<Publication>),
-    /// The press has the result, or never will.
+    /// The stroke is closed.
     Acked {
         /// The stroke.
         key: StrokeKey,
-        /// How it ended.
+        /// Acknowledgement.
         how: Acknowledgement,
     },
 }
 
 impl Record {
-    /// The stroke it belongs to.
+    /// Returns the stroke.
     pub fn key(&self) -> StrokeKey {
         match self {
             Self::Accepted { key, .. } | Self::Scanned { key } | Self::Acked { key, .. } => *key,
@@ -46,7 +46,7 @@ impl Record {
         }
     }
 
-    /// The step it records.
+    /// Returns the step.
     pub fn stage(&self) -> Stage {
         match self {
             Self::Accepted { .. } => Stage::Accepted,
@@ -57,7 +57,7 @@ impl Record {
     }
 }
 
-/// How far a stroke has come, in this order.
+/// Stages of a stroke, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
@@ -65,21 +65,21 @@ pub enum Stage {
     Accepted,
     /// Scanned, not judged.
     Scanned,
-    /// Judged, the press may not have it.
+    /// Judged; the press may not have the result.
     Finished,
-    /// Done with.
+    /// Closed.
     Acked,
 }
 
-/// How the press took a result.
+/// Acknowledgement of a result by the press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Acknowledgement {
-    /// It raised its acknowledge.
+    /// The press raised its acknowledge bit.
     Explicit,
-    /// It went on to the next stroke while the result stood in the registers.
+    /// The press continued with the next stroke while the result was in the registers.
     NextStroke,
-    /// It went on, or restarted, before the result was in the registers: the record alone has it.
+    /// The press continued or restarted before the result was in the registers: only the record has it.
     Never,
 }
 
@@ -90,18 +90,18 @@ pub struct Entry {
     pub key: StrokeKey,
     /// Key of its record.
     pub run_id: u32,
-    /// What the press said about it.
+    /// Data of the press about it.
     pub data: StrokeData,
-    /// How far it came.
+    /// Its stage.
     pub stage: Stage,
     /// Its result; `Some` from [`Stage::Finished`] on.
     pub publication: Option<Publication>,
 }
 
-/// What the journal knows when the host starts.
+/// State of the journal at the start of the host.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recalled {
-    /// Random number of this installation, drawn once, never 0: tells a second host on the same press.
+    /// Random number of this installation, drawn once, never 0: identifies this host among the hosts of a press.
     pub owner: u16,
     /// `seq` of the last publication, 0 before the first.
     pub result_seq: u16,
@@ -114,12 +114,12 @@ pub struct Recalled {
 }
 
 impl Recalled {
-    /// The journal of a new installation.
+    /// Returns the journal of a new installation.
     pub fn empty(owner: u16) -> Self {
         Self { owner, result_seq: 0, run_id: 0, last: None, attempts: BTreeMap::new() }
     }
 
-    /// Takes in the next record of a journal that is read from its beginning.
+    /// Applies the next record of a journal that is read from its beginning.
     pub fn replay(&mut self, record: &Record) {
         if let Record::Accepted { key, run_id, data } = record {
             if self.last.as_ref().is_some_and(|last| last.key.session != key.session) {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct StrokeKey {
     /// Plant number of the press.
     pub press: u16,
-    /// Number that the press changes when it restarts or the part changes; 0 where it has none.
+    /// Session: a number that the press changes when it restarts or the part changes; 0 without one.
     pub session: u16,
     /// Number of the stroke.
     pub stroke: u16,
@@ -65,7 +65,7 @@ pub struct StrokeData {
     pub dry_run: bool,
 }
 
-/// A moment in UTC, as two registers' worth of seconds and milliseconds.
+/// A time in UTC as seconds and milliseconds, which fit registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Timestamp {
     /// Seconds since 1970-01-01.

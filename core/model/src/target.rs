@@ -7,26 +7,26 @@ use serde::{Deserialize, Serialize};
 pub struct Target {
     /// Shape.
     pub shape: TargetShape,
-    /// Which surface the radii are those of.
+    /// Surface that the radii refer to.
     pub radius_of: RadiusOf,
-    /// Which face of the target the scanner sees.
+    /// Face of the target that the scanner sees.
     pub scanned_face: Facing,
 }
 
-/// Target shapes. Radii in metres, positive; directions are those of the straight lines, from u towards v, radians.
+/// Target shapes. Radii in metres, positive; directions are those of the generators, from u towards v, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum TargetShape {
     /// A plane.
     Flat,
-    /// Straight along `axis`.
+    /// Cylinder with straight generators along `axis`.
     Cylinder {
         /// Radius.
         radius: f64,
         /// Direction of the straight lines.
         axis: f64,
     },
-    /// Straight along `axis` in the middle of the plate, the radius changing along it.
+    /// Cone: the middle generator runs along `axis`, and the radius varies linearly along it.
     Cone {
         /// Direction of the middle straight line.
         axis: f64,
@@ -35,12 +35,12 @@ pub enum TargetShape {
         /// Radius at its last end.
         radius_end: f64,
     },
-    /// The same in every direction.
+    /// Sphere.
     Sphere {
         /// Radius.
         radius: f64,
     },
-    /// Two radii; a negative cross radius curves the other way.
+    /// Torus: two radii; a negative cross radius curves to the other side.
     Torus {
         /// Direction in which `radius` is measured.
         axis: f64,
@@ -51,7 +51,7 @@ pub enum TargetShape {
     },
 }
 
-/// Which surface a radius is that of.
+/// Surface that a radius refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RadiusOf {

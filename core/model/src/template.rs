@@ -15,7 +15,7 @@ pub struct Template {
     pub centre: Centre,
     /// Largest gap that passes, metres.
     pub limit: f64,
-    /// How it is held.
+    /// Seat.
     pub seat: Seat,
     /// Origin of the rule, printed beside its verdict. Not sent to plugins.
     #[serde(skip)]
@@ -32,7 +32,7 @@ pub enum Centre {
     Worst,
 }
 
-/// How a template is held.
+/// Seat of a template on the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Seat {

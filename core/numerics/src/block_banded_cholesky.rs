@@ -18,7 +18,7 @@ use crate::vector_registers::ClearVectorRegisters;
 /// Rows of the net that one B-spline reaches back to.
 const REACH: usize = 3;
 
-/// How the coefficients of a net are laid out in blocks.
+/// Layout of the coefficients of a net in blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Layout {
     n_u: usize,

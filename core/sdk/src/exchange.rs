@@ -66,7 +66,7 @@ pub trait Encode {
     /// Writes the value into a zeroed buffer of as many bytes as `allocate` is asked for.
     ///
     /// # Errors
-    /// Those of `allocate`.
+    /// The errors of `allocate`.
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E>;
 
     /// Writes the value into a buffer of its own.

@@ -104,7 +104,7 @@ impl Extractor {
     /// Adds a column. One that was added before is ignored.
     ///
     /// # Errors
-    /// Those of [`Column::check`]; the column is then not added.
+    /// As [`Column::check`]; the column is then not added.
     pub fn push(&mut self, column: &Column) -> Result<(), ColumnError> {
         column.check(self.header.n_rows)?;
         if self.columns.get(column.index).is_some() {

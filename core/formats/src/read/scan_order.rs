@@ -105,7 +105,7 @@ impl Steps {
         rows.collect()
     }
 
-    /// Median move from column to column, the columns told apart by the elevation falling back.
+    /// Median move from column to column, columns separated where the elevation falls back.
     fn azimuth_step(&self, hits: &[Direction], elevations: &[f64]) -> Result<f64, Reason> {
         let falls_back = |(i, e): (usize, &f64)| (e / self.elevation < -0.5).then_some(i + 1);
         let breaks: Vec<usize> = elevations.iter().enumerate().filter_map(falls_back).collect();

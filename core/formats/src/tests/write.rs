@@ -35,7 +35,7 @@ pub(super) fn intensity(row: u32, column: u32) -> f64 {
     f64::from(row * COLUMNS + column)
 }
 
-/// How missing cells are written.
+/// Representation of missing cells.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Gaps {
     Flagged,
@@ -44,7 +44,7 @@ pub(super) enum Gaps {
     Nan,
 }
 
-/// How an E57 file is written.
+/// Settings of a written E57 file.
 #[derive(Clone, Copy)]
 pub(super) struct E57Style {
     pub(super) spherical: bool,
@@ -170,7 +170,7 @@ fn add_cloud(writer: &mut Writer<'_>, style: E57Style, number: usize, descriptio
     cloud.finalize().unwrap();
 }
 
-/// How a PTX file is written.
+/// Settings of a written PTX file.
 #[derive(Clone, Copy)]
 pub(super) struct PtxStyle {
     pub(super) header_end: &'static str,

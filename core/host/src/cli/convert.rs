@@ -18,7 +18,7 @@ use platen_formats::ScanFile;
 pub(super) struct Command {
     /// Scan file: structured E57, PTX, XYZ with row and column, XYB
     input: PathBuf,
-    /// New file; its ending says the format: .e57, .ptx, .xyz or .xyb
+    /// New file; its ending selects the format: .e57, .ptx, .xyz or .xyb
     output: PathBuf,
     /// Which scan of a file that holds several, from 1
     #[arg(long, value_name = "N")]

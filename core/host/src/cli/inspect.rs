@@ -30,7 +30,7 @@ pub(super) struct Command {
     picture: Option<PathBuf>,
 }
 
-/// What was counted while the columns came by.
+/// Counters of a pass over the columns.
 #[derive(Debug, Default)]
 struct Counts {
     columns: u32,

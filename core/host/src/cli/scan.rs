@@ -24,7 +24,7 @@ const OPEN_LIMIT: Duration = Duration::from_secs(60);
 pub(super) struct Command {
     /// Plant file: which scanner, and how it is reached
     plant: PathBuf,
-    /// New file; its ending says the format: .e57, .ptx, .xyz or .xyb
+    /// New file; its ending selects the format: .e57, .ptx, .xyz or .xyb
     output: PathBuf,
     /// Scan only this part: first azimuth, width counter-clockwise, lowest and highest elevation, degrees
     #[arg(long, value_name = "AZ,WIDTH,LOW,HIGH", allow_hyphen_values = true, value_parser = window)]

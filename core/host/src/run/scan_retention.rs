@@ -1,7 +1,7 @@
 //! Retention of raw scans beside their results.
 //!
 //! A scan stays in memory until its result has gone to the press; then a thread of its own writes it as
-//! `run-NNNNNN/scan.e57`, which `platen measure` reads back to the last bit. Scans older than the plant file says are
+//! `run-NNNNNN/scan.e57`, which `platen measure` reads back to the last bit. Scans older than the plant file allows are
 //! removed; no other file is. Results have priority: when the disk runs low, or while the scan before is still being
 //! written, the scan is not kept and the log names the reason.
 

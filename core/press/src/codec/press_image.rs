@@ -11,7 +11,7 @@ use crate::{StrokeData, Timestamp};
 pub struct PressImage {
     /// Heartbeat; `None` where the press has none.
     pub heartbeat: Option<u16>,
-    /// The press wants strokes measured.
+    /// Measuring is enabled.
     pub enable: bool,
     /// A stroke waits to be measured.
     pub trigger: bool,

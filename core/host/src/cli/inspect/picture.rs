@@ -1,8 +1,7 @@
-//! A picture of a scan as the scanner saw it.
+//! Picture of a scan in the scanner's view: equirectangular, every pixel the same angle.
 //!
-//! Every pixel is the same angle wide and high, left is left. Colour says how far away the nearest surfaces are (dark
-//! violet near, yellow far; each colour covers as much of the picture as any other), brightness how strong the echo was;
-//! black is where nothing came back.
+//! Colour is the range of the nearest surface, histogram-equalised from dark violet (near) to yellow (far); brightness is
+//! the intensity; black is no return.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -20,7 +19,7 @@ const DIM: f64 = 0.5;
 /// Nothing came back.
 const NOTHING: [u8; 3] = [0, 0, 0];
 
-/// What fell into one pixel.
+/// Samples of one pixel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pixel {
     range_m: f32,
