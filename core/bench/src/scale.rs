@@ -160,19 +160,19 @@ fn here(
 
 fn print(rows: &[Row]) -> Result<(), CliError> {
     output::line("\nFrom a table scan to a full dome, columns streamed (CPU ms, MB)")?;
-    let mut table = vec![output::head(
-        "lattice | cells | on the plate | columns ms | extract ms | measure ms | raw lattice MB | peak MB",
-    )];
-    for row in rows {
+    let cells = |row: &Row| {
         let peak = row.peak_mb.map_or("-".to_owned(), |mb| format!("{mb:.0}"));
         let times = [row.columns_ms, row.extract_ms, row.measure_ms].map(|ms| format!("{ms:.0}"));
         let [columns, extract, measure] = times;
         let cells = format!("{} x {}", row.rows, row.columns);
         let plate = row.plate_points.to_string();
         let raw = format!("{:.0}", row.raw_lattice_mb);
-        table.push(vec![row.lattice.clone(), cells, plate, columns, extract, measure, raw, peak]);
-    }
-    output::table(&table)?;
+        vec![row.lattice.clone(), cells, plate, columns, extract, measure, raw, peak]
+    };
+    output::titled(
+        "lattice | cells | on the plate | columns ms | extract ms | measure ms | raw lattice MB | peak MB",
+        rows.iter().map(cells),
+    )?;
     output::line(
         "columns: while they arrive, parallel to the scanner; extract: from the last column to the plate's face; measure: from there to \
          S(u, v). Peak memory: of the whole process, ray caster included.",

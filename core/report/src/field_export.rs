@@ -33,7 +33,6 @@ struct Node {
     seen: bool,
 }
 
-/// One component of a field.
 #[derive(Debug, Clone)]
 struct Column {
     /// Name with its unit, e.g. `deviation_mm`.

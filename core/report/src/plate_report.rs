@@ -32,7 +32,6 @@ pub enum ReportError {
     Files(#[from] FilesError),
 }
 
-/// Stroke in the report.
 struct Entry<'a> {
     stroke: &'a Stroke,
     /// Its document, or the reason why there is none.

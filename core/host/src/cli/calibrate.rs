@@ -247,21 +247,13 @@ fn artefact(
 }
 
 fn print(summary: &Summary) -> Result<(), CliError> {
-    let mut rows = vec![output::head("scans | differ by mm | stated mm")];
-    for pair in &summary.pairs {
-        let [a, b] = pair.scans;
-        rows.push(vec![
-            format!("{a} and {b}"),
-            format!("{:.3}", pair.difference_mm),
-            format!("{:.3}", pair.stated_mm),
-        ]);
-    }
-    output::table(&rows)?;
+    let row = |PairRecord { scans: [a, b], difference_mm, stated_mm }: &PairRecord| {
+        vec![format!("{a} and {b}"), format!("{difference_mm:.3}"), format!("{stated_mm:.3}")]
+    };
+    output::titled("scans | differ by mm | stated mm", summary.pairs.iter().map(row))?;
     if summary.pairs.len() < FEW_PAIRS {
-        output::line(&format!(
-            "only {} pairs: four scans or more make the estimate steady",
-            summary.pairs.len()
-        ))?;
+        let pairs = summary.pairs.len();
+        output::line(&format!("only {pairs} pairs: four scans or more make the estimate steady"))?;
     }
     output::line(&format!("correlated error of a pair: {:.3} mm", summary.sigma_correlated_mm))?;
     for gap in &summary.artefact {

@@ -105,15 +105,12 @@ fn summary(
     after_stop: Vec<u16>,
     elapsed: Duration,
 ) -> Result<ExitCode, CliError> {
-    let mut rows = vec![output::head(
-        "stroke | trigger to busy ms | scan ms | evaluation ms | stroke to result ms | gap before mm | gap after mm | verdict",
-    )];
+    let mut rows = Vec::new();
     let mut documents = Vec::new();
     let mut before = None;
     for report in reports {
         let timed = accepted.iter().find(|t| t.is(report.key.stroke, report.key.session, report.key.attempt));
         let gap = gap_mm(report);
-        let number = |value: Option<f64>| value.map(|v| format!("{v:.0}")).unwrap_or_default();
         let length =
             |gap: Option<(f64, f64)>| gap.map(|(g, u)| format!("{g:.2} +- {u:.2}")).unwrap_or_default();
         let record = report.result.as_ref().ok();
@@ -122,10 +119,10 @@ fn summary(
         let verdict = record.map_or(Verdict::NotMeasured, |r| r.verdict).words();
         rows.push(vec![
             if report.baseline { "blank".to_owned() } else { report.key.stroke.to_string() },
-            number(timed.map(|t| t.accepted_ms)),
-            number(scan_ms),
-            number(evaluation_ms),
-            number(timed.map(|t| t.result_ms)),
+            output::number(timed.map(|t| t.accepted_ms), 0),
+            output::number(scan_ms, 0),
+            output::number(evaluation_ms, 0),
+            output::number(timed.map(|t| t.result_ms), 0),
             length(before),
             length(gap),
             verdict.to_owned(),
@@ -152,7 +149,10 @@ fn summary(
             "elapsed_s": elapsed.as_secs_f64(), "folder": command.out,
         }))?;
     } else {
-        output::table(&rows)?;
+        output::titled(
+            "stroke | trigger to busy ms | scan ms | evaluation ms | stroke to result ms | gap before mm | gap after mm | verdict",
+            rows,
+        )?;
         let plate = if passed { "the plate is in tolerance" } else { "the plate is not in tolerance" };
         let words = if correct {
             "the press holds the last stroke's result"

@@ -39,14 +39,8 @@ pub(super) fn run(common: &Common, command: &Command, mut clap: Clap) -> Result<
             std::fs::create_dir_all(folder)
                 .and_then(|()| clap_mangen::generate_to(clap, folder))
                 .map_err(failed)?;
-            if common.json {
-                output::json(&serde_json::json!({ "folder": folder }))?;
-            } else {
-                output::line(&format!(
-                    "wrote {}; man -l {0}/platen.1 shows the first page",
-                    folder.display()
-                ))?;
-            }
+            let text = format!("wrote {}; man -l {0}/platen.1 shows the first page", folder.display());
+            output::either(common, &serde_json::json!({ "folder": folder }), &text)?;
         }
         Verb::Completions { shell } => {
             let mut script = Vec::new();

@@ -91,11 +91,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             let folder = out.as_ref().unwrap_or(&plant.output.folder);
             std::fs::create_dir_all(folder)?;
             let path = plate_report::write(&archive, &plant.name, *plate, folder)?;
-            if common.json {
-                output::json(&serde_json::json!({ "report": path }))?;
-            } else {
-                output::line(&format!("wrote {}", path.display()))?;
-            }
+            let text = format!("wrote {}", path.display());
+            output::either(common, &serde_json::json!({ "report": path }), &text)?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -116,33 +113,26 @@ fn verdict(stroke: &Stroke) -> String {
     }
 }
 
-fn length(stroke: &Stroke, figure: &str) -> String {
-    stroke.figures.get(figure).map(|metres| format!("{:.1}", mm(*metres))).unwrap_or_default()
-}
-
 fn list(strokes: &[Stroke]) -> Result<(), CliError> {
-    let mut rows = vec![output::head(
-        "run | accepted | plate | session | stroke | attempt | verdict | gap mm | +- mm | acknowledged",
-    )];
-    for stroke in strokes {
-        rows.push(vec![
+    let row = |stroke: &Stroke| {
+        let length = |name: &str| stroke.figures.get(name).copied().map(mm);
+        vec![
             stroke.run_id.to_string(),
             stroke.accepted.strftime("%F %T").to_string(),
             stroke.plate.to_string(),
             stroke.key.session.to_string(),
-            if stroke.baseline {
-                format!("{} baseline", stroke.key.stroke)
-            } else {
-                stroke.key.stroke.to_string()
-            },
+            format!("{}{}", stroke.key.stroke, if stroke.baseline { " baseline" } else { "" }),
             stroke.key.attempt.to_string(),
             verdict(stroke),
-            length(stroke, "gap.max"),
-            stroke.figures.get("gap.uncertainty").map(|u| format!("{:.2}", mm(*u))).unwrap_or_default(),
+            output::number(length("gap.max"), 1),
+            output::number(length("gap.uncertainty"), 2),
             stroke.ack.clone().unwrap_or_default(),
-        ]);
-    }
-    output::table(&rows)
+        ]
+    };
+    output::titled(
+        "run | accepted | plate | session | stroke | attempt | verdict | gap mm | +- mm | acknowledged",
+        strokes.iter().map(row),
+    )
 }
 
 fn show(stroke: &Stroke) -> Result<(), CliError> {

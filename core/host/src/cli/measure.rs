@@ -149,32 +149,21 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     if let Some(outline) = &record.outline {
         output::line(&format!("outline: {}", outline.words()))?;
     }
-    let mut rows = vec![output::head("place | u mm | v mm | x m | y m | z m | +- mm")];
     let (w, h) = record.extent_mm();
     let ordered = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
     let corners_mm = record.outline.as_ref().map_or(ordered, |outline| outline.corners_mm);
-    for (corner, [u, v]) in record.corners_m.iter().zip(corners_mm) {
-        rows.push(row("corner", u, v, corner, None));
-    }
-    for marker in &record.markers {
-        rows.push(row(
-            &marker.name,
-            marker.u_mm,
-            marker.v_mm,
-            &marker.position_m,
-            Some(marker.uncertainty_mm),
-        ));
-    }
-    output::table(&rows)?;
-    let checks = record.shape_checks.rows();
-    let mut rows = vec![output::head("check | value | +- (95 %) | unit | seen")];
-    rows.extend(checks.iter().map(|(name, check, unit)| {
-        let digits = if *unit == "mm" { 1 } else { 3 };
+    let corners = record.corners_m.iter().zip(corners_mm);
+    let corners = corners.map(|(corner, [u, v])| row("corner", u, v, corner, None));
+    let markers =
+        record.markers.iter().map(|m| row(&m.name, m.u_mm, m.v_mm, &m.position_m, Some(m.uncertainty_mm)));
+    output::titled("place | u mm | v mm | x m | y m | z m | +- mm", corners.chain(markers))?;
+    let checks = record.shape_checks.rows().into_iter().map(|(name, check, unit)| {
+        let digits = if unit == "mm" { 1 } else { 3 };
         let number = |value: f64| format!("{value:.digits$}");
         let seen = if check.seen { "yes" } else { "corner not seen" };
-        vec![name.clone(), number(check.value), number(check.uncertainty), (*unit).into(), seen.into()]
-    }));
-    output::table(&rows)?;
+        vec![name, number(check.value), number(check.uncertainty), unit.into(), seen.into()]
+    });
+    output::titled("check | value | +- (95 %) | unit | seen", checks)?;
     let t = &record.timings_ms;
     output::line(&format!(
         "ms: acquire {:.0}, extract {:.0}, outline {:.0}, mesh {:.0}, flatten {:.0}, surface {:.0}, compare {:.0}; \
@@ -184,7 +173,6 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
 }
 
 fn row(name: &str, u: f64, v: f64, [x, y, z]: &[f64; 3], uncertainty: Option<f64>) -> Vec<String> {
-    let uncertainty = uncertainty.map(|mm| format!("{mm:.2}")).unwrap_or_default();
     vec![
         name.to_owned(),
         format!("{u:.0}"),
@@ -192,6 +180,6 @@ fn row(name: &str, u: f64, v: f64, [x, y, z]: &[f64; 3], uncertainty: Option<f64
         format!("{x:.4}"),
         format!("{y:.4}"),
         format!("{z:.4}"),
-        uncertainty,
+        output::number(uncertainty, 2),
     ]
 }

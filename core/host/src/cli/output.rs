@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use super::CliError;
+use super::{CliError, Common};
 
 /// Prints one line to stdout; a closed pipe ends the output quietly.
 pub fn line(text: &str) -> Result<(), CliError> {
@@ -19,9 +19,20 @@ pub fn json(document: &impl serde::Serialize) -> Result<(), CliError> {
     line(&text)
 }
 
-/// Splits the head of a table at ` | `.
-pub fn head(cells: &str) -> Vec<String> {
-    cells.split(" | ").map(str::to_owned).collect()
+/// Prints the document with `--json`, else the line.
+pub fn either(common: &Common, document: &impl serde::Serialize, text: &str) -> Result<(), CliError> {
+    if common.json { json(document) } else { line(text) }
+}
+
+/// Formats a number that may be unknown; then the cell stays empty.
+pub fn number(value: Option<f64>, digits: usize) -> String {
+    value.map(|value| format!("{value:.digits$}")).unwrap_or_default()
+}
+
+/// Prints a table with this head, whose cells are separated by ` | `.
+pub fn titled(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Result<(), CliError> {
+    let head = head.split(" | ").map(str::to_owned).collect();
+    table(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
 
 /// Prints a table: columns as wide as their widest cell, the first row is the head.

@@ -60,17 +60,14 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 }
 
 fn list(listed: &[Listed]) -> Result<(), CliError> {
-    let mut rows = vec![output::head("plugin | kind | version | state")];
-    for Listed { path, plugin } in listed {
-        rows.push(match plugin {
-            Ok(p) => vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()],
-            Err(error) => {
-                let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                vec![file, "-".into(), "-".into(), format!("refused: {error}")]
-            }
-        });
-    }
-    output::table(&rows)
+    let row = |Listed { path, plugin }: &Listed| match plugin {
+        Ok(p) => vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()],
+        Err(error) => {
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            vec![file, "-".into(), "-".into(), format!("refused: {error}")]
+        }
+    };
+    output::titled("plugin | kind | version | state", listed.iter().map(row))
 }
 
 fn listed_json(listed: &Listed) -> Json {

@@ -287,7 +287,6 @@ fn map(common: &Common, press: &Press, format: Format, language: AlarmLanguage) 
     }
 }
 
-/// Returns the alarm table as JSON.
 fn alarms(language: Language) -> Vec<serde_json::Value> {
     let row = |code: &Code| {
         let alarm = code.alarm();

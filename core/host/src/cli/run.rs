@@ -87,7 +87,6 @@ impl From<HostError> for CliError {
     }
 }
 
-/// Prints one stroke as a line.
 fn print(report: &StrokeReport, json: bool) -> Result<(), CliError> {
     if json {
         let (verdict, why) = match &report.result {

@@ -68,19 +68,16 @@ pub(super) fn check_output(path: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Says what was written.
 pub(super) fn say(common: &Common, path: &Path, written: &Written) -> Result<ExitCode, CliError> {
     let Written { rows, columns, points, bytes } = *written;
-    if common.json {
-        output::json(&serde_json::json!({
-            "file": path, "rows": rows, "columns": columns, "valid": points, "bytes": bytes,
-        }))?;
-    } else {
-        let megabytes = bytes as f64 / 1e6;
-        output::line(&format!(
-            "wrote {}: {rows} rows x {columns} columns, {points} valid cells, {megabytes:.1} MB",
-            path.display()
-        ))?;
-    }
+    let megabytes = bytes as f64 / 1e6;
+    let text = format!(
+        "wrote {}: {rows} rows x {columns} columns, {points} valid cells, {megabytes:.1} MB",
+        path.display()
+    );
+    let json = serde_json::json!({
+        "file": path, "rows": rows, "columns": columns, "valid": points, "bytes": bytes,
+    });
+    output::either(common, &json, &text)?;
     Ok(ExitCode::SUCCESS)
 }

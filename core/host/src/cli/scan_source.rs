@@ -50,17 +50,14 @@ pub(super) fn follow<'a>(
 }
 
 impl ShownScan<'_> {
-    /// Returns the header of the scan.
     pub(super) fn header(&self) -> &ScanHeader {
         self.scan.header()
     }
 
-    /// Ends the scan.
     pub(super) fn finish(mut self) -> Result<ScanEnd, CliError> {
         self.scan.finish().map_err(|e| failed(self.file, e))
     }
 
-    /// Writes the scan to a new file.
     pub(super) fn write(mut self, mut file: ScanFile) -> Result<Written, CliError> {
         let mut writer = file.writer(self.header())?;
         for column in &mut self {

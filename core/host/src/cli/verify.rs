@@ -8,11 +8,11 @@ use std::process::ExitCode;
 use clap::Args;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::stroke::Baseline;
+use platen_model::Marker;
 use platen_model::units::{metres, mm};
 use platen_plant::PlateFile;
 use platen_report::output_folder;
 use platen_shape::inspection::marker_detection::{DetectedMarker, NoMarker, detect_marker};
-use platen_shape::{Measured, Scanned};
 
 use super::setup::Setup;
 use super::{CliError, Common, measure, output};
@@ -60,7 +60,6 @@ struct Summary {
     within_limit: bool,
 }
 
-/// Marker and its disc.
 #[derive(Debug, Serialize)]
 struct MarkerRecord {
     name: String,
@@ -91,7 +90,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         measure::measure_file(&catalogue, &mut rig, &command.scan, &plate, None, Baseline::None)?;
     progress::done();
 
-    let discs = detect(command, &plate, &scanned, &measured);
+    let surface = &measured.measurement.surface;
+    let detect = |m: &Marker| detect_marker(&scanned.patch, surface, m.at, metres(command.within_mm));
+    let discs: Vec<_> = plate.markers.iter().map(detect).collect();
     if let Some(file) = &command.picture {
         let drawn = picture::draw(&scanned.patch, &measured.measurement, &plate, &discs);
         let drawn = drawn.map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
@@ -104,17 +105,6 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         print(&summary)?
     }
     Ok(if summary.within_limit { ExitCode::SUCCESS } else { ExitCode::from(1) })
-}
-
-fn detect(
-    command: &Command,
-    plate: &PlateFile,
-    scanned: &Scanned,
-    measured: &Measured,
-) -> Vec<Result<DetectedMarker, NoMarker>> {
-    let reach = metres(command.within_mm);
-    let surface = &measured.measurement.surface;
-    plate.markers.iter().map(|marker| detect_marker(&scanned.patch, surface, marker.at, reach)).collect()
 }
 
 fn summarize(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarker, NoMarker>]) -> Summary {
@@ -155,30 +145,30 @@ fn summarize(command: &Command, plate: &PlateFile, discs: &[Result<DetectedMarke
 }
 
 fn print(summary: &Summary) -> Result<(), CliError> {
-    let mut rows =
-        vec![output::head("marker | u mm | v mm | off along u | along v | distance mm | known to mm | disc")];
-    let number =
-        |value: Option<f64>, digits: usize| value.map(|v| format!("{v:.digits$}")).unwrap_or_default();
-    for marker in &summary.markers {
-        rows.push(vec![
+    let offset = |value: Option<f64>| value.map(|v| format!("{v:+.2}")).unwrap_or_default();
+    let row = |marker: &MarkerRecord| {
+        vec![
             marker.name.clone(),
             format!("{:.0}", marker.u_mm),
             format!("{:.0}", marker.v_mm),
-            marker.off_u_mm.map(|v| format!("{v:+.2}")).unwrap_or_default(),
-            marker.off_v_mm.map(|v| format!("{v:+.2}")).unwrap_or_default(),
-            number(marker.distance_mm, 2),
-            number(marker.known_to_mm, 2),
+            offset(marker.off_u_mm),
+            offset(marker.off_v_mm),
+            output::number(marker.distance_mm, 2),
+            output::number(marker.known_to_mm, 2),
             marker.says.clone(),
-        ]);
-    }
-    output::table(&rows)?;
+        ]
+    };
+    output::titled(
+        "marker | u mm | v mm | off along u | along v | distance mm | known to mm | disc",
+        summary.markers.iter().map(row),
+    )?;
     let n_found = summary.markers.iter().filter(|marker| marker.distance_mm.is_some()).count();
     output::line(&format!(
         "{n_found} of {} discs found: mean {} mm, std {} mm, largest {} mm, limit {:.1} mm: {}",
         summary.markers.len(),
-        number(summary.mean_mm, 2),
-        number(summary.std_mm, 2),
-        number(summary.max_mm, 2),
+        output::number(summary.mean_mm, 2),
+        output::number(summary.std_mm, 2),
+        output::number(summary.max_mm, 2),
         summary.limit_mm,
         if summary.within_limit { "within" } else { "outside" }
     ))

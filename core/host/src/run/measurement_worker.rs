@@ -66,7 +66,6 @@ struct ActiveStroke {
     scanned_at: jiff::Timestamp,
 }
 
-/// A stroke with its result.
 struct JudgedStroke {
     answer: Measurement,
     record: ResultRecord,
@@ -76,7 +75,6 @@ struct JudgedStroke {
     folder: Option<PathBuf>,
 }
 
-/// State of the worker.
 #[derive(Debug)]
 pub(super) struct MeasurementWorker {
     plant: PlantFile,
@@ -97,12 +95,9 @@ pub(super) struct MeasurementWorker {
     active: Option<ActiveStroke>,
 }
 
-/// Receivers of the worker's results.
 #[derive(Debug)]
 pub(super) struct Receivers {
-    /// The press side.
     pub(super) answers: UnboundedSender<Answer>,
-    /// Observer of the strokes.
     pub(super) watcher: Option<Watcher>,
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
@@ -345,7 +340,6 @@ impl MeasurementWorker {
         hung
     }
 
-    /// Returns the folder for the files of a stroke.
     fn folder(&self, run_id: u32) -> PathBuf {
         self.plant.output.folder.join(format!("run-{run_id:06}"))
     }

@@ -4,13 +4,11 @@ use platen_history::{Archive, Error, Stroke};
 use platen_report::{history_view, output_folder};
 use platen_shape::{Blank, Surface};
 
-/// An earlier scan of the plate.
 #[derive(Debug)]
 pub(super) struct Earlier {
     pub(super) surface: Surface,
     /// Outline that its (u, v) refer to, where a scan of the blank gave one.
     pub(super) blank: Option<Blank>,
-    /// Supports of the plate.
     pub(super) supports: Option<String>,
     /// Feed rotation as reported by the press, radians.
     pub(super) plate_rot: Option<f64>,

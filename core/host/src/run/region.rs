@@ -11,7 +11,6 @@ use platen_shape::{RegionOfInterest, Scanned, Vec3};
 /// decimetres. A plate that moved farther is scanned again in the base window.
 const ROOM: f64 = 0.5;
 
-/// The windows of a plant's scans.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     choice: ScanWindow,
@@ -37,7 +36,6 @@ impl Region {
         self.plate.as_ref()
     }
 
-    /// Records the place of the plate.
     pub(super) fn saw(&mut self, outline: &Outline) {
         if self.choice == ScanWindow::Plate {
             self.plate = round(outline.edges.iter().flat_map(|edge| &edge.points));

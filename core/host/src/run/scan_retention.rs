@@ -26,7 +26,6 @@ const CELL_BYTES: u64 = 31;
 /// Length of the queue of scans.
 const WAITING: usize = 1;
 
-/// A scan to be written.
 #[derive(Debug)]
 struct Order {
     folder: PathBuf,

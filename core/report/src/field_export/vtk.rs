@@ -9,7 +9,6 @@ use platen_model::units::mm;
 
 use super::PlateTable;
 
-/// Cell type of a triangle in VTK.
 const TRIANGLE: u32 = 5;
 
 impl PlateTable {

@@ -10,17 +10,14 @@ use super::{Caption, PictureError};
 /// Position on the canvas, pixels.
 pub(super) type At = (f64, f64);
 
-/// Drawing area.
 pub(super) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
-    /// Width, pixels.
     pub(super) width: f64,
 }
 
 /// Pixels of the drawing library to one of the picture: the library has whole pixels only.
 const FINE: f64 = 8.0;
 
-/// Size, colour and alignment of a text.
 #[derive(Clone, Copy)]
 pub(super) struct Text {
     /// Height of its letters with their room, pixels.

@@ -16,7 +16,6 @@ pub(super) const STEEL: RGBColor = RGBColor(150, 158, 168);
 pub(super) const WOOD: RGBColor = RGBColor(226, 196, 150);
 /// Edge of a template.
 pub(super) const WOOD_EDGE: RGBColor = RGBColor(138, 98, 46);
-/// Background.
 pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
 
 /// Lightness and chroma along a branch: gray, most vivid, darkest.

@@ -54,7 +54,6 @@ pub fn map(
     })
 }
 
-/// Positions in the picture.
 struct Layout<'a> {
     plate: &'a PlateRecord,
     pixel_per_mm: f64,
@@ -179,7 +178,6 @@ impl Layout<'_> {
     }
 }
 
-/// Part of the plate with its mean.
 struct Part {
     column: usize,
     row: usize,

@@ -15,7 +15,6 @@ const USUAL: [f64; 2] = [3.0, 2000.0];
 /// Steps of the ladder in limits: fine near the limit, coarse towards the unbent plate.
 const LADDER: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 
-/// Steps of an even scale.
 const EVEN: usize = 4;
 
 /// Parameters of the scales of a plate's pictures. They follow from its plate file alone, so that no stroke changes them.
@@ -53,7 +52,6 @@ impl PictureScale {
         per_m(self.limit_mm, self.chord_mm)
     }
 
-    /// Returns the ladder of gaps.
     pub(super) fn gaps(&self) -> Scale {
         let anchors = LADDER.map(|step| step * self.limit_mm).to_vec();
         Scale { anchors, unit: "mm", factor: 1000.0, inverted: false, words: None, locked: true }

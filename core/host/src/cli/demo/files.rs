@@ -16,7 +16,6 @@ pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
     Ok(std::fs::write(out.join("plates/plate-009.toml"), PLATE)?)
 }
 
-/// Writes the configuration of the simulated press.
 pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
     let path = out.join("press.toml");
     std::fs::write(&path, PRESS)?;

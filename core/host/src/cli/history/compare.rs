@@ -81,18 +81,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     for sentence in reports.iter().flat_map(|report| &report.findings.says) {
         output::line(&format!("  {sentence}"))?;
     }
-    let mut rows = vec![output::head("figure in m, rad, s, 1/m | first | second | change")];
-    for difference in figures {
-        let number = |value: Option<f64>| value.map(|value| format!("{value:.5}")).unwrap_or_default();
-        let change = difference.first.zip(difference.second).map(|(a, b)| b - a);
-        rows.push(vec![
-            difference.name.clone(),
-            number(difference.first),
-            number(difference.second),
-            number(change),
-        ]);
-    }
-    output::table(&rows)?;
+    let rows = figures.iter().map(|figure| {
+        let change = figure.first.zip(figure.second).map(|(a, b)| b - a);
+        let numbers = [figure.first, figure.second, change].map(|value| output::number(value, 5));
+        std::iter::once(figure.name.clone()).chain(numbers).collect()
+    });
+    output::titled("figure in m, rad, s, 1/m | first | second | change", rows)?;
     for file in &written {
         output::line(&format!("wrote {}", file.display()))?;
     }

@@ -52,9 +52,6 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
         };
     };
     std::fs::write(out, &bytes).map_err(|e| CliError::Failed(format!("{}: {e}", out.display())))?;
-    if common.json {
-        output::json(&serde_json::json!({ "file": out, "strokes": strokes.len() }))
-    } else {
-        output::line(&format!("wrote {} strokes to {}", strokes.len(), out.display()))
-    }
+    let text = format!("wrote {} strokes to {}", strokes.len(), out.display());
+    output::either(common, &serde_json::json!({ "file": out, "strokes": strokes.len() }), &text)
 }

@@ -38,9 +38,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     if common.json {
         return output::json(&sequence);
     }
-    let mut rows = vec![output::head(
-        "stroke | die | force kN | ram mm | gap mm | overshoot mm | energy left | beyond | bend deg | at u, v mm | direction | feed mm | note",
-    )];
+    let mut rows = Vec::new();
     for stroke in &sequence.strokes {
         let bends = stroke.bends.as_deref().unwrap_or_default();
         rows.push(row(stroke, bends.first()));
@@ -50,21 +48,22 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
             rows.push(more);
         }
     }
-    output::table(&rows)?;
+    output::titled(
+        "stroke | die | force kN | ram mm | gap mm | overshoot mm | energy left | beyond | bend deg | at u, v mm | direction | feed mm | note",
+        rows,
+    )?;
     summary(&sequence.summary)
 }
 
 fn row(stroke: &SequenceStroke, bend: Option<&Bend>) -> Vec<String> {
-    let number =
-        |value: Option<f64>, digits: usize| value.map(|v| format!("{v:.digits$}")).unwrap_or_default();
     let percent = |share: Option<f64>| share.map(|s| format!("{:.1} %", 100.0 * s)).unwrap_or_default();
     let mut cells = vec![
         stroke.stroke.clone(),
         stroke.die_set.map(|die| die.to_string()).unwrap_or_default(),
-        number(stroke.force_kn, 0),
-        number(stroke.ram_depth_mm, 1),
-        number(stroke.gap_mm, 1),
-        number(stroke.overshoot_mm, 1),
+        output::number(stroke.force_kn, 0),
+        output::number(stroke.ram_depth_mm, 1),
+        output::number(stroke.gap_mm, 1),
+        output::number(stroke.overshoot_mm, 1),
         percent(stroke.energy_left_share),
         percent(stroke.beyond_share),
     ];
@@ -87,7 +86,7 @@ fn bend_cells(bend: &Bend) -> [String; 5] {
         format!("{:+.2}{uncertainty}", bend.angle_deg),
         format!("{:.0}, {:.0}", bend.at_mm[0], bend.at_mm[1]),
         format!("{:.0}", bend.direction_deg),
-        bend.feed_mm.map(|mm| format!("{mm:.0}")).unwrap_or_default(),
+        output::number(bend.feed_mm, 0),
         [rehit, back].into_iter().flatten().collect::<Vec<_>>().join(", "),
     ]
 }

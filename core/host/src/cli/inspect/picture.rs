@@ -19,7 +19,6 @@ const DIM: f64 = 0.5;
 /// Nothing came back.
 const NOTHING: [u8; 3] = [0, 0, 0];
 
-/// Samples of one pixel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pixel {
     range_m: f32,
@@ -69,7 +68,6 @@ impl RangePicture {
         }
     }
 
-    /// Width and height.
     pub(super) fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }

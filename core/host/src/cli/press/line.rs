@@ -13,7 +13,6 @@ use crate::progress;
 
 use serde_json::json;
 
-/// Range of unit ids.
 pub(super) type Units = RangeInclusive<u8>;
 
 /// Reads `1..10`, both ends included, or one number.
@@ -25,7 +24,6 @@ pub(super) fn units(text: &str) -> Result<Units, String> {
     }
 }
 
-/// One exchange of the host with the press.
 struct Exchange {
     what: &'static str,
     function: u8,
@@ -94,12 +92,11 @@ pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     if !press.map.counts_strokes() {
         output::line("this press has no stroke counter: a missed stroke cannot be detected")?;
     }
-    let mut rows = vec![output::head("exchange | function | registers | line")];
-    rows.extend(exchanges.iter().map(|it| {
+    let rows = exchanges.iter().map(|it| {
         let line = line_ms(it).map_or_else(|| "-".into(), |ms| format!("{ms:.0} ms"));
         vec![it.what.into(), it.function.to_string(), it.registers.to_string(), line]
-    }));
-    output::table(&rows)?;
+    });
+    output::titled("exchange | function | registers | line", rows)?;
     output::line(&format!(
         "poll every {:.0} ms, answers within {:.0} ms{}",
         ms(press.link.poll),

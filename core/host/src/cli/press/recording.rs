@@ -55,7 +55,6 @@ impl Line {
         }
     }
 
-    /// Returns whether its contents equal those of another.
     fn repeats(&self, other: &Self) -> bool {
         (&self.words, self.exception, &self.error) == (&other.words, other.exception, &other.error)
     }
@@ -95,12 +94,8 @@ pub(super) fn record(
     })?;
     progress::done();
     let seconds = start.elapsed().as_secs_f64();
-    if common.json {
-        output::json(&json!({ "file": file, "lines": lines, "seconds": seconds }))?;
-    } else {
-        output::line(&format!("{}: {lines} lines in {seconds:.0} s", file.display()))?;
-    }
-    Ok(())
+    let text = format!("{}: {lines} lines in {seconds:.0} s", file.display());
+    Ok(output::either(common, &json!({ "file": file, "lines": lines, "seconds": seconds }), &text)?)
 }
 
 async fn look(client: &mut Client<ModbusLink>, block: &Block) -> Result<Vec<u16>, LinkError> {
@@ -140,22 +135,15 @@ pub(super) fn replay(common: &Common, press: &Press, file: &Path) -> Result<Exit
     let name = |&(session, stroke): &(u16, u16)| format!("{session}/{stroke}");
     let names = |strokes: &[(u16, u16)]| strokes.iter().map(name).collect::<Vec<_>>();
     if common.json {
-        let transitions: Vec<_> = replayed
-            .transitions
-            .iter()
-            .map(|(at, transition, stroke)| {
-                json!({ "at_s": at.as_secs_f64(), "transition": format!("{transition:?}"), "stroke": stroke })
-            })
-            .collect();
-        let alarms: Vec<_> = replayed
-            .alarms
-            .iter()
-            .map(|(at, code)| json!({ "at_s": at.as_secs_f64(), "code": code }))
-            .collect();
+        let transitions = replayed.transitions.iter().map(|(at, transition, stroke)| {
+            json!({ "at_s": at.as_secs_f64(), "transition": format!("{transition:?}"), "stroke": stroke })
+        });
+        let alarms =
+            replayed.alarms.iter().map(|(at, code)| json!({ "at_s": at.as_secs_f64(), "code": code }));
         output::json(&json!({
             "samples": samples.len(), "accepted": names(&replayed.accepted), "recorded": names(&replayed.recorded),
             "missed": replayed.missed, "torn": replayed.torn, "agrees": replayed.agrees(),
-            "transitions": transitions, "alarms": alarms,
+            "transitions": transitions.collect::<Vec<_>>(), "alarms": alarms.collect::<Vec<_>>(),
         }))?;
         return Ok(ExitCode::from(u8::from(!replayed.agrees())));
     }

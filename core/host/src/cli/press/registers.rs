@@ -26,7 +26,6 @@ pub(super) fn range(text: &str) -> Result<Range, String> {
     if range.is_empty() { Err(wrong()) } else { Ok(range) }
 }
 
-/// Words of both blocks.
 pub(super) struct Blocks {
     pub(super) press: Vec<u16>,
     pub(super) host: Vec<u16>,
@@ -75,24 +74,19 @@ pub(super) fn dump(
             "words": { "press": raw(&press.map.read, &blocks.press), "host": raw(&press.map.write, &blocks.host) },
         }))?);
     }
-    let mut rows = Vec::new();
     if as_words {
-        rows.push(output::head("block | address | word | hex"));
-        for (side, block, words) in
-            [("press", &press.map.read, &blocks.press), ("host", &press.map.write, &blocks.host)]
-        {
-            let row = |(address, word): (u16, u16)| {
+        let row = |side: &'static str| {
+            move |(address, word): (u16, u16)| {
                 vec![side.to_owned(), address.to_string(), word.to_string(), format!("{word:04X}")]
-            };
-            rows.extend(raw(block, words).into_iter().map(row));
-        }
-    } else {
-        rows.push(output::head("block | field | value"));
-        rows.extend(
-            fields(press, &blocks).into_iter().map(|(side, name, value)| vec![side.to_owned(), name, value]),
-        );
+            }
+        };
+        let inputs = raw(&press.map.read, &blocks.press).into_iter().map(row("press"));
+        let outputs = raw(&press.map.write, &blocks.host).into_iter().map(row("host"));
+        return Ok(output::titled("block | address | word | hex", inputs.chain(outputs))?);
     }
-    Ok(output::table(&rows)?)
+    let rows =
+        fields(press, &blocks).into_iter().map(|(side, name, value)| vec![side.to_owned(), name, value]);
+    Ok(output::titled("block | field | value", rows)?)
 }
 
 /// Reads any holding registers; those in a chunk that the press refuses are read one by one.
@@ -129,13 +123,9 @@ fn dump_range(common: &Common, range: &Range, words: &[(u32, u16)]) -> Result<()
     if common.json {
         return Ok(output::json(&json!({ "words": words }))?);
     }
-    let mut rows = vec![output::head("address | word | hex")];
-    rows.extend(
-        words
-            .iter()
-            .map(|(address, word)| vec![address.to_string(), word.to_string(), format!("{word:04X}")]),
-    );
-    output::table(&rows)?;
+    let row =
+        |(address, word): &(u32, u16)| vec![address.to_string(), word.to_string(), format!("{word:04X}")];
+    output::titled("address | word | hex", words.iter().map(row))?;
     let refused = range.len() - words.len();
     if refused > 0 {
         output::line(&format!("the press refused {refused} registers"))?;
@@ -195,21 +185,20 @@ pub(super) fn probe_order(common: &Common, press: &Press, at: u16, expect: f64) 
         output::json(&json!({ "expect": expect, "readings": all.iter().map(row).collect::<Vec<_>>() }))?;
         return Ok(ExitCode::from(u8::from(right.is_empty())));
     }
-    let mut rows = vec![output::head("address | words | type | order | number | ")];
-    rows.extend(all.iter().map(|it| {
+    let rows = all.iter().map(|it| {
         let [a, b] = it.words;
+        let (words, number) = (format!("{a:04X} {b:04X}"), format!("{:.6}", it.number));
         let sign = if it.is(expect) { "<- match" } else { "" };
-        let number = format!("{:.6}", it.number);
         vec![
             address(it).to_string(),
-            format!("{a:04X} {b:04X}"),
+            words,
             it.kind.name().into(),
             it.order.name().into(),
             number,
             sign.into(),
         ]
-    }));
-    output::table(&rows)?;
+    });
+    output::titled("address | words | type | order | number | ", rows)?;
     let counted_from = press.map.address_base.first(RegisterTable::Holding) as i32;
     for it in &right {
         output::line(&format!(

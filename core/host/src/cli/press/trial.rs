@@ -64,14 +64,15 @@ pub async fn serve(
 }
 
 /// One step of the handshake: figure against limit.
+#[derive(serde::Serialize)]
 struct Step {
+    #[serde(rename = "step")]
     what: String,
     figure: String,
     limit: String,
     good: bool,
 }
 
-/// Steps of one trial.
 #[derive(Default)]
 struct Report {
     steps: Vec<Step>,
@@ -106,20 +107,13 @@ pub(super) fn run(
     let report = runtime()?.block_on(trial(&press, strokes, patience))?;
     progress::done();
     if common.json {
-        let row =
-            |it: &Step| json!({ "step": it.what, "figure": it.figure, "limit": it.limit, "good": it.good });
-        let steps: Vec<_> = report.steps.iter().map(row).collect();
-        output::json(&json!({ "press": press.name, "steps": steps, "good": report.good() }))?;
+        output::json(&json!({ "press": press.name, "steps": report.steps, "good": report.good() }))?;
     } else {
-        let mut rows = vec![output::head("step | seen | limit | ")];
-        let verdict = |good: bool| if good { "good" } else { "NOT GOOD" }.to_owned();
-        rows.extend(
-            report
-                .steps
-                .iter()
-                .map(|it| vec![it.what.clone(), it.figure.clone(), it.limit.clone(), verdict(it.good)]),
-        );
-        output::table(&rows)?;
+        let rows = report.steps.iter().map(|Step { what, figure, limit, good }| {
+            let verdict = if *good { "good" } else { "NOT GOOD" };
+            vec![what.clone(), figure.clone(), limit.clone(), verdict.to_owned()]
+        });
+        output::titled("step | seen | limit | ", rows)?;
         output::line(if report.good() { "the handshake works" } else { "the handshake does not work yet" })?;
     }
     Ok(ExitCode::from(u8::from(!report.good())))

@@ -52,13 +52,12 @@ pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
         let row = |it: &Written| json!({ "field": it.field.name(), "shows": it.shows, "read_back": it.read_back, "confirmed": it.confirmed });
         output::json(&json!({ "fields": written.iter().map(row).collect::<Vec<_>>(), "good": good }))?;
     } else {
-        let mut rows = vec![output::head("field | written | read back | on the screen")];
         let yes = |it: bool| if it { "yes" } else { "NO" }.to_owned();
-        rows.extend(written.iter().map(|it| {
+        let rows = written.iter().map(|it| {
             let confirmed = it.confirmed.map_or_else(|| "-".into(), yes);
             vec![it.field.name().into(), it.shows.clone(), yes(it.read_back), confirmed]
-        }));
-        output::table(&rows)?;
+        });
+        output::titled("field | written | read back | on the screen", rows)?;
     }
     Ok(ExitCode::from(u8::from(!good)))
 }
