@@ -63,14 +63,8 @@ pub enum HostError {
     Worker(String),
 }
 
-/// Channels of a running host to its observer.
-#[derive(Debug)]
-pub struct Watcher {
-    /// Receives one report per stroke, measured or not.
-    pub strokes: tokio::sync::mpsc::UnboundedSender<StrokeReport>,
-}
-
-/// Runs until `stop` turns true; the press's registers are then safe.
+/// Runs until `stop` turns true; the press's registers are then safe. `strokes` receives one report per stroke, measured or
+/// not.
 ///
 /// # Errors
 /// [`HostError`]; nothing was written to the press when the start fails.
@@ -79,7 +73,7 @@ pub async fn run(
     press: Press,
     catalogue: &Catalogue,
     mut stop: watch::Receiver<bool>,
-    watcher: Option<Watcher>,
+    strokes: tokio::sync::mpsc::UnboundedSender<StrokeReport>,
 ) -> Result<(), HostError> {
     let history = History::open(&plant.output.history, press.press_id, Timestamp::now())?;
     let history = Arc::new(Mutex::new(history));
@@ -88,7 +82,7 @@ pub async fn run(
     let (commands, inbox) = std::sync::mpsc::channel();
     let lost = Arc::default();
     let receivers =
-        measurement_worker::Receivers { answers: host.answers.clone(), watcher, lost: Arc::clone(&lost) };
+        measurement_worker::Receivers { answers: host.answers.clone(), strokes, lost: Arc::clone(&lost) };
     let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
     let worker = worker.map_err(HostError::Thread)?;

@@ -178,7 +178,10 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
             dt { "Templates" } dd { @if templates.is_empty() { "none: nothing can be judged" } @for template in &templates { div { (template) } } }
             @if let Some(outline) = &record.outline { dt { "Outline" } dd { (outline.words()) } }
             dt { "Rests on" } dd { (record.supports.as_deref().unwrap_or("not recorded")) }
-            dt { "Scanner" } dd { (record.scan.instrument) (seen(record)) }
+            dt { "Scanner" } dd {
+                (record.scan.instrument) (format!("; {:.0} % of the plate seen", record.quality.coverage * 100.0))
+                (format!(", a sample every {:.1} mm, noise {:.2} mm", record.quality.lattice_step_mm, record.quality.noise_mm))
+            }
             dt { "Calibration" } dd { (calibration(&record.calibration)) }
             dt { "Software" } dd { (record.software) ", " (record.schema) }
         }
@@ -188,16 +191,6 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
             @if let Some(strip) = strip { figure { (strip) } }
         }
     }
-}
-
-fn seen(record: &ResultRecord) -> String {
-    let quality = &record.quality;
-    format!(
-        "; {:.0} % of the plate seen, a sample every {:.1} mm, noise {:.2} mm",
-        quality.coverage * 100.0,
-        quality.lattice_step_mm,
-        quality.noise_mm
-    )
 }
 
 fn calibration(state: &CalibrationRecord) -> String {

@@ -234,7 +234,8 @@ fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Ve
             rehit_of: None,
             bent_back: bent_back(file, [u, v], direction.value, angle.value),
         };
-        bend.feed_mm = last_bend(earlier).map(|last| bend.apart(last)[0]);
+        let last = earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first());
+        bend.feed_mm = last.map(|last| bend.apart(last)[0]);
         bend.rehit_of = earlier
             .iter()
             .find(|stroke| stroke.bends.iter().flatten().any(|other| bend.lies_on(other)))
@@ -243,10 +244,6 @@ fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Ve
     }
     bends.sort_by(|a, b| b.angle_deg.abs().total_cmp(&a.angle_deg.abs()));
     bends
-}
-
-fn last_bend(earlier: &[SequenceStroke]) -> Option<&Bend> {
-    earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first())
 }
 
 fn target(file: &PlateFile) -> Option<TargetSurface> {
@@ -285,12 +282,8 @@ impl Bend {
 impl Summary {
     fn of(strokes: &[SequenceStroke], recorded: &[Stroke]) -> Self {
         let bends = || strokes.iter().filter_map(|stroke| stroke.bends.as_ref()).flatten();
-        let real: Vec<&SequenceStroke> = strokes
-            .iter()
-            .zip(recorded)
-            .filter(|(_, stroke)| !stroke.baseline)
-            .map(|(stroke, _)| stroke)
-            .collect();
+        let real = strokes.iter().zip(recorded).filter(|(_, stroke)| !stroke.baseline);
+        let real: Vec<&SequenceStroke> = real.map(|(stroke, _)| stroke).collect();
         let overshoots: Vec<f64> =
             real.iter().filter_map(|stroke| stroke.overshoot_mm).filter(|mm| *mm > 0.0).collect();
         let feeds: Vec<f64> =

@@ -166,12 +166,9 @@ fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetS
         return Ok(None);
     }
     let usage = |why: String| CliError::Usage(format!("{}: {why}", command.plate.display()));
-    let shape = plate
-        .target
-        .map(|target| TargetSurface::of_plate(&target, &plate.plate))
-        .transpose()
-        .map_err(|e| usage(e.to_string()))?;
-    shape.map(Some).ok_or_else(|| usage("an artefact needs a [target], the shape that it has".into()))
+    let missing = || usage("an artefact needs a [target], the shape that it has".into());
+    let target = plate.target.ok_or_else(missing)?;
+    TargetSurface::of_plate(&target, &plate.plate).map(Some).map_err(|e| usage(e.to_string()))
 }
 
 /// Compares every two of the scans: difference along the normal after rigid alignment, and the noise stated for it.

@@ -14,7 +14,7 @@ use super::cell::{AcceptedResult, Cell};
 use super::run::{runtime, stop_signal};
 use super::{CliError, Common, output};
 use crate::progress;
-use crate::run::{self, StrokeReport, Watcher};
+use crate::run::{self, StrokeReport};
 
 use tokio::sync::{mpsc, watch};
 
@@ -52,7 +52,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let (stop, stopped) = watch::channel(false);
         let mut interrupted = stop_signal()?;
         let catalogue = common.catalogue();
-        let host = run::run(&plant, press, &catalogue, stopped, Some(Watcher { strokes: sender }));
+        let host = run::run(&plant, press, &catalogue, stopped, sender);
         tokio::pin!(host);
         let limit = tokio::time::sleep(LIMIT);
         tokio::pin!(limit);
@@ -142,11 +142,12 @@ fn summary(
         .as_deref()
         .zip(reports.last())
         .is_some_and(|(h, last)| h.get(8) == h.get(53) && h.get(4) == Some(&last.key.stroke));
+    let elapsed_s = elapsed.as_secs_f64();
     let safe = after_stop.get(2) == Some(&0);
     if common.json {
         output::json(&serde_json::json!({
             "strokes": documents, "bent": passed, "registers_correct": correct, "registers_safe": safe,
-            "elapsed_s": elapsed.as_secs_f64(), "folder": command.out,
+            "elapsed_s": elapsed_s, "folder": command.out,
         }))?;
     } else {
         output::titled(
@@ -154,15 +155,10 @@ fn summary(
             rows,
         )?;
         let plate = if passed { "the plate is in tolerance" } else { "the plate is not in tolerance" };
-        let words = if correct {
-            "the press holds the last stroke's result"
-        } else {
-            "the press holds a wrong result"
-        };
+        let held = if correct { "the last stroke's" } else { "a wrong" };
         let after = if safe { "safe after the stop" } else { "not safe after the stop" };
         output::line(&format!(
-            "{plate}; {words}; its registers are {after}; {:.1} s",
-            elapsed.as_secs_f64()
+            "{plate}; the press holds {held} result; its registers are {after}; {elapsed_s:.1} s"
         ))?;
         output::line(&format!(
             "files: {} (the plate's report plate-1.html; one folder a stroke: result.json, tables, mesh, pictures; history.sqlite)",

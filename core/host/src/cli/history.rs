@@ -98,7 +98,6 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Loads the plant file and opens its history for reading.
 fn open(plant: &std::path::Path) -> Result<(PlantFile, Archive), CliError> {
     let plant = PlantFile::load(plant)?;
     let archive = Archive::open(&plant.output.history)?;

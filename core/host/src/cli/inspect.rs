@@ -2,7 +2,7 @@
 
 mod picture;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -74,19 +74,20 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     }
     scan.finish()?;
     if let Some(path) = &command.picture {
-        picture.write(path).map_err(|e| {
-            CliError::Failed(format!(
-                "{}: cannot be written: {e}; check the folder and its disk",
-                path.display()
-            ))
-        })?;
+        let file = path.display();
+        let failed =
+            |e| CliError::Failed(format!("{file}: cannot be written: {e}; check the folder and its disk"));
+        picture.write(path).map_err(failed)?;
     }
     if common.json {
         output::json(&json(&header, &counts))?;
     } else {
         print(&header, &counts)?;
         if let Some(path) = &command.picture {
-            say_picture(path, &picture)?;
+            let (file, (width, height)) = (path.display(), picture.size());
+            output::line(&format!(
+                "wrote {file}: {width} x {height} pixels as the scanner saw it; dark violet is near, yellow far, black no echo"
+            ))?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -140,12 +141,4 @@ fn print(header: &ScanHeader, counts: &Counts) -> Result<(), CliError> {
         output::line(&format!("  {note}"))?;
     }
     Ok(())
-}
-
-fn say_picture(path: &Path, picture: &RangePicture) -> Result<(), CliError> {
-    let (width, height) = picture.size();
-    output::line(&format!(
-        "wrote {}: {width} x {height} pixels as the scanner saw it; dark violet is near, yellow far, black no echo",
-        path.display()
-    ))
 }

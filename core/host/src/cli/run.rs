@@ -8,7 +8,7 @@ use platen_model::Verdict;
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
-use crate::run::{self, HostError, StrokeReport, Watcher};
+use crate::run::{self, HostError, StrokeReport};
 
 use tokio::sync::{mpsc, watch};
 
@@ -25,12 +25,9 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let plant = PlantFile::load(&command.plant)?;
-    let Some(press) = plant.press.clone() else {
-        return Err(CliError::Usage(format!(
-            "{}: has no [press]; add the one to serve",
-            command.plant.display()
-        )));
-    };
+    let file = command.plant.display();
+    let missing = || CliError::Usage(format!("{file}: has no [press]; add the one to serve"));
+    let press = plant.press.clone().ok_or_else(missing)?;
     let json = common.json;
     runtime()?.block_on(async {
         let (reports, mut strokes) = mpsc::unbounded_channel();
@@ -40,8 +37,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 let _ = print(&report, json);
             }
         });
-        let watcher = Watcher { strokes: reports };
-        let ended = run::run(&plant, press, &common.catalogue(), stop_signal()?, Some(watcher)).await;
+        let ended = run::run(&plant, press, &common.catalogue(), stop_signal()?, reports).await;
         // The printer ends with the last sender.
         let _ = printer.await;
         ended.map_err(CliError::from)

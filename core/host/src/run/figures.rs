@@ -32,10 +32,8 @@ pub(super) fn measurement(
     }
     let station = |station: &platen_model::Station| {
         let name = format!("station.{}", station.name);
-        found()
-            .find(|figure| figure.name == name)
-            .map(|figure| figure.value)
-            .filter(|value| value.is_finite())
+        let value = found().find(|figure| figure.name == name)?.value;
+        value.is_finite().then_some(value)
     };
     figures.stations = plate.stations.iter().map(station).collect();
     Measurement { judgement: verdict.into(), figures, scanned_at: timestamp(scanned_at), warning: None }

@@ -24,10 +24,10 @@ use platen_scan::Window;
 use platen_shape::{PlateSpec, Scanned, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::figures;
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
-use super::{Watcher, figures};
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -98,7 +98,7 @@ pub(super) struct MeasurementWorker {
 #[derive(Debug)]
 pub(super) struct Receivers {
     pub(super) answers: UnboundedSender<Answer>,
-    pub(super) watcher: Option<Watcher>,
+    pub(super) strokes: UnboundedSender<StrokeReport>,
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
 }
@@ -162,12 +162,13 @@ impl MeasurementWorker {
         let scanner =
             pipeline::scanner(&self.plant, &self.catalogue).map_err(|e| e.to_string()).and_then(|scanner| {
                 scanner.instance().open(OPEN_LIMIT).map_err(|e| e.to_string())?;
-                let estimate = scanner.estimate(self.region.base(), OPEN_LIMIT).map_err(|e| e.to_string())?;
+                let estimate =
+                    scanner.estimate(self.region.base.as_ref(), OPEN_LIMIT).map_err(|e| e.to_string())?;
                 Ok((scanner, estimate))
             });
         match scanner {
             Ok((scanner, estimate)) => {
-                tracing::info!(?estimate, window = ?self.region.base(), "scanner in reach");
+                tracing::info!(?estimate, window = ?self.region.base, "scanner in reach");
                 self.scanner = Some(scanner);
                 self.estimate = estimate;
                 self.in_reach.get_or_insert_with(Instant::now);
@@ -270,7 +271,7 @@ impl MeasurementWorker {
             *buffer = self.archive.buffer();
         }
         // Only a driver with scan planning receives a window: a file contains the whole scan.
-        let base = self.region.base().filter(|_| self.estimate.is_some());
+        let base = self.region.base.as_ref().filter(|_| self.estimate.is_some());
         let limit = job.limit.saturating_sub(start.elapsed());
         let mut scanned = stroke::scan(scanner, JobSpec { limit, ..job }, base, spec, buffer.as_mut())?;
         scanned.acquire = start.elapsed() - scanned.extract;
@@ -279,7 +280,7 @@ impl MeasurementWorker {
 
     /// Returns the window round the last stroke's plate, if its scan takes less time.
     fn quicker(&self, scanner: &Scanner) -> Option<&Window> {
-        let window = self.region.plate()?;
+        let window = self.region.plate.as_ref()?;
         let takes = scanner.estimate(Some(window), OPEN_LIMIT).ok()??;
         (takes < self.estimate?).then_some(window)
     }
@@ -287,20 +288,13 @@ impl MeasurementWorker {
     fn fail(&self, key: StrokeKey, baseline: bool, code: Code, why: String, started: Instant) {
         tracing::error!(%key, code = code.number(), "not measured: {why}");
         self.answer(Answer::Failed(key, code));
-        self.report(StrokeReport {
-            key,
-            baseline,
-            result: Err(why),
-            folder: None,
-            elapsed: started.elapsed(),
-        });
+        let elapsed = started.elapsed();
+        self.report(StrokeReport { key, baseline, result: Err(why), folder: None, elapsed });
     }
 
     fn report(&self, report: StrokeReport) {
-        if let Some(watcher) = &self.receivers.watcher {
-            // The observer may have gone.
-            let _ = watcher.strokes.send(report);
-        }
+        // The observer may have gone.
+        let _ = self.receivers.strokes.send(report);
     }
 
     /// Loads the plate file of the stroke's recipe.

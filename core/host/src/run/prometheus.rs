@@ -14,21 +14,19 @@ impl StatusRecord {
                 "# HELP platen_{name} {help}\n# TYPE platen_{name} {kind}\nplaten_{name}{{{label}}} {value}\n"
             );
         };
-        one("up", "gauge", "1 while the host runs", f64::from(u8::from(running)));
-        one(
-            "link_fault",
-            "gauge",
-            "1 while something is wrong with the link",
-            f64::from(u8::from(self.link_error.is_some())),
-        );
-        one("error", "gauge", "1 while error_code is not 0", f64::from(u8::from(self.error.is_some())));
-        one("warning", "gauge", "1 while warning_code is not 0", f64::from(u8::from(self.warning.is_some())));
-        one(
-            "results_waiting",
-            "gauge",
-            "results on record that the press has not got",
-            f64::from(u8::from(self.result_waits_s.is_some())),
-        );
+        for (name, help, on) in [
+            ("up", "1 while the host runs", running),
+            ("link_fault", "1 while something is wrong with the link", self.link_error.is_some()),
+            ("error", "1 while error_code is not 0", self.error.is_some()),
+            ("warning", "1 while warning_code is not 0", self.warning.is_some()),
+            (
+                "results_waiting",
+                "results on record that the press has not got",
+                self.result_waits_s.is_some(),
+            ),
+        ] {
+            one(name, "gauge", help, f64::from(u8::from(on)));
+        }
         one("result_waits_seconds", "gauge", "how long it has waited", self.result_waits_s.unwrap_or(0.0));
         if let Some(free) = self.disk_free {
             one("disk_free_bytes", "gauge", "free where results are written", free as f64);

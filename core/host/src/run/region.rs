@@ -14,26 +14,16 @@ const ROOM: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     choice: ScanWindow,
-    /// Base window: the region of interest; `None` is the whole dome.
-    base: Option<Window>,
+    /// Window for a plate without a previous scan: the region of interest; `None` is the whole dome.
+    pub(super) base: Option<Window>,
     /// Window round the last stroke's plate, margin included.
-    plate: Option<Window>,
+    pub(super) plate: Option<Window>,
 }
 
 impl Region {
     pub(super) fn new(choice: ScanWindow, region: Option<&RegionOfInterest>) -> Self {
         let base = region.filter(|_| choice != ScanWindow::Everything).and_then(of_box);
         Self { choice, base, plate: None }
-    }
-
-    /// Returns the window for a plate without a previous scan.
-    pub(super) fn base(&self) -> Option<&Window> {
-        self.base.as_ref()
-    }
-
-    /// Returns the window round the last stroke's plate.
-    pub(super) fn plate(&self) -> Option<&Window> {
-        self.plate.as_ref()
     }
 
     pub(super) fn saw(&mut self, outline: &Outline) {

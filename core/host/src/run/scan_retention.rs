@@ -42,7 +42,6 @@ pub(super) struct ScanRetention {
 impl ScanRetention {
     /// Starts the thread and removes scans that are too old; keeps none where the plant file forbids it.
     pub(super) fn start(output: &Output) -> Self {
-        let none = Self { orders: None, thread: None };
         let age = match output.keep_scans {
             KeepScans::Always => None,
             KeepScans::For(age) => Some(age),
@@ -57,7 +56,7 @@ impl ScanRetention {
             Ok(thread) => Self { orders: None, thread: Some(thread) },
             Err(error) => {
                 tracing::error!("scans are not kept: no thread for them: {error}");
-                none
+                Self { orders: None, thread: None }
             }
         }
     }
@@ -101,9 +100,8 @@ fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>) {
     };
     clean();
     while let Ok(Order { folder, buffer }) = inbox.recv() {
-        match write(&folder, buffer) {
-            Ok(()) => {}
-            Err(why) => tracing::warn!("{}: the scan is not kept: {why}", folder.display()),
+        if let Err(why) = write(&folder, buffer) {
+            tracing::warn!("{}: the scan is not kept: {why}", folder.display());
         }
         clean();
     }

@@ -3,8 +3,6 @@
 //! Source: The VTK User's Guide, "VTK File Formats", "Simple Legacy Formats": a text head before each array, arrays
 //! big-endian. Binary, because VTK's text reader stops at NaN, the value of nodes without data.
 
-use std::fmt::Write as _;
-
 use platen_model::units::mm;
 
 use super::PlateTable;
@@ -54,14 +52,9 @@ impl File {
     }
 
     fn scalars(&mut self, name: &str, values: impl Iterator<Item = Option<f64>>) {
-        let mut head = String::new();
-        // A name ends at the first blank. Writing to a string does not fail.
-        let _ = writeln!(
-            head,
-            "SCALARS {} float 1\nLOOKUP_TABLE default",
-            name.replace(char::is_whitespace, "_")
-        );
-        self.head(&head);
+        // A name ends at the first blank.
+        let name = name.replace(char::is_whitespace, "_");
+        self.head(&format!("SCALARS {name} float 1\nLOOKUP_TABLE default\n"));
         self.array(values.map(|value| value.map_or(f32::NAN, |value| value as f32).to_be_bytes()));
     }
 }

@@ -33,13 +33,9 @@ pub fn section(
         let seat = serde_json::to_value(template.seat).ok();
         let seat = seat.as_ref().and_then(|seat| seat.as_str()).unwrap_or_default();
         let rocks = if template.rocks { ", it rocks" } else { "" };
-        canvas.head(
-            &caption,
-            &format!(
-                "Template {} of {:.0} mm on line {}, seat {seat}{rocks}",
-                template.name, template.chord_mm, line.name
-            ),
-        )?;
+        let TemplateRecord { name, chord_mm, .. } = template;
+        let title = format!("Template {name} of {chord_mm:.0} mm on line {}, seat {seat}{rocks}", line.name);
+        canvas.head(&caption, &title)?;
         canvas.text(&template.says, (24.0, 126.0), Text::new(26.0).bold())?;
         let layout = Layout { line, template, top_mm: top_of_gaps(template, picture_scale) };
         layout.profile(canvas)?;
@@ -51,12 +47,8 @@ pub fn section(
 fn top_of_gaps(template: &TemplateRecord, picture_scale: &PictureScale) -> f64 {
     let most = template.gap_mm.iter().fold(template.limit_mm, |most, gap| most.max(gap.abs()));
     let wanted = 1.1 * (most + template.uncertainty_mm);
-    picture_scale
-        .gaps()
-        .anchors
-        .into_iter()
-        .find(|anchor| *anchor >= wanted)
-        .unwrap_or_else(|| nice_ceiling(wanted))
+    let found = picture_scale.gaps().anchors.into_iter().find(|anchor| *anchor >= wanted);
+    found.unwrap_or_else(|| nice_ceiling(wanted))
 }
 
 struct Layout<'a> {
@@ -91,10 +83,7 @@ impl Layout<'_> {
 
     /// Returns the colour of the gap: that of the required bend in the maps.
     fn open(&self) -> RGBColor {
-        match self.template.sense {
-            0 => colour::diverging(0.0),
-            sense => colour::diverging(0.5 * f64::from(sense)),
-        }
+        colour::diverging(0.5 * f64::from(self.template.sense))
     }
 
     fn profile(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {

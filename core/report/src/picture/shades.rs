@@ -72,10 +72,7 @@ impl Shades {
         let x = |k: usize| left + (right - left) * k as f64 / self.n_x as f64;
         let y = |k: usize| top + (bottom - top) * k as f64 / self.n_y as f64;
         for ((from, to, shade), rows) in self.rectangles() {
-            let colour = match shade {
-                Some(shade) => colour_of(shade, self.n_shades),
-                None => PAPER,
-            };
+            let colour = shade.map_or(PAPER, |shade| colour_of(shade, self.n_shades));
             canvas.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
         }
         for [from, to] in self.hatching() {

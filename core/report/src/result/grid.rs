@@ -51,8 +51,7 @@ impl GridRecord {
             kappa_v_per_m: curvature(|c| c.v),
             kappa_uv_per_m: curvature(|c| c.uv),
             position_m: grid.nodes.iter().map(|n| n.place.position.into()).collect(),
-            displacement_mm: displacement
-                .map(|field| nodes(field, |values, _| [mm(values[0]), mm(values[1]), mm(values[2])])),
+            displacement_mm: displacement.map(|field| nodes(field, |v, _| [v[0], v[1], v[2]].map(mm))),
             deviation_mm: deviation.map(|field| nodes(field, |values, _| mm(values[0]))),
             unchanged: displacement.map(|field| nodes(field, |_, state| state == NodeState::Unchanged)),
         }
@@ -68,8 +67,5 @@ fn nodes<T>(field: &Field, value: impl Fn(&[f64], NodeState) -> T) -> Vec<Option
         let values = &field.values[node * field.components..(node + 1) * field.components];
         (field.state[node] != NodeState::Unseen).then(|| value(values, field.state[node]))
     };
-    (0..GRID[1])
-        .flat_map(|i_v| (0..GRID[0]).map(move |i_u| (i_u, i_v)))
-        .map(|(i_u, i_v)| at(i_u, i_v))
-        .collect()
+    (0..GRID[0] * GRID[1]).map(|k| at(k % GRID[0], k / GRID[0])).collect()
 }

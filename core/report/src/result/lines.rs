@@ -71,21 +71,19 @@ pub struct TemplateRecord {
 }
 
 pub(super) fn record(measurement: &Measurement, plate: &PlateFile, reports: &[&Report]) -> Vec<LineRecord> {
+    let point = |p: &evaluate::Place| PointRecord {
+        u_mm: mm(p.u),
+        v_mm: mm(p.v),
+        position_m: p.position.into(),
+        seen: p.seen,
+    };
     let line = |line: &platen_model::ReferenceLine| {
         let places =
             evaluate::reference_line(&measurement.surface, &measurement.location, line.from, line.to);
         let templates = reports.iter().flat_map(|report| &report.findings.templates);
         LineRecord {
             name: line.name.clone(),
-            points: places
-                .iter()
-                .map(|p| PointRecord {
-                    u_mm: mm(p.u),
-                    v_mm: mm(p.v),
-                    position_m: p.position.into(),
-                    seen: p.seen,
-                })
-                .collect(),
+            points: places.iter().map(point).collect(),
             templates: templates
                 .filter(|t| t.line == line.name)
                 .map(|t| template(t, line, plate, &measurement.surface))

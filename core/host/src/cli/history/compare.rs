@@ -1,15 +1,15 @@
 //! `platen history compare`: two strokes compared in the plate's coordinates (u, v).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use platen_engine::calibration::Calibration;
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, Comparison, Surfaces};
+use platen_engine::plugin::Surfaces;
 use platen_history::Stroke;
 use platen_model::units::mm;
 use platen_model::{Report, Verdict};
-use platen_plant::{PlantFile, PlateFile, PluginUse};
+use platen_plant::{PlateFile, PluginUse};
 use platen_report::picture::Caption;
 use platen_report::result::{PlateRecord, figure};
 use platen_report::{history_view, output_folder};
@@ -45,7 +45,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (first, second) = (command.first.find(&archive)?, command.second.find(&archive)?);
     let (before, now) = (surface(&first)?, surface(&second)?);
     same_size(&first, &before, &second, &now)?;
-    let plate = plate_file(&plant, &second)?;
+    let unknown = || CliError::Failed(format!("{}: no recipe on record", name(&second)));
+    let plate = PlateFile::load(&plant.plate_path(second.recipe.ok_or_else(unknown)?))?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
     let supports =
         first.document.as_deref().and_then(|document| history_view::read_document(document).supports);
@@ -59,13 +60,21 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));
-        reports.push(comparison(&plant, &common.catalogue(), name)?.compare(&task, surfaces)?);
+        let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
+        let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
+        reports.push(pipeline::comparison(&common.catalogue(), &wanted)?.compare(&task, surfaces)?);
     }
     progress::done();
-    let written = match &command.out {
-        Some(out) => write(out, &[&first, &second], &plate, &now, &reports)?,
-        None => Vec::new(),
-    };
+    let mut written = Vec::new();
+    if let Some(out) = &command.out {
+        std::fs::create_dir_all(out)?;
+        let title = format!("Run {} against {}", second.run_id, first.run_id);
+        // A comparison of two strokes has no verdict of its own; the second stroke's is shown.
+        let verdict = second.verdict.unwrap_or(Verdict::NotMeasured);
+        let caption = Caption { plate: &title, stroke: None, verdict };
+        let all: Vec<&Report> = reports.iter().collect();
+        written = output_folder::fields(out, &now, &all, &PlateRecord::new(&plate, &now, None), &caption)?;
+    }
     let figures = platen_history::compare(&first, &second);
     if common.json {
         let comparisons = reports.iter().map(|report| {
@@ -97,13 +106,6 @@ fn name(stroke: &Stroke) -> String {
     format!("run {} (plate {}, stroke {})", stroke.run_id, stroke.plate, history_view::label(stroke))
 }
 
-/// Returns a comparison as configured in the plant file, else with its default options.
-fn comparison(plant: &PlantFile, catalogue: &Catalogue, name: &str) -> Result<Comparison, CliError> {
-    let configured = plant.comparisons.iter().find(|wanted| wanted.plugin == name).cloned();
-    let wanted = configured.unwrap_or_else(|| PluginUse::by_default(name));
-    Ok(pipeline::comparison(catalogue, &wanted)?)
-}
-
 fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
     let refused = |why: String| CliError::Failed(format!("{}: {why}; choose another stroke", name(stroke)));
     let document = stroke.document.as_deref().ok_or_else(|| refused("was not measured".into()))?;
@@ -121,27 +123,4 @@ fn same_size(first: &Stroke, before: &Surface, second: &Stroke, now: &Surface) -
     Err(CliError::Failed(format!(
         "{first} measures {before}, {second} {now}: strokes are compared in (u, v); choose plates of one size"
     )))
-}
-
-fn plate_file(plant: &PlantFile, stroke: &Stroke) -> Result<PlateFile, CliError> {
-    let recipe =
-        stroke.recipe.ok_or_else(|| CliError::Failed(format!("{}: no recipe on record", name(stroke))))?;
-    Ok(PlateFile::load(&plant.plate_path(recipe))?)
-}
-
-fn write(
-    out: &Path,
-    strokes: &[&Stroke; 2],
-    plate: &PlateFile,
-    now: &Surface,
-    reports: &[Report],
-) -> Result<Vec<PathBuf>, CliError> {
-    std::fs::create_dir_all(out)?;
-    let record = PlateRecord::new(plate, now, None);
-    let title = format!("Run {} against {}", strokes[1].run_id, strokes[0].run_id);
-    // A comparison of two strokes has no verdict of its own; the second stroke's is shown.
-    let caption =
-        Caption { plate: &title, stroke: None, verdict: strokes[1].verdict.unwrap_or(Verdict::NotMeasured) };
-    let reports: Vec<&Report> = reports.iter().collect();
-    Ok(output_folder::fields(out, now, &reports, &record, &caption)?)
 }

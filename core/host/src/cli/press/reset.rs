@@ -36,9 +36,8 @@ pub(super) fn run(common: &Common, plant: &PlantFile) -> Result<ExitCode, Failur
             break status;
         }
         if start.elapsed() > 2 * LIMIT {
-            let text =
-                "the host took the request and has not written its status since; see its log".to_owned();
-            return Err(CliError::Failed(text).into());
+            let text = "the host took the request and has not written its status since; see its log";
+            return Err(CliError::Failed(text.into()).into());
         }
         std::thread::sleep(LOOK);
     };

@@ -19,7 +19,6 @@ use serde_json::json;
 /// Time of watching for a running host: two heartbeats at least.
 const WATCH: Duration = Duration::from_millis(1500);
 
-/// Field with the pattern written to it.
 struct Written {
     field: Output,
     shows: String,
@@ -146,10 +145,8 @@ async fn show(
     let block = press.map.write;
     let found = client.read(&block, block.count).await?;
     let value = |words: &[u16]| {
-        describe_outputs(&press.map, words)
-            .into_iter()
-            .find(|(name, _)| *name == field)
-            .map(|(_, value)| value)
+        let mut outputs = describe_outputs(&press.map, words).into_iter();
+        outputs.find(|(name, _)| *name == field).map(|(_, value)| value)
     };
     let shows = value(&words).unwrap_or_default();
     Ok(Written { field, read_back: value(&found).as_ref() == Some(&shows), shows, confirmed: None })
