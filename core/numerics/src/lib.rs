@@ -4,7 +4,7 @@
 //!
 //! | room | method |
 //! |---|---|
-//! | `vector_registers` | clean-up after the dense kernels |
+//! | [`simd`], `vector_registers` | dispatch to wide vector registers; clean-up after the dense kernels |
 //! | [`union_find`], [`random`], [`normal_distribution`] | disjoint sets, SplitMix64, the error function |
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
 //! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
@@ -22,7 +22,7 @@ mod normal_equations;
 pub mod penalised_curve;
 pub mod random;
 pub mod reml;
-
+pub mod simd;
 pub mod sparse;
 pub mod spline_fit;
 pub mod tensor_spline;

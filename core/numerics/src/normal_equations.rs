@@ -8,6 +8,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::block_banded_cholesky::BlockBandedMatrix;
 use crate::reml::{GAUSS, GridValues};
+use crate::simd::dispatch_simd;
 use crate::tensor_spline::TensorSpline;
 use crate::uniform_knots::{BASIS, UniformKnots, multiply, pairs};
 
@@ -70,7 +71,7 @@ impl<const D: usize> CellMoments<D> {
             return;
         }
         let ((i, s), (k, t)) = (self.u.locate(u), self.v.locate(v));
-        // Were the 1 in it known, the loops over slots would fall apart into scalars (benchmark `fit` of core/shape).
+        // Were the 1 in it known, the loops over slots would fall apart into scalars.
         let (p, q) = (std::hint::black_box(powers(s)), powers(t));
         let cell = &mut self.cells[k * self.u.n_spans() + i];
         cell.n_points += 1;
@@ -118,6 +119,14 @@ impl<const D: usize> CellMoments<D> {
 
     /// The normal matrix and the right-hand sides, in the net's order of control values.
     pub(crate) fn normal_equations(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
+        dispatch_simd(
+            #[inline(always)]
+            || self.normal_equations_here(),
+        )
+    }
+
+    #[inline(always)]
+    fn normal_equations_here(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
         let (n_u, n_v) = (self.u.n_coefficients(), self.v.n_coefficients());
         // Per coefficient the sums with those up to three further along v and along u.
         let mut sums = vec![[[0.0; 4]; 4]; n_u * n_v];

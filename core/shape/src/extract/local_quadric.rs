@@ -6,6 +6,7 @@
 //! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+use platen_numerics::simd::dispatch_simd;
 
 use super::window::Window;
 use crate::Vec3;
@@ -170,7 +171,10 @@ impl LocalQuadric {
         if points.n < LEAST_CELLS {
             return None;
         }
-        Self::through(&mut points)
+        dispatch_simd(
+            #[inline(always)]
+            || Self::through(&mut points),
+        )
     }
 
     #[inline(always)]

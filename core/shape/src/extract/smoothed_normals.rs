@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use platen_numerics::simd::dispatch_simd;
+
 use super::continuity::Continuity;
 use super::window::Window;
 
@@ -25,16 +27,21 @@ pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity
     let links = Links::of(window, usable, continuity, &spans);
     let mut copies = [window.inverse.clone(), window.inverse.clone()];
     // A half step of a column needs the one before of its two neighbours, so the half steps follow each other through
-    // the columns, one column apart: what a column needs is still in the cache (benchmark `columns`).
-    for front in 0..spans.len() + 2 * PAIRS {
-        for step in 0..(2 * PAIRS).min(front + 1) {
-            let Some((column, rows)) = spans.get(front - step) else { continue };
-            let [even, odd] = &mut copies;
-            let (from, to) = if step % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
-            let cells = column * n_rows + rows.start..column * n_rows + rows.end;
-            links.diffuse(from, to, cells, n_rows, FACTORS[step % 2]);
-        }
-    }
+    // the columns, one column apart: what a column needs is still in the cache.
+    dispatch_simd(
+        #[inline(always)]
+        || {
+            for front in 0..spans.len() + 2 * PAIRS {
+                for step in 0..(2 * PAIRS).min(front + 1) {
+                    let Some((column, rows)) = spans.get(front - step) else { continue };
+                    let [even, odd] = &mut copies;
+                    let (from, to) = if step % 2 == 0 { (&*even, odd) } else { (&*odd, even) };
+                    let cells = column * n_rows + rows.start..column * n_rows + rows.end;
+                    links.diffuse(from, to, cells, n_rows, FACTORS[step % 2]);
+                }
+            }
+        },
+    );
     let [smooth, _] = copies;
     smooth
 }

@@ -7,6 +7,7 @@
 //! and holes are bridged. Own; Masuda et al. use the raw samples.
 
 use nalgebra::Vector2;
+use platen_numerics::simd::dispatch_simd;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
 use platen_numerics::tensor_spline::TensorSpline;
 use platen_numerics::uniform_knots::UniformKnots;
@@ -139,9 +140,14 @@ impl Heights {
     /// The heights as points of a fit, each with its weight.
     fn weighted(&self, axes: [UniformKnots; 2], weight: impl Fn(usize) -> f64) -> SplineFit<1> {
         let mut fit = SplineFit::new(axes[0], axes[1]);
-        for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
-            fit.add(*a, *b, [*height], weight(i));
-        }
+        dispatch_simd(
+            #[inline(always)]
+            || {
+                for (i, ([a, b], height)) in self.places.iter().zip(&self.heights).enumerate() {
+                    fit.add(*a, *b, [*height], weight(i));
+                }
+            },
+        );
         fit
     }
 }
