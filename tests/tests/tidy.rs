@@ -14,15 +14,9 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         (_, "platen-shape") => &["platen-model", "platen-numerics", "platen-scan"],
         (_, "platen-sdk") => &["platen-abi", "platen-model", "platen-scan", "platen-shape"],
         (_, "platen-press") => &["platen-model", "platen-plant"],
-        (_, "platen-engine") => &[
-            "platen-abi",
-            "platen-formats",
-            "platen-model",
-            "platen-plant",
-            "platen-scan",
-            "platen-sdk",
-            "platen-shape",
-        ],
+        (_, "platen-engine") => {
+            &["platen-abi", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
+        }
         // Documents and pictures: no press, no plugin.
         (_, "platen-report") => {
             &["platen-history", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
