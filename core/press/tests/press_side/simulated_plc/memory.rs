@@ -8,28 +8,28 @@ use super::SharedPlc;
 
 /// Fault probabilities per request, in thousandths.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Chaos {
-    pub late: u32,
-    pub reset: u32,
+pub(crate) struct Chaos {
+    pub(crate) late: u32,
+    pub(crate) reset: u32,
     /// The request is carried out and its answer is lost.
-    pub lost: u32,
+    pub(crate) lost: u32,
 }
 
 #[derive(Debug)]
-pub struct MemoryLink {
+pub(crate) struct MemoryLink {
     plc: SharedPlc,
     chaos: Chaos,
     random: u64,
     connected: bool,
-    pub reachable: std::sync::Arc<std::sync::atomic::AtomicBool>,
+    pub(crate) reachable: std::sync::Arc<std::sync::atomic::AtomicBool>,
     /// The next request fails with a connection reset.
-    pub reset_next: std::sync::Arc<std::sync::atomic::AtomicBool>,
+    pub(crate) reset_next: std::sync::Arc<std::sync::atomic::AtomicBool>,
     /// The next write that withdraws a result is lost; the press is unreachable afterwards.
-    pub lose_withdrawal: std::sync::Arc<std::sync::atomic::AtomicBool>,
+    pub(crate) lose_withdrawal: std::sync::Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl MemoryLink {
-    pub fn new(plc: SharedPlc, chaos: Chaos, seed: u64) -> Self {
+    pub(crate) fn new(plc: SharedPlc, chaos: Chaos, seed: u64) -> Self {
         let reachable = std::sync::Arc::new(true.into());
         let (reset_next, lose_withdrawal) = Default::default();
         Self { plc, chaos, random: seed | 1, connected: false, reachable, reset_next, lose_withdrawal }

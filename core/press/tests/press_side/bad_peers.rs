@@ -1,7 +1,5 @@
 //! Protocol faults of Modbus TCP peers: every wrong answer drops the connection and none is accepted.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::time::Duration;
 
 use platen_plant::press::{Link, Press, RegisterTable};

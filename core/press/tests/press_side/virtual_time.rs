@@ -1,19 +1,15 @@
 //! Whole press side against the simulated PLC in virtual time: faults of the PLC program, of the link, restarts.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot continue must fail")]
-
-mod simulated_plc;
-
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::simulated_plc::memory::{Chaos, MemoryLink};
+use crate::simulated_plc::plc::{Habits, P};
+use crate::simulated_plc::{Memory, Plc, SharedPlc};
 use platen_model::{Acknowledgement, Code, StrokeKey};
 use platen_plant::press::{Link, Mode, Press};
 use platen_press::{Answer, HostSide, RunError, channels, run_press};
-use simulated_plc::memory::{Chaos, MemoryLink};
-use simulated_plc::plc::{Habits, P};
-use simulated_plc::{Memory, Plc, SharedPlc};
 use tokio::task::JoinHandle;
 
 const MS: fn(u64) -> Duration = Duration::from_millis;
@@ -30,7 +26,7 @@ struct Cell {
 }
 
 struct Host {
-    run: JoinHandle<Result<(), RunError<simulated_plc::Full>>>,
+    run: JoinHandle<Result<(), RunError<crate::simulated_plc::Full>>>,
     scanner: JoinHandle<()>,
     answers: tokio::sync::mpsc::UnboundedSender<Answer>,
     status: tokio::sync::watch::Receiver<platen_press::Status>,
@@ -42,7 +38,7 @@ struct Host {
 impl Cell {
     fn new(first_stroke: u16) -> Self {
         let plc: SharedPlc = Arc::new(Mutex::new(Plc::new(3, first_stroke)));
-        tokio::spawn(simulated_plc::run_plc(plc.clone()));
+        tokio::spawn(crate::simulated_plc::run_plc(plc.clone()));
         let journal = Memory::new(7);
         let (scans, alarms) = (Arc::default(), Arc::default());
         Self { plc, journal, chaos: Chaos::default(), seed: 1, mode: Mode::Measure, scans, alarms }
@@ -72,7 +68,7 @@ impl Cell {
         let (HostSide { orders, answers, status }, side) = channels();
         let (scans, alarms) = (Arc::clone(&self.scans), Arc::clone(&self.alarms));
         let scanner =
-            tokio::spawn(simulated_plc::host(orders, answers.clone(), MS(40), MS(10), scans, alarms));
+            tokio::spawn(crate::simulated_plc::host(orders, answers.clone(), MS(40), MS(10), scans, alarms));
         let run = tokio::spawn(run_press(press, link, journal.clone(), side));
         Host { run, scanner, answers, status, reachable, reset_next, lose_withdrawal }
     }
@@ -80,8 +76,10 @@ impl Cell {
     /// Makes `strokes` more strokes and waits until the PLC has finished them.
     async fn strokes(&self, strokes: usize) {
         self.plc().to_do = strokes;
-        simulated_plc::until(Duration::from_secs(600 * strokes as u64), "strokes", || self.plc().idle())
-            .await;
+        crate::simulated_plc::until(Duration::from_secs(600 * strokes as u64), "strokes", || {
+            self.plc().idle()
+        })
+        .await;
     }
 
     /// Asserts the invariants on the PLC's side; returns the numbers of results and scans.
@@ -252,15 +250,15 @@ async fn a_link_cut_in_the_middle_of_a_scan_delivers_once() {
     let host = cell.start();
     cell.strokes(3).await;
     cell.plc().to_do = 1;
-    simulated_plc::until(MS(2000), "the fourth scan", || cell.scans.lock().unwrap().len() == 4).await;
+    crate::simulated_plc::until(MS(2000), "the fourth scan", || cell.scans.lock().unwrap().len() == 4).await;
     host.reachable.store(false, Ordering::SeqCst);
     tokio::time::sleep(MS(1500)).await;
     assert_eq!(cell.plc().results.len(), 3);
     let waits = || host.status.borrow().metrics.result_waits;
     assert!(waits().is_some_and(|since| since > MS(1000)), "{:?}", waits());
     host.reachable.store(true, Ordering::SeqCst);
-    simulated_plc::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
-    simulated_plc::until(MS(1000), "no result to wait", || waits().is_none()).await;
+    crate::simulated_plc::until(MS(2000), "the result after the link is back", || cell.plc().idle()).await;
+    crate::simulated_plc::until(MS(1000), "no result to wait", || waits().is_none()).await;
     host.stop().await;
     assert_eq!(cell.check(), (4, 4));
 }
@@ -273,11 +271,11 @@ async fn a_result_that_could_not_be_withdrawn_is_withdrawn_before_the_next_one()
     // The third result is still valid when the fourth stroke is measured without a link.
     host.lose_withdrawal.store(true, Ordering::SeqCst);
     cell.plc().to_do = 1;
-    simulated_plc::until(MS(20_000), "the lost link", || !host.reachable.load(Ordering::SeqCst)).await;
+    crate::simulated_plc::until(MS(20_000), "the lost link", || !host.reachable.load(Ordering::SeqCst)).await;
     tokio::time::sleep(MS(1000)).await;
     assert_eq!(cell.scans.lock().unwrap().len(), 4);
     host.reachable.store(true, Ordering::SeqCst);
-    simulated_plc::until(MS(20_000), "the fourth result", || cell.plc().idle()).await;
+    crate::simulated_plc::until(MS(20_000), "the fourth result", || cell.plc().idle()).await;
     host.stop().await;
     assert_eq!(cell.check(), (4, 4));
 }
@@ -350,11 +348,11 @@ async fn a_host_killed_round_each_record_of_the_journal() {
             cell.plc().to_do = 3;
             cell.journal.dies_at(record, dies_before);
             let host = cell.start();
-            simulated_plc::until(MS(10_000), "the record", || cell.journal.died()).await;
+            crate::simulated_plc::until(MS(10_000), "the record", || cell.journal.died()).await;
             host.kill().await;
             cell.journal.revive();
             let host = cell.start();
-            simulated_plc::until(MS(60_000), "the strokes", || cell.plc().idle()).await;
+            crate::simulated_plc::until(MS(60_000), "the strokes", || cell.plc().idle()).await;
             host.stop().await;
             let (results, scans) = cell.check();
             let interrupted = cell.plc().results.iter().filter(|result| result.status & 1 << 12 != 0).count();
@@ -447,7 +445,7 @@ async fn the_registers_are_safe_after_a_stop_in_the_middle_of_a_scan() {
     let cell = Cell::new(0);
     let host = cell.start();
     cell.plc().to_do = 1;
-    simulated_plc::until(MS(2000), "a scan", || cell.scans.lock().unwrap().len() == 1).await;
+    crate::simulated_plc::until(MS(2000), "a scan", || cell.scans.lock().unwrap().len() == 1).await;
     host.stop().await;
     let plc = cell.plc();
     assert_eq!((plc.regs[102], plc.regs[106]), (0, 0), "status and error_code");

@@ -2,7 +2,7 @@
 
 use platen_press::{State, Transition};
 
-const README: &str = include_str!("../README.md");
+const README: &str = include_str!("../../README.md");
 
 /// Returns one column of the rows of the table between two lines.
 fn column(first: &str, last: &str, column: usize) -> Vec<String> {

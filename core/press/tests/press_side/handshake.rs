@@ -3,8 +3,6 @@
 //! After every event the harness checks the invariants of the README: no scan twice or without a record, no result
 //! without a record, no write before the press is known.
 
-#![allow(clippy::panic, reason = "helpers of tests")]
-
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 

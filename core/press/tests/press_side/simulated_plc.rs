@@ -1,38 +1,27 @@
 //! Simulated PLC of a press with the host's scanner and journal, for real sockets and for virtual time.
 
-#![allow(
-    dead_code,
-    unused_imports,
-    unreachable_pub,
-    reason = "each test program uses its own part of the simulation"
-)]
-#![allow(clippy::unwrap_used, reason = "a test that cannot continue must fail")]
+pub(crate) mod memory;
+pub(crate) mod plc;
+pub(crate) mod server;
 
-pub mod memory;
-pub mod plc;
-pub mod server;
-
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use platen_model::Measure;
-use platen_model::{
-    Acknowledgement, Figures, Measurement, Publication, Recalled, Record, Stage, StrokeKey, Verdict,
-};
+use platen_model::{Acknowledgement, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
 use platen_press::{Answer, Command, Journal, Order};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
-pub use plc::{Habits, Plc};
+pub(crate) use plc::Plc;
 
-pub type SharedPlc = Arc<Mutex<Plc>>;
+pub(crate) type SharedPlc = Arc<Mutex<Plc>>;
 
 /// Journal in memory that outlives the host.
 #[derive(Debug, Clone)]
-pub struct Memory {
-    pub records: Arc<Mutex<Vec<Record>>>,
-    pub full: Arc<Mutex<bool>>,
+pub(crate) struct Memory {
+    pub(crate) records: Arc<Mutex<Vec<Record>>>,
+    pub(crate) full: Arc<Mutex<bool>>,
     /// Planned power cut: index of the record, and whether the cut precedes it.
     cut: Arc<Mutex<Option<(usize, bool)>>>,
     dead: Arc<AtomicBool>,
@@ -41,40 +30,30 @@ pub struct Memory {
 
 #[derive(Debug, thiserror::Error)]
 #[error("disk full")]
-pub struct Full;
+pub(crate) struct Full;
 
 impl Memory {
-    pub fn new(owner: u16) -> Self {
+    pub(crate) fn new(owner: u16) -> Self {
         let (records, full, cut, dead) = Default::default();
         Self { records, full, cut, dead, owner }
     }
 
     /// Plans a power cut just before or just after the record with this index is written.
-    pub fn dies_at(&self, record: usize, before: bool) {
+    pub(crate) fn dies_at(&self, record: usize, before: bool) {
         *self.cut.lock().unwrap() = Some((record, before));
     }
 
-    pub fn died(&self) -> bool {
+    pub(crate) fn died(&self) -> bool {
         self.dead.load(Ordering::SeqCst)
     }
 
     /// Ends the power cut.
-    pub fn revive(&self) {
+    pub(crate) fn revive(&self) {
         *self.cut.lock().unwrap() = None;
         self.dead.store(false, Ordering::SeqCst);
     }
 
-    /// Returns the last publication of each stroke.
-    pub fn publications(&self) -> BTreeMap<StrokeKey, Publication> {
-        let records = self.records.lock().unwrap();
-        let publications = records.iter().filter_map(|record| match record {
-            Record::Finished(publication) => Some((publication.key, (**publication).clone())),
-            _ => None,
-        });
-        publications.collect()
-    }
-
-    pub fn acked(&self) -> Vec<(StrokeKey, Acknowledgement)> {
+    pub(crate) fn acked(&self) -> Vec<(StrokeKey, Acknowledgement)> {
         let records = self.records.lock().unwrap();
         let acked = records.iter().filter_map(|record| match record {
             Record::Acked { key, how } => Some((*key, *how)),
@@ -117,7 +96,7 @@ impl Journal for Memory {
 }
 
 /// Returns the measurement of the simulated scanner: the stroke number in hundredths of a millimetre.
-pub fn measurement(key: StrokeKey) -> Measurement {
+pub(crate) fn measurement(key: StrokeKey) -> Measurement {
     let figure = f64::from(key.stroke % 30_000) * 1e-5;
     Measurement {
         judgement: (if key.stroke.is_multiple_of(2) { Verdict::Pass } else { Verdict::Fail }).into(),
@@ -128,7 +107,7 @@ pub fn measurement(key: StrokeKey) -> Measurement {
 }
 
 /// Runs a host that scans and evaluates after fixed times and lists the scanned strokes.
-pub async fn host(
+pub(crate) async fn host(
     mut orders: UnboundedReceiver<Order>,
     answers: UnboundedSender<Answer>,
     scan: Duration,
@@ -161,7 +140,7 @@ pub async fn host(
 }
 
 /// Runs one cycle of the PLC program every 5 ms.
-pub async fn run_plc(plc: SharedPlc) {
+pub(crate) async fn run_plc(plc: SharedPlc) {
     let start = tokio::time::Instant::now();
     let mut interval = tokio::time::interval(Duration::from_millis(5));
     interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
@@ -172,7 +151,7 @@ pub async fn run_plc(plc: SharedPlc) {
 }
 
 /// Waits until the condition holds, at most `limit`.
-pub async fn until(limit: Duration, what: &str, mut holds: impl FnMut() -> bool) {
+pub(crate) async fn until(limit: Duration, what: &str, mut holds: impl FnMut() -> bool) {
     let waited = tokio::time::timeout(limit, async {
         while !holds() {
             tokio::time::sleep(Duration::from_millis(5)).await;

@@ -35,7 +35,7 @@ impl tokio_modbus::server::Service for Service {
 }
 
 /// Serves the PLC on a free port; returns the port.
-pub async fn serve(plc: SharedPlc) -> u16 {
+pub(crate) async fn serve(plc: SharedPlc) -> u16 {
     let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
     let port = listener.local_addr().unwrap().port();
     tokio::spawn(async move {

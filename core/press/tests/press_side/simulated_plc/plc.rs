@@ -2,53 +2,53 @@
 
 use std::time::Duration;
 
-pub const P: usize = 0;
-pub const H: usize = 100;
+pub(crate) const P: usize = 0;
+pub(crate) const H: usize = 100;
 
 /// Faults of the PLC program.
 #[derive(Debug, Clone, Default)]
-pub struct Habits {
+pub(crate) struct Habits {
     /// Lowers the trigger in every other cycle while it waits.
-    pub bounce: bool,
+    pub(crate) bounce: bool,
     /// Keeps the trigger up until the result is valid.
-    pub keeps_trigger: bool,
+    pub(crate) keeps_trigger: bool,
     /// Never acknowledges.
-    pub no_ack: bool,
+    pub(crate) no_ack: bool,
     /// Increments the stroke number by two before the stroke with this index.
-    pub jump_at: Option<usize>,
+    pub(crate) jump_at: Option<usize>,
     /// Sets the stroke number to 1 and changes the session before the stroke with this index.
-    pub back_at: Option<usize>,
+    pub(crate) back_at: Option<usize>,
     /// Delays the tail of its block by this many cycles at each stroke.
-    pub torn_cycles: u32,
+    pub(crate) torn_cycles: u32,
     /// Lowers `clear_to_scan` this many ms after acceptance.
-    pub unclear_after_ms: Option<u64>,
+    pub(crate) unclear_after_ms: Option<u64>,
 }
 
 /// Result as read by the PLC.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Result {
-    pub stroke: u16,
-    pub status: u16,
-    pub dev_max: u16,
-    pub error: u16,
-    pub seq: u16,
+pub(crate) struct Result {
+    pub(crate) stroke: u16,
+    pub(crate) status: u16,
+    pub(crate) dev_max: u16,
+    pub(crate) error: u16,
+    pub(crate) seq: u16,
 }
 
 #[derive(Debug)]
-pub struct Plc {
-    pub regs: [u16; 256],
-    pub habits: Habits,
-    pub to_do: usize,
-    pub done: usize,
-    pub results: Vec<Result>,
-    pub gave_up: Vec<u16>,
-    pub writes: usize,
-    pub outside: usize,
+pub(crate) struct Plc {
+    pub(crate) regs: [u16; 256],
+    pub(crate) habits: Habits,
+    pub(crate) to_do: usize,
+    pub(crate) done: usize,
+    pub(crate) results: Vec<Result>,
+    pub(crate) gave_up: Vec<u16>,
+    pub(crate) writes: usize,
+    pub(crate) outside: usize,
     /// Writes that replaced a valid result by another one.
-    pub swapped: usize,
-    pub now_ms: u64,
+    pub(crate) swapped: usize,
+    pub(crate) now_ms: u64,
     /// Times from the trigger to its acceptance, on the clock of the PLC.
-    pub accept_ms: Vec<u64>,
+    pub(crate) accept_ms: Vec<u64>,
     waiting: bool,
     accepted: bool,
     since_ms: u64,
@@ -62,7 +62,7 @@ pub struct Plc {
 }
 
 impl Plc {
-    pub fn new(press_id: u16, first_stroke: u16) -> Self {
+    pub(crate) fn new(press_id: u16, first_stroke: u16) -> Self {
         let mut regs = [0; 256];
         regs[P] = 1;
         regs[P + 2] = 0b10_0001;
@@ -96,12 +96,12 @@ impl Plc {
         }
     }
 
-    pub fn idle(&self) -> bool {
+    pub(crate) fn idle(&self) -> bool {
         self.to_do == 0 && !self.waiting && self.regs[P + 2] & 0b100 == 0
     }
 
     /// Restarts the PLC: registers lost, new session, a waiting stroke forgotten.
-    pub fn restart(&mut self, session: u16) {
+    pub(crate) fn restart(&mut self, session: u16) {
         let press_id = self.regs[P + 7];
         let stroke = self.regs[P + 3];
         let fresh = Self::new(press_id, stroke);
@@ -113,12 +113,12 @@ impl Plc {
         self.waiting = false;
     }
 
-    pub fn read(&self, start: u16, count: u16) -> Option<Vec<u16>> {
+    pub(crate) fn read(&self, start: u16, count: u16) -> Option<Vec<u16>> {
         let start = usize::from(start);
         self.regs.get(start..start + usize::from(count)).map(<[u16]>::to_vec)
     }
 
-    pub fn write(&mut self, start: u16, words: &[u16]) -> bool {
+    pub(crate) fn write(&mut self, start: u16, words: &[u16]) -> bool {
         let start = usize::from(start);
         self.writes += 1;
         if start < H || start + words.len() > H + 64 {
@@ -133,7 +133,7 @@ impl Plc {
     }
 
     /// Returns whether this write lowers the valid bit.
-    pub fn would_withdraw(&self, start: u16, words: &[u16]) -> bool {
+    pub(crate) fn would_withdraw(&self, start: u16, words: &[u16]) -> bool {
         let status = (H + 2).checked_sub(usize::from(start)).and_then(|at| words.get(at));
         self.valid_result().is_some() && status.is_some_and(|status| status & 1 << 2 == 0)
     }
@@ -165,7 +165,7 @@ impl Plc {
     }
 
     /// Runs one cycle of the reference program. The host is alive while `now - host_beat_ms <= 2000`.
-    pub fn cycle(&mut self, now: Duration) {
+    pub(crate) fn cycle(&mut self, now: Duration) {
         self.now_ms = now.as_millis() as u64;
         self.cycle += 1;
         if self.cycle.is_multiple_of(20) {

@@ -1,19 +1,15 @@
 //! RTU frames: through a gateway that passes late answers to the next connection, and on a pseudo terminal.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
-
-mod simulated_plc;
-
 use std::io::{Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::simulated_plc::{Memory, Plc, SharedPlc};
 use platen_model::StrokeKey;
 use platen_plant::press::{Block, Link, Press, Quiet, RegisterTable, Serial, Transport};
 use platen_press::{Answer, Client, ModbusLink, channels, run_press};
 use serialport::{SerialPort, TTYPort};
-use simulated_plc::{Memory, Plc, SharedPlc};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpListener;
 use tokio::net::tcp::OwnedWriteHalf;
@@ -118,12 +114,12 @@ fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
 
 /// Runs strokes over a link and asserts that each has its own result; returns the number of poisoned connections.
 async fn strokes(link: Link, plc: SharedPlc, strokes: usize) -> u64 {
-    tokio::spawn(simulated_plc::run_plc(plc.clone()));
+    tokio::spawn(crate::simulated_plc::run_plc(plc.clone()));
     let press = Press::pph1("Press 3", 3, link);
     let (host, side) = channels();
     let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
     let ms = Duration::from_millis;
-    let scanner = simulated_plc::host(
+    let scanner = crate::simulated_plc::host(
         host.orders,
         host.answers.clone(),
         ms(20),
@@ -135,7 +131,7 @@ async fn strokes(link: Link, plc: SharedPlc, strokes: usize) -> u64 {
     let link = ModbusLink::new(&press.link);
     let run = tokio::spawn(run_press(press, link, Memory::new(7), side));
     plc.lock().unwrap().to_do = strokes;
-    simulated_plc::until(Duration::from_secs(120), "the strokes", || plc.lock().unwrap().idle()).await;
+    crate::simulated_plc::until(Duration::from_secs(120), "the strokes", || plc.lock().unwrap().idle()).await;
     let poisoned = host.status.borrow().counts.poisoned;
     host.answers.send(Answer::Stop).unwrap();
     run.await.unwrap().unwrap();

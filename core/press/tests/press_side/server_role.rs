@@ -1,18 +1,14 @@
 //! Server role: the press is the Modbus client.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod simulated_plc;
-
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::simulated_plc::plc::{H, P};
+use crate::simulated_plc::{Memory, Plc, SharedPlc};
 use platen_model::StrokeKey;
 use platen_plant::press::{Link, Press, Role};
 use platen_press::{Answer, PressLink, channels, run_press};
-use simulated_plc::plc::{H, P};
-use simulated_plc::{Memory, Plc, SharedPlc};
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::*;
 
@@ -47,7 +43,7 @@ async fn thirty_strokes_with_the_host_as_server() {
     let (host, side) = channels();
     let scans: Arc<Mutex<Vec<StrokeKey>>> = Arc::default();
     let ms = Duration::from_millis;
-    let scanner = simulated_plc::host(
+    let scanner = crate::simulated_plc::host(
         host.orders,
         host.answers.clone(),
         ms(20),
@@ -57,10 +53,10 @@ async fn thirty_strokes_with_the_host_as_server() {
     );
     tokio::spawn(scanner);
     let run = tokio::spawn(run_press(press, link, Memory::new(7), side));
-    tokio::spawn(simulated_plc::run_plc(plc.clone()));
+    tokio::spawn(crate::simulated_plc::run_plc(plc.clone()));
     tokio::spawn(exchange(plc.clone(), host_at));
     plc.lock().unwrap().to_do = 30;
-    simulated_plc::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
+    crate::simulated_plc::until(Duration::from_secs(60), "the strokes", || plc.lock().unwrap().idle()).await;
 
     // Refused: writes outside the press block, other functions, other units.
     let mut stranger = ask(host_at).await;
