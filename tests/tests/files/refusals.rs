@@ -84,7 +84,7 @@ fn measure(scan: &Path, plate: &Path, more: &[&str]) -> Said {
     said
 }
 
-/// What a half-written folder would be called.
+/// Name of a half-written folder.
 fn is_part_of(path: &Path, out: &Path) -> bool {
     let name = |p: &Path| p.file_name().unwrap().to_string_lossy().into_owned();
     path != out && name(path).starts_with(&format!("{}.", name(out)))

@@ -192,7 +192,7 @@ impl Drop for Host {
     }
 }
 
-/// What no host may ever do, as the press saw it.
+/// Acts that are forbidden to every host, as counted by the press.
 #[track_caller]
 pub(crate) fn assert_clean(stats: &Json, log: &str) {
     for count in ["writes_outside", "writes_before_sync", "wrong_values", "duplicates", "changed"] {

@@ -45,7 +45,7 @@ pub(crate) fn quick() -> Config {
     }
 }
 
-/// What the product is told of a press at `address`.
+/// Plant description of a press at `address`.
 pub(crate) fn tcp(address: SocketAddr) -> Press {
     Press::pph1("Press 3", 3, Link::tcp(address.ip().to_string(), address.port(), 1))
 }
@@ -101,7 +101,7 @@ impl Journal for Memory {
     }
 }
 
-/// What the host was told while it ran.
+/// Orders and alarms that the host received.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Heard {
     pub(crate) scans: Arc<Mutex<Vec<StrokeKey>>>,
@@ -247,7 +247,7 @@ fn measurement(strokes: u32) -> Measurement {
     Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
-/// What must hold of every run, whatever was done to it.
+/// Asserts the conditions that hold for every run, with any fault.
 pub(crate) fn assert_clean(counters: &Counters) {
     assert_eq!(counters.wrong, Vec::<String>::new());
     let counts = [

@@ -30,7 +30,7 @@ use platen_sim_plate::{Plate, PlateState, Pose};
 use platen_sim_scanner::stream::{BridgeConfig, RayCastHead};
 use platen_sim_scanner::{Cyclic, Faces, Instrument, Surroundings};
 
-/// What is wrong: with the scanner, the shop or how the plate lies.
+/// Fault of the scanner, of the surroundings or of the pose of the plate.
 struct Scene {
     instrument: Instrument,
     surroundings: Surroundings,
