@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use toml::de::DeTable;
 
+use crate::duplicate::{self, DUPLICATE};
 use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
 use crate::{Error, Fault, Faults, TomlTable};
@@ -58,7 +59,8 @@ impl Document {
     ///
     /// The parser recovers from an error, but one slip may have several errors and may hide keys. Of the errors in one value
     /// or one line only the first is reported, the value is skipped, and no key is reported as missing. Lines after which
-    /// the parser would lose the following tables are blanked, and the text is parsed again.
+    /// the parser would lose the following tables are blanked, and the text is parsed again. A key that is defined twice
+    /// hides nothing: its first value is read.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
         let mut source = Source { file: file.into(), text: text.into(), syntax_errors: Vec::new() };
         let mut readable = source.text.clone();
@@ -67,6 +69,7 @@ impl Document {
             let (table, mut errors) = DeTable::parse_recoverable(&readable);
             errors.sort_by_key(|error| span(error).start);
             errors.truncate(MOST_ERRORS);
+            let doubled: Vec<_> = errors.extract_if(.., |error| error.message() == DUPLICATE).collect();
             let spans: Vec<Range<usize>> = errors.iter().map(span).collect();
             let root = Node::from_document(&table, &spans);
             let mut reported = Vec::new();
@@ -89,6 +92,7 @@ impl Document {
                 end = Some(value.map_or(line.end, |value| value.end.max(line.end)));
             }
             faults.extend(reported);
+            faults.extend(doubled.iter().map(|error| duplicate::fault(&source, &root, &span(error))));
             source.syntax_errors.extend(spans);
             break root;
         };

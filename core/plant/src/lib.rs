@@ -9,6 +9,7 @@
 //! Limits: files are read and nothing else; no socket, no clock, no plugin.
 
 mod document;
+mod duplicate;
 mod error;
 mod fault;
 mod key;

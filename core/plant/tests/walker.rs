@@ -92,14 +92,34 @@ fn missing_and_unknown_keys_name_their_table() {
 }
 
 #[test]
-fn a_doubled_key_is_reported_at_its_second_place() {
-    check(&format!("{GOOD}  id = 'B'\n"), &["4:3: duplicate key"]);
+fn a_doubled_key_names_both_places_and_hides_nothing() {
+    check(&format!("{GOOD}  id = 'B'\n"), &["4:3: plate.id: defined twice, first at f.toml:2:1; remove one"]);
     check(
         &format!("{GOOD}[[marker]]\nnumber = 1\n[[marker]]\nnumber = 2\nnumber = 3\n"),
-        &["8:1: duplicate key"],
+        &["8:1: marker[2].number: defined twice, first at f.toml:7:1; remove one"],
     );
-    check(&format!("{GOOD}[plate] # again\nid = 'B'\n"), &["4:2: duplicate key", "5:1: duplicate key"]);
-    check(&format!("{GOOD}at_mm = {{id = 1, id = 2}}\n"), &["4:18: duplicate key"]);
+    check(
+        &format!("{GOOD}[plate] # again\nid = 'B'\n"),
+        &[
+            "4:2: plate: defined twice, first at f.toml:1:2; remove one",
+            "5:1: plate.id: defined twice, first at f.toml:2:1; remove one",
+        ],
+    );
+    check(
+        &format!("{GOOD}at_mm = {{id = 1, id = 2}}\n"),
+        &[
+            "4:9: plate.at_mm: found a table, expected a list of 2 numbers",
+            "4:18: plate.at_mm.id: defined twice, first at f.toml:4:10; remove one",
+        ],
+    );
+    check(
+        "[plate]\nid = 'A'\n'id' = 'B'\ncolour = 1\n",
+        &[
+            "1:1: plate.width_mm: missing",
+            "3:1: plate.id: defined twice, first at f.toml:2:1; remove one",
+            "4:1: plate.colour: unknown key; allowed here: id, width_mm, at_mm, shape, bevelled, words",
+        ],
+    );
 }
 
 #[test]
