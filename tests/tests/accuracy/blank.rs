@@ -91,11 +91,12 @@ fn a_baseline_makes_uv_metric_on_a_blank_cut_off_its_rectangle() {
     scan(folder, "flat", CUT, FLAT, "0.05");
     scan(folder, "rolled", CUT, ROLLED, "0.05");
     scan(folder, "sphere", CUT, SPHERE, "0.05");
-    // Largest error of corners and of markers: what is called excellent of each shape; the harmonic map's own on a sphere is 0.5.
+    // Largest error of corners and of markers, about twice what is found: corners 0.19, 0.23, 0.33, 0.28; markers 0.11, 0.14, 0.12 and,
+    // by the harmonic map's own error on a sphere, 0.45.
     for (name, flattening, bounds) in [
-        ("rolled", "elastic", [0.5, 0.25]),
-        ("rolled", "harmonic", [0.5, 0.25]),
-        ("sphere", "elastic", [0.5, 0.4]),
+        ("rolled", "elastic", [0.4, 0.21]),
+        ("rolled", "harmonic", [0.46, 0.25]),
+        ("sphere", "elastic", [0.5, 0.25]),
         ("sphere", "harmonic", [0.5, 0.7]),
     ] {
         let (corners, markers, outline) = errors(folder, name, flattening, Some("flat"));
@@ -173,10 +174,11 @@ fn mesh(shape: Shape, n: u32) -> DiskMesh {
 /// The simulator lays the flat sheet on the shape with its own series of least energy; here the way leads back.
 #[test]
 fn a_blank_a_little_curved_tells_its_outline() {
+    // Twice what is found: 1e-4 mm, and 0.012 mm on the cylinder, whose facets are chords.
     for (shape, bound_mm) in [
-        (Shape::Sphere { radius_mm: 80_000.0 }, 0.02),
-        (Shape::Torus { axis_deg: 30.0, radius_mm: 60_000.0, cross_radius_mm: -150_000.0 }, 0.02),
-        (Shape::Cylinder { radius_mm: 5000.0, axis_deg: 60.0 }, 0.05),
+        (Shape::Sphere { radius_mm: 80_000.0 }, 3e-4),
+        (Shape::Torus { axis_deg: 30.0, radius_mm: 60_000.0, cross_radius_mm: -150_000.0 }, 3e-4),
+        (Shape::Cylinder { radius_mm: 5000.0, axis_deg: 60.0 }, 0.024),
     ] {
         let name = shape.name();
         let found = Blank::of_mesh(&mesh(shape, 80)).unwrap();

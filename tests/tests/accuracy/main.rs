@@ -3,5 +3,6 @@
 
 mod bench;
 mod blank;
+mod golden;
 mod plates;
 mod trust;

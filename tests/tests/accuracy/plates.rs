@@ -95,7 +95,7 @@ fn plate_file(plate: &Path, file: &Path) -> String {
 }
 
 /// Runs the program as a user would and reads its result.
-fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json {
+pub(crate) fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json {
     let file = folder.join("plate.toml");
     let hint = plate_file(plate, &file);
     let plant = folder.join("plant.toml");

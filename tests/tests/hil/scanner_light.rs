@@ -109,6 +109,7 @@ fn over_half_a_turn(seam: f64, clockwise: bool) -> Window {
     Window { azimuth_start, azimuth_width: PI + BEHIND, elevation_min: -0.72, elevation_max: -0.42 }
 }
 
+/// Measured within bounds: about twice what the scene gives.
 #[track_caller]
 fn survives(corners_mm: f64, surface_mm: f64, scene: Scene) -> Found {
     let found = measure(scene).unwrap_or_else(|error| panic!("{error}"));
@@ -135,13 +136,13 @@ fn never_wrong(corners_mm: f64, surface_mm: f64, scene: Scene) {
 
 #[test]
 fn undisturbed() {
-    survives(2.0, 0.1, Scene::default());
+    survives(0.8, 0.01, Scene::default());
 }
 
 #[test]
 fn mixed_pixels() {
     let instrument = Instrument { footprint: 1.2e-3, ..Scene::default().instrument };
-    survives(3.0, 0.1, Scene { instrument, ..Scene::default() });
+    survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
 /// The plate stands up to the scanner, so that its mirror lobe, of this half width, looks over its upper edge.
@@ -155,7 +156,7 @@ fn before_the_mirror(lobe_deg: f64) -> Scene {
 
 #[test]
 fn specular_hole() {
-    let found = survives(3.0, 0.1, before_the_mirror(2.0));
+    let found = survives(0.5, 0.01, before_the_mirror(2.0));
     assert!(found.coverage < 0.98, "no hole: {found:?}");
 }
 
@@ -169,34 +170,34 @@ fn an_edge_in_the_mirror_lobe() {
 #[test]
 fn dark_noise() {
     let instrument = Instrument { range_sigma: 1.5e-3, dropout: 0.05, ..Scene::default().instrument };
-    survives(4.0, 0.2, Scene { instrument, ..Scene::default() });
+    survives(1.0, 0.025, Scene { instrument, ..Scene::default() });
 }
 
 #[test]
 fn cyclic_bias() {
     let cyclic = Some(Cyclic { amplitude: 0.3e-3, period: 1.2, phase: 0.0 });
     let instrument = Instrument { cyclic, ..Scene::default().instrument };
-    survives(3.0, 0.4, Scene { instrument, ..Scene::default() });
+    survives(0.9, 0.22, Scene { instrument, ..Scene::default() });
 }
 
 #[test]
 fn angular_noise() {
     let instrument = Instrument { angular_sigma: 30e-6, ..Scene::default().instrument };
-    survives(3.0, 0.2, Scene { instrument, ..Scene::default() });
+    survives(1.1, 0.012, Scene { instrument, ..Scene::default() });
 }
 
 #[test]
 fn inclination() {
     // Seen from a scanner that leans, the plate leans.
     let pose = Pose { pitch_deg: 4.0, roll_deg: -2.0, ..Pose::default() };
-    survives(3.0, 0.1, Scene { plate: PlateState { pose, ..plate() }, ..Scene::default() });
+    survives(0.8, 0.01, Scene { plate: PlateState { pose, ..plate() }, ..Scene::default() });
 }
 
 #[test]
 fn warm_up_columns() {
     // 40 columns, 2.8 degrees, of ranges that scatter by centimetres, beside the plate.
     let instrument = Instrument { warm_up_columns: 40, ..Scene::default().instrument };
-    survives(2.0, 0.1, Scene { instrument, ..Scene::default() });
+    survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
 /// Both faces see a part of the plate, the back face with its own collimation and from 1.1 mm beside; three columns at the seam are left out.
@@ -209,18 +210,18 @@ fn seam(seam_deg: f64, clockwise: bool) -> Scene {
 
 #[test]
 fn seam_across_the_plate() {
-    survives(3.0, 0.8, seam(-2.0, false));
+    survives(2.2, 0.8, seam(-2.0, false));
 }
 
 #[test]
 fn seam_of_a_head_that_turns_clockwise() {
-    survives(3.0, 0.8, seam(3.0, true));
+    survives(2.2, 0.8, seam(3.0, true));
 }
 
 #[test]
 fn stray_and_occluded() {
     let surroundings = Surroundings { person_in_front: true, chain: true, ..Surroundings::default() };
-    survives(6.0, 0.5, Scene { surroundings, ..Scene::default() });
+    survives(0.8, 0.01, Scene { surroundings, ..Scene::default() });
 }
 
 #[test]

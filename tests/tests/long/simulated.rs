@@ -15,31 +15,44 @@ const CONSTANT: &[&str] = &["cylinder", "cone", "sphere", "torus"];
 const NARROW: &[&str] = &["bands", "half-bent"];
 const ALL: &[&str] = &["cylinder", "cone", "bands", "half-bent", "sphere", "torus"];
 
-/// Figure, plates, largest mean over the seeds at the lower noise. At the higher one it may be twice as large: the same factor for all that
-/// is asked of the surface there.
-const BOUNDS: &[(&str, &[&str], f64)] = &[
-    ("corners_rms_mm", ALL, 0.5),
-    ("markers_mean_mm", DEVELOPABLE, 0.25),
-    ("markers_mean_mm", DOUBLY_CURVED, 0.4),
-    ("surface_inside_rms_mm", ALL, 0.03),
-    ("surface_edge_rms_mm", ALL, 0.06),
-    ("d_u_std_mm", ALL, 0.1),
-    ("d_v_std_mm", ALL, 0.1),
-    ("theta_std_deg", ALL, 0.02),
-    ("curvature_rms_per_m", CONSTANT, 3e-4),
-    ("curvature_rms_per_m", NARROW, 9e-3),
+/// Figure, plates, largest mean over the seeds at each noise: about twice what 4 and 50 seeds give on the worst of the plates.
+const BOUNDS: &[(&str, &[&str], [f64; 2])] = &[
+    // Found: 0.31 and 0.43 (torus, 50 seeds).
+    ("corners_rms_mm", ALL, [0.5, 0.86]),
+    // Found: 0.10 and 0.18 (bands: their edges along the lattice).
+    ("markers_mean_mm", DEVELOPABLE, [0.2, 0.36]),
+    // Found: 0.12 and 0.16.
+    ("markers_mean_mm", DOUBLY_CURVED, [0.24, 0.32]),
+    // Found: 0.010 and 0.023 (bands, as in all that follows but the angle).
+    ("surface_inside_rms_mm", ALL, [0.02, 0.046]),
+    // Found: 0.028 and 0.084.
+    ("surface_edge_rms_mm", ALL, [0.056, 0.12]),
+    // Found: 0.025 and 0.037.
+    ("d_u_std_mm", ALL, [0.05, 0.074]),
+    // Found: 0.016 and 0.026.
+    ("d_v_std_mm", ALL, [0.033, 0.052]),
+    // Found: 0.015 and 0.022 (sphere).
+    ("theta_std_deg", ALL, [0.02, 0.04]),
+    // Found: 1.8e-4 and 2.5e-4 (cone).
+    ("curvature_rms_per_m", CONSTANT, [3e-4, 5e-4]),
+    // Found: 5.7e-3 and 7.7e-3.
+    ("curvature_rms_per_m", NARROW, [9e-3, 0.0155]),
 ];
 
 /// Largest corner figure of any one scan of a plate of constant curvature, at any noise: an edge at a lesser maximum of its
 /// likelihood is 1 mm off, which a mean over seeds hides.
 const WORST_CORNERS_MM: f64 = 0.75;
 
-/// Figure of a stroke, its largest mean likewise.
-const STROKES: &[(&str, f64)] = &[
-    ("displacement_normal_rms_mm", 0.05),
-    ("displacement_vector_rms_mm", 0.5),
-    ("band_angle_error_deg", 0.02),
-    ("template_gap_error_mm", 0.1),
+/// Figure of a stroke, its largest means likewise.
+const STROKES: &[(&str, [f64; 2])] = &[
+    // Found: 0.025 and 0.059.
+    ("displacement_normal_rms_mm", [0.05, 0.1]),
+    // Found: 0.15 and 0.24.
+    ("displacement_vector_rms_mm", [0.3, 0.48]),
+    // Found: 0.010 and 0.026.
+    ("band_angle_error_deg", [0.02, 0.04]),
+    // Found: 0.004 and 0.009.
+    ("template_gap_error_mm", [0.01, 0.02]),
 ];
 /// Share of an unchanged plate above the level of detection, in the mean over null pairs, at any noise.
 const FALSE_CHANGE: f64 = 0.06;
@@ -98,8 +111,8 @@ fn plates_and_strokes_are_measured_within_the_bounds() {
     println!("| plate | noise mm | figure | mean over {} seeds | worst | bound of the mean |", seeds());
     for (name, plates, bound) in BOUNDS {
         for plate in *plates {
-            for (noise_mm, factor) in NOISE_MM.into_iter().zip([1.0, 2.0]) {
-                hold(&mut failures, plate, noise_mm, name, row(plate, noise_mm, "elastic"), factor * bound);
+            for (noise_mm, bound) in NOISE_MM.into_iter().zip(*bound) {
+                hold(&mut failures, plate, noise_mm, name, row(plate, noise_mm, "elastic"), bound);
             }
         }
     }
@@ -110,10 +123,10 @@ fn plates_and_strokes_are_measured_within_the_bounds() {
         }
     }
     let pairs = found.pointer("/accuracy/pairs").and_then(Json::as_array).unwrap();
-    for (pair, factor) in pairs.iter().zip([1.0, 2.0]) {
+    for (k, pair) in pairs.iter().enumerate() {
         let noise_mm = number(pair, "/noise_mm");
-        for (name, bound) in STROKES {
-            hold(&mut failures, "stroke", noise_mm, name, pair, factor * bound);
+        for (name, bounds) in STROKES {
+            hold(&mut failures, "stroke", noise_mm, name, pair, bounds[k]);
         }
         hold(&mut failures, "null pair", noise_mm, "false_change_share", pair, FALSE_CHANGE);
     }
