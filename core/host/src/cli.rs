@@ -216,14 +216,18 @@ fn run_program(run: impl FnOnce(&Cli) -> Result<ExitCode, CliError>) -> ExitCode
 
 /// Starts the log on stderr, filtered by `PLATEN_LOG`; warnings and errors by default.
 fn start_log() {
-    use tracing_subscriber::filter::{EnvFilter, LevelFilter};
-    let filter = EnvFilter::builder()
-        .with_default_directive(LevelFilter::WARN.into())
-        .with_env_var("PLATEN_LOG")
-        .from_env_lossy();
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .init();
+    use tracing_subscriber::filter::{LevelFilter, Targets};
+    use tracing_subscriber::prelude::*;
+
+    let filter = match std::env::var("PLATEN_LOG").unwrap_or_default().parse::<Targets>() {
+        Ok(filter) if filter.default_level().is_none() => filter.with_default(LevelFilter::WARN),
+        Ok(filter) => filter,
+        Err(error) => {
+            output::error(&format!("PLATEN_LOG: {error}; write for example debug or platen_press=trace"));
+            Targets::new().with_default(LevelFilter::WARN)
+        }
+    };
+    let colours = std::io::IsTerminal::is_terminal(&std::io::stderr());
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(colours);
+    tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }
