@@ -76,7 +76,7 @@ pub fn scan(
     let header = scan.header().clone();
     let mut extractor = Extractor::new(&header, spec);
     if let Some(buffer) = buffer.as_deref_mut() {
-        buffer.begin(header.clone());
+        buffer.header = Some(header.clone());
     }
     for column in &mut scan {
         let column = column?;
@@ -87,7 +87,7 @@ pub fn scan(
     }
     let end = scan.finish()?;
     if let Some(buffer) = buffer {
-        buffer.end(end);
+        buffer.end = Some(end);
     }
     let acquired = Instant::now();
     extractor.leave_out_warm_up(end.warm_up_columns);

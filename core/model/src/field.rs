@@ -29,6 +29,13 @@ pub enum NodeState {
     Unchanged = 2,
 }
 
+impl From<bool> for NodeState {
+    /// Returns the state of a node that was seen, or was not.
+    fn from(seen: bool) -> Self {
+        if seen { Self::Seen } else { Self::Unseen }
+    }
+}
+
 impl Field {
     /// Returns one component at a share of the plate's sides (0 to 1): interpolated bilinearly between the seen nodes, with
     /// the state of the nearest one.

@@ -32,6 +32,26 @@ pub struct Figure {
     pub at: Option<[f64; 2]>,
 }
 
+impl Figure {
+    /// Makes a figure without uncertainty and place.
+    #[must_use]
+    pub fn new(name: impl Into<String>, value: f64, unit: &str) -> Self {
+        Self { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
+    }
+
+    /// Adds the expanded uncertainty (95 %).
+    #[must_use]
+    pub fn uncertainty(self, uncertainty: f64) -> Self {
+        Self { uncertainty: Some(uncertainty), ..self }
+    }
+
+    /// Adds the place on the plate.
+    #[must_use]
+    pub fn at(self, place: [f64; 2]) -> Self {
+        Self { at: Some(place), ..self }
+    }
+}
+
 /// Contact of one template with the plate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TemplateFinding {

@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use platen_model::Report;
-use platen_sdk::exchange::{AlignedBuffer, Decode, Encode};
+use platen_sdk::exchange::{AlignedBuffer, Payload};
 use platen_shape::Surface;
 
 use crate::field_export::PlateTable;

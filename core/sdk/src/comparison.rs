@@ -7,7 +7,7 @@ use platen_abi::{desc_flag, frame_flag};
 use platen_model::{Report, Task};
 use platen_shape::Surface;
 
-use crate::exchange::{Decode, check};
+use crate::exchange::{Payload, check};
 use crate::shim::{Input, Plugin, describe, refused};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 

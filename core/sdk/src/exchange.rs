@@ -1,7 +1,6 @@
 //! Payloads of the plugin boundary, written and read in one place.
 //!
-//! Each value that crosses the boundary has one format of `platen.h`, and one module here with its [`Encode`] beside its
-//! [`Decode`]. The SDK writes into buffers of the host, the host into an [`AlignedBuffer`]; a file of a surface
+//! Each value that crosses the boundary has one format of `platen.h`, and one implementation of [`Payload`] here. The SDK writes into buffers of the host, the host into an [`AlignedBuffer`]; a file of a surface
 //! (`surface.platen`) has the same bytes.
 //!
 //! | module | values | format |
@@ -25,7 +24,7 @@ pub use scan::{from_raw_window, to_raw_window};
 
 use std::ffi::CStr;
 
-use platen_abi::payload::Malformed;
+use platen_abi::payload::{self, Element, Header, Layout, Malformed, Span};
 
 /// Reason why a payload is refused.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +52,8 @@ impl From<Malformed> for DecodeError {
     }
 }
 
-/// A value that can be written as a payload.
-pub trait Encode {
+/// A value that crosses the boundary as a payload.
+pub trait Payload: Sized {
     /// Name of the format.
     const FORMAT: &'static CStr;
 
@@ -66,7 +65,7 @@ pub trait Encode {
     /// Writes the value into a zeroed buffer of as many bytes as `allocate` is asked for.
     ///
     /// # Errors
-    /// The errors of `allocate`.
+    /// Those of `allocate`.
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E>;
 
     /// Writes the value into a buffer of its own.
@@ -76,18 +75,43 @@ pub trait Encode {
         let Ok(buffer) = allocated;
         buffer
     }
-}
-
-/// A value that can be read from a payload.
-pub trait Decode: Sized {
-    /// Name of the format.
-    const FORMAT: &'static CStr;
 
     /// Reads the value. Arrays are read in place: `bytes` starts at a multiple of 8, as in an [`AlignedBuffer`].
     ///
     /// # Errors
     /// [`DecodeError`], when headers, arrays or values are wrong. No content can cause a panic.
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError>;
+}
+
+/// Arrays of a payload, placed behind its header in the order of their addition.
+struct Arrays<'a> {
+    layout: Layout,
+    put: Vec<Box<dyn Fn(&mut [u8]) + 'a>>,
+}
+
+impl<'a> Arrays<'a> {
+    fn behind<H: Header>() -> Self {
+        Self { layout: Layout::of::<H>(), put: Vec::new() }
+    }
+
+    /// Adds an array; returns its place.
+    fn add<T: Element>(&mut self, elements: &'a [T]) -> Span {
+        let span = self.layout.add::<T>(elements.len());
+        self.put.push(Box::new(move |bytes| payload::put(bytes, span, elements)));
+        span
+    }
+
+    /// Writes header and arrays, as [`Payload::encode`].
+    fn encode<H: Header, B: AsMut<[u8]>, E>(
+        self,
+        header: &H,
+        allocate: impl FnOnce(usize) -> Result<B, E>,
+    ) -> Result<B, E> {
+        let mut buffer = allocate(self.layout.bytes())?;
+        payload::put_header(buffer.as_mut(), header);
+        self.put.iter().for_each(|put| put(buffer.as_mut()));
+        Ok(buffer)
+    }
 }
 
 /// Zeroed bytes that start at a multiple of 8.

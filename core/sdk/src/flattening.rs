@@ -5,7 +5,7 @@ use std::ffi::c_char;
 use platen_abi::payload::{self, Header};
 use platen_shape::{Chart, DiskMesh};
 
-use crate::exchange::Decode;
+use crate::exchange::Payload;
 use crate::shim::{Input, Plugin, describe, refused};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use platen_abi as abi;
 
-use crate::exchange::Encode;
+use crate::exchange::Payload;
 use crate::{Error, ErrorKind, Result};
 
 /// Callback that wakes a blocking call of the plugin when its job is cancelled.
@@ -85,7 +85,7 @@ impl<'a> Job<'a> {
     }
 
     /// Sends a value to the host.
-    pub(crate) fn send<T: Encode>(&self, value: &T, flags: u32) -> Result<()> {
+    pub(crate) fn send<T: Payload>(&self, value: &T, flags: u32) -> Result<()> {
         let buffer = value.encode(|bytes| self.buffer(bytes))?;
         self.emit(T::FORMAT, value.count(), flags, buffer)
     }

@@ -28,42 +28,33 @@ impl Options for () {
 #[derive(Debug, Clone, Copy)]
 pub struct Values<'a>(pub(crate) &'a [Value]);
 
-impl<'a> Values<'a> {
-    fn find(&self, name: &CStr) -> Option<Received<'a>> {
-        // SAFETY: the host's strings are NUL-terminated and live for the call.
-        let value = self.0.iter().find(|v| unsafe { CStr::from_ptr(v.name) } == name)?;
-        Some(Received { value })
-    }
-
+impl Values<'_> {
     /// Returns the value of one option.
     ///
     /// # Errors
     /// When it is missing or of another type.
     #[doc(hidden)]
     pub fn get<T: OptionType>(&self, name: &CStr) -> crate::Result<T> {
-        T::receive(self.find(name)).ok_or_else(|| {
-            let name = name.to_string_lossy();
-            crate::Error::new(
-                crate::ErrorKind::Internal,
-                format!("the host gave no valid value for option {name}"),
-            )
+        // SAFETY: the host's strings are NUL-terminated and live for the call.
+        let value = self.0.iter().find(|v| unsafe { CStr::from_ptr(v.name) } == name);
+        T::receive(value.map(Received)).ok_or_else(|| {
+            let message = format!("the host gave no valid value for option {}", name.to_string_lossy());
+            crate::Error::new(crate::ErrorKind::Internal, message)
         })
     }
 }
 
 /// One value as received.
 #[derive(Debug, Clone, Copy)]
-pub struct Received<'a> {
-    value: &'a Value,
-}
+pub struct Received<'a>(&'a Value);
 
 impl Received<'_> {
     fn text(&self) -> Option<String> {
-        if self.value.s.is_null() {
+        if self.0.s.is_null() {
             return None;
         }
         // SAFETY: not null, NUL-terminated and alive for the call.
-        Some(unsafe { CStr::from_ptr(self.value.s) }.to_string_lossy().into_owned())
+        Some(unsafe { CStr::from_ptr(self.0.s) }.to_string_lossy().into_owned())
     }
 }
 
@@ -91,21 +82,21 @@ macro_rules! option_type {
 }
 
 option_type! {
-    bool = BOOL, |r| Some(r.value.i != 0);
-    i64 = INT, |r| Some(r.value.i);
-    f64 = FLOAT, |r| Some(r.value.f);
+    bool = BOOL, |r| Some(r.0.i != 0);
+    i64 = INT, |r| Some(r.0.i);
+    f64 = FLOAT, |r| Some(r.0.f);
     String = STRING, |r| r.text();
     PathBuf = PATH, |r| r.text().map(PathBuf::from);
-    std::time::Duration = DURATION, |r| std::time::Duration::try_from_secs_f64(r.value.f).ok();
+    std::time::Duration = DURATION, |r| std::time::Duration::try_from_secs_f64(r.0.f).ok();
     Vec<f64> = FLOAT_LIST, |r| {
-        if r.value.n == 0 {
+        if r.0.n == 0 {
             return Some(Vec::new());
         }
-        if r.value.list.is_null() {
+        if r.0.list.is_null() {
             return None;
         }
         // SAFETY: the host's list has n numbers and lives for the call.
-        Some(unsafe { std::slice::from_raw_parts(r.value.list, usize::try_from(r.value.n).ok()?) }.to_vec())
+        Some(unsafe { std::slice::from_raw_parts(r.0.list, usize::try_from(r.0.n).ok()?) }.to_vec())
     };
 }
 
@@ -140,27 +131,20 @@ const fn pointer(text: Option<&'static str>) -> *const c_char {
     }
 }
 
+/// Returns a bound and its flag; 0 without one.
+const fn bound(bound: Option<f64>, flag: u32) -> (f64, u32) {
+    match bound {
+        Some(bound) => (bound, flag),
+        None => (0.0, 0),
+    }
+}
+
 /// Makes a row of the table. The texts must end in NUL; the macro appends it.
 #[doc(hidden)]
 pub const fn declare<T: OptionType>(declared: Declared) -> OptionDecl {
-    let mut flags = 0;
-    if T::REQUIRED && declared.default_text.is_none() {
-        flags |= option_flag::REQUIRED;
-    }
-    let min = match declared.min {
-        Some(min) => {
-            flags |= option_flag::HAS_MIN;
-            min
-        }
-        None => 0.0,
-    };
-    let max = match declared.max {
-        Some(max) => {
-            flags |= option_flag::HAS_MAX;
-            max
-        }
-        None => 0.0,
-    };
+    let required = T::REQUIRED && declared.default_text.is_none();
+    let (min, has_min) = bound(declared.min, option_flag::HAS_MIN);
+    let (max, has_max) = bound(declared.max, option_flag::HAS_MAX);
     let (kind, choices) = match declared.choices {
         Some(choices) => (option_type::CHOICE, choices.as_ptr()),
         None => (T::TYPE, std::ptr::null()),
@@ -168,7 +152,7 @@ pub const fn declare<T: OptionType>(declared: Declared) -> OptionDecl {
     OptionDecl {
         struct_size: size_of::<OptionDecl>() as u32,
         kind,
-        flags,
+        flags: has_min | has_max | if required { option_flag::REQUIRED } else { 0 },
         reserved: 0,
         name: pointer(Some(declared.name)),
         unit: pointer(declared.unit),

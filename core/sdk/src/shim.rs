@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use platen_abi as abi;
 
-use crate::exchange::{Decode, DecodeError, from_raw_window};
+use crate::exchange::{DecodeError, Payload, from_raw_window};
 pub use crate::option::{Declared, declare};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Scanner, Values, job, logging};
 
@@ -97,7 +97,7 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
         self.0.estimate_s(window)
     }
     fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()> {
-        let window = inputs.iter().find(|input| input.format == <platen_scan::Window as Decode>::FORMAT);
+        let window = inputs.iter().find(|input| input.format == platen_scan::Window::FORMAT);
         let window = window
             .map(|input| platen_scan::Window::decode(input.bytes).map_err(|e| refused(&e)))
             .transpose()?;

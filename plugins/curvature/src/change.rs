@@ -6,7 +6,7 @@ use platen_shape::surface::Curvature;
 use platen_shape::{EXPANDED, Surface};
 
 use crate::bands::{self, Band};
-use crate::{Nodes, Options, figure, place};
+use crate::{Nodes, Options, place};
 
 /// Median of chi squared with three degrees of freedom.
 const MEDIAN: f64 = 2.366;
@@ -54,12 +54,12 @@ pub(crate) fn add(
     let median_lod = lod.get(lod.len() / 2).copied().unwrap_or(0.0);
 
     let findings = &mut report.findings;
-    findings.figures.push(figure("curvature.lod", median_lod, "1/m"));
+    findings.figures.push(Figure::new("curvature.lod", median_lod, "1/m"));
     let share = |n: usize| n as f64 / lod.len().max(1) as f64;
     let above = label.iter().filter(|label| **label != 0).count();
     let changed = bands.iter().map(|band| band.nodes.len()).sum();
-    findings.figures.push(figure("curvature.above_lod", share(above), "1"));
-    findings.figures.push(figure("curvature.changed_share", share(changed), "1"));
+    findings.figures.push(Figure::new("curvature.above_lod", share(above), "1"));
+    findings.figures.push(Figure::new("curvature.changed_share", share(changed), "1"));
     findings.figures.extend(bands.iter().enumerate().flat_map(|(k, band)| figures(k + 1, band)));
     findings.says.extend(bands.iter().map(|band| sentence(band, &options.against)));
     if bands.is_empty() {
@@ -114,12 +114,11 @@ fn chi_squared(change: &Curvature, sigma: [f64; 3]) -> f64 {
 
 fn figures(number: usize, band: &Band) -> [Figure; 4] {
     let named = |what: &str| format!("bend.{number}.{what}");
-    let (uncertainty, at) = (Some(band.uncertainty), Some(band.centre));
     [
-        Figure { uncertainty, at, ..figure(named("angle"), band.angle, "rad") },
-        figure(named("direction"), band.direction, "rad"),
-        figure(named("length"), band.length, "m"),
-        figure(named("width"), band.width, "m"),
+        Figure::new(named("angle"), band.angle, "rad").uncertainty(band.uncertainty).at(band.centre),
+        Figure::new(named("direction"), band.direction, "rad"),
+        Figure::new(named("length"), band.length, "m"),
+        Figure::new(named("width"), band.width, "m"),
     ]
 }
 

@@ -4,7 +4,7 @@ use platen_model::{Figure, NodeState, Report};
 use platen_sdk::PlateGrid;
 use platen_shape::{EXPANDED, TargetSurface};
 
-use crate::{Nodes, figure, place};
+use crate::{Nodes, place};
 
 /// Adds the field, the figures and the sentences of the missing curvature.
 pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
@@ -28,7 +28,7 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let known = state.iter().filter(|s| **s != NodeState::Unseen).count();
     let enough = state.iter().filter(|s| **s == NodeState::Unchanged).count();
     let figures = &mut report.findings.figures;
-    figures.push(figure("curvature.enough", enough as f64 / known.max(1) as f64, "1"));
+    figures.push(Figure::new("curvature.enough", enough as f64 / known.max(1) as f64, "1"));
     // The extreme of each sense among the significant nodes.
     for (name, sign, word) in
         [("curvature.deficit_max", 1.0, "bend more"), ("curvature.deficit_min", -1.0, "bent too far")]
@@ -36,8 +36,7 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
         let beyond = |i: &usize| state[*i] == NodeState::Seen && sign * value[*i] > 0.0;
         let most = (0..value.len()).filter(beyond).max_by(|&a, &b| value[a].abs().total_cmp(&value[b].abs()));
         let Some(i) = most else { continue };
-        let (uncertainty, at) = (Some(lod[i]), Some(grid.at(i)));
-        figures.push(Figure { uncertainty, at, ..figure(name, value[i], "1/m") });
+        figures.push(Figure::new(name, value[i], "1/m").uncertainty(lod[i]).at(grid.at(i)));
         let size = value[i].abs();
         report.findings.says.push(format!("{word}: {size:.3} 1/m at {}", place(grid.at(i))));
     }
@@ -60,15 +59,15 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
         |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>() * grid.cell();
     let (missing, wanted) = (total(&value), total(&goal));
     let figures = &mut report.findings.figures;
-    figures.push(figure("gaussian.missing", missing, "1"));
-    figures.push(figure("gaussian.wanted", wanted, "1"));
-    figures.push(figure("gaussian.missing_share", missing / wanted, "1"));
+    figures.push(Figure::new("gaussian.missing", missing, "1"));
+    figures.push(Figure::new("gaussian.wanted", wanted, "1"));
+    figures.push(Figure::new("gaussian.missing_share", missing / wanted, "1"));
     report.findings.says.push(format!(
         "still to stretch: {:.0} % of the target's Gaussian curvature is missing ({missing:.4} of {wanted:.4} sr)",
         100.0 * missing / wanted
     ));
-    let state = nodes.known.iter().map(|known| if *known { NodeState::Seen } else { NodeState::Unseen });
-    report.fields.push(grid.scalar("gaussian_missing", "1/m2", value, state.collect()));
+    let state = nodes.known.iter().copied().map(NodeState::from).collect();
+    report.fields.push(grid.scalar("gaussian_missing", "1/m2", value, state));
 }
 
 /// Returns whether the target has Gaussian curvature, which bending alone cannot make.

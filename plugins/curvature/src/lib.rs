@@ -79,7 +79,7 @@ mod change;
 mod deficit;
 mod strain;
 
-use platen_model::{Field, Figure, Findings, NodeState, Report};
+use platen_model::{Field, Findings, NodeState, Report};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::surface::Curvature;
 use platen_shape::{EXPANDED, Surface, TargetSurface};
@@ -140,8 +140,7 @@ impl Nodes {
     }
 
     fn fields(&self) -> Vec<Field> {
-        let known = |known: &bool| if *known { NodeState::Seen } else { NodeState::Unseen };
-        let state: Vec<NodeState> = self.known.iter().map(known).collect();
+        let state: Vec<NodeState> = self.known.iter().copied().map(NodeState::from).collect();
         let field = |name: &str, unit: &str, take: fn(&Curvature) -> f64| {
             self.grid.scalar(name, unit, self.curvature.iter().map(take).collect(), state.clone())
         };
@@ -191,11 +190,6 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         }
     }
     Ok(report)
-}
-
-/// Returns a figure without place and uncertainty.
-fn figure(name: impl Into<String>, value: f64, unit: &str) -> Figure {
-    Figure { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
 }
 
 /// Formats a place as `u 1500, v 900 mm`.

@@ -4,7 +4,7 @@ use platen_model::{Figure, NodeState, Report};
 use platen_sdk::PlateGrid;
 use platen_shape::Surface;
 
-use crate::{Nodes, figure};
+use crate::Nodes;
 
 /// Adds the membrane strain of the mid-surface: Green's strain of S(u, v) against the flat rectangle,
 /// (|S_u|^2 - 1) / 2, (|S_v|^2 - 1) / 2 and S_u . S_v / 2.
@@ -24,11 +24,10 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, now: &Surface) {
     for (name, sign) in [("strain.max", 1.0), ("strain.min", -1.0)] {
         let of_seen = (0..PlateGrid::NODES).filter(|i| seen[*i]).map(|i| (i, principal(i, sign)));
         let most = of_seen.max_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1)));
-        let placed = most.map(|(i, value)| Figure { at: Some(nodes.grid.at(i)), ..figure(name, value, "1") });
-        report.findings.figures.extend(placed);
+        let figure = most.map(|(i, value)| Figure::new(name, value, "1").at(nodes.grid.at(i)));
+        report.findings.figures.extend(figure);
     }
-    let state: Vec<NodeState> =
-        seen.iter().map(|seen| if *seen { NodeState::Seen } else { NodeState::Unseen }).collect();
+    let state: Vec<NodeState> = seen.into_iter().map(NodeState::from).collect();
     for (k, name) in ["strain_u", "strain_v", "strain_uv"].into_iter().enumerate() {
         let values = strain.iter().map(|strain| strain[k]).collect();
         report.fields.push(nodes.grid.scalar(name, "1", values, state.clone()));

@@ -1,6 +1,6 @@
 //! Maps, bands and null pairs on plates of closed form.
 
-use platen_model::{Facing, RadiusOf, Target, TargetShape, Task};
+use platen_model::{Facing, Figure, RadiusOf, Target, TargetShape, Task};
 use platen_shape::Vec3;
 use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 

@@ -177,32 +177,26 @@ fn report(
         );
     }
 
-    let figure = |name: &str, value: f64, unit: &str| Figure {
-        name: name.into(),
-        value,
-        unit: unit.into(),
-        uncertainty: None,
-        at: None,
-    };
     let mean_square = |square: &dyn Fn(usize) -> f64| {
         let of_seen = (0..PlateGrid::NODES).filter(|&i| changes.state[i] != NodeState::Unseen);
         of_seen.map(square).sum::<f64>() / seen.max(1) as f64
     };
     let mut figures = vec![
-        figure("displacement.rms", mean_square(&|i| changes.normal[i].powi(2)).sqrt(), "m"),
-        figure("displacement.sigma", mean_square(&|i| changes.sigma[i].powi(2)).sqrt(), "m"),
-        figure("displacement.above_lod", changes.above_lod, "1"),
-        figure("displacement.changed_share", share, "1"),
-        figure("displacement.lod", changes.median_lod, "m"),
-        figure("displacement.plate_rotation", alignment.motion.angle(), "rad"),
-        figure("displacement.plate_translation", alignment.motion.translation_at(nodes.centre()).norm(), "m"),
+        Figure::new("displacement.rms", mean_square(&|i| changes.normal[i].powi(2)).sqrt(), "m"),
+        Figure::new("displacement.sigma", mean_square(&|i| changes.sigma[i].powi(2)).sqrt(), "m"),
+        Figure::new("displacement.above_lod", changes.above_lod, "1"),
+        Figure::new("displacement.changed_share", share, "1"),
+        Figure::new("displacement.lod", changes.median_lod, "m"),
+        Figure::new("displacement.plate_rotation", alignment.motion.angle(), "rad"),
+        Figure::new(
+            "displacement.plate_translation",
+            alignment.motion.translation_at(nodes.centre()).norm(),
+            "m",
+        ),
     ];
     if let Some(i) = largest {
-        figures.push(Figure {
-            uncertainty: Some(changes.lod[i]),
-            at: Some(nodes.grid.at(i)),
-            ..figure("displacement.max", changes.normal[i], "m")
-        });
+        let largest = Figure::new("displacement.max", changes.normal[i], "m");
+        figures.push(largest.uncertainty(changes.lod[i]).at(nodes.grid.at(i)));
     }
 
     let field = |name: &str, components: usize, values: Vec<f64>| {

@@ -34,28 +34,28 @@ pub(crate) fn of_deviation(
         .fold(min, |deepest, i| if deviation.value[i] < deviation.value[deepest] { i } else { deepest });
 
     // The best fit depends on all places: its uncertainty is negligible beside that of one place.
-    let placed = |name: &str, i: usize| Figure {
-        uncertainty: Some(EXPANDED * now.sigma_point(deviation.uv[i][0], deviation.uv[i][1])),
-        ..at(name, deviation.fitted[i], "m", deviation.uv[i])
+    let placed = |name: &str, i: usize| {
+        let [u, v] = deviation.uv[i];
+        let figure = Figure::new(name, deviation.fitted[i], "m");
+        figure.uncertainty(EXPANDED * now.sigma_point(u, v)).at([u, v])
     };
     let mut figures = vec![
         placed("deviation.max", max),
         placed("deviation.min", min),
-        plain("deviation.rms", rms, "m"),
-        plain("deviation.p95", p95, "m"),
-        plain("deviation.max_u", deviation.uv[max][0], "m"),
-        plain("deviation.max_v", deviation.uv[max][1], "m"),
-        plain("deviation.min_u", deviation.uv[min][0], "m"),
-        plain("deviation.min_v", deviation.uv[min][1], "m"),
-        Figure {
-            uncertainty: Some(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest])),
-            ..at("deviation.gap", -deviation.value[deepest], "m", deviation.uv[deepest])
-        },
-        plain("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
+        Figure::new("deviation.rms", rms, "m"),
+        Figure::new("deviation.p95", p95, "m"),
+        Figure::new("deviation.max_u", deviation.uv[max][0], "m"),
+        Figure::new("deviation.max_v", deviation.uv[max][1], "m"),
+        Figure::new("deviation.min_u", deviation.uv[min][0], "m"),
+        Figure::new("deviation.min_v", deviation.uv[min][1], "m"),
+        Figure::new("deviation.gap", -deviation.value[deepest], "m")
+            .uncertainty(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest]))
+            .at(deviation.uv[deepest]),
+        Figure::new("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
     ];
     if let Some(tolerance) = tolerance {
         let within = seen.iter().filter(|&&i| -deviation.value[i] <= tolerance).count() as f64 / n;
-        figures.extend([plain("tolerance", tolerance, "m"), plain("in_tolerance", within, "1")]);
+        figures.extend([Figure::new("tolerance", tolerance, "m"), Figure::new("in_tolerance", within, "1")]);
     }
     figures
 }
@@ -70,21 +70,18 @@ pub(crate) fn of_templates(evaluated: &[Evaluated]) -> Vec<Figure> {
     };
     let finding = &evaluated[worst].finding;
     let mut figures = vec![
-        Figure {
-            uncertainty: Some(finding.uncertainty),
-            ..at("gap.max", finding.max_gap, "m", finding.max_gap_at)
-        },
-        plain("gap.uncertainty", finding.uncertainty, "m"),
-        plain("gap.u", finding.max_gap_at[0], "m"),
-        plain("gap.v", finding.max_gap_at[1], "m"),
-        plain("gap.line", (worst + 1) as f64, "1"),
-        plain("sense", f64::from(finding.sense), "1"),
+        Figure::new("gap.max", finding.max_gap, "m").uncertainty(finding.uncertainty).at(finding.max_gap_at),
+        Figure::new("gap.uncertainty", finding.uncertainty, "m"),
+        Figure::new("gap.u", finding.max_gap_at[0], "m"),
+        Figure::new("gap.v", finding.max_gap_at[1], "m"),
+        Figure::new("gap.line", (worst + 1) as f64, "1"),
+        Figure::new("sense", f64::from(finding.sense), "1"),
     ];
     for j in evaluated {
         let named = |what: &str| format!("template.{}.{what}", j.finding.name);
-        figures.extend(j.radius.map(|radius| plain(&named("radius"), radius, "m")));
-        figures.push(plain(&named("sagitta"), j.sagitta, "m"));
-        figures.push(plain(&named("rocking"), j.rocking, "rad"));
+        figures.extend(j.radius.map(|radius| Figure::new(named("radius"), radius, "m")));
+        figures.push(Figure::new(named("sagitta"), j.sagitta, "m"));
+        figures.push(Figure::new(named("rocking"), j.rocking, "rad"));
     }
     figures
 }
@@ -104,7 +101,7 @@ pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figu
     }
     // 1e-6 1/m in the mean: a radius of 1000 km.
     let flat = wanted.abs() <= 1e-6 * (GRID * GRID) as f64;
-    (!flat).then(|| plain("curvature.deviation", is / wanted - 1.0, "1"))
+    (!flat).then(|| Figure::new("curvature.deviation", is / wanted - 1.0, "1"))
 }
 
 /// Returns the figures of the stations, except those that were not seen or have no template.
@@ -118,9 +115,9 @@ pub(crate) fn of_stations(
     let mut figures = Vec::new();
     for station in &task.stations {
         let [u, v] = station.at;
-        let figure = |value: f64, unit: &str, sigma: f64| Figure {
-            uncertainty: Some(EXPANDED * sigma),
-            ..at(&format!("station.{}", station.name), value, unit, station.at)
+        let figure = |value: f64, unit: &str, sigma: f64| {
+            let figure = Figure::new(format!("station.{}", station.name), value, unit);
+            figure.uncertainty(EXPANDED * sigma).at(station.at)
         };
         match station.quantity {
             Quantity::Gap => figures.extend(
@@ -165,14 +162,4 @@ fn nearest_gap(station: [f64; 2], evaluated: &[Evaluated]) -> Option<(f64, f64)>
     });
     let nearest = places.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)))?;
     Some((nearest.1, nearest.2))
-}
-
-/// Returns a figure without place and uncertainty.
-pub(crate) fn plain(name: &str, value: f64, unit: &str) -> Figure {
-    Figure { name: name.into(), value, unit: unit.into(), uncertainty: None, at: None }
-}
-
-/// Returns a figure at a place, without uncertainty.
-pub(crate) fn at(name: &str, value: f64, unit: &str, place: [f64; 2]) -> Figure {
-    Figure { at: Some(place), ..plain(name, value, unit) }
 }

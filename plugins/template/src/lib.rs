@@ -77,7 +77,7 @@ mod linear_program;
 mod seat;
 mod section;
 
-use platen_model::{Centre, Field, Figure, Findings, NodeState, Report, Task, Template, Verdict};
+use platen_model::{Centre, Figure, Findings, NodeState, Report, Task, Template, Verdict};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::TargetSurface;
 
@@ -122,7 +122,9 @@ impl Comparison for TemplateGap {
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let (task, now) = (&inputs.task, &inputs.now);
     let Some(target) = &task.target else {
-        return Ok(unjudged("cannot tell: the plate file names no target"));
+        let says = vec!["cannot tell: the plate file names no target".into()];
+        let findings = Findings { verdict: Some(Verdict::CannotTell), says, ..Findings::default() };
+        return Ok(Report::new(findings, Vec::new()));
     };
     let target = TargetSurface::new(target, task.width, task.height, task.thickness)
         .map_err(|e| Error::new(ErrorKind::Config, e.to_string()))?;
@@ -159,14 +161,9 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let verdict = evaluated.iter().map(|j| j.finding.verdict).max().unwrap_or(Verdict::CannotTell);
     let templates = evaluated.into_iter().map(|j| j.finding).collect();
     let findings = Findings { verdict: Some(verdict), says, figures: found, templates };
-    Ok(Report::new(findings, vec![field(PlateGrid::new(now), deviation)]))
-}
-
-/// Returns the report of a plate that cannot be judged.
-fn unjudged(why: &str) -> Report {
-    let findings =
-        Findings { verdict: Some(Verdict::CannotTell), says: vec![why.into()], ..Findings::default() };
-    Report::new(findings, Vec::new())
+    let state = deviation.seen.into_iter().map(NodeState::from).collect();
+    let field = PlateGrid::new(now).scalar("deviation", "m", deviation.value, state);
+    Ok(Report::new(findings, vec![field]))
 }
 
 /// Returns the line of a template and the position of the template on it.
@@ -249,7 +246,7 @@ fn search(
             }
         }
         let Some((gap, place)) = worst else { continue };
-        found.push(figures::at(name, gap, "m", place));
+        found.push(Figure::new(name, gap, "m").at(place));
         if gap > largest {
             largest = gap;
             sentence = Some(format!(
@@ -263,11 +260,6 @@ fn search(
         }
     }
     Ok((found, sentence))
-}
-
-fn field(grid: PlateGrid, deviation: Deviation) -> Field {
-    let state = deviation.seen.iter().map(|seen| if *seen { NodeState::Seen } else { NodeState::Unseen });
-    grid.scalar("deviation", "m", deviation.value, state.collect())
 }
 
 platen_sdk::export!(comparison TemplateGap);

@@ -49,8 +49,7 @@ impl Comparison {
     /// # Errors
     /// The plugin's reason, the deadline, or the violation in its output.
     pub fn compare(&self, task: &Task, surfaces: Surfaces<'_>) -> Result<Report, PluginError> {
-        let misbehaved =
-            |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };
+        let misbehaved = |what: String| self.instance.misbehaved(what);
         let mut inputs = vec![InputFrame::new(task, None), InputFrame::new(surfaces.now, Some(c"now"))];
         inputs.extend(surfaces.before.map(|s| InputFrame::new(s, Some(c"before"))));
         inputs.extend(surfaces.baseline.map(|s| InputFrame::new(s, Some(c"baseline"))));

@@ -89,7 +89,7 @@ impl Descriptor {
 
 /// # Safety
 /// `p` is null or a string with a NUL at its end.
-unsafe fn text(p: *const c_char) -> String {
+pub(super) unsafe fn text(p: *const c_char) -> String {
     if p.is_null() {
         return String::new();
     }

@@ -32,19 +32,19 @@ impl Flattening {
     }
 
     fn run(&self, mesh: &DiskMesh) -> Result<Chart, PluginError> {
-        let misbehaved =
-            |what: String| PluginError::Misbehaved { name: self.instance.name().to_owned(), what };
         let mut job =
             self.instance.start(JobSpec::untriggered(self.limit), vec![InputFrame::new(mesh, None)]);
         let mut answer = None;
         while let Some(frame) = job.next_frame() {
             if !frame.is::<Chart>() || answer.is_some() {
-                return Err(misbehaved(format!("a frame {} out of turn", frame.format)));
+                return Err(self.instance.misbehaved(format!("a frame {} out of turn", frame.format)));
             }
-            answer = Some(frame.decode().map_err(|e| misbehaved(format!("a malformed chart: {e}")))?);
+            answer = Some(
+                frame.decode().map_err(|e| self.instance.misbehaved(format!("a malformed chart: {e}")))?,
+            );
         }
         job.finish()?;
-        answer.ok_or_else(|| misbehaved("success without a chart".into()))
+        answer.ok_or_else(|| self.instance.misbehaved("success without a chart"))
     }
 }
 

@@ -1,14 +1,16 @@
 //! The host's functions for plugins (`platen_host` of `platen.h`). Every argument is checked.
 #![allow(unsafe_code, reason = "callbacks from the other side of the boundary")]
 
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ffi::{c_char, c_int, c_void};
 use std::sync::PoisonError;
 use std::time::Instant;
 
 use platen_abi as abi;
 use platen_sdk::exchange::AlignedBuffer;
 
-use super::job::{self, EmittedFrame, Event};
+use super::Emitted;
+use super::descriptor::text as lossy;
+use super::job::{self, Event};
 
 /// Largest frame: a column of the finest scanner has some 400 kB, a surface with covariance some 10 MB.
 const MAX_FRAME_BYTES: u64 = 256 << 20;
@@ -62,16 +64,6 @@ pub(super) fn message(error: &abi::Error) -> String {
         (message, hint) if hint.is_empty() => message,
         (message, hint) => format!("{message}; {hint}"),
     }
-}
-
-/// # Safety
-/// `text` is null or a string with a NUL at its end.
-unsafe fn lossy(text: *const c_char) -> String {
-    if text.is_null() {
-        return String::new();
-    }
-    // SAFETY: as the caller promises.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 unsafe extern "C" fn log_enabled(_: *const abi::Host, level: abi::Level) -> c_int {
@@ -146,7 +138,7 @@ unsafe extern "C" fn emit(_: *const abi::Host, job: u64, frame: *const abi::Fram
     }
     // SAFETY: the plugin's string lives for the call.
     let format = unsafe { lossy(frame.format) };
-    let emitted = EmittedFrame { format, flags: frame.flags, buffer };
+    let emitted = Emitted { format, flags: frame.flags, buffer };
     if job.frames.send(Event::Frame(emitted)).is_err() { abi::status::CANCELLED } else { abi::status::OK }
 }
 

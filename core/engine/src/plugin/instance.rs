@@ -11,9 +11,9 @@ use platen_abi as abi;
 use platen_abi::payload;
 use platen_plant::OptionValue;
 use platen_scan::Window;
-use platen_sdk::exchange::{AlignedBuffer, Decode, DecodeError, Encode, to_raw_window};
+use platen_sdk::exchange::{AlignedBuffer, DecodeError, Payload, to_raw_window};
 
-use super::job::{self, CancelToken, EmittedFrame, Event, JobSpec, Listed};
+use super::job::{self, CancelToken, Event, JobSpec, Listed};
 use super::values::Values;
 use super::{Kind, Library, PluginError, host_table};
 
@@ -36,7 +36,7 @@ pub(super) struct InputFrame {
 }
 
 impl InputFrame {
-    pub(super) fn new<T: Encode>(value: &T, role: Option<&'static CStr>) -> Self {
+    pub(super) fn new<T: Payload>(value: &T, role: Option<&'static CStr>) -> Self {
         Self { format: T::FORMAT, role, buffer: value.to_buffer() }
     }
 }
@@ -119,7 +119,12 @@ impl Instance {
     }
 
     fn died(&self) -> PluginError {
-        PluginError::Misbehaved { name: self.name.clone(), what: "its thread ended".into() }
+        self.misbehaved("its thread ended")
+    }
+
+    /// Returns the error of a plugin that violated the contract of the boundary.
+    pub(super) fn misbehaved(&self, what: impl Into<String>) -> PluginError {
+        PluginError::Misbehaved { name: self.name.clone(), what: what.into() }
     }
 
     /// Opens the instance: the plugin connects to its device.
@@ -199,7 +204,7 @@ pub struct Emitted {
     pub format: String,
     /// Bits of `platen_abi::frame_flag`.
     pub flags: u32,
-    buffer: AlignedBuffer,
+    pub(super) buffer: AlignedBuffer,
 }
 
 impl Emitted {
@@ -209,15 +214,15 @@ impl Emitted {
     }
 
     /// Whether the frame has the format of `T`.
-    pub fn is<T: Decode>(&self) -> bool {
+    pub fn is<T: Payload>(&self) -> bool {
         self.format.as_bytes() == T::FORMAT.to_bytes()
     }
 
     /// Reads the value in the frame.
     ///
     /// # Errors
-    /// As [`Decode::decode`].
-    pub fn decode<T: Decode>(&self) -> Result<T, DecodeError> {
+    /// As [`Payload::decode`].
+    pub fn decode<T: Payload>(&self) -> Result<T, DecodeError> {
         T::decode(self.bytes())
     }
 }
@@ -244,9 +249,7 @@ impl RunningJob<'_> {
             let until = self.cancelled_at.map_or(self.listed.0.deadline, |at| at + GRACE);
             let left = until.saturating_duration_since(Instant::now());
             match self.inbox.recv_timeout(left.min(CANCEL_POLL)) {
-                Ok(Event::Frame(EmittedFrame { format, flags, buffer })) if self.cancelled_at.is_none() => {
-                    return Some(Emitted { format, flags, buffer });
-                }
+                Ok(Event::Frame(frame)) if self.cancelled_at.is_none() => return Some(frame),
                 Ok(Event::Frame(_)) => {}
                 Ok(Event::Done(result)) => self.result = Some(self.judge(result)),
                 Err(RecvTimeoutError::Timeout) if left > CANCEL_POLL => {}
@@ -289,9 +292,8 @@ impl RunningJob<'_> {
         self.result.clone().unwrap_or(Ok(()))
     }
 
-    /// Returns the name of the plugin, for messages.
-    pub fn name(&self) -> &str {
-        &self.instance.name
+    pub(super) fn misbehaved(&self, what: impl Into<String>) -> PluginError {
+        self.instance.misbehaved(what)
     }
 }
 
@@ -304,7 +306,7 @@ impl Drop for RunningJob<'_> {
             self.cancel();
         }
         let hung = matches!(self.finish(), Err(PluginError::Hangs { .. }));
-        tracing::debug!(plugin = self.name(), hung, "cancelled before its end");
+        tracing::debug!(plugin = self.instance.name, hung, "cancelled before its end");
     }
 }
 

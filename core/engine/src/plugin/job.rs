@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use platen_sdk::exchange::AlignedBuffer;
 
-use super::PluginError;
+use super::{Emitted, PluginError};
 
 /// Cancels a job from another thread.
 #[derive(Debug, Clone, Default)]
@@ -46,18 +46,10 @@ impl JobSpec {
     }
 }
 
-/// A frame from a plugin.
-#[derive(Debug)]
-pub(super) struct EmittedFrame {
-    pub(super) format: String,
-    pub(super) flags: u32,
-    pub(super) buffer: AlignedBuffer,
-}
-
 /// Events of a job for its consumer.
 #[derive(Debug)]
 pub(super) enum Event {
-    Frame(EmittedFrame),
+    Frame(Emitted),
     Done(Result<(), PluginError>),
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_plant::OptionValue;
 use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, Window};
-use platen_sdk::exchange::Decode;
+use platen_sdk::exchange::Payload;
 
 use super::instance::InputFrame;
 use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError, RunningJob};
@@ -53,13 +53,13 @@ impl Scanner {
         let mut job = self.0.start(spec, window.into_iter().collect());
         let Some(frame) = job.next_frame() else {
             job.finish()?;
-            return Err(misbehaved(&job, NO_END));
+            return Err(job.misbehaved(NO_END));
         };
         if !frame.is::<ScanHeader>() {
-            return Err(misbehaved(&job, out_of_turn(&frame)));
+            return Err(job.misbehaved(out_of_turn(&frame)));
         }
         let header: ScanHeader = decode(&job, &frame)?;
-        check(&header).map_err(|what| misbehaved(&job, what))?;
+        check(&header).map_err(|what| job.misbehaved(what))?;
         Ok(RunningScan { job, header, end: None })
     }
 }
@@ -89,34 +89,34 @@ impl RunningScan<'_> {
     /// The driver's reason, the deadline, or the fault in what it sent.
     pub fn finish(&mut self) -> Result<ScanEnd, PluginError> {
         self.by_ref().try_for_each(|column| column.map(drop))?;
-        self.end.ok_or_else(|| misbehaved(&self.job, NO_END))
+        self.end.ok_or_else(|| self.job.misbehaved(NO_END))
     }
 
     fn next_column(&mut self) -> Result<Option<Column>, PluginError> {
         while let Some(frame) = self.job.next_frame() {
             let job = &self.job;
             if self.end.is_some() {
-                return Err(misbehaved(job, format!("{} after the scan's end", frame.format)));
+                return Err(job.misbehaved(format!("{} after the scan's end", frame.format)));
             }
             if frame.is::<Column>() {
                 let column: Column = decode(job, &frame)?;
-                column.check(self.header.n_rows).map_err(|e| misbehaved(job, e.to_string()))?;
+                column.check(self.header.n_rows).map_err(|e| job.misbehaved(e.to_string()))?;
                 if column.index >= MAX_COLUMNS {
-                    return Err(misbehaved(job, format!("column {} of at most {MAX_COLUMNS}", column.index)));
+                    return Err(job.misbehaved(format!("column {} of at most {MAX_COLUMNS}", column.index)));
                 }
                 return Ok(Some(column));
             }
             if !frame.is::<ScanEnd>() {
-                return Err(misbehaved(job, out_of_turn(&frame)));
+                return Err(job.misbehaved(out_of_turn(&frame)));
             }
             let end: ScanEnd = decode(job, &frame)?;
             if end.outcome != Outcome::Complete {
-                return Err(misbehaved(job, "success without a complete scan"));
+                return Err(job.misbehaved("success without a complete scan"));
             }
             self.end = Some(end);
         }
         self.job.finish()?;
-        if self.end.is_some() { Ok(None) } else { Err(misbehaved(&self.job, NO_END)) }
+        if self.end.is_some() { Ok(None) } else { Err(self.job.misbehaved(NO_END)) }
     }
 }
 
@@ -128,16 +128,12 @@ impl Iterator for RunningScan<'_> {
     }
 }
 
-fn misbehaved(job: &RunningJob<'_>, what: impl Into<String>) -> PluginError {
-    PluginError::Misbehaved { name: job.name().to_owned(), what: what.into() }
-}
-
 fn out_of_turn(frame: &Emitted) -> String {
     format!("a frame {} out of turn", frame.format)
 }
 
-fn decode<T: Decode>(job: &RunningJob<'_>, frame: &Emitted) -> Result<T, PluginError> {
-    frame.decode().map_err(|e| misbehaved(job, format!("a malformed {}: {e}", frame.format)))
+fn decode<T: Payload>(job: &RunningJob<'_>, frame: &Emitted) -> Result<T, PluginError> {
+    frame.decode().map_err(|e| job.misbehaved(format!("a malformed {}: {e}", frame.format)))
 }
 
 fn check(header: &ScanHeader) -> Result<(), String> {

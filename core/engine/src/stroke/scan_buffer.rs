@@ -5,20 +5,16 @@ use platen_scan::{Column, ScanEnd, ScanHeader};
 /// A whole scan in memory, for the retention of raw scans.
 #[derive(Debug, Default)]
 pub struct ScanBuffer {
-    header: Option<ScanHeader>,
+    pub(super) header: Option<ScanHeader>,
     columns: Vec<Column>,
     cells: usize,
-    end: Option<ScanEnd>,
+    pub(super) end: Option<ScanEnd>,
 }
 
 /// Largest scan held, cells of `Column::SAMPLE_BYTES` each: a full dome at the finest step in use for plates.
 const MAX_CELLS: usize = 50_000_000;
 
 impl ScanBuffer {
-    pub(super) fn begin(&mut self, header: ScanHeader) {
-        self.header = Some(header);
-    }
-
     pub(super) fn push(&mut self, column: Column) {
         self.cells += column.len();
         if self.cells > MAX_CELLS {
@@ -26,10 +22,6 @@ impl ScanBuffer {
         } else {
             self.columns.push(column);
         }
-    }
-
-    pub(super) fn end(&mut self, end: ScanEnd) {
-        self.end = Some(end);
     }
 
     /// Returns the scan.

@@ -2,64 +2,40 @@
 
 use std::ffi::CStr;
 
-use platen_abi::payload::{self, Header, Layout};
+use platen_abi::payload::{self, Header};
 use platen_model::{Field, Findings, NodeState, Task};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
-use super::{Decode, DecodeError, Encode};
+use super::{Arrays, DecodeError, Payload};
 
 /// Largest field accepted: 4 million numbers.
 const MAX_FIELD: usize = 1 << 22;
 
-/// Writes a document. The documents of the boundary are plain data, which always have a JSON form.
-fn encode_json<B: AsMut<[u8]>, E>(
-    document: &impl Serialize,
-    allocate: impl FnOnce(usize) -> Result<B, E>,
-) -> Result<B, E> {
-    let text = serde_json::to_vec(document).unwrap_or_default();
-    let mut buffer = allocate(text.len())?;
-    buffer.as_mut().copy_from_slice(&text);
-    Ok(buffer)
+/// Implements [`Payload`] as JSON without a header. These documents are plain data, which always have a JSON form.
+macro_rules! json {
+    ($($document:ty = $format:expr;)*) => { $(
+        impl Payload for $document {
+            const FORMAT: &'static CStr = $format;
+
+            fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
+                let text = serde_json::to_vec(self).unwrap_or_default();
+                let mut buffer = allocate(text.len())?;
+                buffer.as_mut().copy_from_slice(&text);
+                Ok(buffer)
+            }
+
+            fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+                serde_json::from_slice(bytes).map_err(|error| DecodeError::Invalid(error.to_string()))
+            }
+        }
+    )* };
 }
 
-fn decode_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
-    serde_json::from_slice(bytes).map_err(|error| DecodeError::Invalid(error.to_string()))
+json! {
+    Task = payload::TASK;
+    Findings = payload::FINDINGS;
 }
 
-impl Encode for Task {
-    const FORMAT: &'static CStr = payload::TASK;
-
-    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
-        encode_json(self, allocate)
-    }
-}
-
-impl Decode for Task {
-    const FORMAT: &'static CStr = payload::TASK;
-
-    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        decode_json(bytes)
-    }
-}
-
-impl Encode for Findings {
-    const FORMAT: &'static CStr = payload::FINDINGS;
-
-    fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
-        encode_json(self, allocate)
-    }
-}
-
-impl Decode for Findings {
-    const FORMAT: &'static CStr = payload::FINDINGS;
-
-    fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        decode_json(bytes)
-    }
-}
-
-impl Encode for Field {
+impl Payload for Field {
     const FORMAT: &'static CStr = payload::Grid::FORMAT;
 
     fn count(&self) -> u64 {
@@ -68,7 +44,7 @@ impl Encode for Field {
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let state: Vec<u8> = self.state.iter().map(|state| *state as u8).collect();
-        let mut layout = Layout::of::<payload::Grid>();
+        let mut arrays = Arrays::behind::<payload::Grid>();
         let head = payload::Grid {
             struct_size: size_of::<payload::Grid>() as u32,
             reserved: 0,
@@ -76,24 +52,13 @@ impl Encode for Field {
             n_v: self.nodes[1] as u32,
             components: self.components as u32,
             reserved_2: 0,
-            name: layout.add::<u8>(self.name.len()),
-            unit: layout.add::<u8>(self.unit.len()),
-            values: layout.add::<f64>(self.values.len()),
-            state: layout.add::<u8>(state.len()),
+            name: arrays.add(self.name.as_bytes()),
+            unit: arrays.add(self.unit.as_bytes()),
+            values: arrays.add(&self.values),
+            state: arrays.add(&state),
         };
-        let mut buffer = allocate(layout.bytes())?;
-        let bytes = buffer.as_mut();
-        payload::put_header(bytes, &head);
-        payload::put(bytes, head.name, self.name.as_bytes());
-        payload::put(bytes, head.unit, self.unit.as_bytes());
-        payload::put(bytes, head.values, &self.values);
-        payload::put(bytes, head.state, &state);
-        Ok(buffer)
+        arrays.encode(&head, allocate)
     }
-}
-
-impl Decode for Field {
-    const FORMAT: &'static CStr = payload::Grid::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Grid = payload::read(bytes)?;

@@ -2,18 +2,18 @@
 
 use std::ffi::CStr;
 
-use platen_abi::payload::{self, Header, Layout};
+use platen_abi::payload::{self, Header};
 use platen_shape::mesh::{DiskMesh, DiskParts};
 use platen_shape::{Chart, Vec3};
 
-use super::{Decode, DecodeError, Encode};
+use super::{Arrays, DecodeError, Payload};
 
-impl Encode for DiskMesh {
+impl Payload for DiskMesh {
     const FORMAT: &'static CStr = payload::Mesh::FORMAT;
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let vertices: Vec<[f64; 3]> = self.vertices.iter().map(|p| [p.x, p.y, p.z]).collect();
-        let mut layout = Layout::of::<payload::Mesh>();
+        let mut arrays = Arrays::behind::<payload::Mesh>();
         let mut corner_sigma = [0.0; 8];
         for (pair, sigma) in corner_sigma.chunks_exact_mut(2).zip(&self.corner_sigma) {
             pair.copy_from_slice(sigma);
@@ -28,26 +28,14 @@ impl Encode for DiskMesh {
             corner_sigma,
             edge_sigma: self.edge_sigma,
             edge_length: self.edge_length,
-            vertices: layout.add::<[f64; 3]>(vertices.len()),
-            triangles: layout.add::<[u32; 3]>(self.triangles.len()),
-            boundary: layout.add::<u32>(self.boundary.len()),
-            arc: layout.add::<f64>(self.arc.len()),
-            places: layout.add::<[f64; 2]>(self.places.len()),
+            vertices: arrays.add(&vertices),
+            triangles: arrays.add(&self.triangles),
+            boundary: arrays.add(&self.boundary),
+            arc: arrays.add(&self.arc),
+            places: arrays.add(&self.places),
         };
-        let mut buffer = allocate(layout.bytes())?;
-        let bytes = buffer.as_mut();
-        payload::put_header(bytes, &head);
-        payload::put(bytes, head.vertices, &vertices);
-        payload::put(bytes, head.triangles, &self.triangles);
-        payload::put(bytes, head.boundary, &self.boundary);
-        payload::put(bytes, head.arc, &self.arc);
-        payload::put(bytes, head.places, &self.places);
-        Ok(buffer)
+        arrays.encode(&head, allocate)
     }
-}
-
-impl Decode for DiskMesh {
-    const FORMAT: &'static CStr = payload::Mesh::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Mesh = payload::read(bytes)?;
@@ -73,7 +61,7 @@ impl Decode for DiskMesh {
     }
 }
 
-impl Encode for Chart {
+impl Payload for Chart {
     const FORMAT: &'static CStr = payload::Chart::FORMAT;
 
     fn count(&self) -> u64 {
@@ -83,26 +71,16 @@ impl Encode for Chart {
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let strain = self.strain.as_deref().unwrap_or_default();
         let sigma = self.sigma.as_deref().unwrap_or_default();
-        let mut layout = Layout::of::<payload::Chart>();
+        let mut arrays = Arrays::behind::<payload::Chart>();
         let head = payload::Chart {
             struct_size: size_of::<payload::Chart>() as u32,
             reserved: 0,
-            uv: layout.add::<[f64; 2]>(self.uv.len()),
-            strain: layout.add::<[f64; 3]>(strain.len()),
-            sigma: layout.add::<[f64; 2]>(sigma.len()),
+            uv: arrays.add(&self.uv),
+            strain: arrays.add(strain),
+            sigma: arrays.add(sigma),
         };
-        let mut buffer = allocate(layout.bytes())?;
-        let bytes = buffer.as_mut();
-        payload::put_header(bytes, &head);
-        payload::put(bytes, head.uv, &self.uv);
-        payload::put(bytes, head.strain, strain);
-        payload::put(bytes, head.sigma, sigma);
-        Ok(buffer)
+        arrays.encode(&head, allocate)
     }
-}
-
-impl Decode for Chart {
-    const FORMAT: &'static CStr = payload::Chart::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Chart = payload::read(bytes)?;

@@ -2,17 +2,17 @@
 
 use std::ffi::CStr;
 
-use platen_abi::payload::{self, Header, Layout};
+use platen_abi::payload::{self, Header};
 use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window, wrap_azimuth};
 
-use super::{Decode, DecodeError, Encode};
+use super::{Arrays, DecodeError, Payload};
 
-impl Encode for ScanHeader {
+impl Payload for ScanHeader {
     const FORMAT: &'static CStr = payload::Scan::FORMAT;
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let notes = self.notes.join("\n");
-        let mut layout = Layout::of::<payload::Scan>();
+        let mut arrays = Arrays::behind::<payload::Scan>();
         let head = payload::Scan {
             struct_size: size_of::<payload::Scan>() as u32,
             flags: u32::from(self.simulated),
@@ -26,20 +26,11 @@ impl Encode for ScanHeader {
             intensity_min: self.intensity_range.0,
             intensity_max: self.intensity_range.1,
             acquired_unix_s: self.acquired_unix_s.unwrap_or(0.0),
-            instrument: layout.add::<u8>(self.instrument.len()),
-            notes: layout.add::<u8>(notes.len()),
+            instrument: arrays.add(self.instrument.as_bytes()),
+            notes: arrays.add(notes.as_bytes()),
         };
-        let mut buffer = allocate(layout.bytes())?;
-        let bytes = buffer.as_mut();
-        payload::put_header(bytes, &head);
-        payload::put(bytes, head.instrument, self.instrument.as_bytes());
-        payload::put(bytes, head.notes, notes.as_bytes());
-        Ok(buffer)
+        arrays.encode(&head, allocate)
     }
-}
-
-impl Decode for ScanHeader {
-    const FORMAT: &'static CStr = payload::Scan::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Scan = payload::read(bytes)?;
@@ -60,7 +51,7 @@ impl Decode for ScanHeader {
     }
 }
 
-impl Encode for Column {
+impl Payload for Column {
     const FORMAT: &'static CStr = payload::Column::FORMAT;
 
     fn count(&self) -> u64 {
@@ -68,34 +59,21 @@ impl Encode for Column {
     }
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
-        let n = self.len();
-        let mut layout = Layout::of::<payload::Column>();
+        let state: Vec<u8> = self.state.iter().map(|s| *s as u8).collect();
+        let mut arrays = Arrays::behind::<payload::Column>();
         let head = payload::Column {
             struct_size: size_of::<payload::Column>() as u32,
             index: self.index,
             face: u32::from(self.face == Face::Back),
             first_row: self.first_row,
-            range_m: layout.add::<f64>(n),
-            azimuth: layout.add::<f64>(n),
-            elevation: layout.add::<f64>(n),
-            intensity: layout.add::<u16>(n),
-            state: layout.add::<u8>(n),
+            range_m: arrays.add(&self.range_m),
+            azimuth: arrays.add(&self.azimuth),
+            elevation: arrays.add(&self.elevation),
+            intensity: arrays.add(&self.intensity),
+            state: arrays.add(&state),
         };
-        let state: Vec<u8> = self.state.iter().map(|s| *s as u8).collect();
-        let mut buffer = allocate(layout.bytes())?;
-        let bytes = buffer.as_mut();
-        payload::put_header(bytes, &head);
-        payload::put(bytes, head.range_m, &self.range_m);
-        payload::put(bytes, head.azimuth, &self.azimuth);
-        payload::put(bytes, head.elevation, &self.elevation);
-        payload::put(bytes, head.intensity, &self.intensity);
-        payload::put(bytes, head.state, &state);
-        Ok(buffer)
+        arrays.encode(&head, allocate)
     }
-}
-
-impl Decode for Column {
-    const FORMAT: &'static CStr = payload::Column::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Column = payload::read(bytes)?;
@@ -117,7 +95,7 @@ impl Decode for Column {
     }
 }
 
-impl Encode for ScanEnd {
+impl Payload for ScanEnd {
     const FORMAT: &'static CStr = payload::ScanEnd::FORMAT;
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
@@ -132,14 +110,8 @@ impl Encode for ScanEnd {
                 Outcome::Failed => 2,
             },
         };
-        let mut buffer = allocate(Layout::of::<payload::ScanEnd>().bytes())?;
-        payload::put_header(buffer.as_mut(), &head);
-        Ok(buffer)
+        Arrays::behind::<payload::ScanEnd>().encode(&head, allocate)
     }
-}
-
-impl Decode for ScanEnd {
-    const FORMAT: &'static CStr = payload::ScanEnd::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::ScanEnd = payload::read(bytes)?;
@@ -180,18 +152,12 @@ pub fn from_raw_window(window: &payload::Window) -> Window {
     }
 }
 
-impl Encode for Window {
+impl Payload for Window {
     const FORMAT: &'static CStr = payload::Window::FORMAT;
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
-        let mut buffer = allocate(size_of::<payload::Window>())?;
-        payload::put_header(buffer.as_mut(), &to_raw_window(self));
-        Ok(buffer)
+        Arrays::behind::<payload::Window>().encode(&to_raw_window(self), allocate)
     }
-}
-
-impl Decode for Window {
-    const FORMAT: &'static CStr = payload::Window::FORMAT;
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         Ok(from_raw_window(&payload::read(bytes)?))
