@@ -70,25 +70,16 @@ pub struct TrueFace {
 
 /// Failure to read a truth file.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum TruthError {
     /// Unreadable file.
     #[error("{path}: {source}; the simulated scanner writes it when its option truth_file is set")]
-    Read {
-        /// File.
-        path: String,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Read { path: String, source: std::io::Error },
     /// File that is no truth document.
     #[error(
         "{path}: not the truth of a scan: {what}; rebuild the simulated driver together with this program"
     )]
-    Malformed {
-        /// File.
-        path: String,
-        /// The first fault.
-        what: String,
-    },
+    Malformed { path: String, what: String },
 }
 
 impl Truth {

@@ -9,7 +9,6 @@ use serde_json::{Map, Value as Json, json};
 /// Figure of errors of type `E`: name in documents, head in tables, value in the unit of the name, digits after the point.
 pub(super) type Figure<E> = (&'static str, &'static str, fn(&E) -> f64, usize);
 
-/// Figures of a measurement.
 pub(super) const OF_MEASUREMENT: [Figure<Accuracy>; 9] = [
     ("corners_rms_mm", "corners", |a| mm(a.corners), 2),
     ("markers_mean_mm", "markers", |a| mm(a.markers_mean), 2),

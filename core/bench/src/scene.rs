@@ -70,7 +70,6 @@ impl Setting {
 /// Scan in memory, with its truth.
 #[derive(Debug)]
 pub(super) struct Shot {
-    /// Header of the scan.
     pub(super) header: ScanHeader,
     /// The lattice.
     pub(super) columns: Vec<Column>,

@@ -26,7 +26,6 @@ pub(super) struct Stages {
     pub(super) outline: Duration,
     /// Smooth face, mid-surface, mesh.
     pub(super) mesh: Duration,
-    /// Flattening.
     pub(super) flatten: Duration,
     /// Fit of S(u, v) and its covariance.
     pub(super) surface: Duration,

@@ -32,26 +32,17 @@ pub struct Calibration {
 
 /// Reason why a plant's calibration is invalid.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum Invalid {
     /// No file, or a faulty one.
     #[error("calibration: {0}; run platen calibrate")]
     Absent(#[from] PlantError),
     /// Older than allowed.
     #[error("calibration: {} is {age_d:.0} days old, {limit_d:.0} are allowed; run platen calibrate", .file.display())]
-    TooOld {
-        /// The file.
-        file: PathBuf,
-        /// Its age, days.
-        age_d: f64,
-        /// Largest age, days.
-        limit_d: f64,
-    },
+    TooOld { file: PathBuf, age_d: f64, limit_d: f64 },
     /// The scanner is warming up.
     #[error("calibration: the scanner is still warming up, {left_min:.0} minutes are left")]
-    Cold {
-        /// Minutes until it is warm.
-        left_min: f64,
-    },
+    Cold { left_min: f64 },
 }
 
 impl Calibration {

@@ -79,15 +79,14 @@ pub struct Expected {
 
 /// Reason why stored cells are no lattice of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum OrientError {
     /// A row or column number beyond any scanner.
     #[error(
         "cell (row {row}, column {column}) lies outside of any scanner's lattice ({max} rows or columns at most)"
     )]
     IndexOutOfRange {
-        /// Stored row.
         row: u32,
-        /// Stored column.
         column: u32,
         /// Largest number of either.
         max: u32,
@@ -96,24 +95,15 @@ pub enum OrientError {
     #[error(
         "cell (row {row}, column {column}) comes twice: rows and columns were lost; export a structured scan"
     )]
-    DuplicateCell {
-        /// Stored row.
-        row: u32,
-        /// Stored column.
-        column: u32,
-    },
+    DuplicateCell { row: u32, column: u32 },
     /// Fewer cells than 2 % of the places between the first and the last row and column.
     #[error(
         "{cells} cells spread over {n_rows} x {n_columns} places ({percent:.2} %, at least {needed} % needed): the scan was thinned out; export every point"
     )]
     TooSparse {
-        /// Cells stored.
         cells: u64,
-        /// Rows between the first and the last.
         n_rows: u32,
-        /// Columns between the first and the last.
         n_columns: u32,
-        /// Share of places filled.
         percent: f64,
         /// Share needed.
         needed: f64,
@@ -122,14 +112,7 @@ pub enum OrientError {
     #[error(
         "{valid} valid cells in {n_rows} rows and {n_columns} columns: too few to tell rows from columns (3 x 3 needed)"
     )]
-    TooSmall {
-        /// Valid cells.
-        valid: u64,
-        /// Rows with valid cells.
-        n_rows: u32,
-        /// Columns with valid cells.
-        n_columns: u32,
-    },
+    TooSmall { valid: u64, n_rows: u32, n_columns: u32 },
     /// Neither assignment of rows and columns follows the angles.
     #[error(
         "rows follow elevation by {rows_elevation:+.3} and columns azimuth by {columns_azimuth:+.3} (swapped: {columns_elevation:+.3}, {rows_azimuth:+.3}), 0.99 needed: the points are not seen from the origin of the file; export in the scanner's own frame, structured, without registration applied"
@@ -148,30 +131,17 @@ pub enum OrientError {
     #[error(
         "half of the {valid} ranges are {side} {limit}: neither metres nor millimetres; export in metres"
     )]
-    Unit {
-        /// Valid cells.
-        valid: u64,
-        /// "above" or "below".
-        side: &'static str,
-        /// The limit.
-        limit: f64,
-    },
+    Unit { valid: u64, side: &'static str, limit: f64 },
     /// Columns in the direction opposite to the known one.
     #[error(
         "columns run {found}, this scanner's run {expected}: the file is mirrored; export in a right-handed frame, or set mirror"
     )]
-    Mirrored {
-        /// Direction found.
-        found: &'static str,
-        /// Direction expected.
-        expected: &'static str,
-    },
+    Mirrored { found: &'static str, expected: &'static str },
     /// Other cells in the second pass than in the first.
     #[error(
         "the scan changed while it was read ({expected} cells in the first pass, {found} in the second); wait until it is complete"
     )]
     Changed {
-        /// Cells in the first pass.
         expected: u64,
         /// Cells in the second.
         found: u64,

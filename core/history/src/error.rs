@@ -6,65 +6,33 @@ use crate::StrokeKey;
 
 /// Errors of recording, querying and exporting.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum Error {
     /// Another process has the history open for writing.
     #[error("{}: in use by {holder}; one history belongs to one host, stop that one first", path.display())]
     InUse {
-        /// The database.
         path: PathBuf,
         /// Program, process id and start of the other process, from its lock file.
         holder: String,
     },
     /// The file or its folder cannot be opened.
     #[error("{}: {source}", path.display())]
-    Unreachable {
-        /// The database or its lock.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    Unreachable { path: PathBuf, source: std::io::Error },
     /// SQLite failed: disk full, disk fault, no such table.
     #[error("{}: {source}", path.display())]
-    Storage {
-        /// The database.
-        path: PathBuf,
-        /// Error of SQLite.
-        source: rusqlite::Error,
-    },
+    Storage { path: PathBuf, source: rusqlite::Error },
     /// The file is not a history, or has the format of a newer program.
     #[error("{}: {why}", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// Description of the file.
-        why: String,
-    },
+    Foreign { path: PathBuf, why: String },
     /// A step does not follow from those on record: a fault of the caller. Nothing was changed.
     #[error("{key}: {why}")]
-    Contradiction {
-        /// The stroke.
-        key: StrokeKey,
-        /// Description of the conflict.
-        why: String,
-    },
+    Contradiction { key: StrokeKey, why: String },
     /// No record has this number.
     #[error("{}: no stroke has the run id {run_id}; `platen history list` shows them", path.display())]
-    NoSuchRun {
-        /// The database.
-        path: PathBuf,
-        /// The number asked for.
-        run_id: u32,
-    },
+    NoSuchRun { path: PathBuf, run_id: u32 },
     /// A row contains a value that this program never writes.
     #[error("{}: run {run_id}: {why}; the file was changed by other means", path.display())]
-    Damaged {
-        /// The database.
-        path: PathBuf,
-        /// The row.
-        run_id: u32,
-        /// Description of the fault.
-        why: String,
-    },
+    Damaged { path: PathBuf, run_id: u32, why: String },
     /// An export could not be written.
     #[error("the export cannot be written: {0}")]
     Export(#[from] std::io::Error),

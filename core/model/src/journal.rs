@@ -22,19 +22,13 @@ pub enum Record {
         data: Box<StrokeData>,
     },
     /// The scan is taken.
-    Scanned {
-        /// The stroke.
-        key: StrokeKey,
-    },
+    #[allow(missing_docs, reason = "the stroke")]
+    Scanned { key: StrokeKey },
     /// The result is going to be published.
     Finished(Box<Publication>),
     /// The stroke is closed.
-    Acked {
-        /// The stroke.
-        key: StrokeKey,
-        /// Acknowledgement.
-        how: Acknowledgement,
-    },
+    #[allow(missing_docs, reason = "the stroke and its acknowledgement")]
+    Acked { key: StrokeKey, how: Acknowledgement },
 }
 
 impl Record {

@@ -156,11 +156,6 @@ impl<const D: usize> Spd<D> {
         self.place.len() * D
     }
 
-    /// Returns the number of stored entries of the factor.
-    pub fn factor_len(&self) -> usize {
-        self.factor.len()
-    }
-
     /// Sets all values to zero; the factor stays as it was.
     pub fn clear(&mut self) {
         self.values.fill(0.0);

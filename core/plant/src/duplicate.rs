@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::Fault;
 use crate::node::{Entry, Node, NodeKind};
-use crate::source::{Place, Source};
+use crate::source::{Place, Source, dotted};
 
 /// The parser's message.
 pub(crate) const DUPLICATE: &str = "duplicate key";
@@ -20,7 +20,7 @@ pub(crate) fn fault(source: &Source, root: &Node, second: &Range<usize>) -> Faul
             find_owner(root, "", source, second.start, &mut owner);
             let (path, table) = owner;
             let first = table.as_table().unwrap_or_default().iter().find(|entry| entry.key == name);
-            (joined(&path, name), first.map(|entry| entry.key_span.start))
+            (dotted(&path, name), first.map(|entry| entry.key_span.start))
         }
     };
     let first = first.filter(|&first| first < second.start).map(|first| source.line_column(first));
@@ -48,7 +48,7 @@ fn find_owner<'a>(
             if before && (opened_by_header || node.span.end > offset) {
                 *owner = (path.to_owned(), node);
             }
-            entries.iter().map(|Entry { key, value, .. }| (joined(path, key), value)).collect()
+            entries.iter().map(|Entry { key, value, .. }| (dotted(path, key), value)).collect()
         }
         NodeKind::Array(values) => {
             values.iter().enumerate().map(|(i, value)| (format!("{path}[{}]", i + 1), value)).collect()
@@ -58,10 +58,6 @@ fn find_owner<'a>(
     for (path, child) in children {
         find_owner(child, &path, source, offset, owner);
     }
-}
-
-fn joined(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
 /// Returns the path in the header with which `text` begins.

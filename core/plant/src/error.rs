@@ -6,15 +6,11 @@ use crate::{Fault, Faults};
 
 /// Error of reading a file.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum Error {
     /// The file cannot be opened or read.
     #[error("{}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
+    Unreadable { path: PathBuf, source: std::io::Error },
     /// The file has faults.
     #[error(transparent)]
     Faulty(#[from] Faults),

@@ -92,7 +92,6 @@ impl Node {
         }
     }
 
-    /// Returns the entries of a table.
     pub(crate) fn as_table(&self) -> Option<&[Entry]> {
         match &self.kind {
             NodeKind::Table(entries) => Some(entries),

@@ -73,10 +73,6 @@ pub struct OptionDecl {
     pub doc: String,
     /// Value kept out of logs and records. May be given as `{ env = "NAME" }` or `{ file = "PATH" }`.
     pub secret: bool,
-    /// Rarely needed.
-    pub advanced: bool,
-    /// Replacement of an option that will be removed.
-    pub deprecated: Option<String>,
 }
 
 /// Checked value. Numbers are in the declared unit, durations in seconds.

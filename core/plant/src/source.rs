@@ -29,6 +29,11 @@ impl Place {
     }
 }
 
+/// Returns the dotted path of `key` in the table at `path`.
+pub(crate) fn dotted(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
 impl Source {
     /// Returns line and column of a byte, both from 1, the column in characters.
     pub(crate) fn line_column(&self, offset: usize) -> (usize, usize) {
@@ -38,7 +43,6 @@ impl Source {
         (line, before[line_start..].trim_start_matches('\u{feff}').chars().count() + 1)
     }
 
-    /// Makes a fault at `place`.
     pub(crate) fn fault(&self, place: &Place, message: String) -> Fault {
         let (line, column) = self.line_column(place.offset);
         Fault { file: self.file.clone(), line, column, key: place.key.clone(), message }

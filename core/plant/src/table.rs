@@ -5,7 +5,7 @@ use crate::document::{Document, Reported};
 use crate::key::{Located, TomlKey};
 use crate::nearest;
 use crate::node::{Entry, Node, NodeKind};
-use crate::source::Place;
+use crate::source::{Place, dotted};
 
 /// Reader of one table of a [`Document`].
 ///
@@ -213,10 +213,7 @@ impl<'d> TomlTable<'d> {
     }
 
     fn place_of(&self, key: &str) -> String {
-        match self.place.key.as_str() {
-            "" => key.to_owned(),
-            path => format!("{path}.{key}"),
-        }
+        dotted(&self.place.key, key)
     }
 }
 

@@ -213,8 +213,6 @@ fn option(name: &str, kind: OptionType) -> OptionDecl {
         required: false,
         doc: format!("What {name} does."),
         secret: false,
-        advanced: false,
-        deprecated: None,
     }
 }
 

@@ -35,21 +35,11 @@ use rtu::DRAIN_MAX;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Read consecutive registers.
-    Read {
-        /// Kind of the registers.
-        table: RegisterTable,
-        /// Address of the first.
-        start: u16,
-        /// Number of registers.
-        count: u16,
-    },
+    #[allow(missing_docs, reason = "the protocol's own names")]
+    Read { table: RegisterTable, start: u16, count: u16 },
     /// Write consecutive holding registers.
-    Write {
-        /// Address of the first.
-        start: u16,
-        /// Values.
-        words: Vec<u16>,
-    },
+    #[allow(missing_docs, reason = "the protocol's own names")]
+    Write { start: u16, words: Vec<u16> },
     /// Read device identification (function 43, MEI type 14).
     Identify,
 }
@@ -72,12 +62,8 @@ pub enum Response {
     /// Registers.
     Words(Vec<u16>),
     /// Echo of a write.
-    Written {
-        /// Address of the first.
-        start: u16,
-        /// Number of registers.
-        count: u16,
-    },
+    #[allow(missing_docs, reason = "the protocol's own names")]
+    Written { start: u16, count: u16 },
     /// Vendor, product and revision, as far as they are text.
     Identity(Vec<String>),
     /// Exception code.

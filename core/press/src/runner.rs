@@ -115,21 +115,14 @@ pub fn channels() -> (HostSide, PressSide) {
 
 /// Reason why the press side could not start.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum RunError<E: std::error::Error + 'static> {
     /// The journal could not be read: without it a stroke could be measured twice.
     #[error("press {press}: the journal cannot be read: {source}; repair or replace it before measuring")]
-    Journal {
-        /// Name of the press.
-        press: String,
-        /// Error of the journal.
-        source: E,
-    },
+    Journal { press: String, source: E },
     /// The journal panicked while it was read.
     #[error("press {press}: the journal failed while being read")]
-    JournalGone {
-        /// Name of the press.
-        press: String,
-    },
+    JournalGone { press: String },
 }
 
 /// Serves one press until the host sends [`Answer::Stop`] or drops its end; then makes the registers safe.

@@ -19,26 +19,17 @@ pub const SURFACE: &str = "surface.platen";
 
 /// Failure to write the files of a measurement.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum FilesError {
     /// Unwritable file or folder.
     #[error("{}: cannot be written: {source}; check the folder and the space on its disk", .path.display())]
-    Write {
-        /// File or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Write { path: PathBuf, source: std::io::Error },
     /// Folder that exists already.
     #[error("{}: exists already; give another --out or remove it", .0.display())]
     Exists(PathBuf),
     /// Picture that cannot be drawn.
     #[error("picture of {name}: {why}; report this with the result")]
-    Picture {
-        /// Name of the picture.
-        name: String,
-        /// Reason.
-        why: String,
-    },
+    Picture { name: String, why: String },
     /// Table or mesh that cannot be encoded.
     #[error("{0}; report this with the result")]
     Export(String),

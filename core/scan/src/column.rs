@@ -50,29 +50,18 @@ pub struct Column {
 
 /// Reason why a column cannot be part of a lattice.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum ColumnError {
     /// The vectors of the column differ in length.
     #[error("column {index}: {field} has {found} entries, range_m has {expected}")]
-    Length {
-        /// Column.
-        index: u32,
-        /// Name of the vector.
-        field: &'static str,
-        /// Its length.
-        found: usize,
-        /// Length of `range_m`.
-        expected: usize,
-    },
+    Length { index: u32, field: &'static str, found: usize, expected: usize },
     /// The column does not fit into the rows of the lattice.
     #[error("column {index} covers rows {first_row}..{end}, the lattice has {n_rows}")]
     Rows {
-        /// Column.
         index: u32,
-        /// First row.
         first_row: u32,
         /// One past the last row.
         end: u64,
-        /// Rows of the lattice.
         n_rows: u32,
     },
     /// A range or an angle that no scanner measures, in a valid cell.
@@ -80,11 +69,8 @@ pub enum ColumnError {
         "column {index} row {row}: range {range_m} m, azimuth {azimuth}, elevation {elevation} is not a measurement"
     )]
     NotFinite {
-        /// Column.
         index: u32,
-        /// Row.
         row: u32,
-        /// Range.
         range_m: f64,
         /// Radians.
         azimuth: f64,

@@ -83,10 +83,13 @@ pub trait Payload: Sized {
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError>;
 }
 
+/// Write of one array into the buffer of its payload.
+type PutArray<'a> = Box<dyn Fn(&mut [u8]) + 'a>;
+
 /// Arrays of a payload, placed behind its header in the order of their addition.
 struct Arrays<'a> {
     layout: Layout,
-    put: Vec<Box<dyn Fn(&mut [u8]) + 'a>>,
+    put: Vec<PutArray<'a>>,
 }
 
 impl<'a> Arrays<'a> {

@@ -96,7 +96,7 @@ pub use option::{OptionType, Options, Values};
 pub use platen_abi as abi;
 #[cfg(feature = "comparison")]
 pub use platen_model::{Field, NodeState, Report};
-pub use scanner::{ScanSink, Scanner};
+pub use scanner::{ScanReceiver, ScanSink, Scanner};
 
 /// Compiles the example of `plugins/README.md` as a test.
 #[cfg(all(doctest, feature = "comparison"))]

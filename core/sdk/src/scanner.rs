@@ -1,5 +1,7 @@
 //! Scanner plugins: trait, and the sink of a scan.
 
+use std::time::Duration;
+
 use platen_abi::frame_flag;
 use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
@@ -48,6 +50,43 @@ pub trait Scanner: Send + Sized + 'static {
 
     /// Disconnects, and joins the threads that the plugin started.
     fn close(&mut self) {}
+}
+
+/// Receiver of a scan and its job: [`ScanSink`], or a test's.
+pub trait ScanReceiver {
+    /// As [`Job::check`].
+    fn check(&self) -> Result<()>;
+    /// As [`Job::remaining`].
+    fn remaining(&self) -> Duration;
+    /// As [`Job::progress`].
+    fn progress(&self, fraction: f64, phase: &str);
+    /// As [`ScanSink::begin`].
+    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
+    /// As [`ScanSink::column`].
+    fn column(&mut self, column: &Column) -> Result<()>;
+    /// As [`ScanSink::end`].
+    fn end(&mut self, end: &ScanEnd) -> Result<()>;
+}
+
+impl ScanReceiver for ScanSink<'_> {
+    fn check(&self) -> Result<()> {
+        self.job.check()
+    }
+    fn remaining(&self) -> Duration {
+        self.job.remaining()
+    }
+    fn progress(&self, fraction: f64, phase: &str) {
+        self.job.progress(fraction, phase);
+    }
+    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
+        self.begin(header)
+    }
+    fn column(&mut self, column: &Column) -> Result<()> {
+        self.column(column)
+    }
+    fn end(&mut self, end: &ScanEnd) -> Result<()> {
+        self.end(end)
+    }
 }
 
 /// Sink of one scan.

@@ -62,14 +62,6 @@ pub struct Grid {
     pub nodes: Vec<Node>,
 }
 
-impl Place {
-    /// Returns the standard deviation of the position, all directions together, metres.
-    #[must_use]
-    pub fn sigma_all(&self) -> f64 {
-        self.sigma.iter().map(|s| s * s).sum::<f64>().sqrt()
-    }
-}
-
 /// Cells of [`Location`] along each side.
 const CELLS: usize = 16;
 

@@ -42,27 +42,17 @@ pub trait Flatten {
 
 /// Reason why there is no chart.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum FlattenError {
     /// The method refused the mesh or failed on it.
     #[error("flattening: {message}; {hint}")]
-    Refused {
-        /// Message of the method.
-        message: String,
-        /// Advice to the operator.
-        hint: String,
-    },
+    Refused { message: String, hint: String },
     /// The deadline passed, or the stroke was cancelled.
     #[error("flattening: stopped: {reason}; the scan is kept, measure it again")]
-    Stopped {
-        /// Reason of the stop.
-        reason: String,
-    },
+    Stopped { reason: String },
     /// The method answered with something that is no chart of this mesh: its author must act.
     #[error("flattening: not a chart: {what}; report this scan to the author of the flattening")]
-    NotAChart {
-        /// The first fault found.
-        what: String,
-    },
+    NotAChart { what: String },
 }
 
 impl Chart {

@@ -17,7 +17,6 @@ pub(crate) struct Entry {
     pub(crate) size: u64,
     /// Last change, by the clock of the share.
     pub(crate) modified: Option<SystemTime>,
-    /// Whether it is a folder.
     pub(crate) folder: bool,
 }
 

@@ -42,7 +42,6 @@ impl Layout {
         }
     }
 
-    /// Returns the ScanBegin.
     pub(crate) fn begin(&self) -> &ScanBegin {
         &self.begin
     }

@@ -4,8 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use platen_scan::{Column, ScanEnd, ScanHeader};
-use platen_sdk::{Job, ScanSink};
+use platen_sdk::ScanReceiver;
 
 use crate::error::{Error, Result};
 use crate::message::{self, Settings};
@@ -24,54 +23,6 @@ const CONNECT: Duration = Duration::from_secs(2);
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(5));
 /// Time before the deadline reserved for reporting why there is no scan.
 const REPORT_TIME: Duration = Duration::from_millis(100);
-
-/// Host of a scan job.
-pub(crate) trait Host {
-    /// Returns an error when the job was cancelled.
-    fn check(&self) -> Result<()>;
-    /// Returns the time until the deadline.
-    fn remaining(&self) -> Duration;
-    /// Reports the progress.
-    fn progress(&self, fraction: f64, phase: &str);
-    /// Receives the header.
-    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
-    /// Receives a column.
-    fn column(&mut self, column: &Column) -> Result<()>;
-    /// Receives the end.
-    fn end(&mut self, end: &ScanEnd) -> Result<()>;
-}
-
-/// Host across the plugin boundary.
-pub(crate) struct ToHost<'a, 'j, 's> {
-    pub(crate) job: &'a Job<'j>,
-    pub(crate) out: &'a mut ScanSink<'s>,
-}
-
-impl Host for ToHost<'_, '_, '_> {
-    fn check(&self) -> Result<()> {
-        Ok(self.job.check()?)
-    }
-
-    fn remaining(&self) -> Duration {
-        self.job.remaining()
-    }
-
-    fn progress(&self, fraction: f64, phase: &str) {
-        self.job.progress(fraction, phase);
-    }
-
-    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
-        Ok(self.out.begin(header)?)
-    }
-
-    fn column(&mut self, column: &Column) -> Result<()> {
-        Ok(self.out.column(column)?)
-    }
-
-    fn end(&mut self, end: &ScanEnd) -> Result<()> {
-        Ok(self.out.end(end)?)
-    }
-}
 
 /// Connection to a bridge.
 struct Link {
@@ -144,7 +95,7 @@ impl Link {
 }
 
 /// Scans through the bridge at `address`; delivers columns to the host as they arrive.
-pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Result<()> {
+pub(crate) fn scan(address: &str, request: Request, host: &mut impl ScanReceiver) -> Result<()> {
     let mut session = Session::new(request);
     let mut wait = BACK_OFF.0;
     loop {
@@ -165,7 +116,7 @@ pub(crate) fn scan(address: &str, request: Request, host: &mut impl Host) -> Res
 }
 
 /// Runs one connection until the scan is complete or the connection fails.
-fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Result<()> {
+fn connection(address: &str, session: &mut Session, host: &mut impl ScanReceiver) -> Result<()> {
     let mut link = Link::connect(address)?;
     session.connected();
     loop {
@@ -175,7 +126,7 @@ fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Res
                 Action::Progress(fraction, phase) => host.progress(fraction, &phase),
                 Action::Begin(header) => host.begin(&header)?,
                 Action::Column(column) => host.column(&column)?,
-                Action::End(end) => return host.end(&end),
+                Action::End(end) => return Ok(host.end(&end)?),
             }
         }
         if let Err(cancelled) = host.check() {
@@ -183,7 +134,7 @@ fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Res
                 // The job ends even when Abort is not delivered: the lease expires by itself.
                 let _ = link.send(kind, scan, &payload);
             }
-            return Err(cancelled);
+            return Err(cancelled.into());
         }
         if host.remaining() < REPORT_TIME {
             return Err(Error::TooLate("the scan was still running".to_owned()));
@@ -194,7 +145,7 @@ fn connection(address: &str, session: &mut Session, host: &mut impl Host) -> Res
     }
 }
 
-fn pause_for(pause: Duration, host: &impl Host, error: &Error) -> Result<()> {
+fn pause_for(pause: Duration, host: &impl ScanReceiver, error: &Error) -> Result<()> {
     let started = Instant::now();
     while started.elapsed() < pause {
         host.check()?;

@@ -7,6 +7,7 @@ pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 /// Error of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub(crate) enum Error {
     /// Broken connection; reconnecting may help.
     #[error("the connection broke: {0}")]
@@ -14,41 +15,26 @@ pub(crate) enum Error {
     /// Request refused for now; retrying later may help.
     #[error("the bridge is busy: {text}")]
     Busy {
-        /// Text of the bridge.
         text: String,
         /// Time until the next attempt, milliseconds.
         retry_ms: u64,
     },
     /// Another major version of the protocol.
     #[error("the bridge uses version {}.{} of the protocol, this driver 1.0; update the older of the two", .bridge.0, .bridge.1)]
-    Version {
-        /// Version of the bridge.
-        bridge: (u8, u8),
-    },
+    Version { bridge: (u8, u8) },
     /// Another scanner than that of this press.
     #[error("scanner {found} answers, {expected} is expected; check the address, or the option serial")]
     WrongScanner {
-        /// Serial number found.
         found: String,
         /// Serial number in the plant file, option `serial`.
         expected: String,
     },
     /// Request refused by bridge or scanner.
     #[error("the bridge refuses ({code}): {text}")]
-    Refused {
-        /// Code of the protocol.
-        code: String,
-        /// Text of the bridge.
-        text: String,
-    },
+    Refused { code: String, text: String },
     /// Scan ended by the bridge before it was complete.
     #[error("the scan ended as {outcome}: {reason}")]
-    Ended {
-        /// `aborted` or `failed`.
-        outcome: String,
-        /// Text of the bridge.
-        reason: String,
-    },
+    Ended { outcome: String, reason: String },
     /// Violation of the protocol by the bridge; retrying does not help.
     #[error("the bridge violates the protocol: {0}; report this to the supplier of the bridge")]
     Bridge(String),

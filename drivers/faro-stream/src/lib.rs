@@ -98,9 +98,7 @@ impl Scanner for FaroStream {
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let request = self.request(job.id(), out.window());
-        let mut host = device::ToHost { job, out };
-        device::scan(&self.options.address, request, &mut host)
-            .map_err(|error| error.at(&self.options.address))
+        device::scan(&self.options.address, request, out).map_err(|error| error.at(&self.options.address))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 
-/// `PSB1`.
 const MAGIC: u32 = u32::from_le_bytes(*b"PSB1");
 /// Supported version.
 pub(crate) const VERSION: (u8, u8) = (1, 0);

@@ -4,7 +4,7 @@ use crate::Options;
 use crate::error::Error;
 use crate::pace::Pace;
 use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
-use platen_sdk::{Job, Result, ScanSink};
+use platen_sdk::{Result, ScanReceiver};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
     CellCounts, Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
@@ -23,39 +23,6 @@ const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Computing time of one cell on one core, seconds.
 const SECONDS_PER_CELL: f64 = 2e-6;
-
-/// Receiver of a scan.
-pub(crate) trait Receiver {
-    fn check(&mut self, done: f64) -> Result<()>;
-    fn begin(&mut self, header: &ScanHeader) -> Result<()>;
-    fn column(&mut self, column: &Column) -> Result<()>;
-    fn end(&mut self, end: &ScanEnd) -> Result<()>;
-}
-
-/// Receiver that forwards to the host.
-pub(crate) struct ToHost<'a, 'j, 's> {
-    pub(crate) job: &'a Job<'j>,
-    pub(crate) out: &'a mut ScanSink<'s>,
-}
-
-impl Receiver for ToHost<'_, '_, '_> {
-    fn check(&mut self, done: f64) -> Result<()> {
-        self.job.progress(done, "scanning");
-        self.job.check()
-    }
-
-    fn begin(&mut self, header: &ScanHeader) -> Result<()> {
-        self.out.begin(header)
-    }
-
-    fn column(&mut self, column: &Column) -> Result<()> {
-        self.out.column(column)
-    }
-
-    fn end(&mut self, end: &ScanEnd) -> Result<()> {
-        self.out.end(end)
-    }
-}
 
 /// Scan prepared to be taken.
 #[derive(Debug)]
@@ -102,7 +69,7 @@ impl PreparedScan {
     }
 
     /// Takes the scan and delivers it to `out`.
-    pub(crate) fn take(&self, out: &mut impl Receiver) -> Result<()> {
+    pub(crate) fn take(&self, out: &mut impl ScanReceiver) -> Result<()> {
         let started = Instant::now();
         out.begin(&self.header())?;
         let (mut points, mut counts) = (0, CellCounts::default());
@@ -123,7 +90,7 @@ impl PreparedScan {
             return Err(error);
         }
         if let Some(pace) = &self.pace {
-            pace.wait_for_end(started, || out.check(1.0))?;
+            pace.wait_for_end(started, || progress(out, 1.0))?;
         }
         if let Some(truth) = &self.truth {
             let document = truth_document(&truth.state, &self.scene, &counts);
@@ -139,12 +106,18 @@ impl PreparedScan {
     }
 
     /// Delivers a column when it is due.
-    fn deliver(&self, column: SimColumn, started: Instant, done: f64, out: &mut impl Receiver) -> Result<()> {
+    fn deliver(
+        &self,
+        column: SimColumn,
+        started: Instant,
+        done: f64,
+        out: &mut impl ScanReceiver,
+    ) -> Result<()> {
         if let Some(pace) = &self.pace {
-            pace.wait_for_column(started, done, || out.check(done))?;
+            pace.wait_for_column(started, done, || progress(out, done))?;
         }
         out.column(&converted(column))?;
-        out.check(done)
+        progress(out, done)
     }
 
     fn seam(&self) -> Option<u32> {
@@ -255,4 +228,9 @@ fn converted(column: SimColumn) -> Column {
         elevation: column.elevation,
         intensity: column.intensity,
     }
+}
+
+fn progress(out: &impl ScanReceiver, done: f64) -> Result<()> {
+    out.progress(done, "scanning");
+    out.check()
 }

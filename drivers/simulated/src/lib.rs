@@ -144,12 +144,12 @@ impl Scanner for Simulated {
         capture::estimate_s(&self.options, window)
     }
 
-    fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
+    fn capture(&mut self, _: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let state = plate::fetch(&self.options)?;
         let window = out.window().copied();
         self.scans += 1;
         let shot = capture::PreparedScan::new(&self.options, state, window.as_ref(), self.scans)?;
-        shot.take(&mut capture::ToHost { job, out })
+        shot.take(out)
     }
 }
 

@@ -1,12 +1,13 @@
 //! Tests of the driver without a host: sources of plates, windows, columns.
 
-use crate::capture::{PreparedScan, Receiver};
+use crate::capture::PreparedScan;
 use crate::{Options, capture, plate};
 use platen_scan::{Column, Direction, Lattice, ScanEnd, ScanHeader, Window};
-use platen_sdk::{ErrorKind, Result};
+use platen_sdk::{ErrorKind, Result, ScanReceiver};
 use platen_sim_plate::{Plate, PlateState, Reply, Shape, Vec3};
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
+use std::time::Duration;
 
 fn options() -> Options {
     Options {
@@ -49,13 +50,19 @@ struct Keep {
     stop_after: Option<usize>,
 }
 
-impl Receiver for Keep {
-    fn check(&mut self, _: f64) -> Result<()> {
+impl ScanReceiver for Keep {
+    fn check(&self) -> Result<()> {
         match self.stop_after {
             Some(n) if self.columns >= n => Err(platen_sdk::Error::new(ErrorKind::Cancelled, "enough")),
             _ => Ok(()),
         }
     }
+
+    fn remaining(&self) -> Duration {
+        Duration::MAX
+    }
+
+    fn progress(&self, _: f64, _: &str) {}
 
     fn begin(&mut self, header: &ScanHeader) -> Result<()> {
         self.lattice = Some(Lattice::new(header.clone()));

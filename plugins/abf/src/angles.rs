@@ -83,7 +83,6 @@ impl Jacobian {
         sum
     }
 
-    /// Returns the rows of corner `k`.
     pub(crate) fn rows(&self, k: usize) -> &[Corners; 2] {
         &self.0[k]
     }

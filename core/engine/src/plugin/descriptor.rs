@@ -163,8 +163,6 @@ unsafe fn option(raw: &RawOption) -> Result<OptionDecl, String> {
         required: flag(option_flag::REQUIRED),
         doc: doc.lines().map(str::trim).collect::<Vec<_>>().join(" ").trim().to_owned(),
         secret: flag(option_flag::SECRET),
-        advanced: flag(option_flag::ADVANCED),
-        deprecated: flag(option_flag::DEPRECATED).then(|| "see its documentation".to_owned()),
         name,
     })
 }

@@ -155,7 +155,6 @@ impl Instance {
         self.ask(spec.limit + GRACE, |reply| Command::Arm(raw, reply))?
     }
 
-    /// Starts a job.
     pub(super) fn start(&self, spec: JobSpec, inputs: Vec<InputFrame>) -> RunningJob<'_> {
         let (reports, inbox) = sync_channel(FRAMES_UNDER_WAY);
         let started = Instant::now();

@@ -9,15 +9,11 @@ pub(crate) type Result<T> = std::result::Result<T, ReadError>;
 
 /// Reason why a file gives no lattice. The caller adds the path.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum ReadError {
     /// The operating system refuses: share, permissions, or the caller cancelled.
     #[error("{doing}: {source}")]
-    Io {
-        /// Operation tried.
-        doing: &'static str,
-        /// Reason of the operating system.
-        source: io::Error,
-    },
+    Io { doing: &'static str, source: io::Error },
     /// The file is shorter than it declares, still being written or cut in transfer: format, found and required.
     #[error("{0} file is incomplete: {1}; wait until it is written, or copy it again")]
     Incomplete(&'static str, String),

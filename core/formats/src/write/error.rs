@@ -9,6 +9,7 @@ pub(super) type Result<T> = std::result::Result<T, WriteFault>;
 
 /// Reason why there is no file.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum WriteError {
     /// The extension is that of no format.
     #[error("{}: unknown format; let the name end in .e57, .ptx, .xyz or .xyb", .0.display())]
@@ -18,16 +19,12 @@ pub enum WriteError {
     Exists(PathBuf),
     /// Writing failed.
     #[error("{}: {fault}", .path.display())]
-    Failed {
-        /// File.
-        path: PathBuf,
-        /// Reason.
-        fault: WriteFault,
-    },
+    Failed { path: PathBuf, fault: WriteFault },
 }
 
 /// Reason why writing failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum WriteFault {
     /// The operating system refuses.
     #[error("cannot be written: {0}; check the folder and the space on its disk")]
@@ -37,14 +34,7 @@ pub enum WriteFault {
     E57(#[from] e57::Error),
     /// A text format has no room for a coordinate.
     #[error("column {column} row {row} is {metres:.0} m away, beyond the format; write an E57")]
-    TooFar {
-        /// Column.
-        column: u32,
-        /// Row.
-        row: u32,
-        /// Range.
-        metres: f64,
-    },
+    TooFar { column: u32, row: u32, metres: f64 },
 }
 
 impl WriteError {

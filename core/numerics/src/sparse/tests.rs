@@ -29,10 +29,10 @@ fn the_order_names_every_node_once_and_saves_fill() {
     let n = points.len();
     let graph = Graph::of_elements(&triangles, &all_free(n), n);
     let mut order = elimination_order::nested_dissection(&graph, &points);
-    let dissected = Spd::<1>::analyse(&graph, &points).unwrap().factor_len();
+    let dissected = Spd::<1>::analyse(&graph, &points).unwrap().factor.len();
     // Along a line nothing can be dissected: the order is that of the rows, the factor a full band.
     let row_by_row: Vec<_> = (0..n).map(|k| [k as f64, 0.0]).collect();
-    let banded = Spd::<1>::analyse(&graph, &row_by_row).unwrap().factor_len();
+    let banded = Spd::<1>::analyse(&graph, &row_by_row).unwrap().factor.len();
     assert!(dissected * 3 < banded * 2, "factor of {dissected} entries against {banded} of a band");
     order.sort_unstable();
     assert!(order.iter().enumerate().all(|(k, &node)| k as u32 == node));

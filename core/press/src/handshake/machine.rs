@@ -55,7 +55,6 @@ impl Config {
     }
 }
 
-/// Active stroke.
 #[derive(Debug, Clone)]
 pub(super) struct ActiveStroke {
     pub(super) key: StrokeKey,

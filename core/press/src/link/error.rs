@@ -9,72 +9,30 @@ use crate::Code;
 
 /// Reason why a request to the press failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum LinkError {
     /// Connecting failed.
     #[error("press {peer}: no connection: {source}; check that it is on, and host and port in [press.link]")]
-    Connect {
-        /// Address of the press.
-        peer: String,
-        /// Error of the transport.
-        source: TransportError,
-    },
+    Connect { peer: String, source: TransportError },
     /// Connecting took too long.
     #[error("press {peer}: no connection in {} ms; check that it is on, and host and port in [press.link]", limit.as_millis())]
-    ConnectTimeout {
-        /// Address of the press.
-        peer: String,
-        /// Time limit.
-        limit: Duration,
-    },
+    ConnectTimeout { peer: String, limit: Duration },
     /// No answer in time. The connection is dropped; a write may have been executed.
     #[error("press {peer}: no answer to {request} in {} ms; check the cable or response_timeout_ms", limit.as_millis())]
-    Timeout {
-        /// Address of the press.
-        peer: String,
-        /// The request.
-        request: Request,
-        /// Time limit.
-        limit: Duration,
-    },
+    Timeout { peer: String, request: Request, limit: Duration },
     /// The connection failed and is dropped; a write may have been executed.
     #[error("press {peer}: {request} failed: {source}; connecting again")]
-    Broken {
-        /// Address of the press.
-        peer: String,
-        /// The request.
-        request: Request,
-        /// Error of the transport.
-        source: TransportError,
-    },
+    Broken { peer: String, request: Request, source: TransportError },
     /// The answer does not fit the request. The connection is dropped.
     #[error("press {peer}: wrong answer to {request}: {answer}; connecting again")]
-    Mismatch {
-        /// Address of the press.
-        peer: String,
-        /// The request.
-        request: Request,
-        /// The answer.
-        answer: String,
-    },
+    Mismatch { peer: String, request: Request, answer: String },
     /// The press answered with an exception. The connection persists.
     #[error("press {peer}: {request} refused with exception {code:02X} ({}); {}", exception_name(*code), exception_remedy(*code))]
-    Exception {
-        /// Address of the press.
-        peer: String,
-        /// The request.
-        request: Request,
-        /// Modbus exception code.
-        code: u8,
-    },
+    Exception { peer: String, request: Request, code: u8 },
     /// The allow-list or the mode forbids the write. Nothing was sent.
     #[error("press {peer}: writing holding registers {}..={} refused: not in [press.write] allow; nothing was sent",
         refused.start, u32::from(refused.start) + u32::from(refused.count.max(1)) - 1)]
-    Refused {
-        /// Address of the press.
-        peer: String,
-        /// The write.
-        refused: Refused,
-    },
+    Refused { peer: String, refused: Refused },
 }
 
 fn exception_name(code: u8) -> &'static str {

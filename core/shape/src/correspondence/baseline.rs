@@ -24,25 +24,20 @@ const MOST_STRAIN: f64 = 5e-5;
 
 /// Reason why a scan gives no outline of the blank.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum BlankError {
     /// No mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// It cannot be laid flat.
     #[error("the blank cannot be laid flat: {reason}; scan it again")]
-    Rough {
-        /// Why not.
-        reason: String,
-    },
+    Rough { reason: String },
     /// It is curved in two directions.
     #[error(
         "the blank is curved in two directions: laid flat it keeps a strain of {strain:.1e}, {MOST_STRAIN:.0e} at most; scan it before it \
          is pressed"
     )]
-    Curved {
-        /// Root mean square strain.
-        strain: f64,
-    },
+    Curved { strain: f64 },
     /// It is not the plate of the plate file.
     #[error(
         "the blank is {:.1} x {:.1} mm and up to {:.1} mm off its rectangle as ordered, {:.0} mm at most; check width_mm and \

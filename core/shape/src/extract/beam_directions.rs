@@ -5,7 +5,6 @@ use crate::Vec3;
 /// Up to here, radians, the series of [`AngleSinCos::by`] is exact to the last bits of an f64.
 const SMALL: f64 = 0.02;
 
-/// Sine and cosine of an angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct AngleSinCos {
     pub(super) sin: f64,

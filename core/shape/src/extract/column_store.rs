@@ -35,7 +35,6 @@ impl Segment {
     }
 }
 
-/// A stored column.
 #[derive(Debug, Clone)]
 pub(super) struct StoredColumn {
     /// Its runs, by row.

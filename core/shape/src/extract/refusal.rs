@@ -4,13 +4,13 @@ use crate::Vec3;
 
 /// Reason why no plate was found in a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum Refusal {
     /// The header describes no lattice.
     #[error(
         "the scan has {n_rows} rows, steps of {azimuth_step} rad and {elevation_step} rad: not a lattice; check the driver"
     )]
     NotALattice {
-        /// Rows of the header.
         n_rows: u32,
         /// Radians.
         azimuth_step: f64,
@@ -19,12 +19,7 @@ pub enum Refusal {
     },
     /// The plate file gives no plate.
     #[error("the plate is {width_mm} x {height_mm} mm in the plate file; both must be above zero")]
-    NoSize {
-        /// Millimetres.
-        width_mm: f64,
-        /// Millimetres.
-        height_mm: f64,
-    },
+    NoSize { width_mm: f64, height_mm: f64 },
     /// Nothing in the scan comes near the plate's size.
     #[error(
         "no plate in the scan: the largest connected face {} has {largest_m2:.2} m2, the plate {expected_m2:.2} m2; \
@@ -37,7 +32,6 @@ pub enum Refusal {
         largest_m2: f64,
         /// Area of the plate, square metres.
         expected_m2: f64,
-        /// True when a region of interest was given.
         region: bool,
     },
     /// A face of another size.
@@ -61,7 +55,6 @@ pub enum Refusal {
         .first.x, .first.y, .first.z, .second.x, .second.y, .second.z
     )]
     SeveralPlates {
-        /// Number of them.
         count: usize,
         /// Middle of one, metres.
         first: Vec3,
@@ -79,7 +72,6 @@ pub enum Refusal {
         spacing_mm: f64,
         /// The widest that is measured, millimetres.
         widest_mm: f64,
-        /// Angle between beams at which it would be reached.
         step_deg: f64,
     },
     /// The region of interest cuts the plate.

@@ -11,11 +11,11 @@ const MAX_LENGTH_MISFIT: f64 = 0.1;
 
 /// Reason why a disk cannot be flattened onto its rectangle.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum UnfitMesh {
     /// A triangle has no area in space.
     #[error("triangle {triangle} is degenerate: {height:.1e} m high on a side of {side:.1e} m")]
     Degenerate {
-        /// Triangle.
         triangle: usize,
         /// Its height over its longest side, metres.
         height: f64,
@@ -24,16 +24,10 @@ pub enum UnfitMesh {
     },
     /// A triangle has all corners on one edge of the plate: on the rectangle it has no area.
     #[error("triangle {triangle} has all its corners on edge {edge} of the plate")]
-    Ear {
-        /// Triangle.
-        triangle: usize,
-        /// Edge.
-        edge: usize,
-    },
+    Ear { triangle: usize, edge: usize },
     /// An edge is far from its side of the rectangle.
     #[error("edge {edge} is {measured:.3} m long, its side of the rectangle {side:.3} m")]
     EdgeLength {
-        /// Edge.
         edge: usize,
         /// Its arc length, metres.
         measured: f64,

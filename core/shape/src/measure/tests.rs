@@ -2,7 +2,7 @@
 
 use super::scene::{Errors, Scene};
 use crate::Vec3;
-use crate::evaluate::{grid, reference_line};
+use crate::evaluate::{Place, grid, reference_line};
 use crate::flatten::closed_form::{cone, cylinder, half_bent, sphere_of_fibres};
 
 fn errors(name: &str, scene: &Scene) -> Errors {
@@ -125,7 +125,8 @@ fn lines_and_grid_lie_on_the_face() {
     assert_eq!((line[0].u, line[1].u, line[60].u), (0.0, 0.05, 3.0));
     let placed = scene.placed();
     assert!(line.iter().all(|p| (p.position - placed.face(p.u, p.v)).norm() < 1e-3 && p.seen));
-    assert!(line.iter().all(|p| p.sigma_all() > 1e-6 && p.sigma_all() < 1e-3));
+    let sigma = |p: &Place| p.sigma.iter().map(|s| s * s).sum::<f64>().sqrt();
+    assert!(line.iter().all(|p| (1e-6..1e-3).contains(&sigma(p))));
     let grid = grid(&m.surface, &m.location, 21, 21);
     let node = &grid.nodes[20 * 21];
     assert_eq!((node.place.u, node.place.v), (0.0, 2.0));

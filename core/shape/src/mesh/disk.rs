@@ -54,12 +54,6 @@ impl DiskMesh {
         Ok(Self(parts))
     }
 
-    /// Returns the parts, to be changed and checked again.
-    #[must_use]
-    pub fn into_parts(self) -> DiskParts {
-        self.0
-    }
-
     /// Returns the positions in `boundary` of edge `k`'s vertices from corner k to corner k + 1, both included.
     ///
     /// The last edge ends in position 0, given as `boundary.len()`: take it modulo the length.

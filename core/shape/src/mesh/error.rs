@@ -2,19 +2,14 @@
 
 /// Reason why a set of parts is no disk.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum MeshError {
     /// A length, index or number is outside what the type allows.
     #[error("mesh: {what}; the program that made this mesh is at fault, report it")]
-    Malformed {
-        /// The first fault found.
-        what: String,
-    },
+    Malformed { what: String },
     /// The triangles do not form a disk.
     #[error("mesh: not a disk: {what}; scan again with the plate in full view, or report this scan")]
-    NotADisk {
-        /// The first fault found.
-        what: String,
-    },
+    NotADisk { what: String },
 }
 
 pub(super) fn malformed(what: impl Into<String>) -> MeshError {

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use platen_scan::{Column, Lattice, ScanEnd, ScanHeader};
+use platen_sdk::{Result, ScanReceiver};
 
 use super::bridge::{BRIDGE, Got, check, request};
-use crate::device::{Host, ask, scan};
-use crate::error::{Error, Result};
+use crate::device::{ask, scan};
+use crate::error::Error;
 use crate::wire::{Decoder, encode, kind};
 
 /// Starts a bridge that accepts one connection and answers each frame by `answer`; it closes on `None`.
@@ -77,12 +78,12 @@ impl Taker {
     }
 }
 
-impl Host for Taker {
+impl ScanReceiver for Taker {
     fn check(&self) -> Result<()> {
         if self.columns.len() < self.cancel_after {
             return Ok(());
         }
-        Err(platen_sdk::Error::new(platen_sdk::ErrorKind::Cancelled, "cancelled").into())
+        Err(platen_sdk::Error::new(platen_sdk::ErrorKind::Cancelled, "cancelled"))
     }
     fn remaining(&self) -> Duration {
         self.until.saturating_duration_since(Instant::now())
