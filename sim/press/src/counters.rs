@@ -58,7 +58,7 @@ pub struct Counters {
     pub writes_outside: u64,
     /// Writes on a connection that had not read both blocks before.
     pub writes_before_sync: u64,
-    /// Writes while the registers were cleared or had another map version.
+    /// Writes on a connection that had last read cleared registers or another map version.
     pub writes_while_void: u64,
     /// Injected line faults, by name.
     pub line_faults: BTreeMap<String, u64>,

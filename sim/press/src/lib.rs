@@ -77,6 +77,8 @@ impl SimPress {
     /// [`Error::Config`], [`Error::Plate`], and [`Error::Listen`] or [`Error::Serial`] when a port is unavailable.
     pub async fn start(config: Config) -> Result<Self> {
         let shared = Arc::new(Shared::new(&config)?);
+        // The registers contain the map before a client can read them.
+        shared.cycle()?;
         let mut tasks = JoinSet::new();
         let (private, server) = listen(SocketAddr::from(([127, 0, 0, 1], 0))).await?;
         tasks.spawn(forever(server::serve(private, config.unit, Arc::clone(&shared))));

@@ -124,12 +124,6 @@ impl Press {
         &self.program
     }
 
-    /// Returns whether the registers contain a valid map; otherwise a host must not write.
-    #[must_use]
-    pub fn serves_the_map(&self) -> bool {
-        self.config.map_version == crate::registers::MAP_VERSION && !matches!(self.phase, Phase::Void { .. })
-    }
-
     /// Executes one cycle at the time `now` since the start of the press.
     ///
     /// # Errors

@@ -287,6 +287,12 @@ impl Table {
         HBlock(block)
     }
 
+    /// Returns whether the P block contains this version of the map; a host must not write otherwise.
+    #[must_use]
+    pub fn contains_map(&self) -> bool {
+        self.words[self.p_base + p::MAP_VERSION] == MAP_VERSION
+    }
+
     /// Returns the present P block.
     #[must_use]
     pub fn p_block(&self) -> [u16; P_LEN] {

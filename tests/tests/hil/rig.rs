@@ -249,17 +249,17 @@ fn measurement(strokes: u32) -> Measurement {
 
 /// Asserts the conditions that hold for every run, with any fault.
 pub(crate) fn assert_clean(counters: &Counters) {
-    assert_eq!(counters.wrong, Vec::<String>::new());
     let counts = [
         ("writes outside the H block", counters.writes_outside),
         ("writes before both blocks were read", counters.writes_before_sync),
-        ("writes to registers that are not the map's", counters.writes_while_void),
+        ("writes after registers without the map were read", counters.writes_while_void),
         ("results published twice", counters.duplicates),
         ("results that changed", counters.changed),
     ];
     for (what, count) in counts {
         assert_eq!(count, 0, "{what}: {counters:?}");
     }
+    assert_eq!(counters.wrong, Vec::<String>::new(), "{counters:?}");
     for taken in &counters.taken {
         if taken.verdict == platen_sim_press::registers::Verdict::NotMeasured {
             continue;
