@@ -25,7 +25,8 @@ use tokio::task::{JoinHandle, JoinSet};
 /// Longer than any of these tests takes on a busy machine.
 pub(crate) const LIMIT: Duration = Duration::from_secs(300);
 
-/// A press whose ram hardly takes time, with a programme of 70 light strokes.
+/// A press whose ram hardly takes time, with a programme of 70 light strokes. It waits a minute, not 2 s, for a host without a
+/// heartbeat: how soon a host reconnects depends on its back-off and on the machine, and is tested in virtual time.
 pub(crate) fn quick() -> Config {
     let timings = Timings {
         cycle_ms: 2,
@@ -34,6 +35,7 @@ pub(crate) fn quick() -> Config {
         between_ms: 0,
         restart_ms: 60,
         heartbeat_ms: 100,
+        host_ms: 60_000,
         ..Timings::default()
     };
     let plan = Plan { passes: 10, ..Plan::default() };
