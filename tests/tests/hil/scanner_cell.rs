@@ -1,5 +1,6 @@
-//! A cell as in a plant: the real host, a simulated press on Modbus, and a scanner behind the scan bridge protocol, all
-//! of them processes that know each other by sockets only. What counts is what stands in the press's registers.
+//! Whole cell: host, simulated press on Modbus, and simulated scanner by the scan bridge protocol or as a folder of files. Each is a process
+//! of its own, connected by sockets and files only, but for one test whose scanner moves the plate. The results that the press accepted are
+//! compared with the host's record and with the known plate.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -13,18 +14,18 @@ use platen_sim_plate::{Plate, PlateState, Reply};
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
 use serde_json::Value as Json;
 
-/// `platen-sim cell`.
+/// Process `platen-sim cell`.
 struct Cell {
     child: Child,
     out: BufReader<ChildStdout>,
     modbus: String,
-    /// Empty where scans come as files.
+    /// Address of the scan bridge; empty when scans are files.
     scanner: String,
     line: BufReader<TcpStream>,
 }
 
 impl Cell {
-    /// Scans come over TCP.
+    /// Starts a cell whose scans are transferred over TCP.
     fn start(press: &Path, more: &[&str]) -> Self {
         Self::run(press, &[&["--serve", "127.0.0.1:0"], more].concat())
     }
@@ -55,7 +56,7 @@ impl Cell {
         serde_json::from_str(&answer).unwrap()
     }
 
-    /// Waits for the end of the strokes; gives what the press counted and the last plate in it.
+    /// Waits for the end of the strokes; returns the counters of the press and the last plate in it.
     fn wait_done(&mut self) -> (Json, PlateState) {
         let mut plate = None;
         until("the end of the strokes", || {
@@ -68,7 +69,7 @@ impl Cell {
         })
     }
 
-    /// Ends it and gives what its bridge has done.
+    /// Ends the process and returns the counters of its bridge.
     fn end(mut self) -> Json {
         drop(self.child.stdin.take());
         let mut said = String::new();
@@ -81,13 +82,13 @@ impl Cell {
 
 impl Drop for Cell {
     fn drop(&mut self) {
-        // One that has ended already needs no killing.
+        // An error means that the process has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// `config/sim-cell-plant.toml` with other ports and a folder of its own.
+/// Writes `config/sim-cell-plant.toml` with other ports into `folder`.
 fn plant(folder: &Path, modbus: &str, scanner: &str, change: impl Fn(String) -> String) -> PathBuf {
     let config = platen_tests::repository().join("config");
     let text = std::fs::read_to_string(config.join("sim-cell-plant.toml")).unwrap();
@@ -103,7 +104,7 @@ fn plant(folder: &Path, modbus: &str, scanner: &str, change: impl Fn(String) -> 
     path
 }
 
-/// `config/sim-press.toml`, its ram quick.
+/// Writes `config/sim-press.toml` with a fast ram into `folder`.
 fn press(folder: &Path, change: impl Fn(String) -> String) -> PathBuf {
     let text = std::fs::read_to_string(platen_tests::repository().join("config/sim-press.toml")).unwrap();
     let path = folder.join("press.toml");
@@ -112,20 +113,20 @@ fn press(folder: &Path, change: impl Fn(String) -> String) -> PathBuf {
     path
 }
 
-/// So many bends whatever the results say, five in a pass.
+/// Sets a fixed programme of this many bends, whatever the results, five in a pass.
 fn programme(text: String, strokes: u32, passes: u32) -> String {
     text.replace("strokes = 14", &format!("strokes = {strokes}"))
         .replace("closed_loop", "programme")
         .replace("passes = 1", &format!("passes = {passes}"))
 }
 
-/// Result document of a record.
+/// Reads the result document of a record.
 fn document(record: &Json) -> Json {
     let path = record["document"].as_str().unwrap_or_else(|| panic!("no document: {record:#}"));
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Every result that the press took is the one on record; gap.max is in hundredths of a millimetre.
+/// Asserts that each result accepted by the press is the recorded one; its register of gap.max is in hundredths of a millimetre.
 #[track_caller]
 fn assert_registers(history: &[Json], taken: &[Json]) {
     assert_eq!(history.len(), taken.len());
@@ -138,7 +139,7 @@ fn assert_registers(history: &[Json], taken: &[Json]) {
     }
 }
 
-/// The corners of a result are those of the plate in the press.
+/// Asserts that the corners of a result are those of the plate in the press, to 3 mm.
 #[track_caller]
 fn assert_corners(document: &Json, plate: &PlateState) {
     let plate = Plate::new(plate).unwrap();
@@ -149,10 +150,10 @@ fn assert_corners(document: &Json, plate: &PlateState) {
 }
 
 #[test]
-fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
+fn twenty_strokes_with_the_scanner_link_cut_once() {
     let folder = tempfile::tempdir().unwrap();
     let open = |text: String| programme(text, 20, 4);
-    // Cut in the scan of the blank after 300 columns; the scanner answers late the first time.
+    // The scan of the blank is cut after 300 columns; the first connection is answered late.
     let faults = ["--fault", "drop-mid-scan=300", "--fault", "connect-late=500"];
     let mut cell = Cell::start(&press(folder.path(), open), &faults);
     let plant = plant(folder.path(), &cell.modbus, &cell.scanner, |text| text);
@@ -169,7 +170,7 @@ fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
     assert_eq!(plate.strokes, 20);
     assert_corners(documents.last().unwrap(), &plate);
 
-    // Region scans: the blank in the region of interest, every stroke where the stroke before lay.
+    // The blank is scanned in the region of interest, each later stroke in the window of the plate before.
     let columns: Vec<u64> = documents.iter().map(|d| d["scan"]["columns"].as_u64().unwrap()).collect();
     println!("columns: {columns:?}");
     assert!(columns[1..].iter().all(|stroke| *stroke < columns[0] * 3 / 4), "{columns:?}");
@@ -182,7 +183,7 @@ fn twenty_strokes_over_sockets_with_a_link_cut_in_a_scan() {
 }
 
 #[test]
-fn a_late_file_that_grows_is_the_scan_of_its_own_stroke() {
+fn a_late_growing_file_is_assigned_to_its_stroke() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");
     let few = |text: String| programme(text, 5, 1);
@@ -207,19 +208,19 @@ fn a_late_file_that_grows_is_the_scan_of_its_own_stroke() {
 
     let waited: Vec<f64> = documents.iter().map(|d| d["timings_ms"]["acquire"].as_f64().unwrap()).collect();
     println!("waited for files, ms: {waited:.0?}");
-    // It was not there for 750 ms, and not whole for as long again.
+    // The file appears after 750 ms and is complete after as long again.
     let late = history.iter().position(|record| record["key"]["stroke"] == 3).unwrap();
     assert!(waited[late] > 1500.0, "{waited:?}\n{log}");
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
 
 #[test]
-fn region_scans_save_time_and_can_be_switched_off() {
+fn a_smaller_scan_window_has_fewer_columns() {
     let mut scans = Vec::new();
     for window in ["plate", "region", "everything"] {
         let folder = tempfile::tempdir().unwrap();
         let few = |text: String| programme(text, 3, 1);
-        // A fiftieth of the scanner's time.
+        // A fiftieth of a real scanner's time.
         let mut cell =
             Cell::start(&press(folder.path(), few), &["--time-scale", "0.02", "--margin-deg", "40"]);
         let choose = |text: String| text.replace("window = \"plate\"", &format!("window = \"{window}\""));
@@ -240,10 +241,10 @@ fn region_scans_save_time_and_can_be_switched_off() {
 }
 
 #[test]
-fn a_plate_that_left_its_window_is_scanned_again_once() {
+fn a_plate_outside_its_window_is_scanned_again_once() {
     let folder = tempfile::tempdir().unwrap();
-    // From the third scan on the plate lies one metre farther along its v: half in its window. From the sixth on it lies
-    // where it was not seen at all.
+    // From the third scan on the plate is displaced by one metre along its v, half out of its window; from the sixth on by two
+    // metres the other way, wholly out of its window.
     let scans = AtomicU32::new(0);
     let moving = move || {
         let mut state = crate::stream::plate();

@@ -1,21 +1,21 @@
-//! Faults of the light and of the scanner's stand: from the simulator's bridge over a socket through
-//! the driver library to the measured plate, against the truth of the simulator. The plate is measured within bounds, or
-//! refused with one sentence; it is never measured wrong.
+//! Optical faults and errors of the instrument and of its pose: a scan by the simulator's bridge, transferred over a socket by the driver
+//! library, is measured and compared with the known plate. The result is within the bounds of the table, or the plate is refused with
+//! one sentence.
 //!
-//! | fault | test | outcome: corners, mid-surface along its normal (rms of a 9 x 9 grid) |
+//! | fault | test | bounds: largest error of the corners, rms of the mid-surface along its normal (9 x 9 grid) |
 //! |---|---|---|
-//! | none | `undisturbed` | 2 mm, 0.1 mm |
-//! | mixed pixels at the edges | `mixed_pixels` | 3 mm, 0.1 mm |
-//! | hole in the mirror lobe of bright metal, through an edge | `specular_hole` | 3 mm, 0.1 mm |
-//! | a mirror lobe as wide as the plate | `an_edge_in_the_mirror_lobe` | refused: "plate: 4 % of one edge of the plate is seen .." |
-//! | dark plate: three times the noise | `dark_noise` | 4 mm, 0.2 mm |
-//! | cyclic range bias of 0.3 mm | `cyclic_bias` | 3 mm, 0.4 mm |
-//! | angular noise of 30 urad | `angular_noise` | 3 mm, 0.2 mm |
-//! | scanner leaning by 4 degrees | `inclination` | 3 mm, 0.1 mm |
-//! | warm-up columns | `warm_up_columns` | left out |
-//! | seam of the two faces across the plate | `seam_across_the_plate`, `seam_of_a_head_that_turns_clockwise` | 3 mm, 0.8 mm |
-//! | a person and a chain before the plate | `stray_and_occluded` | 6 mm, 0.5 mm |
-//! | seen under more than 75 degrees | `grazing` | refused: "scan: .." or "plate: .." |
+//! | none | `no_fault` | 0.8 mm, 0.01 mm |
+//! | mixed pixels at the edges | `mixed_pixels_at_the_edges` | 0.8 mm, 0.01 mm |
+//! | hole by specular reflection on bright metal, through an edge | `a_specular_hole_through_an_edge` | 0.5 mm, 0.01 mm |
+//! | specular lobe as wide as the plate | `an_edge_in_the_specular_lobe_is_refused` | refused: "plate: 4 % of one edge of the plate is seen .." |
+//! | dark plate: three times the noise, 5 % of the echoes lost | `a_dark_plate` | 1.0 mm, 0.025 mm |
+//! | cyclic range error of 0.3 mm | `cyclic_range_error` | 0.9 mm, 0.22 mm |
+//! | angular noise of 30 urad | `angular_noise` | 1.1 mm, 0.012 mm |
+//! | scanner inclined by 4 degrees | `an_inclined_scanner` | 0.8 mm, 0.01 mm |
+//! | 40 columns before the laser is warm | `warm_up_columns_are_left_out` | left out; 0.8 mm, 0.01 mm |
+//! | seam of the two faces on the plate | `two_faces_meeting_on_the_plate`, `two_faces_of_a_clockwise_scanner` | 2.2 mm, 0.8 mm |
+//! | person and chain before the plate | `a_person_and_a_chain_before_the_plate` | 0.8 mm, 0.01 mm |
+//! | incidence above 75 degrees | `grazing_incidence_is_never_measured_wrong` | refused: "scan: .." or "plate: .."; else 30 mm, 1 mm |
 
 use std::f64::consts::PI;
 
@@ -38,7 +38,7 @@ struct Scene {
     /// Errors of the two faces; the seam lies at this azimuth of the plate, degrees.
     faces: Option<(Faces, f64)>,
     clockwise: bool,
-    /// Where the plate is looked for.
+    /// Region of interest in which the plate is searched.
     region: Option<RegionOfInterest>,
 }
 
@@ -55,7 +55,7 @@ impl Default for Scene {
 struct Found {
     corners: f64,
     surface: f64,
-    /// Share of the plate that was seen.
+    /// Share of the plate covered by samples.
     coverage: f64,
 }
 
@@ -83,7 +83,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let window = scene.faces.map(|(_, seam_deg)| over_half_a_turn(seam_deg.to_radians(), scene.clockwise));
     let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), window.as_ref(), &spec, None)?;
     assert_eq!(scanned.header.seam_column.is_some(), window.is_some());
-    // Those that come last in the host's order are emptied by the driver.
+    // Clockwise columns arrive reversed: the driver itself discards the warm-up columns, which come last.
     let left_out = if scene.clockwise { 0 } else { scene.instrument.warm_up_columns };
     assert_eq!(scanned.warm_up_columns, left_out);
     let measured = stroke::measure_scanned(&mut rig, &scanned, &spec, None, Baseline::None)?;
@@ -92,7 +92,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let surface = &measured.measurement.surface;
     let mut squares = 0.0;
     for k in 0..81 {
-        // Not the last centimetres, which are the edge's.
+        // 5 % from the edges, whose errors the corners show.
         let share = |i: usize| 0.05 + 0.9 * i as f64 / 8.0;
         let (u, v) = (share(k % 9) * width, share(k / 9) * height);
         squares += (surface.point(u, v) - truth.mid(u, v)).dot(&truth.normal(u, v)).powi(2);
@@ -102,14 +102,14 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     Ok(Found { corners, surface: (squares / 81.0).sqrt(), coverage })
 }
 
-/// A window in which the other face begins at the azimuth `seam`: half a turn before it, and a little behind.
+/// Returns a window wider than half a turn in which the second face begins at the azimuth `seam`.
 fn over_half_a_turn(seam: f64, clockwise: bool) -> Window {
     const BEHIND: f64 = 0.4;
     let azimuth_start = if clockwise { seam - BEHIND } else { seam - PI };
     Window { azimuth_start, azimuth_width: PI + BEHIND, elevation_min: -0.72, elevation_max: -0.42 }
 }
 
-/// Measured within bounds: about twice what the scene gives.
+/// Asserts that the plate is measured within bounds, about twice the errors found.
 #[track_caller]
 fn survives(corners_mm: f64, surface_mm: f64, scene: Scene) -> Found {
     let found = measure(scene).unwrap_or_else(|error| panic!("{error}"));
@@ -118,7 +118,7 @@ fn survives(corners_mm: f64, surface_mm: f64, scene: Scene) -> Found {
     found
 }
 
-/// Measured within bounds, or refused with a sentence.
+/// Asserts that the plate is measured within bounds or refused with a sentence.
 #[track_caller]
 fn never_wrong(corners_mm: f64, surface_mm: f64, scene: Scene) {
     match measure(scene) {
@@ -135,46 +135,46 @@ fn never_wrong(corners_mm: f64, surface_mm: f64, scene: Scene) {
 }
 
 #[test]
-fn undisturbed() {
+fn no_fault() {
     survives(0.8, 0.01, Scene::default());
 }
 
 #[test]
-fn mixed_pixels() {
+fn mixed_pixels_at_the_edges() {
     let instrument = Instrument { footprint: 1.2e-3, ..Scene::default().instrument };
     survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
-/// The plate stands up to the scanner, so that its mirror lobe, of this half width, looks over its upper edge.
-fn before_the_mirror(lobe_deg: f64) -> Scene {
+/// A plate raised towards the scanner, so that a specular lobe of this half width lies across its upper edge.
+fn in_specular_reflection(lobe_deg: f64) -> Scene {
     let pose = Pose { centre_mm: [6_000.0, 0.0, -1_800.0], pitch_deg: -70.0, ..Pose::default() };
-    // The bed is as large as the plate.
+    // Region of interest: the bed, as large as the plate.
     let region = RegionOfInterest { min: Vec3::new(3.0, -2.0, -3.3), max: Vec3::new(9.0, 2.0, 0.5) };
     let instrument = Instrument { specular_lobe: Some(lobe_deg.to_radians()), ..Scene::default().instrument };
     Scene { instrument, plate: PlateState { pose, ..plate() }, region: Some(region), ..Scene::default() }
 }
 
 #[test]
-fn specular_hole() {
-    let found = survives(0.5, 0.01, before_the_mirror(2.0));
+fn a_specular_hole_through_an_edge() {
+    let found = survives(0.5, 0.01, in_specular_reflection(2.0));
     assert!(found.coverage < 0.98, "no hole: {found:?}");
 }
 
 #[test]
-fn an_edge_in_the_mirror_lobe() {
-    let refused = measure(before_the_mirror(5.0)).unwrap_err().to_string();
+fn an_edge_in_the_specular_lobe_is_refused() {
+    let refused = measure(in_specular_reflection(5.0)).unwrap_err().to_string();
     assert!(refused.contains("% of one edge of the plate is seen"), "{refused}");
     assert!(refused.contains("or tilt it where it mirrors the beam"), "{refused}");
 }
 
 #[test]
-fn dark_noise() {
+fn a_dark_plate() {
     let instrument = Instrument { range_sigma: 1.5e-3, dropout: 0.05, ..Scene::default().instrument };
     survives(1.0, 0.025, Scene { instrument, ..Scene::default() });
 }
 
 #[test]
-fn cyclic_bias() {
+fn cyclic_range_error() {
     let cyclic = Some(Cyclic { amplitude: 0.3e-3, period: 1.2, phase: 0.0 });
     let instrument = Instrument { cyclic, ..Scene::default().instrument };
     survives(0.9, 0.22, Scene { instrument, ..Scene::default() });
@@ -187,20 +187,20 @@ fn angular_noise() {
 }
 
 #[test]
-fn inclination() {
-    // Seen from a scanner that leans, the plate leans.
+fn an_inclined_scanner() {
+    // An inclined scanner is equivalent to an inclined plate.
     let pose = Pose { pitch_deg: 4.0, roll_deg: -2.0, ..Pose::default() };
     survives(0.8, 0.01, Scene { plate: PlateState { pose, ..plate() }, ..Scene::default() });
 }
 
 #[test]
-fn warm_up_columns() {
-    // 40 columns, 2.8 degrees, of ranges that scatter by centimetres, beside the plate.
+fn warm_up_columns_are_left_out() {
+    // 40 columns (2.8 degrees) beside the plate; their ranges scatter by centimetres.
     let instrument = Instrument { warm_up_columns: 40, ..Scene::default().instrument };
     survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
-/// Both faces see a part of the plate, the back face with its own collimation and from 1.1 mm beside; three columns at the seam are left out.
+/// Both faces scan a part of the plate; the back face has its own collimation error and is displaced by 1.1 mm; three warm-up columns.
 fn seam(seam_deg: f64, clockwise: bool) -> Scene {
     let faces = Faces { seam_column: 0, collimation: 50e-6, trunnion: 25e-6, moved: [0.0, 0.5e-3, 1e-3] };
     let scene = Scene::default();
@@ -209,23 +209,23 @@ fn seam(seam_deg: f64, clockwise: bool) -> Scene {
 }
 
 #[test]
-fn seam_across_the_plate() {
+fn two_faces_meeting_on_the_plate() {
     survives(2.2, 0.8, seam(-2.0, false));
 }
 
 #[test]
-fn seam_of_a_head_that_turns_clockwise() {
+fn two_faces_of_a_clockwise_scanner() {
     survives(2.2, 0.8, seam(3.0, true));
 }
 
 #[test]
-fn stray_and_occluded() {
+fn a_person_and_a_chain_before_the_plate() {
     let surroundings = Surroundings { person_in_front: true, chain: true, ..Surroundings::default() };
     survives(0.8, 0.01, Scene { surroundings, ..Scene::default() });
 }
 
 #[test]
-fn grazing() {
+fn grazing_incidence_is_never_measured_wrong() {
     let pose = Pose { centre_mm: [11_000.0, 0.0, -1_800.0], ..Pose::default() };
     never_wrong(30.0, 1.0, Scene { plate: PlateState { pose, ..plate() }, ..Scene::default() });
 }

@@ -1,39 +1,39 @@
-//! Every fault of link, bridge and scanner that is known, on a real socket: the driver library as the host loads it
-//! against the simulator's bridge, which shares no code with it. The scan survives to the last bit, or fails within
-//! its deadline with one sentence.
+//! Faults of link, bridge and scanner: the driver library `faro-stream`, loaded as by the host, against the simulator's bridge on a
+//! socket. The two share no code. A scan either survives, which means that its lattice equals that of an undisturbed scan bit for bit, or
+//! fails before its deadline with one sentence that states the cause.
 //!
 //! | fault | test | outcome |
 //! |---|---|---|
-//! | link cut, at any column | `drop_mid_scan_at_every_column`, `drop_often` | survived: resumed, no column twice |
-//! | bridge or vendor's library crashed | `sdk_crash_bridge_killed` | "the bridge refuses (gone): scan .. is not kept here" |
-//! | nobody let in after a cut | `reconnect_too_fast` | survived |
-//! | reply to Start lost | `double_start_when_the_reply_is_lost` | survived: two Starts, one scan |
-//! | delay, silence | `slow`, `stalled_longer_than_the_driver_waits` | survived |
-//! | flipped bits | `corrupt_frame`, `corrupt_end`, `corrupt_header` | survived: asked for again |
-//! | frame too long | `oversize` | survived: reconnected |
-//! | columns missing, shuffled, repeated | `missing_column`, `shuffled`, `repeated` | survived |
-//! | frames of another scan | `late_frames` | survived |
-//! | several of these together | `everything_at_once` | survived |
-//! | column without content | `zero_length` | "a column of 0 bytes is shorter than its fixed part" |
-//! | column twice, different | `torn_column` | "received twice with different content" |
-//! | digest of other columns | `wrong_digest` | "received .. but ScanEnd states .." |
-//! | unknown frame | `unknown_frames` | skipped, or "unknown to version 1.0" |
-//! | other version | `version_mismatch` | "uses version 2.0 of the protocol, this driver 1.0" |
-//! | scan's end never told | `event_lost` | "no scan in time" at the deadline |
-//! | lease held by a dead client | `lease_stuck` | survived, or "busy: held by press-4" at the deadline |
-//! | scanner off or starting | `asleep` | survived, or "the scanner is starting up" at the deadline |
-//! | connected late | `connect_late`, `connect_later_than_the_driver_waits` | survived |
-//! | mirror not up to speed | `start_stall` | survived, or "did not reach its speed in 5 attempts" |
-//! | status stale, progress jumps | `stale_status_and_progress_jump` | survived |
-//! | parameters altered | `params_altered` | survived, noted in the scan |
-//! | impossible parameters | `impossible_settings_are_refused_with_what_is_possible` | "choose a lower rate" |
-//! | bridge's disk full | `slow_consumer_spool_overflow` | "refuses (overflow)" |
-//! | library, card missing; card full | `sdk_missing`, `card_missing`, `storage_full` | its sentence |
-//! | pushed while scanning | `tilted_while_scanning` | "the scanner was moved" |
-//! | battery, temperature, dirt | `battery_low_temperature_contamination_are_warnings` | survived, said as progress |
-//! | clock wrong, jumps | `clock_jump` | survived |
-//! | another scanner | `wrong_scanner` | "SIM9999 answers, SIM0001 is expected" |
-//! | no bridge | `nobody_there` | "no scan in time: the connection broke" |
+//! | link cut at any column, or often | `a_scan_is_resumed_after_a_cut_at_any_column`, `a_scan_is_resumed_after_many_cuts` | survived: resumed, no column twice |
+//! | bridge restarted without its scans | `a_scan_lost_by_a_restarted_bridge_fails` | "the bridge refuses (gone): scan .. is not kept here" |
+//! | connections refused after a cut | `connections_refused_after_a_cut_are_tried_again` | survived |
+//! | reply to Start lost | `a_lost_reply_to_start_causes_no_second_scan` | survived: two Starts, one scan |
+//! | columns delayed, silence | `delayed_columns_are_waited_for`, `a_silence_beyond_the_time_limit_reconnects` | survived |
+//! | flipped bits | `a_corrupt_column_is_requested_again`, `a_corrupt_scan_end_reconnects`, `a_corrupt_frame_header_reconnects` | survived: requested again, or reconnected |
+//! | frame too long | `an_oversized_frame_reconnects` | survived: reconnected |
+//! | columns missing, shuffled, repeated | `a_missing_column_is_requested_again`, `shuffled_columns_are_sorted`, `repeated_columns_are_used_once` | survived |
+//! | frames of another scan | `frames_of_another_scan_are_ignored` | survived |
+//! | several of these together | `seven_faults_of_the_link_together` | survived |
+//! | empty column | `an_empty_column_fails_the_scan` | "a column of 0 bytes is shorter than its fixed part" |
+//! | column twice with different content | `two_contents_of_one_column_fail_the_scan` | "received twice with different content" |
+//! | wrong digest | `a_wrong_digest_fails_the_scan` | "received .. but ScanEnd states .." |
+//! | unknown frame | `unknown_frames_are_skipped_unless_critical` | skipped, or "unknown to version 1.0" |
+//! | another version of the protocol | `another_protocol_version_is_refused` | "uses version 2.0 of the protocol, this driver 1.0" |
+//! | ScanEnd never sent | `a_missing_scan_end_fails_at_the_deadline` | "no scan in time" at the deadline |
+//! | lease held by another client | `a_lease_held_by_another_client_is_waited_for` | survived, or "busy: held by press-4" at the deadline |
+//! | scanner off or starting | `a_scanner_that_starts_up_is_waited_for` | survived, or "the scanner is starting up" at the deadline |
+//! | connection answered late | `a_late_answer_to_the_connection_is_waited_for`, `an_answer_to_the_connection_beyond_the_time_limit_reconnects` | survived |
+//! | mirror below its speed | `a_mirror_below_its_speed_is_waited_for` | survived, or "did not reach its speed in 5 attempts" |
+//! | status and progress never change | `a_stale_status_and_progress_change_nothing` | survived |
+//! | measuring rate altered | `a_rate_altered_by_the_scanner_is_noted` | survived, noted in the scan |
+//! | impossible settings | `impossible_settings_are_refused_with_the_reason` | "requires a mirror frequency of 762 Hz" |
+//! | bridge's disk full | `a_full_disk_of_the_bridge_is_reported` | "refuses (overflow)" |
+//! | library, card missing; card full | `a_missing_vendor_library_is_reported`, `a_missing_memory_card_is_reported`, `a_full_memory_card_is_reported` | the sentence of each |
+//! | scanner moved during the scan | `a_scanner_moved_during_the_scan_is_reported` | "the scanner was moved" |
+//! | low battery, temperature, contamination | `battery_temperature_and_contamination_are_warnings` | survived |
+//! | clock wrong and jumping | `a_wrong_clock_changes_nothing` | survived |
+//! | another scanner | `another_scanner_is_refused` | "SIM9999 answers, SIM0001 is expected" |
+//! | no bridge | `a_missing_bridge_fails_at_the_deadline` | "no scan in time: the connection broke" |
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -44,7 +44,7 @@ use platen_sim_scanner::stream::{Bridge, BridgeConfig, BridgeCounters};
 
 type Cells = Vec<(Option<u64>, Option<[u64; 2]>, u16)>;
 
-/// The scan that nothing disturbed.
+/// Returns cells, columns and points of a scan without a fault, made once.
 fn undisturbed() -> &'static (Cells, u32, u64) {
     static SCAN: OnceLock<(Cells, u32, u64)> = OnceLock::new();
     SCAN.get_or_init(|| {
@@ -56,7 +56,7 @@ fn undisturbed() -> &'static (Cells, u32, u64) {
     })
 }
 
-/// The scan comes whole, from one scan of the head.
+/// Asserts that the scan equals the undisturbed one and was made once.
 #[track_caller]
 fn survives_on(bridge: &Bridge) -> BridgeCounters {
     let (lattice, end) = scan(&driver(bridge.address(), COARSE), Some(&WINDOW), LIMIT).unwrap();
@@ -73,7 +73,7 @@ fn survives(faults: &[&str]) -> BridgeCounters {
     survives_on(&bridge(faults))
 }
 
-/// The scan fails with this sentence, within its deadline.
+/// Asserts that the scan fails with this sentence before its deadline.
 #[track_caller]
 fn fails(faults: &[&str], sentence: &str) {
     fails_within(LIMIT, faults, sentence);
@@ -91,7 +91,7 @@ fn fails_within(limit: Duration, faults: &[&str], sentence: &str) {
 }
 
 #[test]
-fn drop_mid_scan_at_every_column() {
+fn a_scan_is_resumed_after_a_cut_at_any_column() {
     let columns = undisturbed().1;
     for column in 0..=columns {
         let counters = survives(&[&format!("drop-mid-scan={column}")]);
@@ -101,84 +101,84 @@ fn drop_mid_scan_at_every_column() {
 }
 
 #[test]
-fn drop_often() {
+fn a_scan_is_resumed_after_many_cuts() {
     let counters = survives(&["drop-often=7"]);
     assert!(counters.cuts >= 4 && counters.starts == 1, "{counters:?}");
 }
 
 #[test]
-fn sdk_crash_bridge_killed() {
-    // What a bridge has forgotten cannot be resumed, and is not scanned again under the same name.
+fn a_scan_lost_by_a_restarted_bridge_fails() {
+    // A scan that the bridge does not know cannot be resumed, and is not repeated under the same identity.
     fails(&["bridge-killed=12"], "the bridge refuses (gone): scan ");
 }
 
 #[test]
-fn reconnect_too_fast() {
+fn connections_refused_after_a_cut_are_tried_again() {
     let counters = survives(&["drop-mid-scan=9", "reconnect-too-fast=700"]);
     assert_eq!(counters.cuts, 1);
 }
 
 #[test]
-fn double_start_when_the_reply_is_lost() {
+fn a_lost_reply_to_start_causes_no_second_scan() {
     let counters = survives(&["reply-lost"]);
     assert_eq!((counters.starts, counters.scans), (2, 1));
 }
 
 #[test]
-fn slow() {
+fn delayed_columns_are_waited_for() {
     survives(&["slow=15"]);
 }
 
 #[test]
-fn stalled_longer_than_the_driver_waits() {
+fn a_silence_beyond_the_time_limit_reconnects() {
     let counters = survives(&["stalled=5000"]);
     assert!(counters.connections >= 2, "{counters:?}");
 }
 
 #[test]
-fn corrupt_frame() {
+fn a_corrupt_column_is_requested_again() {
     let counters = survives(&["corrupt-frame=3"]);
     assert!(counters.resumes >= 1 && counters.connections == 1, "{counters:?}");
 }
 
 #[test]
-fn corrupt_end() {
+fn a_corrupt_scan_end_reconnects() {
     assert_eq!(survives(&["corrupt-end"]).connections, 2);
 }
 
 #[test]
-fn corrupt_header() {
+fn a_corrupt_frame_header_reconnects() {
     assert_eq!(survives(&["corrupt-header=5"]).connections, 2);
 }
 
 #[test]
-fn oversize() {
+fn an_oversized_frame_reconnects() {
     assert_eq!(survives(&["oversize=5"]).connections, 2);
 }
 
 #[test]
-fn missing_column() {
+fn a_missing_column_is_requested_again() {
     let counters = survives(&["missing-column=4"]);
     assert_eq!((counters.resumes, counters.connections), (1, 1));
 }
 
 #[test]
-fn shuffled() {
+fn shuffled_columns_are_sorted() {
     survives(&["shuffled=40"]);
 }
 
 #[test]
-fn repeated() {
+fn repeated_columns_are_used_once() {
     survives(&["repeated=2"]);
 }
 
 #[test]
-fn late_frames() {
+fn frames_of_another_scan_are_ignored() {
     survives(&["late-frames"]);
 }
 
 #[test]
-fn everything_at_once() {
+fn seven_faults_of_the_link_together() {
     survives(&[
         "drop-often=11",
         "corrupt-frame=5",
@@ -191,7 +191,7 @@ fn everything_at_once() {
 }
 
 #[test]
-fn zero_length() {
+fn an_empty_column_fails_the_scan() {
     fails(
         &["zero-length=5"],
         "the bridge violates the protocol: a column of 0 bytes is shorter than its fixed part",
@@ -199,60 +199,60 @@ fn zero_length() {
 }
 
 #[test]
-fn torn_column() {
+fn two_contents_of_one_column_fail_the_scan() {
     fails(&["torn-column=5"], "received twice with different content");
 }
 
 #[test]
-fn wrong_digest() {
+fn a_wrong_digest_fails_the_scan() {
     fails(&["wrong-digest"], "ScanEnd states");
 }
 
 #[test]
-fn unknown_frames() {
+fn unknown_frames_are_skipped_unless_critical() {
     survives(&["unknown-frame=4"]);
     fails(&["unknown-command=4"], "frames of type 0x8777, unknown to version 1.0");
 }
 
 #[test]
-fn version_mismatch() {
+fn another_protocol_version_is_refused() {
     fails(&["version-mismatch"], "the bridge uses version 2.0 of the protocol, this driver 1.0");
 }
 
 #[test]
-fn event_lost() {
+fn a_missing_scan_end_fails_at_the_deadline() {
     fails_within(Duration::from_secs(3), &["event-lost"], "no scan in time: the scan was still running");
 }
 
 #[test]
-fn lease_stuck() {
+fn a_lease_held_by_another_client_is_waited_for() {
     survives(&["lease-stuck=1500"]);
     fails_within(Duration::from_secs(2), &["lease-stuck=100000"], "the bridge is busy: held by press-4");
 }
 
 #[test]
-fn asleep() {
+fn a_scanner_that_starts_up_is_waited_for() {
     survives(&["asleep=1200"]);
     fails_within(Duration::from_secs(2), &["asleep=100000"], "the scanner is starting up");
 }
 
 #[test]
-fn connect_late() {
+fn a_late_answer_to_the_connection_is_waited_for() {
     survives(&["connect-late=1500"]);
 }
 
 #[test]
-fn connect_later_than_the_driver_waits() {
+fn an_answer_to_the_connection_beyond_the_time_limit_reconnects() {
     assert_eq!(survives(&["connect-late=6000"]).connections, 2);
 }
 
-/// A hundredth of a real scanner's time.
+/// Starts a bridge that scans in a hundredth of a real scanner's time.
 fn scaled(faults: &[&str]) -> Bridge {
     start(faults, BridgeConfig { time_scale: 0.01, ..BridgeConfig::default() }, head())
 }
 
 #[test]
-fn start_stall() {
+fn a_mirror_below_its_speed_is_waited_for() {
     survives_on(&scaled(&["start-stall=2"]));
     let bridge = scaled(&["start-stall=6"]);
     let error = scan(&driver(bridge.address(), COARSE), Some(&WINDOW), LIMIT).unwrap_err().to_string();
@@ -260,13 +260,13 @@ fn start_stall() {
 }
 
 #[test]
-fn stale_status_and_progress_jump() {
+fn a_stale_status_and_progress_change_nothing() {
     survives_on(&scaled(&["stale-status"]));
     survives_on(&scaled(&["progress-jump"]));
 }
 
 #[test]
-fn params_altered() {
+fn a_rate_altered_by_the_scanner_is_noted() {
     let bridge = bridge(&["params-altered"]);
     let (lattice, _) =
         scan(&driver(bridge.address(), "divisor = 16\nrate_kpts = 244"), Some(&WINDOW), LIMIT).unwrap();
@@ -275,7 +275,7 @@ fn params_altered() {
 }
 
 #[test]
-fn impossible_settings_are_refused_with_what_is_possible() {
+fn impossible_settings_are_refused_with_the_reason() {
     let bridge = bridge(&[]);
     let error = scan(&driver(bridge.address(), "divisor = 32\nrate_kpts = 976"), Some(&WINDOW), LIMIT);
     let error = error.unwrap_err().to_string();
@@ -283,44 +283,44 @@ fn impossible_settings_are_refused_with_what_is_possible() {
 }
 
 #[test]
-fn slow_consumer_spool_overflow() {
+fn a_full_disk_of_the_bridge_is_reported() {
     fails(&["overflow=3"], "the bridge refuses (overflow): the bridge's disk is full");
 }
 
 #[test]
-fn sdk_missing() {
+fn a_missing_vendor_library_is_reported() {
     fails(&["sdk-missing"], "the scanner's library is not registered on this computer");
 }
 
 #[test]
-fn card_missing() {
+fn a_missing_memory_card_is_reported() {
     fails(&["card-missing"], "there is no card in the scanner");
 }
 
 #[test]
-fn storage_full() {
+fn a_full_memory_card_is_reported() {
     fails(&["storage-full=8"], "the scan ended as failed: the memory card is full");
 }
 
 #[test]
-fn tilted_while_scanning() {
+fn a_scanner_moved_during_the_scan_is_reported() {
     fails(&["tilted=8"], "the scan ended as failed: the scanner was moved: its inclination changed");
 }
 
 #[test]
-fn battery_low_temperature_contamination_are_warnings() {
+fn battery_temperature_and_contamination_are_warnings() {
     for fault in ["battery-low", "temperature", "contamination"] {
         survives(&[fault]);
     }
 }
 
 #[test]
-fn clock_jump() {
+fn a_wrong_clock_changes_nothing() {
     survives(&["clock-jump"]);
 }
 
 #[test]
-fn wrong_scanner() {
+fn another_scanner_is_refused() {
     let bridge = bridge(&["wrong-scanner"]);
     let scanner = driver(bridge.address(), &format!("{COARSE}\nserial = \"SIM0001\""));
     let error = scan(&scanner, Some(&WINDOW), LIMIT).unwrap_err().to_string();
@@ -329,14 +329,14 @@ fn wrong_scanner() {
 }
 
 #[test]
-fn a_bridge_that_sends_after_the_fact_gives_the_same_scan() {
+fn columns_sent_after_the_scan_give_the_same_lattice() {
     survives_on(&start(&[], BridgeConfig { live: false, ..BridgeConfig::default() }, head()));
     let cut = BridgeConfig { live: false, time_scale: 0.01, ..BridgeConfig::default() };
     survives_on(&start(&["drop-mid-scan=13"], cut, head()));
 }
 
 #[test]
-fn nobody_there() {
+fn a_missing_bridge_fails_at_the_deadline() {
     let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let limit = Duration::from_secs(1);
     let error = scan(&driver(nobody, COARSE), Some(&WINDOW), limit).unwrap_err().to_string();

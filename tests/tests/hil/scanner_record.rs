@@ -1,5 +1,5 @@
-//! Frames recorded and replayed, scanners that count the other way, two faces, and a whole dome in little memory: the
-//! driver library as the host loads it against the simulator's bridge.
+//! Recording and replay of frames, direction of rotation, two faces, memory during the scan of a whole dome, scan window: the driver library
+//! `faro-stream`, loaded as by the host, against the simulator's bridge.
 
 use std::f64::consts::PI;
 use std::io::{BufRead as _, BufReader};
@@ -20,7 +20,7 @@ fn lattice_of(bridge: &Bridge, options: &str, window: &Window) -> Lattice {
 }
 
 #[test]
-fn a_recording_replays_to_the_last_bit() {
+fn a_replayed_recording_gives_the_same_lattice() {
     let folder = tempfile::tempdir().unwrap();
     let config = BridgeConfig { record: Some(folder.path().into()), ..BridgeConfig::default() };
     let recording = start(&[], config, head());
@@ -28,7 +28,7 @@ fn a_recording_replays_to_the_last_bit() {
     let file = folder.path().join("scan-00001.psb");
     assert!(file.metadata().unwrap().len() > 1000);
 
-    // Replayed by the program, over a link that breaks and shuffles.
+    // Replayed by `platen-sim`, over a link that is cut and shuffles columns.
     let mut child = platen_tests::program("platen-sim")
         .args(["scanner", "--serve", "127.0.0.1:0", "--with-parent", "--fault", "drop-often=9", "--fault"])
         .args(["shuffled=5", "--replay"])
@@ -49,7 +49,7 @@ fn a_recording_replays_to_the_last_bit() {
     drop(child.stdin.take());
     assert!(child.wait().unwrap().success());
 
-    // A recording that was cut off is refused.
+    // A truncated recording is refused.
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(&file, &whole[..whole.len() - 3]).unwrap();
     let refused = platen_tests::program("platen-sim")
@@ -65,7 +65,7 @@ fn a_recording_replays_to_the_last_bit() {
 }
 
 #[test]
-fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
+fn a_clockwise_scanner_gives_the_same_lattice() {
     let warm = || Instrument { warm_up_columns: 0, ..head().instrument };
     for values in [Values::Range, Values::Polar] {
         let [plain, mirrored] = [false, true].map(|mirrored| {
@@ -84,7 +84,7 @@ fn a_scanner_that_counts_the_other_way_gives_the_same_lattice() {
 }
 
 #[test]
-fn a_window_of_more_than_half_a_turn_is_scanned_with_both_faces() {
+fn a_window_wider_than_half_a_turn_uses_both_faces() {
     let faces = Faces { seam_column: 0, collimation: 0.0, trunnion: 0.0, moved: [0.0; 3] };
     let head = RayCastHead { faces: Some(faces), ..head() };
     let bridge = start(&["shuffled=12"], BridgeConfig::default(), head);
@@ -99,7 +99,7 @@ fn a_window_of_more_than_half_a_turn_is_scanned_with_both_faces() {
     assert_eq!(narrow.header().seam_column, None);
 }
 
-/// A dome of spherical cap, without casting a ray.
+/// Head that scans a whole dome of constant range, without ray casting.
 struct Dome {
     rows: u32,
     columns: u32,
@@ -151,7 +151,7 @@ impl Head for Dome {
     }
 }
 
-/// Most memory that this process ever held, kilobytes.
+/// Returns the peak resident memory of this process in kilobytes.
 fn most_memory_kb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmHWM:")).unwrap();
@@ -160,7 +160,7 @@ fn most_memory_kb() -> u64 {
 
 const DOME_BRIDGE: &str = "PLATEN_TEST_DOME_BRIDGE";
 
-/// 7 million cells; with `PLATEN_DOME=full` 44 million, a whole scan at 1/4.
+/// 7 million cells; with `PLATEN_DOME=full` 44 million, a full scan at 1/4 resolution.
 #[test]
 fn a_dome_is_streamed_in_bounded_memory() {
     if let Some(address) = std::env::var_os(DOME_BRIDGE) {
@@ -169,7 +169,7 @@ fn a_dome_is_streamed_in_bounded_memory() {
     let full = std::env::var_os("PLATEN_DOME").is_some_and(|size| size == "full");
     let (rows, columns) = if full { (4338, 10240) } else { (1735, 4096) };
     let bridge = Bridge::start(BridgeConfig::default(), Box::new(Dome { rows, columns })).unwrap();
-    // A process of its own, so that the driver's and the host's memory are counted and the bridge's is not.
+    // In a process of its own, whose memory is that of driver and host without the bridge.
     let output = Command::new(std::env::current_exe().unwrap())
         .args(["scanner_record::a_dome_is_streamed_in_bounded_memory", "--exact", "--nocapture"])
         .env(DOME_BRIDGE, bridge.address().to_string())
@@ -181,7 +181,7 @@ fn a_dome_is_streamed_in_bounded_memory() {
     println!("{line}");
     let figures: Vec<u64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     assert_eq!(figures[0], u64::from(rows) * u64::from(columns));
-    // All cells in the form of the boundary would be 31 bytes each: 220 MB, and 1.4 GB of the full dome.
+    // All cells at once would need 31 bytes each at the plugin boundary: 220 MB, for the full dome 1.4 GB.
     assert!(figures[1] < 40_000, "the scan took {} kB of memory", figures[1]);
 }
 
@@ -199,7 +199,7 @@ fn take_dome(address: &str) {
 }
 
 #[test]
-fn the_window_that_is_asked_for_is_what_is_scanned() {
+fn the_scan_covers_the_requested_window_only() {
     let bridge = bridge(&[]);
     let whole = scan(&driver(bridge.address(), COARSE), None, LIMIT).unwrap().0;
     let window = lattice_of(&bridge, COARSE, &WINDOW);
