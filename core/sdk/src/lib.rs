@@ -49,7 +49,7 @@
 //!
 //! # Options
 //!
-//! [`options!`] declares each option once; validation, `platen plugins describe`, the JSON Schema and the typed value follow
+//! [`options!`] declares each option once; validation, `platen plugins describe` and the typed value follow
 //! from the declaration. A field of type `Option<T>` is optional; any other field without a default is required. The host
 //! checks the plant file before the plugin is created.
 //!
