@@ -148,8 +148,8 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
 
 /// Executes one command.
 pub(crate) fn execute(command: Command, shared: &Shared) -> Result<()> {
-    let now = shared.now();
     let mut machine = shared.machine();
+    let now = shared.now();
     let Machine { press, table } = &mut *machine;
     match command {
         Command::Stroke => press.stroke(now)?,

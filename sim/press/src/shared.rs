@@ -77,8 +77,9 @@ impl Shared {
 
     /// Executes one cycle of the controller.
     pub(crate) fn cycle(&self) -> Result<()> {
-        let now = self.now();
         let mut machine = self.machine();
+        // Under the lock: the press never sees a time before that of an earlier command.
+        let now = self.now();
         let Machine { press, table } = &mut *machine;
         let restarts = press.counters.restarts;
         press.step(table, now)?;
