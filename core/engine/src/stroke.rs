@@ -49,7 +49,7 @@ pub enum NotMeasured {
     },
     /// The corner assignment is ambiguous: the plate fits the previous scan only after a quarter or half turn.
     #[error(
-        "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot"
+        "plate: it fits the scan before only when taken as turned {0}; turn it back, or let the press send plate_rot (`measure --turned`)"
     )]
     Turned(Reorientation),
     /// The scan of the blank is that of another plate.

@@ -219,14 +219,15 @@ fn start_log() {
     use tracing_subscriber::filter::{LevelFilter, Targets};
     use tracing_subscriber::prelude::*;
 
-    let filter = match std::env::var("PLATEN_LOG").unwrap_or_default().parse::<Targets>() {
-        Ok(filter) if filter.default_level().is_none() => filter.with_default(LevelFilter::WARN),
-        Ok(filter) => filter,
-        Err(error) => {
-            output::error(&format!("PLATEN_LOG: {error}; write for example debug or platen_press=trace"));
-            Targets::new().with_default(LevelFilter::WARN)
-        }
-    };
+    let given = std::env::var("PLATEN_LOG").ok().filter(|given| !given.trim().is_empty());
+    let filter = given.map_or(Ok(Targets::new()), |given| given.parse::<Targets>());
+    let mut filter = filter.unwrap_or_else(|error| {
+        output::error(&format!("PLATEN_LOG: {error}; write for example debug or platen_press=trace"));
+        Targets::new()
+    });
+    if filter.default_level().is_none() {
+        filter = filter.with_default(LevelFilter::WARN);
+    }
     let colours = std::io::IsTerminal::is_terminal(&std::io::stderr());
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(colours);
     tracing_subscriber::registry().with(lines.with_filter(filter)).init();

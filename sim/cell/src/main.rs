@@ -54,7 +54,10 @@ enum Verb {
 
 #[tokio::main]
 async fn main() -> ExitCode {
-    let filter = std::env::var("PLATEN_LOG").ok().and_then(|filter| filter.parse::<Targets>().ok());
+    let filter = std::env::var("PLATEN_LOG")
+        .ok()
+        .filter(|filter| !filter.is_empty())
+        .and_then(|filter| filter.parse::<Targets>().ok());
     let filter = filter.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
     tracing_subscriber::registry().with(lines.with_filter(filter)).init();

@@ -89,7 +89,14 @@ fn a_plate_that_came_back_turned_is_refused() {
     for (yaw_deg, turn) in [(180.0, "by half a turn"), (90.0, "by a quarter turn")] {
         let turned = bench.scan("turned.e57", CONE, SQUARE, yaw_deg, &[]);
         let output = measure(&turned, &["--before", text(&before)]);
-        refused(&output, 1, &["turned.e57", turn, "plate_rot"]);
+        refused(&output, 1, &["turned.e57", turn, "plate_rot", "--turned"]);
+        // The plate turned counter-clockwise, seen from above: its corner (0, 0) is found again.
+        let told = measure(&turned, &["--before", text(&before), "--turned", &yaw_deg.to_string()]);
+        assert!(json(&told)["says"].to_string().contains("nothing changed above"), "{}", json(&told)["says"]);
+        let wrong =
+            measure(&turned, &["--before", text(&before), "--turned", &(yaw_deg - 180.0).to_string()]);
+        refused(&wrong, 1, &["turned.e57", "by half a turn"]);
+        refused(&measure(&turned, &["--turned", "90"]), 2, &["--before or --baseline"]);
     }
     let askew = bench.scan("askew.e57", CONE, SQUARE, 42.0, &[]);
     refused(&measure(&askew, &["--before", text(&before)]), 1, &["askew.e57", "degrees from where u ran"]);

@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use platen_engine::calibration::Calibration;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{PluginError, Surfaces};
-use platen_engine::stroke::Baseline;
+use platen_engine::stroke::{Baseline, PreviousPose};
 use platen_model::units::mm;
 use platen_plant::{PlantFile, PlateFile, PluginUse};
 use platen_report::output_folder;
@@ -111,7 +111,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let mut surfaces: Vec<Surface> = Vec::new();
     let mut instrument = String::new();
     for scan in &command.scans {
-        let last = surfaces.last();
+        let last = surfaces.last().map(|surface| PreviousPose { surface, fed_by: None });
         let (scanned, measured) =
             measure::measure_file(&catalogue, &mut rig, scan, &plate, last, Baseline::None)?;
         instrument = scanned.header.instrument;

@@ -25,6 +25,7 @@ use crate::progress;
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
                         platen measure after.e57 --before before.e57 --plate plate.toml --plant plant.toml --out results/a17\n  \
                         platen measure bent.e57 --baseline flat.e57 --plate plate.toml\n  \
+                        platen measure after.e57 --before before.e57 --turned 180 --plate plate.toml\n  \
                         platen measure scan.ptx --plate plate.toml --json | jq .markers\n\n\
                         The exit code is 0 when the plate was measured, whatever the verdict.")]
 pub(super) struct Command {
@@ -38,6 +39,10 @@ pub(super) struct Command {
     /// Scan of the same plate before the first stroke; (u, v) of all scans then refer to its outline
     #[arg(long, value_name = "SCAN")]
     baseline: Option<PathBuf>,
+    /// Turn of the plate since the scan before it, degrees, counter-clockwise seen from above the press; as the press's
+    /// register `plate_rot` tells it during `platen run`
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    turned: Option<f64>,
     /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -46,6 +51,11 @@ pub(super) struct Command {
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     if let Some(out) = command.out.as_ref().filter(|out| out.exists()) {
         return Err(CliError::Usage(output_folder::FilesError::Exists(out.clone()).to_string()));
+    }
+    if command.turned.is_some() && command.before.is_none() && command.baseline.is_none() {
+        return Err(CliError::Usage(
+            "--turned needs the scan before the turn: --before or --baseline".into(),
+        ));
     }
     let catalogue = common.catalogue();
     let (plant, plate) = command.setup.load()?;
@@ -56,10 +66,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     });
     let mut rig = Pipeline::of(&plant, &catalogue)?;
     // In the order in which they were taken: the corner (0, 0) is carried from one to the next.
-    let mut measure = |scan: &Path, last: Option<&Surface>, baseline: Baseline<'_>| {
+    let mut measure = |scan: &Path, last: Option<PreviousPose<'_>>, baseline: Baseline<'_>| {
         measure_file(&catalogue, &mut rig, scan, &plate, last, baseline)
     };
     let mut earlier = |scan: &Option<PathBuf>, last: Option<&Surface>, baseline: Baseline<'_>| {
+        let last = last.map(|surface| PreviousPose { surface, fed_by: None });
         let measured = scan.as_deref().map(|scan| measure(scan, last, baseline)).transpose()?;
         Ok::<_, CliError>(measured.map(|(_, measured)| (measured.measurement.surface, measured.blank)))
     };
@@ -67,7 +78,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let blank = blank.flatten();
     let cut = blank.as_ref().map_or(Baseline::None, Baseline::Earlier);
     let before = earlier(&command.before, baseline.as_ref(), cut)?.map(|(surface, _)| surface);
-    let (scanned, now) = measure(&command.scan, before.as_ref().or(baseline.as_ref()), cut)?;
+    let fed_by = command.turned.map(f64::to_radians);
+    let last = before.as_ref().or(baseline.as_ref()).map(|surface| PreviousPose { surface, fed_by });
+    let (scanned, now) = measure(&command.scan, last, cut)?;
 
     progress::phase("comparing");
     let surfaces =
@@ -107,13 +120,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Measures one scan file through the driver `faro-file`; `last` is the plate's surface in the previous scan.
+/// Measures one scan file through the driver `faro-file`; `last` is the plate's pose in the previous scan.
 pub(super) fn measure_file(
     catalogue: &Catalogue,
     rig: &mut Pipeline,
     scan: &Path,
     plate: &PlateFile,
-    last: Option<&Surface>,
+    last: Option<PreviousPose<'_>>,
     baseline: Baseline<'_>,
 ) -> Result<(Scanned, Measured), CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
@@ -122,7 +135,6 @@ pub(super) fn measure_file(
     let spec = rig.spec(plate);
     let job = JobSpec::untriggered(READ_LIMIT);
     let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
-    let last = last.map(|surface| PreviousPose { surface, fed_by: None });
     let measured = stroke::measure_scanned(rig, &scanned, &spec, last, baseline).map_err(|e| failed(&e))?;
     Ok((scanned, measured))
 }
