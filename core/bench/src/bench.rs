@@ -6,7 +6,7 @@ use platen_host::cli::bench::{BenchArguments, Part};
 use platen_host::cli::{CliError, Common, output};
 
 use crate::machine::Machine;
-use crate::{scale, seeds, tables};
+use crate::{random, scale, seeds, tables};
 
 use serde_json::json;
 
@@ -23,7 +23,10 @@ pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCod
         document["tables"] = tables::tables(&catalogue, &arguments.out, arguments, common.json)?;
     }
     if wanted(Part::Accuracy) {
-        document["accuracy"] = seeds::accuracy(&catalogue, &arguments.out, arguments, common.json)?;
+        document["accuracy"] = match arguments.random {
+            Some(n) => random::random(&catalogue, &arguments.out, arguments, n, common.json)?,
+            None => seeds::accuracy(&catalogue, &arguments.out, arguments, common.json)?,
+        };
     }
     if wanted(Part::Scale) {
         document["scale"] = scale::scale(common, arguments)?;

@@ -5,6 +5,7 @@
 //! | `bench` | command line of `platen bench` |
 //! | `tables` | tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", beside this machine's figures |
 //! | `seeds`, `strokes` | accuracy over many seeds: plates of every shape, strokes, templates |
+//! | `random` | accuracy over random scenes, coverage of the stated intervals |
 //! | `scale` | time and memory from 1.6 to 44 million cells |
 //! | `soak` | strokes against a simulated press on a faulty line |
 //! | `accuracy` | the difference of a measurement from the known truth |
@@ -14,6 +15,7 @@ pub mod accuracy;
 mod bench;
 mod figures;
 mod machine;
+mod random;
 mod scale;
 mod scene;
 mod seeds;

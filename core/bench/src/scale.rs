@@ -122,7 +122,7 @@ fn here(
         return Err(CliError::Usage("give at least one --flattening".into()));
     };
     let window = window(cells);
-    let (spec, (scanner, _)) = (scene.spec(), scene.scanner(catalogue, folder, setting)?);
+    let (spec, (scanner, _)) = (scene.spec(), scene.scanner(catalogue, folder, setting, &[])?);
     let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), window.as_ref())?;
     let header = scan.header().clone();
     let mut extractor = Extractor::new(&header, &spec);

@@ -116,14 +116,15 @@ impl Scene {
         )
     }
 
-    /// Scans into memory; description and truth stay in `folder`.
+    /// Scans into memory, with `more` options of the driver; description and truth stay in `folder`.
     pub(super) fn scan(
         &self,
         catalogue: &Catalogue,
         folder: &Path,
         setting: Setting,
+        more: &[(&'static str, Value)],
     ) -> Result<Shot, CliError> {
-        let (scanner, truth) = self.scanner(catalogue, folder, setting)?;
+        let (scanner, truth) = self.scanner(catalogue, folder, setting, more)?;
         let mut scan = scanner.start(JobSpec::untriggered(SCAN_LIMIT), None)?;
         let header = scan.header().clone();
         let columns = scan.by_ref().collect::<Result<_, _>>()?;
@@ -138,6 +139,7 @@ impl Scene {
         catalogue: &Catalogue,
         folder: &Path,
         setting: Setting,
+        more: &[(&'static str, Value)],
     ) -> Result<(Scanner, PathBuf), CliError> {
         let file = |ending: &str| -> Result<PathBuf, CliError> {
             let name =
@@ -157,6 +159,7 @@ impl Scene {
             ("threads", whole(setting.threads as u64)),
             ("warm_up_columns", whole(0)),
         ];
+        let options = options.into_iter().chain(more.iter().cloned());
         let (library, values) = pipeline::load_with(catalogue, "simulated", options)?;
         let scanner = Scanner::create(&library, &values)?;
         scanner.instance().open(SCAN_LIMIT)?;

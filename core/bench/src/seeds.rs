@@ -85,7 +85,7 @@ pub(super) fn accuracy(
     let load = || stages::flattenings(catalogue, &arguments.flattening);
     let errors = shared(&cases, arguments.threads, load, |flattenings, (scene, noise_mm, seed)| {
         progress::phase(&format!("{} at {noise_mm} mm, seed {seed}", scene.name));
-        let shot = scene.scan(catalogue, folder, Setting::of_accuracy(*noise_mm, *seed))?;
+        let shot = scene.scan(catalogue, folder, Setting::of_accuracy(*noise_mm, *seed), &[])?;
         let failed =
             |e: NotMeasured| CliError::Failed(format!("{} at {noise_mm} mm, seed {seed}: {e}", scene.name));
         let seen = stages::see(&shot).map_err(failed)?;
@@ -136,7 +136,7 @@ fn pairs(
 }
 
 /// Runs `work` for every case on several threads, each with tools of its own; returns the results in the order of the cases.
-fn shared<C: Sync, T, R: Send>(
+pub(super) fn shared<C: Sync, T, R: Send>(
     cases: &[C],
     threads: usize,
     load: impl Fn() -> Result<T, CliError> + Sync,

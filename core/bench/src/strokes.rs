@@ -113,7 +113,7 @@ pub(super) fn errors(
         };
         // Four scans a seed, none with the errors of another.
         let setting = Setting::of_accuracy(noise_mm, seed.wrapping_mul(4).wrapping_add(number));
-        let shot = scene.scan(catalogue, folder, setting)?;
+        let shot = scene.scan(catalogue, folder, setting, &[])?;
         let run = stages::run(&shot, &mut tools.flattening).map_err(|e| failed(&e))?;
         Ok((shot, run.measurement.surface))
     };

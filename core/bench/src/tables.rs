@@ -77,7 +77,7 @@ pub(super) fn tables(
     let noise_mm = arguments.noise_mm.first().copied().unwrap_or(0.5);
     let (step_deg, threads) = (arguments.step_deg, arguments.threads);
     let setting = Setting { step_deg, margin_deg: MARGIN_DEG, noise_mm, seed: arguments.seed, threads };
-    let shot = scene.scan(catalogue, folder, setting)?;
+    let shot = scene.scan(catalogue, folder, setting, &[])?;
     let mut flattenings = stages::flattenings(catalogue, &arguments.flattening)?;
     let mut outcomes = Vec::new();
     let mut last = None;

@@ -59,6 +59,9 @@ pub struct ResultRecord {
     pub scan: ScanRecord,
     /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
     pub corners_m: [[f64; 3]; 4],
+    /// Expanded uncertainty (95 %) of each corner, all directions together; null in documents older than it.
+    #[serde(default)]
+    pub corners_uncertainty_mm: Option<[f64; 4]>,
     /// Whether each corner was seen or extrapolated.
     pub corners_seen: [bool; 4],
     /// Markers.
@@ -222,6 +225,7 @@ impl ResultRecord {
                 notes: scanned.header.notes.clone(),
             },
             corners_m: measurement.corners.map(Into::into),
+            corners_uncertainty_mm: Some(corner_uncertainties(measured)),
             corners_seen: outline.corners.each_ref().map(|corner| corner.seen),
             shape_checks: ShapeChecksRecord::new(&ShapeChecks::new(outline, &measurement.surface)),
             markers: markers(measured, context.plate),
@@ -259,6 +263,18 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
         says.push("nothing judged this plate: give it a [target] and a [[template]], or add a comparison that judges".into());
     }
     says
+}
+
+/// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the surface.
+fn corner_uncertainties(measured: &Measured) -> [f64; 4] {
+    let surface = &measured.measurement.surface;
+    let (w, h) = (surface.width(), surface.height());
+    let places = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
+    std::array::from_fn(|k| {
+        let [u, v] = places[k];
+        let [leaving, arriving] = measured.outline.corners[k].sigma;
+        mm(EXPANDED * leaving.hypot(arriving).hypot(surface.sigma_point(u, v)))
+    })
 }
 
 fn markers(measured: &Measured, plate: &PlateFile) -> Vec<MarkerRecord> {

@@ -57,8 +57,9 @@ impl PreparedScan {
         };
         let plate = state.as_ref().map(Plate::new).transpose()?;
         let lattice = lattice(options, plate.as_ref(), window)?;
+        let surroundings = surroundings(options, plate.as_ref());
         Ok(Self {
-            scene: Scene::new(plate, &surroundings(options)),
+            scene: Scene::new(plate, &surroundings),
             lattice,
             pace: Pace::new(options, width(&lattice))?,
             instrument: instrument(options, &lattice, number),
@@ -175,11 +176,21 @@ fn lattice(
     Ok(SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step).on_encoder())
 }
 
-fn surroundings(options: &Options) -> Surroundings {
+/// Gap between the plate and the wall behind the press at least, metres.
+const BEHIND_PLATE: f64 = 2.0;
+
+fn surroundings(options: &Options, plate: Option<&Plate>) -> Surroundings {
     let height = options.scanner_m.as_ref().and_then(|position| position.get(2)).unwrap_or(&0.0);
     let all = Surroundings::default();
     let hides = |what: &str| options.hidden_by == what || options.hidden_by == "both";
-    Surroundings { floor: all.floor - height, person_in_front: hides("person"), chain: hides("chain"), ..all }
+    let corners = plate.map(|plate| plate.corners().map(|corner| corner.x)).into_iter().flatten();
+    Surroundings {
+        floor: all.floor - height,
+        wall: corners.map(|x| x + BEHIND_PLATE).fold(all.wall, f64::max),
+        person_in_front: hides("person"),
+        chain: hides("chain"),
+        ..all
+    }
 }
 
 fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrument {

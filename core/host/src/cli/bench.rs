@@ -42,7 +42,7 @@ pub enum Cells {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen bench\n  platen bench --flattening harmonic --repeat 11\n  \
                         platen bench --json | jq .tables.table_2\n  platen bench accuracy --seeds 50 --noise-mm 0.5,2 --threads 2\n  \
-                        platen bench scale --cells dome\n\n\
+                        platen bench accuracy --random 40 --flattening harmonic --threads 2\n  platen bench scale --cells dome\n\n\
                         Scans come from the `simulated` driver library; the true shape is written beside them into --out. \
                         A measurement runs on one thread by design: times are processor time of one measurement, whatever --threads is.")]
 pub struct BenchArguments {
@@ -61,6 +61,9 @@ pub struct BenchArguments {
     /// Seeds of `accuracy`, counted up from --seed
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
     pub seeds: usize,
+    /// Random scenes of `accuracy` instead of the plates of a shop; seeds count up from --seed
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub random: Option<usize>,
     /// Threads that cast rays; those of `accuracy` also measure plates side by side
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     pub threads: usize,

@@ -164,8 +164,9 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     let (w, h) = record.extent_mm();
     let ordered = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
     let corners_mm = record.outline.as_ref().map_or(ordered, |outline| outline.corners_mm);
-    let corners = record.corners_m.iter().zip(corners_mm);
-    let corners = corners.map(|(corner, [u, v])| row("corner", u, v, corner, None));
+    let corners = record.corners_m.iter().zip(corners_mm).enumerate().map(|(k, (corner, [u, v]))| {
+        row("corner", u, v, corner, record.corners_uncertainty_mm.map(|uncertainties| uncertainties[k]))
+    });
     let markers =
         record.markers.iter().map(|m| row(&m.name, m.u_mm, m.v_mm, &m.position_m, Some(m.uncertainty_mm)));
     output::titled("place | u mm | v mm | x m | y m | z m | +- mm", corners.chain(markers))?;

@@ -19,6 +19,7 @@ use platen_numerics::normal_distribution::{CERTAIN, cdf, log_cdf};
 
 use super::developed_strip::DevelopedStrip;
 use super::projected_crossing::ProjectedCrossing;
+use crate::Vec3;
 use crate::extract::Beyond;
 
 /// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
@@ -107,11 +108,7 @@ impl LatticeLine {
         let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
         let along = 0.5 * (inside.x + outside.x);
         let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
-        // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
-        // inward part of that, over all e across the beam, is the length of this vector.
-        let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
-        let across = lever - beam * lever.dot(&beam);
-        let per_radian = crossing.inside.norm() * across.norm();
+        let per_radian = inwards_per_radian(crossing.inside, normal, inward);
         // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
         // height / (height + thickness) of its way.
         let height = -normal.dot(&crossing.inside);
@@ -192,6 +189,21 @@ impl LatticeLine {
         of([EdgeObservation::Above(above), EdgeObservation::Below(below)]
             .map(|observation| observation.within(soft)))
     }
+}
+
+/// Returns the distance inwards on the face by which a beam to `point` moves when it turns, per radian; `normal` and `inward` are
+/// unit vectors there.
+pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64 {
+    let beam = point.normalize();
+    // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
+    // inward part of that, over all e across the beam, is the length of this vector.
+    let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
+    point.norm() * (lever - beam * lever.dot(&beam)).norm()
+}
+
+/// Returns true when the side face below the edge at `point` is seen: there the edge is located by the ranges on it.
+pub(super) fn shows_side_face(point: Vec3, normal: Vec3, inward: Vec3) -> bool {
+    inward.dot(&point) > -normal.dot(&point) * DIRECTION
 }
 
 /// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels on all edges; 0 where
