@@ -107,15 +107,15 @@ async fn serve_client(client: TcpStream, shared: &Shared) -> io::Result<()> {
     let (reader, mut writer) = client.into_split();
     let mut lines = BufReader::new(reader).lines();
     while let Some(line) = lines.next_line().await? {
-        let mut reply = answer(&line, shared).to_string();
+        let mut reply = answer(&line, shared).await.to_string();
         reply.push('\n');
         writer.write_all(reply.as_bytes()).await?;
     }
     Ok(())
 }
 
-/// Returns the answer to one line.
-fn answer(line: &str, shared: &Shared) -> serde_json::Value {
+/// Returns the answer to one line; to a command when the registers show it.
+async fn answer(line: &str, shared: &Shared) -> serde_json::Value {
     let error = |text: String| serde_json::json!({ "error": text });
     let answered = match serde_json::from_str(line) {
         Ok(Line::Get(Get::Plate)) => {
@@ -137,10 +137,12 @@ fn answer(line: &str, shared: &Shared) -> serde_json::Value {
             let (p, h) = (machine.table.p_block(), machine.table.h_block().0.to_vec());
             Ok(serde_json::json!({ "registers": { "p": p, "h": h } }))
         }
-        Ok(Line::Do(command)) => match execute(command, shared) {
-            Ok(()) => Ok(serde_json::json!({ "ok": true })),
-            Err(refused) => Ok(error(refused.to_string())),
-        },
+        Ok(Line::Do(command)) => {
+            let executed = execute(command, shared);
+            shared.next_cycle().await;
+            Ok(executed
+                .map_or_else(|refused| error(refused.to_string()), |()| serde_json::json!({ "ok": true })))
+        }
         Err(invalid) => Ok(error(format!("{invalid}; write for example {{\"get\":\"plate\"}}"))),
     };
     answered.unwrap_or_else(|unwritable| error(unwritable.to_string()))

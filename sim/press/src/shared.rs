@@ -83,13 +83,21 @@ impl Shared {
         let Machine { press, table } = &mut *machine;
         let restarts = press.counters.restarts;
         press.step(table, now)?;
-        let restarted = press.counters.restarts != restarts;
-        drop(machine);
-        if restarted {
+        if press.counters.restarts != restarts {
             self.cut();
         }
+        // Under the lock as well: the cycle counted next contains every command executed before.
         self.cycles.send_modify(|cycle| *cycle += 1);
         Ok(())
+    }
+
+    /// Waits until the registers show the commands executed so far, or the press stops.
+    pub(crate) async fn next_cycle(&self) {
+        let mut cycles = self.cycles.subscribe();
+        tokio::select! {
+            _ = cycles.changed() => {}
+            () = self.stopped() => {}
+        }
     }
 
     /// Cuts all connections.
