@@ -6,8 +6,9 @@ use platen_scan::{Column, ScanHeader, State, wrap_azimuth};
 
 use super::connected_components::{Components, Run};
 
-/// Cells kept around those of a component: its surroundings.
-pub(super) const MARGIN: u32 = 4;
+/// Cells kept around those of a component: a mixed pixel beside the face, and behind it a cell with its neighbours, so that the cell is
+/// told from a mixed one (two on either side); the face may reach one cell beyond its component.
+pub(super) const MARGIN: u32 = 6;
 
 /// One cell as kept: 16 bytes.
 #[derive(Debug, Clone, Copy, Default)]
