@@ -10,7 +10,9 @@
 //! | `height_field` | the face as one smoothed height over its mean `plane` | own |
 //! | `projected_crossing` | crossings moved along their beams onto that height field | own |
 //! | `developed_strip` | each edge's surroundings developed into the plane | own |
+//! | `lattice_line` | one lattice line across an edge as an observation: interval, mixed pixels, side face | own |
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
+//! | `footprint` | angle that a beam sees, from the mixed pixels | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
 //! | `coverage` | where along an edge it was seen | own |
@@ -27,7 +29,9 @@ mod edge;
 mod edge_likelihood;
 mod edge_posterior;
 mod error;
+mod footprint;
 mod height_field;
+mod lattice_line;
 mod plane;
 mod projected_crossing;
 mod visible_boundary;
@@ -136,9 +140,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         EdgeData::new(&crossings, [from, to], spec.thickness, sampling)
     };
     let data = [side(0)?, side(1)?, side(2)?, side(3)?];
-    let footprint = edge::footprint(&data, sampling);
-    let [a, b, c, d] = data.map(|data| Edge::fit(data, footprint, sampling));
-    let mut edges = [a?, b?, c?, d?];
+    let mut edges = edge::fit_all(data, sampling)?;
     let mut points = near;
     for k in 0..4 {
         let arriving = (k + 3) % 4;

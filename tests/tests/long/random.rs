@@ -2,15 +2,15 @@
 
 use serde_json::Value as Json;
 
-/// Each figure with its bounds: 95 % of the errors, the largest; about twice what is found (0.68 and 4.1, 0.39 and 3.6, 0.88 and 4.9, 1.1
-/// and 3.2 mm, 0.067 and 0.13, 0.007 and 0.013 degrees).
+/// Each figure with its bounds: 95 % of the errors, the largest; about twice what is found (0.63 and 1.7, 0.38 and 1.7, 0.82 and 2.6, 0.88
+/// and 1.7 mm, 0.065 and 0.13, 0.010 and 0.020 degrees).
 const BOUNDS: [(&str, [f64; 2]); 6] = [
-    ("corner, u or v, mm", [1.4, 8.2]),
-    ("marker, u or v, mm", [0.8, 7.2]),
-    ("edge, mm", [1.8, 9.8]),
-    ("diagonal, mm", [2.2, 6.4]),
-    ("angle, degrees", [0.14, 0.27]),
-    ("twist, degrees", [0.014, 0.026]),
+    ("corner, u or v, mm", [1.3, 3.5]),
+    ("marker, u or v, mm", [0.8, 3.4]),
+    ("edge, mm", [1.7, 5.2]),
+    ("diagonal, mm", [1.8, 3.4]),
+    ("angle, degrees", [0.13, 0.26]),
+    ("twist, degrees", [0.02, 0.04]),
 ];
 /// Least share of errors inside their 95 % interval, and largest ratio of root mean square error to standard deviation.
 const COVERAGE: f64 = 0.93;

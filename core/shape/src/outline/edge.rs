@@ -12,8 +12,10 @@ use platen_numerics::uniform_knots::UniformKnots;
 
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
-use super::edge_likelihood::{self, BeamModel, EdgeLikelihood, LatticeLine};
+use super::edge_likelihood::EdgeLikelihood;
 use super::edge_posterior::Posterior;
+use super::footprint;
+use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
@@ -29,9 +31,11 @@ const CURVATURE: (f64, f64) = (0.003, 0.3);
 /// plates of an independent simulator edges are 0.1 to 0.3 mm farther off than the scatter of their lines explains.
 const COMMON: f64 = 1e-4;
 
-/// The same where the edge is located by the pixels that see both sides of it, in parts of half the footprint on the face: its shape is
-/// not known better. On the face it grows with the incidence: 1 mm at 8 m and 45 degrees, 8 mm at 80 degrees.
-const FOOTPRINT_SHARE: f64 = 0.1;
+/// The same where the edge is located by the pixels that see both sides of it, in parts of half the footprint on the face and of the logarithm
+/// of one over the cosine of the incidence: a face is the darker the more obliquely it is seen, and what lies behind it outshines it,
+/// so that pixels are mixed farther inside of the edge than outside; of a Gaussian beam by about three times this, if both are
+/// equally bright under normal incidence.
+const CONTRAST_SHARE: f64 = 0.1;
 
 /// Newton steps with widened likelihoods, then further ones at most, and the movement that ends them, metres.
 const WIDENED_ROUNDS: i32 = 8;
@@ -66,19 +70,35 @@ impl EdgeData {
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let strip = DevelopedStrip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
-        let line = |crossing| LatticeLine::new(&strip, crossing, thickness, sampling.angle);
+        let line = |crossing| LatticeLine::new(&strip, crossing, thickness, sampling);
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
         Ok(Self { strip, lines, dithered, from, to })
     }
 }
 
-/// Estimates half the angle over which a beam sees both sides of an edge, radians, from the mixed pixels of all edges. Along an
-/// edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
-pub(super) fn footprint(edges: &[EdgeData], sampling: Sampling) -> f64 {
+/// Fits the four edges. Half the angle that a beam sees is first counted from the mixed pixels, then estimated at each edge that shows
+/// it, and their mean taken for those that do not.
+///
+/// # Errors
+/// [`OutlineError::Edge`] when too little of one is seen.
+pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
+    // Along an edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
     let any = edges.iter().any(|edge| edge.dithered);
-    let telling = edges.iter().filter(|edge| edge.dithered || !any);
-    edge_likelihood::footprint(telling.flat_map(|edge| &edge.lines), sampling.angle)
+    let lines = edges.iter().filter(|edge| edge.dithered || !any).flat_map(|edge| &edge.lines);
+    let counted = footprint::by_number(lines, sampling.angle);
+    let telling = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
+    let mut fitted = [None, None, None, None];
+    for (k, edge) in edges.iter().enumerate().filter(|(k, _)| telling[*k]) {
+        fitted[k] = Some(Edge::fit(edge.clone(), counted, sampling)?);
+    }
+    let found: Vec<f64> = fitted.iter().flatten().map(|edge: &Edge| edge.footprint).collect();
+    let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| match fitted[k].take() {
+        Some(edge) => Ok(edge),
+        None => Edge::fit(edges[k].clone(), common, sampling),
+    });
+    Ok([a?, b?, c?, d?])
 }
 
 /// Returns true when the edge, about at `base`, crosses so many columns and rows of the lattice that its place between them
@@ -116,22 +136,23 @@ impl Edge {
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
         let too_few = || strip.too_few();
-        let likelihoods =
-            |footprint: f64| lines.iter().map(move |l| l.likelihood(BeamModel::of(footprint), noise));
-        let mut used: Vec<EdgeLikelihood> = likelihoods(footprint).collect();
-        let (mut curve, mut precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
-        let mut own = footprint;
+        let fit = |beam: BeamModel| {
+            let used: Vec<EdgeLikelihood> = lines.iter().map(|l| l.likelihood(beam, noise)).collect();
+            let (curve, precision) = most_likely(&prior, &used, step)?;
+            Some((used, curve, precision))
+        };
+        let mut beam = BeamModel::of(footprint);
+        let (mut used, mut curve, mut precision) = fit(beam).ok_or_else(too_few)?;
         for _ in 0..FOOTPRINT_ROUNDS {
-            let last = own;
+            let last = beam.footprint;
             if footprint > 0.0 {
-                own = edge_likelihood::footprint_at(&lines, |along| curve.at(along), footprint);
+                beam.footprint = footprint::at_edge(&lines, |along| curve.at(along), footprint);
             }
             // The same footprint gives the same curve, and that one the same footprint.
-            if own == last {
+            if beam.footprint == last {
                 break;
             }
-            used = likelihoods(own).collect();
-            (curve, precision) = most_likely(&prior, &used, step).ok_or_else(too_few)?;
+            (used, curve, precision) = fit(beam).ok_or_else(too_few)?;
         }
         let (from, to) = (strip.flatten(from).x, strip.flatten(to).x);
         let posterior = if dithered {
@@ -141,7 +162,7 @@ impl Edge {
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        Ok(Self { strip, posterior, footprint: own, seen, from, to })
+        Ok(Self { strip, posterior, footprint: beam.footprint, seen, from, to })
     }
 
     /// Returns the point of the edge at a distance along it.
@@ -171,10 +192,11 @@ impl Edge {
 
     fn footprint_error(&self, along: f64) -> f64 {
         let (point, normal, inward) = (self.point(along), self.strip.normal(along), self.strip.inward(along));
-        if edge_likelihood::shows_side_face(point, normal, inward) {
+        if lattice_line::shows_side_face(point, normal, inward) {
             return 0.0;
         }
-        FOOTPRINT_SHARE * self.footprint * edge_likelihood::inwards_per_radian(point, normal, inward)
+        let darkness = -(-normal.dot(&point.normalize())).ln();
+        CONTRAST_SHARE * darkness * self.footprint * lattice_line::inwards_per_radian(point, normal, inward)
     }
 }
 

@@ -1,0 +1,63 @@
+//! The beam at an edge: half the angle that it sees, from the mixed pixels, by counting and by maximum likelihood. Own.
+
+use platen_numerics::normal_distribution::cdf;
+
+use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
+use super::lattice_line::{LatticeLine, SOFTNESS};
+
+/// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
+pub(super) const FOOTPRINT_SPREAD: f64 = 0.3;
+
+/// Lines that give the number to a tenth.
+const LEAST_LINES: usize = 100;
+
+/// Returns true when enough lines show the footprint to estimate it at their edge.
+pub(super) fn is_shown(lines: &[LatticeLine]) -> bool {
+    lines.iter().filter(|line| line.shows_footprint()).count() >= LEAST_LINES
+}
+
+/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels on all edges; 0 where
+/// too few lines show it. `angle` is that between beams.
+pub(super) fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f64 {
+    /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
+    const MOST_CELLS: f64 = 3.0;
+    let (mut n, mut mixed, mut expected) = (0, 0.0, 0.0);
+    for line in lines.filter(|l| l.shows_footprint() && l.per_radian * angle < MOST_CELLS * l.per_step) {
+        n += 1;
+        mixed += line.mixed.map_or(0.0, |(low, high)| (high - low) / line.per_step + 1.0);
+        expected += 2.0 * (1.0 - HIDDEN_PART) * line.per_radian / line.per_step;
+    }
+    if n >= LEAST_LINES { mixed / expected } else { 0.0 }
+}
+
+/// Estimates the footprint at an edge of known place, near that of all edges, by maximum likelihood of its mixed and its sound
+/// pixels; two nested grid searches.
+pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64) -> f64 {
+    /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
+    const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
+    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
+    const TOGETHER: usize = 16;
+    let showing: Vec<(&LatticeLine, f64)> =
+        lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
+    let likelihood = |line: &LatticeLine, edge: f64, footprint: f64| {
+        let seen = footprint * line.per_radian;
+        let is_mixed =
+            |off: f64| (1.0 - HIDDEN_PART) * cdf((seen - (off - edge).abs()) / (SOFTNESS * line.per_angle));
+        let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
+        line.mixed.map_or(sound, |(low, high)| {
+            sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART)
+        })
+    };
+    let fits = |footprint: f64| {
+        let off = (footprint / all - 1.0) / FOOTPRINT_SPREAD;
+        let together = |lines: &[(&LatticeLine, f64)]| {
+            lines.iter().map(|(l, e)| likelihood(l, *e, footprint)).product::<f64>()
+        };
+        showing.chunks(TOGETHER).map(|lines| together(lines).ln()).sum::<f64>() - 0.5 * off * off
+    };
+    SEARCH.iter().fold(all, |from, (steps, size)| {
+        let trials = (-steps..=*steps).map(|k| from + all * size * f64::from(k));
+        let trials = trials.map(|footprint| (fits(footprint), footprint));
+        trials.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, footprint)| footprint)
+    })
+}

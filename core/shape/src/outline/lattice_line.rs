@@ -1,0 +1,198 @@
+//! One lattice line (a row or a column of the lattice) where it crosses an edge, as an observation of the edge.
+//!
+//! The observation is interval-censored: the edge lies between the last sample on the face and the first beyond it. What narrows
+//! the interval:
+//!
+//! - A mixed pixel sees both sides: the edge is within a footprint of its beam. A beam that is not mixed has its centre on its
+//!   own side, and most likely a footprint away; a quarter of the mixed beams is mixed too little to be detected.
+//! - Where the plate's side face is visible, its lower edge mixes the beams; that edge's place beside the upper one follows from
+//!   the thickness. A beam on a side face of a few millimetres falls behind the face's continuation in proportion to its
+//!   distance from the edge: a direct observation.
+//! - The last cell taken for one of the face may itself lie on the side face, within the noise: both its range and that of the
+//!   first cell not taken enter, else the selection would bias the edge outwards.
+//!
+//! In: a projected crossing in its developed strip; out: its [`EdgeLikelihood`]. All distances inwards, in metres. Own; Masuda et al.
+//! take the boundary samples as the edge.
+
+use super::Sampling;
+use super::developed_strip::DevelopedStrip;
+use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation};
+use super::projected_crossing::ProjectedCrossing;
+use crate::Vec3;
+use crate::extract::Beyond;
+
+/// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
+pub(super) const SOFTNESS: f64 = 0.03;
+
+/// Noise of the smooth face near its edges in parts of that of a sample.
+const FACE_NOISE: f64 = 0.03;
+
+/// A beam less than this part of the seen side face outside of the edge is on it; tangent of the angle by which a cut
+/// may be out of square.
+const SIDE_SLACK: f64 = 1.1;
+const SIDE_SLOPE: f64 = 0.1;
+
+/// The direction of an edge is known to about this, radians: a side face visible under a smaller angle is taken as hidden.
+const DIRECTION: f64 = 0.02;
+
+/// Properties of the beams.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BeamModel {
+    /// Half the angle that a beam sees, radians.
+    pub(super) footprint: f64,
+    /// Standard deviation of an interval's ends, in parts of the angle between beams.
+    pub(super) softness: f64,
+}
+
+impl BeamModel {
+    /// Builds beams of the usual softness.
+    pub(super) fn of(footprint: f64) -> Self {
+        Self { footprint, softness: SOFTNESS }
+    }
+}
+
+/// One lattice line where it crosses an edge, in the edge's developed strip. Distances inwards, metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LatticeLine {
+    pub(super) along: f64,
+    /// Column and row of the last cell of the face.
+    pub(super) place: [u32; 2],
+    pub(super) low: f64,
+    pub(super) high: f64,
+    /// Lowest and highest mixed pixel.
+    pub(super) mixed: Option<(f64, f64)>,
+    complete: bool,
+    beyond: Beyond,
+    /// Distance inwards on the face per radian of footprint.
+    pub(super) per_radian: f64,
+    /// The same per angle between beams.
+    pub(super) per_angle: f64,
+    /// Distance inwards per lattice step.
+    pub(super) per_step: f64,
+    /// Distance outside of the edge at which the plate's lower edge is seen, on the face's continuation; 0 where it is hidden.
+    side: f64,
+    /// Distance inwards per range by which a beam falls behind the face's continuation on a square side face.
+    per_range: f64,
+    /// The nearest cell off the face, and its range behind the face's continuation.
+    off: f64,
+    excess: f64,
+    /// The last cell of the face, and its range behind the face.
+    cell: f64,
+    residual: f64,
+}
+
+impl LatticeLine {
+    /// Places a crossing in its strip.
+    pub(super) fn new(
+        strip: &DevelopedStrip,
+        settled: &ProjectedCrossing,
+        thickness: f64,
+        Sampling { angle, .. }: Sampling,
+    ) -> Self {
+        let crossing = &settled.crossing;
+        let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
+        let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
+        let along = 0.5 * (inside.x + outside.x);
+        let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
+        let per_radian = inwards_per_radian(crossing.inside, normal, inward);
+        // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
+        // height / (height + thickness) of its way.
+        let height = -normal.dot(&crossing.inside);
+        let side = inward.dot(&crossing.inside) * thickness / (height + thickness);
+        let (off, excess) = match mixed {
+            Some([near, _]) => (near, crossing.mixed_excess),
+            None => (inside.y.min(outside.y), crossing.excess),
+        };
+        Self {
+            along,
+            place: settled.place,
+            low: inside.y.min(outside.y),
+            high: inside.y.max(outside.y),
+            mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
+            complete: crossing.complete,
+            beyond: crossing.beyond,
+            per_radian,
+            per_angle: angle * per_radian,
+            per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
+            side: if side > DIRECTION * thickness { side } else { 0.0 },
+            per_range: inward.dot(&beam),
+            off,
+            excess: f64::from(excess),
+            cell: strip.flatten(settled.cell).y,
+            residual: settled.residual,
+        }
+    }
+
+    /// Returns true when the plate ends here in front of something and every cell up to there was measured: such lines show the
+    /// footprint.
+    pub(super) fn shows_footprint(&self) -> bool {
+        self.complete && self.beyond == Beyond::Behind && self.side == 0.0
+    }
+
+    /// Returns true when an edge at `at` is within `slack` of the interval.
+    pub(super) fn is_near(&self, at: f64, slack: f64) -> bool {
+        self.low - slack < at && at < self.high + slack
+    }
+
+    /// Returns the likelihood of an edge position given this line; `noise` is that of ranges, metres.
+    pub(super) fn likelihood(&self, beam: BeamModel, noise: f64) -> EdgeLikelihood {
+        let noise = noise * self.per_range.abs();
+        let soft = norm(beam.softness * self.per_angle, FACE_NOISE * noise);
+        let seen = beam.footprint * self.per_radian;
+        let of = |terms| EdgeLikelihood { along: self.along, terms };
+        let last =
+            EdgeObservation::Last { cell: self.cell, behind: self.residual * self.per_range }.within(noise);
+        if self.beyond == Beyond::SideFace {
+            // Given as two standard deviations about the crease.
+            let soft = norm(soft, 0.25 * (self.high - self.low));
+            return of([EdgeObservation::At(0.5 * (self.low + self.high)).within(soft), last]);
+        }
+        let on_side = self.excess * self.per_range;
+        // Of a side face a few beams wide each may pass for mixed.
+        if self.side > 0.0
+            && self.beyond == Beyond::Behind
+            && (self.mixed.is_none() || on_side > -3.0 * noise)
+            && on_side < SIDE_SLACK * self.side + 3.0 * noise
+        {
+            let soft = norm(norm(soft, noise), SIDE_SLOPE * on_side);
+            return of([EdgeObservation::At(self.off + on_side).within(soft), last]);
+        }
+        let mut above = Bound { sure: self.low, likely: self.low };
+        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that.
+        let mut below =
+            Bound { sure: self.high + self.side.min(seen), likely: self.high - (seen - self.side).max(0.0) };
+        if self.beyond == Beyond::Behind {
+            above.sure += self.side;
+            above.likely += self.side + seen;
+        }
+        if let Some((lowest, highest)) = self.mixed {
+            let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
+            above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
+            below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
+        } else if self.side > seen && noise > 0.0 {
+            return of([EdgeObservation::Above(above).within(soft), last]);
+        }
+        of([EdgeObservation::Above(above), EdgeObservation::Below(below)]
+            .map(|observation| observation.within(soft)))
+    }
+}
+
+/// Returns the distance inwards on the face by which a beam to `point` moves when it turns, per radian; `normal` and `inward` are
+/// unit vectors there.
+pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64 {
+    let beam = point.normalize();
+    // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
+    // inward part of that, over all e across the beam, is the length of this vector.
+    let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
+    point.norm() * (lever - beam * lever.dot(&beam)).norm()
+}
+
+/// Returns true when the side face below the edge at `point` is seen: there the edge is located by the ranges on it.
+pub(super) fn shows_side_face(point: Vec3, normal: Vec3, inward: Vec3) -> bool {
+    inward.dot(&point) > -normal.dot(&point) * DIRECTION
+}
+
+/// Returns the length of (a, b) without the range checks of `hypot`.
+fn norm(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
+}
