@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Rotation3, Vector6};
 use platen_sdk::{PlateGrid, Result};
-use platen_shape::Vec3;
+use platen_shape::{Placement, Vec3};
 
 use crate::nodes::Nodes;
 
@@ -18,6 +18,9 @@ const NORMAL_FLOOR: f64 = 0.05e-3;
 
 /// Tukey's biweight constant: 95 % efficiency for normal errors (Huber, Ronchetti, Robust Statistics, 2nd ed., 4.8).
 const TUKEY: f64 = 4.685;
+
+/// Standard deviation of normal errors over the length of the shortest interval that contains half of them.
+const SHORTH: f64 = 0.7413;
 
 /// Local fits along each side in the search for the unchanged part.
 const LOCAL_FITS: usize = 6;
@@ -88,7 +91,7 @@ pub(crate) fn places(nodes: &Nodes) -> Motion {
 }
 
 fn fit(nodes: &Nodes, places: &[usize]) -> Motion {
-    let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
+    let mut motion = closed_form(nodes, places.iter().copied());
     for _ in 0..8 {
         step(nodes, &mut motion, places.iter().map(|i| (*i, 1.0)), 1.0);
     }
@@ -120,11 +123,21 @@ pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result
     Ok((motion, weights))
 }
 
+/// Returns the motion by unweighted least squares (Kabsch), the start of Gauss-Newton: it also finds a plate turned by half a turn.
+fn closed_form(nodes: &Nodes, places: impl Iterator<Item = usize>) -> Motion {
+    let seen = places.filter(|i| nodes.seen[*i]);
+    let placement = Placement::of_pairs(seen.map(|i| (nodes.before[i], nodes.now[i])));
+    let pivot = nodes.centre();
+    let translation = placement.moved(&pivot) - pivot;
+    Motion { rotation: placement.rotation(), translation, pivot, ..Motion::none() }
+}
+
 /// Fits all places that were seen.
 fn all_seen(nodes: &Nodes) -> Motion {
-    let mut motion = Motion { pivot: nodes.centre(), ..Motion::none() };
+    let places = || (0..PlateGrid::NODES).step_by(7);
+    let mut motion = closed_form(nodes, places());
     for _ in 0..6 {
-        step(nodes, &mut motion, (0..PlateGrid::NODES).step_by(7).map(|i| (i, 1.0)), 1.0);
+        step(nodes, &mut motion, places().map(|i| (i, 1.0)), 1.0);
     }
     motion
 }
@@ -145,9 +158,15 @@ fn local(nodes: &Nodes, start: &Motion, row: usize, column: usize) -> Motion {
     motion
 }
 
+/// Returns the standard deviation of a place along the normal. The scanner's correlated error is part of it: a fit to the scale of
+/// the noise alone follows one crest of a wave and leaves the other as a change.
+fn sigma_normal(nodes: &Nodes, i: usize) -> f64 {
+    nodes.sigma[i].hypot(NORMAL_FLOOR).hypot(nodes.correlated)
+}
+
 fn scaled_residual(nodes: &Nodes, motion: &Motion, i: usize) -> f64 {
     let off = (nodes.now[i] - motion.apply(&nodes.before[i])).dot(&nodes.normal[i]);
-    off / nodes.sigma[i].hypot(NORMAL_FLOOR)
+    off / sigma_normal(nodes, i)
 }
 
 fn inliers(nodes: &Nodes, motion: &Motion) -> f64 {
@@ -155,13 +174,29 @@ fn inliers(nodes: &Nodes, motion: &Motion) -> f64 {
     (0..PlateGrid::NODES).step_by(3).filter(near).count() as f64
 }
 
-/// Returns Tukey's biweight of every node.
+/// Returns Tukey's biweight of every node, to the scale of [`scatter`].
 fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
-    let weight = |i: usize| {
-        let r = scaled_residual(nodes, motion, i) / TUKEY;
-        if r.abs() < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 }
+    let residual: Vec<f64> = (0..PlateGrid::NODES).map(|i| scaled_residual(nodes, motion, i)).collect();
+    let scale = scatter(nodes, &residual);
+    let weight = |r: f64| if r.abs() < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 };
+    residual.into_iter().map(|r| weight(r / (TUKEY * scale))).collect()
+}
+
+/// Returns the standard deviation of the scaled residuals of the part that kept its shape: from the shortest interval that contains
+/// half of them (Rousseeuw, Leroy, "Robust Regression and Outlier Detection", 1987, 4.3, the shorth), wherever a first fit has
+/// put it. Not below the noise of the fits, not above 1, all that is stated: the errors of a good scanner are smaller than its data sheet's,
+/// and to the scale of the latter a change would draw the alignment with it.
+fn scatter(nodes: &Nodes, residual: &[f64]) -> f64 {
+    let of_seen = |value: &dyn Fn(usize) -> f64| {
+        let mut values: Vec<f64> = (0..PlateGrid::NODES).filter(|i| nodes.seen[*i]).map(value).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        values
     };
-    (0..PlateGrid::NODES).map(weight).collect()
+    let sorted = of_seen(&|i| residual[i]);
+    let half = sorted.len() / 2;
+    let shortest = sorted.iter().zip(sorted.iter().skip(half)).map(|(from, to)| to - from).reduce(f64::min);
+    let noise = of_seen(&|i| nodes.sigma[i] / sigma_normal(nodes, i)).get(half).copied().unwrap_or(1.0);
+    (SHORTH * shortest.unwrap_or(0.0)).clamp(noise.min(1.0), 1.0)
 }
 
 /// Nodes per independent place: a spline has fewer degrees of freedom than the fields have nodes. One in 25, as in the
@@ -178,9 +213,8 @@ fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize,
         let arm = moved - motion.pivot - motion.translation;
         let n = nodes.normal[i];
         let tangent = n.cross(&least_axis(&n)).normalize();
-        let sigma_n = nodes.sigma[i].hypot(NORMAL_FLOOR);
-        for (direction, sigma) in [(n, sigma_n), (tangent, TANGENT_SIGMA), (n.cross(&tangent), TANGENT_SIGMA)]
-        {
+        let (sigma_n, sigma_t) = (sigma_normal(nodes, i), TANGENT_SIGMA.hypot(nodes.correlated));
+        for (direction, sigma) in [(n, sigma_n), (tangent, sigma_t), (n.cross(&tangent), sigma_t)] {
             let row = jacobian_row(&arm, &direction);
             let w = weight / (sigma * sigma);
             normal_matrix += row * row.transpose() * w;

@@ -12,6 +12,9 @@ use crate::nodes::Nodes;
 /// level of detection by chance, and they are neighbours; a patch is therefore a change only when one of its nodes exceeds this.
 const SIGNIFICANT: f64 = 3.86;
 
+/// The same for the scanner's correlated error, whose waves are half a metre to a metre long: of 30 independent places.
+const SIGNIFICANT_CORRELATED: f64 = 3.144;
+
 /// Displacement at every node.
 #[derive(Debug)]
 pub(crate) struct Changes {
@@ -35,7 +38,6 @@ pub(crate) struct Changes {
 pub(crate) fn changes(
     nodes: &Nodes,
     Alignment { motion, weights, .. }: &Alignment<'_>,
-    sigma_correlated: f64,
     min_patch: f64,
 ) -> Changes {
     let moved: Vec<Vec3> = nodes.before.iter().map(|p| motion.apply(p)).collect();
@@ -45,7 +47,7 @@ pub(crate) fn changes(
         .map(|i| {
             // Where a place determines the alignment, the alignment follows its error and does not add to it.
             let align = motion.sigma(&nodes.before[i], &nodes.normal[i]) * (1.0 - weights[i]).sqrt();
-            nodes.sigma[i].hypot(sigma_correlated).hypot(align)
+            nodes.sigma[i].hypot(nodes.correlated).hypot(align)
         })
         .collect();
     let lod: Vec<f64> = sigma.iter().map(|sigma| EXPANDED * sigma).collect();
@@ -59,7 +61,11 @@ pub(crate) fn changes(
     let count = |wanted: NodeState| state.iter().filter(|state| **state == wanted).count();
     let (above, below) = (count(NodeState::Seen), count(NodeState::Unchanged));
     let above_lod = above as f64 / (above + below).max(1) as f64;
-    let significant = |patch: &[usize]| patch.iter().any(|&i| normal[i].abs() > SIGNIFICANT * sigma[i]);
+    // The scanner's correlated error has far fewer independent places than the noise.
+    let excess = (SIGNIFICANT.powi(2) - SIGNIFICANT_CORRELATED.powi(2)) * nodes.correlated.powi(2);
+    let significant = |patch: &[usize]| {
+        patch.iter().any(|&i| normal[i].powi(2) > (SIGNIFICANT * sigma[i]).powi(2) - excess)
+    };
     let least = (min_patch / nodes.grid.cell()) as usize;
     drop_patches(&mut state, &normal, |patch| patch.len() < least || !significant(patch));
     let mut of_seen: Vec<f64> = (0..PlateGrid::NODES).filter(|&i| nodes.seen[i]).map(|i| lod[i]).collect();

@@ -11,7 +11,7 @@
 //!
 //! | `alignment` | motion |
 //! |---|---|
-//! | `unchanged` | robust: the largest part that kept its shape coincides. Of many local fits the one with the most inliers starts iteratively reweighted least squares with Tukey's biweight (Huber, Ronchetti, "Robust Statistics", 2nd ed., 4.8) |
+//! | `unchanged` | robust: the largest part that kept its shape coincides. Of many local fits the one with the most inliers starts iteratively reweighted least squares with Tukey's biweight (Huber, Ronchetti, "Robust Statistics", 2nd ed., 4.8), its scale that of the shorth of the residuals |
 //! | `corners` | least squares of the four corners |
 //! | `supports` | least squares of the places on the press's supports, `[[support]]` of the plate file |
 //! | `none` | identity: for a plate on fixed supports under a fixed scanner |
@@ -23,11 +23,11 @@
 //! ```
 //!
 //! with s1 and s2 from the splines' covariances without their smoothing bias, which is equal in both scans; s_corr from the
-//! plant's null pairs; s_align from the covariance of the alignment, less where the place itself determines the alignment.
+//! plant's null pairs, until there are any from the range error of the scanner's data sheet; s_align from the covariance of the alignment, less where the place itself determines the alignment.
 //!
 //! *Patches.* By chance 5 % of an unchanged plate lies above the LoD. Connected places above it are a change only when they
 //! cover `min_patch` and one of them exceeds 3.86 standard deviations (1.97 LoD), which happens on one unchanged plate in twenty
-//! (two-sided, Bonferroni over 441 independent places).
+//! (two-sided, Bonferroni over 441 independent places); of the part s_corr, whose waves are long, 3.14 (30 places).
 //!
 //! # Example
 //!
@@ -115,7 +115,7 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         let says = vec![format!("no {} scan: displacement is not known", options.against)];
         return Ok(Report::new(Findings { says, ..Findings::default() }, Vec::new()));
     };
-    let nodes = Nodes::new(&inputs.now, earlier);
+    let nodes = Nodes::new(&inputs.now, earlier, inputs.task.sigma_correlated);
     let unweighted = |motion| (motion, vec![0.0; PlateGrid::NODES]);
     let (motion, weights) = match options.alignment.as_str() {
         "corners" => unweighted(align::corners(&nodes)),
@@ -124,14 +124,14 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         _ => align::unchanged(check, &nodes)?,
     };
     let alignment = Alignment { motion, weights, name: &options.alignment };
-    let changes = detect::changes(&nodes, &alignment, inputs.task.sigma_correlated, options.min_patch);
+    let changes = detect::changes(&nodes, &alignment, options.min_patch);
     Ok(report(&nodes, &alignment, &changes, inputs.task.supports_changed, &options.against))
 }
 
 /// Aligns the places on the supports.
 fn on_supports(inputs: &Inputs, earlier: &Surface) -> Result<Motion> {
     let supports: Vec<[f64; 2]> = inputs.task.supports.iter().map(|support| support.at).collect();
-    let nodes = Nodes::at(&inputs.now, earlier, &supports);
+    let nodes = Nodes::at(&inputs.now, earlier, &supports, inputs.task.sigma_correlated);
     let in_sight = nodes.seen.iter().filter(|seen| **seen).count();
     if in_sight < 3 {
         let given = nodes.seen.len();

@@ -16,19 +16,21 @@ pub(crate) struct Nodes {
     pub(crate) normal: Vec<Vec3>,
     /// Standard deviation of the difference along the normal, from both fits, metres.
     pub(crate) sigma: Vec<f64>,
+    /// Standard deviation of the scanner's correlated error of a difference, metres.
+    pub(crate) correlated: f64,
     /// Whether both scans saw the place.
     pub(crate) seen: Vec<bool>,
 }
 
 impl Nodes {
     /// Evaluates both surfaces at every node of the grid.
-    pub(crate) fn new(now: &Surface, before: &Surface) -> Self {
+    pub(crate) fn new(now: &Surface, before: &Surface, correlated: f64) -> Self {
         let grid = PlateGrid::new(now);
-        Self::at(now, before, &grid.map(|u, v| [u, v]))
+        Self::at(now, before, &grid.map(|u, v| [u, v]), correlated)
     }
 
     /// Evaluates both surfaces at `places`, (u, v) in metres.
-    pub(crate) fn at(now: &Surface, before: &Surface, places: &[[f64; 2]]) -> Self {
+    pub(crate) fn at(now: &Surface, before: &Surface, places: &[[f64; 2]], correlated: f64) -> Self {
         let places = || places.iter().copied();
         let seen = |[u, v]: [f64; 2]| now.mask().seen(u, v) && before.mask().seen(u, v);
         Self {
@@ -37,6 +39,7 @@ impl Nodes {
             before: places().map(|[u, v]| before.face(u, v)).collect(),
             normal: places().map(|[u, v]| now.normal(u, v)).collect(),
             sigma: places().map(|[u, v]| now.sigma_repeat(u, v).hypot(before.sigma_repeat(u, v))).collect(),
+            correlated,
             seen: places().map(seen).collect(),
         }
     }

@@ -1,7 +1,8 @@
 //! `platen calibrate`: correlated and systematic errors of a scanner, from repeated scans of one plate.
 //!
-//! Each pair of scans of an untouched plate (a null pair) differs by noise, which every scan states, and by errors that
-//! are correlated over the plate. The excess over the stated noise, pooled over all pairs, is `sigma_correlated`. Gaps under
+//! Each pair of scans of an unbent plate (a null pair) differs by noise, which every scan states, and by errors that
+//! are correlated over the plate. `sigma_correlated` is the error with which 5 % of the area of all pairs lies above the level of
+//! detection: its nominal rate. Gaps under
 //! templates on an artefact of known shape give `sigma_true`: the systematic error with which the stated uncertainty covers
 //! 95 % of them. Formulas: `platen_shape::inspection::calibration`.
 
@@ -29,6 +30,9 @@ use serde::Serialize;
 /// its supports.
 const NULL_LIMIT: f64 = 2e-3;
 
+/// Share of an unchanged plate above the level of detection: that of 1.96 standard deviations.
+const NOMINAL: f64 = 0.05;
+
 /// Fewest pairs of a steady estimate: below, it scatters by a quarter or more.
 const FEW_PAIRS: usize = 6;
 
@@ -36,8 +40,9 @@ const FEW_PAIRS: usize = 6;
 #[command(
     after_help = "Examples:\n  platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate plates/plate-017.toml\n  \
                         platen calibrate plant.toml 1.e57 2.e57 3.e57 4.e57 --plate granite.toml --artefact\n\n\
-                        Scan one plate several times without touching it. The difference of the scans beyond their noise is the \
-                        correlated error in every level of detection. With --artefact the plate has exactly the [target] of its \
+                        Scan one plate several times without bending it, moved by some decimetres as by strokes: an error that depends on \
+                        the range is the same in scans of a plate left in its place. The difference of the scans beyond their \
+                        noise is the correlated error in every level of detection. With --artefact the plate has exactly the [target] of its \
                         file: gaps under templates on it are the scanner's own, and enter every template's uncertainty. Writes the \
                         file that [calibration] of the plant file names."
 )]
@@ -118,19 +123,19 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         surfaces.push(measured.measurement.surface);
     }
     progress::phase("comparing");
-    let (pairs, pooled) = null_pairs(&rig, &plate, &surfaces)?;
-    let sigma_correlated = pooled.excess();
+    let (pairs, excess) = null_pairs(&rig, &plate, &surfaces)?;
+    if excess > NULL_LIMIT {
+        return Err(CliError::Failed(format!(
+            "the scans differ by {:.1} mm beyond their noise: the plate was bent between them, or is not the same; scan one \
+             plate without bending it",
+            mm(excess)
+        )));
+    }
+    let sigma_correlated = nominal_sigma(&rig, &plate, &surfaces)?;
     let artefact =
         shape.map(|shape| artefact(&surfaces, &shape, &chords(&plate), sigma_correlated)).transpose()?;
     progress::done();
 
-    if sigma_correlated > NULL_LIMIT {
-        return Err(CliError::Failed(format!(
-            "the scans differ by {:.1} mm beyond their noise: the plate was bent between them, or is not the same; scan one \
-             plate without touching it",
-            mm(sigma_correlated)
-        )));
-    }
     let (gaps, sigma_true) = artefact.map_or((Vec::new(), None), |(gaps, sigma)| (gaps, Some(sigma)));
     let calibration = Calibration {
         made: Timestamp::now(),
@@ -171,37 +176,78 @@ fn artefact_shape(command: &Command, plate: &PlateFile) -> Result<Option<TargetS
     TargetSurface::of_plate(&target, &plate.plate).map(Some).map_err(|e| usage(e.to_string()))
 }
 
-/// Compares every two of the scans: difference along the normal after rigid alignment, and the noise stated for it.
-fn null_pairs(
+/// A null pair, its scans numbered from 1, with figures of its comparison.
+struct NullPair<const N: usize> {
+    scans: [usize; 2],
+    figures: [f64; N],
+}
+
+/// Returns the figures of `names` of every null pair: of every two of the scans.
+fn null_figures<const N: usize>(
     rig: &Pipeline,
     plate: &PlateFile,
     surfaces: &[Surface],
-) -> Result<(Vec<PairRecord>, Pooled), CliError> {
-    let task = plate.task(0.0, None, false);
-    let (mut pairs, mut pooled) = (Vec::new(), Pooled::default());
+    sigma_correlated: f64,
+    names: [&str; N],
+) -> Result<Vec<NullPair<N>>, CliError> {
+    let task = plate.task(sigma_correlated, None, false);
+    let mut pairs = Vec::new();
     for (i, now) in surfaces.iter().enumerate() {
         for (k, before) in surfaces[..i].iter().enumerate() {
             let surfaces = Surfaces { now, before: Some(before), baseline: None };
             let reports = rig.comparisons.iter().map(|comparison| comparison.compare(&task, surfaces));
             let reports = reports.collect::<Result<Vec<_>, PluginError>>()?;
-            let figure = |name: &str| {
+            let mut figures = [0.0; N];
+            for (figure, name) in figures.iter_mut().zip(names) {
                 let found = reports.iter().flat_map(|r| &r.findings.figures).find(|f| f.name == name);
-                found.map(|f| f.value).ok_or_else(|| {
+                *figure = found.map(|f| f.value).ok_or_else(|| {
                     CliError::Failed(format!(
                         "displacement gives no figure {name}; install the plugin of this version"
                     ))
-                })
-            };
-            let (difference, stated) = (figure("displacement.rms")?, figure("displacement.sigma")?);
-            pooled.add(difference, stated);
-            pairs.push(PairRecord {
-                scans: [k + 1, i + 1],
-                difference_mm: mm(difference),
-                stated_mm: mm(stated),
-            });
+                })?;
+            }
+            pairs.push(NullPair { scans: [k + 1, i + 1], figures });
         }
     }
-    Ok((pairs, pooled))
+    Ok(pairs)
+}
+
+/// Compares every two of the scans: difference along the normal after rigid alignment, the noise stated for it, and the excess of
+/// all differences over their noise.
+fn null_pairs(
+    rig: &Pipeline,
+    plate: &PlateFile,
+    surfaces: &[Surface],
+) -> Result<(Vec<PairRecord>, f64), CliError> {
+    let found = null_figures(rig, plate, surfaces, 0.0, ["displacement.rms", "displacement.sigma"])?;
+    let mut pooled = Pooled::default();
+    let records = found.into_iter().map(|NullPair { scans, figures: [difference, stated] }| {
+        pooled.add(difference, stated);
+        PairRecord { scans, difference_mm: mm(difference), stated_mm: mm(stated) }
+    });
+    let records = records.collect();
+    Ok((records, pooled.excess()))
+}
+
+/// Returns the correlated error, one sigma, with which the null pairs show change over [`NOMINAL`] of their area: 0 where noise
+/// alone shows less, else by bisection. A scanner's range error is periodic and bounded: 1.96 times its root mean square lies beyond
+/// its crests, so that a level of detection by the excess of the scatter would hide changes (0 to 1 % of the area instead of 5 %).
+fn nominal_sigma(rig: &Pipeline, plate: &PlateFile, surfaces: &[Surface]) -> Result<f64, CliError> {
+    let is_quiet = |sigma: f64| -> Result<bool, CliError> {
+        let shares = null_figures(rig, plate, surfaces, sigma, ["displacement.above_lod"])?;
+        let sum: f64 = shares.iter().map(|pair| pair.figures[0]).sum();
+        Ok(sum <= NOMINAL * shares.len() as f64)
+    };
+    if is_quiet(0.0)? {
+        return Ok(0.0);
+    }
+    let [mut low, mut high] = [0.0, NULL_LIMIT];
+    while high - low > 0.02 * high && high > 1e-6 {
+        // Halves the logarithm once the scale is known.
+        let middle = if low > 0.0 { (low * high).sqrt() } else { 0.25 * high };
+        *(if is_quiet(middle)? { &mut high } else { &mut low }) = middle;
+    }
+    Ok(high)
 }
 
 /// Returns the chords of the plate file's templates; half the shorter side where it has none.

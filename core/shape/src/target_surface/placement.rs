@@ -40,6 +40,12 @@ impl Placement {
         Self { rotation, translation: to - rotation * from }
     }
 
+    /// Returns the rotation of the motion.
+    #[must_use]
+    pub fn rotation(&self) -> Rotation3<f64> {
+        self.rotation
+    }
+
     /// Returns the moved point.
     #[must_use]
     pub fn moved(&self, p: &Vec3) -> Vec3 {
