@@ -55,7 +55,7 @@ static platen_status column(const platen_job *job, uint32_t index, double height
 static platen_status run(platen_instance *self, const platen_job *job, const platen_frame *in, uint32_t n_in,
                          platen_error *error) {
   (void)in, (void)n_in, (void)error;
-  platen_scan scan = {sizeof scan, 0, ROWS, COLUMNS, 0.0, STEP, -0.3, STEP, UINT32_MAX, 0, 2047, 0.0, {0, 0}, {0, 0}};
+  platen_scan scan = {sizeof scan, 0, ROWS, COLUMNS, 0.0, STEP, -0.3, STEP, UINT32_MAX, 0, 2047, 0.0, {0, 0}, {0, 0}, 0.0};
   platen_status status = put(job, PLATEN_FORMAT_SCAN, &scan, sizeof scan, 0);
   for (uint32_t index = 0; status == PLATEN_OK && index < COLUMNS; index++) {
     if (host->cancelled(host, job->job_id)) return PLATEN_E_CANCELLED;

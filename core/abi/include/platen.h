@@ -192,13 +192,14 @@ typedef struct platen_span {
 
 /* Rows run down from the top, columns by increasing azimuth, counter-clockwise seen from above; z is up. */
 typedef struct platen_scan {
-  uint32_t struct_size, flags; /* 1: simulated */
+  uint32_t struct_size, flags; /* 1: simulated, 2: range_error_m is stated */
   uint32_t n_rows, n_columns;
   double azimuth_start, azimuth_step, elevation_start, elevation_step; /* steps positive */
   uint32_t seam_column;                                                /* first of the back face, UINT32_MAX: one face */
   uint16_t intensity_min, intensity_max;
   double acquired_unix_s;        /* 0: unknown */
   platen_span instrument, notes; /* UTF-8; notes: one sentence per line */
+  double range_error_m;          /* flag 2: data sheet's range error, one sigma; appended since: may be left out */
 } platen_scan;
 
 typedef struct platen_column {

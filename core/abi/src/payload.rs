@@ -4,6 +4,7 @@
 //! check sizes, offsets and alignment before any access.
 
 use std::ffi::CStr;
+use std::mem::MaybeUninit;
 
 /// Plain number type, valid with any bit pattern.
 ///
@@ -30,6 +31,8 @@ unsafe impl<T: Pod, const N: usize> Pod for [T; N] {}
 pub unsafe trait Header: Copy + 'static {
     /// Format string of a frame with this header.
     const FORMAT: &'static CStr;
+    /// Size of the first version of the format. Members appended since are zero in a payload of an older writer.
+    const FIRST_SIZE: usize = size_of::<Self>();
 }
 
 /// Position of an array: byte offset from the start of the buffer, and number of scalar elements. 0, 0: absent.
@@ -43,7 +46,9 @@ pub struct Span {
 }
 
 macro_rules! header {
-    ($(#[doc = $doc:literal])* $name:ident = $format:literal { $($(#[doc = $field_doc:literal])* $field:ident: $ty:ty,)* }) => {
+    ($(#[doc = $doc:literal])* $name:ident = $format:literal $(, first $first:literal bytes)? {
+        $($(#[doc = $field_doc:literal])* $field:ident: $ty:ty,)*
+    }) => {
         $(#[doc = $doc])*
         #[repr(C)]
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +60,7 @@ macro_rules! header {
         // SAFETY: numbers only, in an order without padding (asserted below).
         unsafe impl Header for $name {
             const FORMAT: &'static CStr = $format;
+            $(const FIRST_SIZE: usize = $first;)?
         }
         const _: () = assert!(size_of::<$name>() == 4 $(+ size_of::<$ty>())*, "padding");
     };
@@ -62,8 +68,8 @@ macro_rules! header {
 
 header! {
     /// First frame of a scan, driver to host. Azimuths run counter-clockwise, rows go down from `elevation_start`.
-    Scan = c"platen.scan/1" {
-        /// 1: simulated, without a real instrument.
+    Scan = c"platen.scan/1", first 96 bytes {
+        /// 1: simulated, without a real instrument; 2: `range_error_m` is stated.
         flags: u32,
         /// Rows of the lattice.
         n_rows: u32,
@@ -89,6 +95,8 @@ header! {
         instrument: Span,
         /// UTF-8: decisions and corrections of the driver, one sentence per line.
         notes: Span,
+        /// Range error that neighbouring cells share, one sigma, as the instrument's data sheet states it. Flag 2.
+        range_error_m: f64,
     }
 }
 
@@ -303,20 +311,22 @@ impl std::fmt::Display for Malformed {
 
 impl std::error::Error for Malformed {}
 
-/// Reads the header at the start of a buffer.
+/// Reads the header at the start of a buffer; members that an older writer did not know are zero.
 ///
 /// # Errors
 /// [`Malformed::Header`] when it is incomplete.
 pub fn read<H: Header>(bytes: &[u8]) -> Result<H, Malformed> {
     let struct_size = bytes.first_chunk().map_or(0, |b| u32::from_le_bytes(*b));
-    if bytes.len() < size_of::<H>()
-        || (struct_size as usize) < size_of::<H>()
-        || struct_size as usize > bytes.len()
-    {
+    let stated = struct_size as usize;
+    if stated < H::FIRST_SIZE || stated > bytes.len() {
         return Err(Malformed::Header { bytes: bytes.len(), struct_size });
     }
-    // SAFETY: the buffer holds size_of::<H>() bytes and H has no invalid bit patterns.
-    Ok(unsafe { bytes.as_ptr().cast::<H>().read_unaligned() })
+    let mut header = MaybeUninit::<H>::zeroed();
+    let n = stated.min(size_of::<H>());
+    // SAFETY: both hold `n` bytes and do not overlap.
+    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), header.as_mut_ptr().cast(), n) };
+    // SAFETY: every byte is zero or copied, and H has no invalid bit patterns.
+    Ok(unsafe { header.assume_init() })
 }
 
 /// Returns the elements of an array; `T` may be a number or a fixed array of numbers such as `[f64; 3]`.

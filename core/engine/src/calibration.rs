@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use jiff::Timestamp;
-use platen_model::Task;
 use platen_model::units::{metres, mm};
 use platen_plant::plant::CalibrationUse;
-use platen_plant::{Document, Error as PlantError, PlateFile, Reported, TomlTable};
+use platen_plant::{Document, Error as PlantError, Reported, TomlTable};
 
 /// Largest plausible standard deviation, millimetres: above it a plate was bent or the scanner moved.
 const LARGEST_SIGMA_MM: f64 = 20.0;
@@ -46,16 +45,6 @@ pub enum Invalid {
 }
 
 impl Calibration {
-    /// Returns the task of the comparisons for a plate, by a scanner with this calibration, if any.
-    pub fn task(calibration: Option<&Self>, plate: &PlateFile, supports_changed: bool) -> Task {
-        let sigma_correlated = calibration.map_or(0.0, |calibration| calibration.sigma_correlated);
-        plate.task(
-            sigma_correlated,
-            calibration.and_then(|calibration| calibration.sigma_true),
-            supports_changed,
-        )
-    }
-
     /// Reads a calibration file.
     ///
     /// # Errors

@@ -31,6 +31,9 @@ pub(crate) fn to_text(header: &ScanHeader, warm_up_columns: u32) -> String {
     if let Some(time) = header.acquired_unix_s {
         put("acquired_unix_s", &time);
     }
+    if let Some(error) = header.range_error_m {
+        put("range_error_m", &error);
+    }
     put("simulated", &header.simulated);
     put("instrument", &one_line(&header.instrument));
     header.notes.iter().for_each(|note| put("note", &one_line(note)));
@@ -56,6 +59,7 @@ pub(crate) fn from_text(text: &str) -> Option<(ScanHeader, u32)> {
             "warm_up_columns" => warm_up_columns = value.parse().ok()?,
             "seam_column" => header.seam_column = Some(value.parse().ok()?),
             "acquired_unix_s" => header.acquired_unix_s = Some(value.parse().ok()?),
+            "range_error_m" => header.range_error_m = Some(value.parse().ok()?),
             "simulated" => header.simulated = value.parse().ok()?,
             "instrument" => header.instrument = value.to_owned(),
             "note" => header.notes.push(value.to_owned()),
@@ -87,6 +91,7 @@ mod tests {
             simulated: true,
             instrument: "maker model 17".to_owned(),
             acquired_unix_s: Some(1.7e9 + 0.123),
+            range_error_m: Some(0.002),
             notes: vec!["row 0 is at the top".to_owned(), "a note  with blanks".to_owned()],
         };
         assert_eq!(from_text(&to_text(&header, 10)), Some((header, 10)));

@@ -23,7 +23,8 @@ pub struct Task {
     pub templates: Vec<Template>,
     /// Places with one figure each.
     pub stations: Vec<Station>,
-    /// Correlated part of the level of detection of a position, one sigma, from null pairs; 0 when not calibrated.
+    /// Correlated part of the level of detection of a position between two scans, one sigma: from null pairs, else from the
+    /// range error of the scanner's data sheet.
     pub sigma_correlated: f64,
     /// The scanner's systematic uncertainty against a known artefact, one sigma; `None` when never calibrated.
     pub sigma_true: Option<f64>,

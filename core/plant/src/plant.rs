@@ -15,6 +15,8 @@ pub use plugin_use::PluginUse;
 
 use std::path::{Path, PathBuf};
 
+use platen_model::units::metres;
+
 use crate::document::{Document, Reported};
 use crate::press::Press;
 use crate::{Error, Fault, Faults, Located, TomlTable};
@@ -27,6 +29,9 @@ const COMPARISONS: [&str; 2] = ["displacement", "template"];
 /// Words of `window` in `[scanner]`.
 const WINDOWS: [(&str, ScanWindow); 3] =
     [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
+
+/// Largest range error of a scanner that measures plates, millimetres: above it a figure has another unit.
+const LARGEST_RANGE_ERROR_MM: f64 = 20.0;
 
 /// Part of the dome that is scanned, by a driver that plans its scans (one that estimates their time).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -56,7 +61,9 @@ pub struct PlantFile {
     pub scan_window: ScanWindow,
     /// Position of the scanner relative to press and plate.
     pub frame: Frame,
-    /// Calibration of the scanner; without it only its noise is in the uncertainties.
+    /// Range error of the scanner until it is calibrated, one sigma, metres, in place of its driver's.
+    pub range_error: Option<f64>,
+    /// Calibration of the scanner; without it the range error of its data sheet is in the uncertainties.
     pub calibration: Option<CalibrationUse>,
     /// Folder of the plate files.
     pub plates: PathBuf,
@@ -102,6 +109,7 @@ impl Default for PlantFile {
             scanner: None,
             scan_window: ScanWindow::default(),
             frame: Frame::default(),
+            range_error: None,
             calibration: None,
             plates: PathBuf::from("plates"),
             flattening: PluginUse::by_default(FLATTENING),
@@ -157,11 +165,14 @@ impl PlantFile {
             plugin
         };
         let scanner = root.table("scanner").optional().and_then(|table| {
-            let Some(mut table) = table else { return Ok((None, default.scan_window)) };
+            let Some(mut table) = table else { return Ok((None, default.scan_window, None)) };
             let scanner = plugin(PluginRole::Scanner, &mut table);
             let window = table.choice("window", &WINDOWS).or(default.scan_window);
+            let range_error =
+                table.number("range_error_mm").in_range(0.0..=LARGEST_RANGE_ERROR_MM).map(metres);
+            let range_error = range_error.optional();
             table.finish();
-            Ok((Some(scanner?), window?))
+            Ok((Some(scanner?), window?, range_error?))
         });
         let mut plugin = |role, mut table: TomlTable<'_>| {
             let plugin = plugin(role, &mut table);
@@ -205,7 +216,7 @@ impl PlantFile {
         root.finish();
 
         let (name, seed) = plant?;
-        let (scanner, scan_window) = scanner?;
+        let (scanner, scan_window, range_error) = scanner?;
         Ok(Self {
             name,
             seed,
@@ -213,6 +224,7 @@ impl PlantFile {
             scanner,
             scan_window,
             frame: frame?,
+            range_error,
             calibration: calibration?,
             plates: plates?,
             flattening: flattening?.unwrap_or(default.flattening),

@@ -61,8 +61,8 @@ impl PlateFile {
         Self::take(Document::parse(file, text))
     }
 
-    /// Returns the task of the comparisons for this plate. `sigma_correlated` and `sigma_true` are those of the scanner's
-    /// calibration, metres: 0 and `None` without one.
+    /// Returns the task of the comparisons for this plate. `sigma_correlated` and `sigma_true` are the scanner's
+    /// errors, metres.
     pub fn task(&self, sigma_correlated: f64, sigma_true: Option<f64>, supports_changed: bool) -> Task {
         Task {
             plate: self.plate.id.clone(),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use platen_history::{Archive, Error, Filter, Stroke};
 use platen_model::Verdict;
-use platen_model::units::mm;
+use platen_model::units::{metres, mm};
 use platen_plant::PlateFile;
 use platen_shape::Blank;
 
@@ -72,9 +72,21 @@ pub struct EarlierDocument {
     /// Supports of the plate.
     pub supports: Option<String>,
     outline: Option<OutlineRecord>,
+    #[serde(default)]
+    scan: EarlierScan,
+}
+
+#[derive(Debug, Default, serde::Deserialize)]
+struct EarlierScan {
+    range_error_mm: Option<f64>,
 }
 
 impl EarlierDocument {
+    /// Returns the range error that the driver stated, one sigma, metres.
+    pub fn range_error(&self) -> Option<f64> {
+        self.scan.range_error_mm.map(metres)
+    }
+
     /// Returns the outline of the blank to which (u, v) refer, where a scan of the blank gave one.
     pub fn blank(&self) -> Option<Blank> {
         self.outline.as_ref().and_then(OutlineRecord::blank)

@@ -194,9 +194,14 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
 }
 
 fn calibration(state: &CalibrationRecord) -> String {
-    let null_pairs = match state.sigma_correlated_mm {
-        0.0 => "no null pairs scanned: changes may be called real a little too often".to_owned(),
-        sigma => format!("correlated error {sigma:.2} mm (one sigma, from null pairs)"),
+    let null_pairs = match (&state.assumption, state.sigma_correlated_mm) {
+        (Some(assumption), sigma) => {
+            return format!(
+                "{assumption}; it stands for {sigma:.2} mm between two scans in every uncertainty"
+            );
+        }
+        (None, 0.0) => "no null pairs scanned: changes may be called real a little too often".to_owned(),
+        (None, sigma) => format!("correlated error {sigma:.2} mm (one sigma, from null pairs)"),
     };
     let artefact = match state.sigma_true_mm {
         None => {

@@ -83,12 +83,15 @@ pub struct ResultRecord {
 }
 
 /// Calibration of the scanner at this measurement.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CalibrationRecord {
-    /// Correlated part of the level of detection, one sigma; 0 when no null pairs were taken.
+    /// Correlated part of the level of detection, one sigma: from null pairs, else from the assumed range error.
     pub sigma_correlated_mm: f64,
     /// Systematic uncertainty against a known artefact, one sigma; null when none was measured.
     pub sigma_true_mm: Option<f64>,
+    /// Range error that stands in for a calibration, as a sentence; null with a calibration, and in documents older than it.
+    #[serde(default)]
+    pub assumption: Option<String>,
 }
 
 /// Scan behind a measurement.
@@ -104,6 +107,9 @@ pub struct ScanRecord {
     pub plate_points: usize,
     /// Maker, model, serial number.
     pub instrument: String,
+    /// Range error of the instrument's data sheet as the driver states it, one sigma; null where it does not.
+    #[serde(default)]
+    pub range_error_mm: Option<f64>,
     /// Whether the scan is simulated.
     pub simulated: bool,
     /// Notes of the driver on its decisions and corrections.
@@ -181,6 +187,8 @@ pub struct Context<'a, E> {
     pub plate: &'a PlateFile,
     /// Task of the comparisons.
     pub task: &'a Task,
+    /// Range error that stands in for a calibration, as a sentence.
+    pub assumption: Option<&'a str>,
     /// Origin of the press in the scanner frame, where the plant file places it.
     pub press: Option<Vec3>,
     /// Stroke, where there is one.
@@ -204,7 +212,10 @@ impl ResultRecord {
             plate: context.plate.plate.id.clone(),
             stroke: context.stroke,
             verdict: context.verdict,
-            says: sentences(context.reports),
+            says: sentences(context.reports)
+                .into_iter()
+                .chain(context.assumption.map(str::to_owned))
+                .collect(),
             supports: context.plate.plate.supports.clone(),
             plate_file: PlateRecord::new(context.plate, &measurement.surface, context.press),
             outline: Some(OutlineRecord::new(
@@ -214,6 +225,7 @@ impl ResultRecord {
             calibration: CalibrationRecord {
                 sigma_correlated_mm: mm(context.task.sigma_correlated),
                 sigma_true_mm: context.task.sigma_true.map(mm),
+                assumption: context.assumption.map(str::to_owned),
             },
             scan: ScanRecord {
                 rows: scanned.header.n_rows,
@@ -221,6 +233,7 @@ impl ResultRecord {
                 valid: scanned.n_valid,
                 plate_points: scanned.patch.samples.len(),
                 instrument: scanned.header.instrument.clone(),
+                range_error_mm: scanned.header.range_error_m.map(mm),
                 simulated: scanned.header.simulated,
                 notes: scanned.header.notes.clone(),
             },

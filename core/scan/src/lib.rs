@@ -10,10 +10,12 @@
 
 mod angle;
 mod column;
+mod data_sheet;
 mod lattice;
 mod scan;
 
 pub use angle::{Direction, Window, wrap_azimuth};
 pub use column::{Column, ColumnError, Face, State};
+pub use data_sheet::data_sheet_range_error_m;
 pub use lattice::Lattice;
 pub use scan::{Outcome, ScanEnd, ScanHeader};

@@ -26,6 +26,9 @@ pub struct ScanHeader {
     pub instrument: String,
     /// Time of the scan, seconds since 1970 UTC, where known.
     pub acquired_unix_s: Option<f64>,
+    /// Range error that neighbouring cells share and averaging leaves, one sigma, metres, as the instrument's data sheet
+    /// states it; `None` where it is not known.
+    pub range_error_m: Option<f64>,
     /// Decisions and changes of the driver, one sentence each (orientation, units, handedness).
     pub notes: Vec<String>,
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use platen_formats::orient::Expected;
 use platen_formats::{Oriented, ScanReader};
+use platen_scan::data_sheet_range_error_m;
 use platen_sdk::{ErrorKind, Job, ScanSink};
 
 use crate::error::{Error, Result};
@@ -53,7 +54,9 @@ pub(crate) fn deliver(
     oriented: &Oriented,
     out: &mut ScanSink<'_>,
 ) -> Result<()> {
-    out.begin(oriented.header())?;
+    let mut header = oriented.header().clone();
+    header.range_error_m = header.range_error_m.or_else(|| data_sheet_range_error_m(&header.instrument));
+    out.begin(&header)?;
     let mut progress = progress(job, "reading columns");
     let mut columns = reader.columns(oriented)?;
     for number in 0_u32.. {

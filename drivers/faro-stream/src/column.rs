@@ -1,6 +1,6 @@
 //! Lattice announced by ScanBegin, and its columns converted to the order of `platen-scan`.
 
-use platen_scan::{Column, Face, ScanHeader, State, wrap_azimuth};
+use platen_scan::{Column, Face, ScanHeader, State, data_sheet_range_error_m, wrap_azimuth};
 
 use crate::error::{Error, Result};
 use crate::message::{ScanBegin, Values};
@@ -33,6 +33,7 @@ impl Layout {
             && step(begin.elevation_step)
             && begin.range_unit_m > 0.0
             && begin.range_unit_m <= 1.0
+            && begin.range_error_m.is_none_or(|error| (0.0..=1.0).contains(&error))
             && begin.intensity.0 <= begin.intensity.1
             && begin.seam_column.is_none_or(|seam| seam < begin.columns);
         if sound {
@@ -66,6 +67,7 @@ impl Layout {
         if self.rows_flipped() {
             notes.push("row 0 is at the bottom at the bridge: rows reversed".to_owned());
         }
+        let instrument = if b.instrument.is_empty() { scanner.to_owned() } else { b.instrument.clone() };
         ScanHeader {
             n_rows: b.rows,
             n_columns: b.columns,
@@ -78,7 +80,8 @@ impl Layout {
                 .map(|seam| if self.columns_flipped() { b.columns - seam } else { seam }),
             intensity_range: b.intensity,
             simulated: b.simulated,
-            instrument: if b.instrument.is_empty() { scanner.to_owned() } else { b.instrument.clone() },
+            range_error_m: b.range_error_m.or_else(|| data_sheet_range_error_m(&instrument)),
+            instrument,
             acquired_unix_s: b.acquired_unix_s,
             notes,
         }

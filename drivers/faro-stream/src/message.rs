@@ -125,6 +125,7 @@ pub(crate) struct ScanBegin {
     #[serde(default)]
     pub(crate) instrument: String,
     pub(crate) acquired_unix_s: Option<f64>,
+    pub(crate) range_error_m: Option<f64>,
     #[serde(default)]
     pub(crate) simulated: bool,
     #[serde(default)]

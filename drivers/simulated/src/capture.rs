@@ -139,6 +139,7 @@ impl PreparedScan {
             simulated: true,
             instrument: "platen simulated scanner".to_owned(),
             acquired_unix_s: None,
+            range_error_m: Some(self.instrument.range_error()),
             notes: vec![self.note.clone(), format!("seed {}", self.instrument.seed)],
         }
     }

@@ -62,8 +62,13 @@ pub(crate) fn add(
     findings.figures.push(Figure::new("curvature.changed_share", share(changed), "1"));
     findings.figures.extend(bands.iter().enumerate().flat_map(|(k, band)| figures(k + 1, band)));
     findings.says.extend(bands.iter().map(|band| sentence(band, &options.against)));
-    if bands.is_empty() {
-        let against = &options.against;
+    let against = &options.against;
+    if lod.is_empty() {
+        let trusted = options.trusted;
+        findings.says.push(format!(
+            "cannot tell what bent: no curvature is known to {trusted:.3} 1/m (against the {against} scan)"
+        ));
+    } else if bands.is_empty() {
         findings
             .says
             .push(format!("nothing bent by more than {median_lod:.3} 1/m (against the {against} scan)"));

@@ -143,6 +143,12 @@ impl Instrument {
         1.0 - (1.0 - self.dropout) * (1.0 - weak * 0.1) * (1.0 - mirror)
     }
 
+    /// Returns the standard deviation of the systematic error over many ranges, metres: the figure of a data sheet.
+    #[must_use]
+    pub fn range_error(&self) -> f64 {
+        self.cyclic.map_or(0.0, |cyclic| cyclic.amplitude.abs() / std::f64::consts::SQRT_2)
+    }
+
     /// Returns the systematic error of a range.
     pub(crate) fn bias(&self, range: f64) -> f64 {
         self.cyclic.map_or(0.0, |c| c.amplitude * (std::f64::consts::TAU * range / c.period + c.phase).sin())

@@ -129,7 +129,8 @@ fn a_baseline_that_tells_no_outline_says_why_in_one_sentence() {
     ] {
         let output = measure(folder, "flat", "harmonic", Some(baseline));
         let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!((output.status.code(), said.trim_end().lines().count()), (Some(code), 1), "{said}");
+        let of_baseline = said.lines().filter(|line| !line.contains("the scanner is not calibrated")).count();
+        assert_eq!((output.status.code(), of_baseline), (Some(code), 1), "{said}");
         assert!(said.contains(says), "{said}");
         if code == 0 {
             let result: Json = serde_json::from_slice(&output.stdout).unwrap();

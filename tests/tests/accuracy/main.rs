@@ -4,5 +4,6 @@
 mod bench;
 mod blank;
 mod golden;
+mod null_pairs;
 mod plates;
 mod trust;

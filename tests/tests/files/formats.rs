@@ -146,6 +146,7 @@ impl Head for Again {
             order: "azimuth".to_owned(),
             instrument: "again".to_owned(),
             acquired_unix_s: None,
+            range_error_m: None,
             simulated: true,
             altered: Vec::new(),
             warm_up_columns: 0,
@@ -246,14 +247,17 @@ fn run(arguments: &[&std::ffi::OsStr]) -> serde_json::Value {
 }
 
 fn measured(scan: &Path) -> serde_json::Value {
-    let plate = bench().file("plate.toml");
+    let (plate, plant) = (bench().file("plate.toml"), bench().file("plant.toml"));
+    // No format says so, but the scanner of the scene has no range error beside its noise.
+    let text = "[frame]\nu_axis = [1.0, 0.0, 0.0]\n[scanner]\nplugin = \"faro-file\"\nrange_error_mm = 0.0\n";
+    std::fs::write(&plant, text).unwrap();
     run(&[
         "measure".as_ref(),
         scan.as_ref(),
         "--plate".as_ref(),
         plate.as_ref(),
-        "--u-axis".as_ref(),
-        "1,0,0".as_ref(),
+        "--plant".as_ref(),
+        plant.as_ref(),
     ])
 }
 

@@ -127,6 +127,7 @@ impl Head for Dome {
             order: "azimuth".into(),
             instrument: "dome".into(),
             acquired_unix_s: None,
+            range_error_m: None,
             simulated: true,
             altered: Vec::new(),
         };

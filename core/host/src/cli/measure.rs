@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use clap::Args;
 use jiff::Timestamp;
-use platen_engine::calibration::{self, Calibration};
+use platen_engine::calibration;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{Catalogue, JobSpec, Surfaces};
+use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, PreviousPose};
 use platen_plant::PlateFile;
 use platen_report::output_folder;
@@ -62,7 +63,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let calibration = plant.calibration.as_ref().and_then(|wanted| {
         // A file has no record of the scanner's warm-up: it counts as warm.
         let calibration = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
-        calibration.map_err(|why| tracing::warn!("{why}; only noise is in the uncertainties")).ok()
+        calibration.map_err(|why| tracing::warn!("{why}")).ok()
     });
     let mut rig = Pipeline::of(&plant, &catalogue)?;
     // In the order in which they were taken: the corner (0, 0) is carried from one to the next.
@@ -86,13 +87,18 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let surfaces =
         Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
     let start = Instant::now();
-    let task = Calibration::task(calibration.as_ref(), &plate, false);
+    let surface = &now.measurement.surface;
+    let assumed = || ScannerError::assumed(plant.range_error, scanned.header.range_error_m, surface);
+    let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
+    scanner.log();
+    let task = scanner.task(&plate, false);
     let reports = stroke::compare(&rig, &task, surfaces);
     let compare = start.elapsed();
     let verdict = stroke::verdict(&reports);
     let context = Context {
         plate: &plate,
         task: &task,
+        assumption: scanner.assumption.as_deref(),
         press: rig.press,
         stroke: None,
         verdict,

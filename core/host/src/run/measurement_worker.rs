@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use platen_engine::calibration::{self, Calibration};
 use platen_engine::pipeline::{self, Pipeline};
 use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
+use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
 use platen_history::History;
 use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey};
@@ -362,17 +363,18 @@ impl MeasurementWorker {
         let comparing = Instant::now();
         let calibration = self.calibration().ok().flatten();
         let supports = earlier.last().and_then(|last| last.supports.as_deref());
-        let task = Calibration::task(
-            calibration.as_ref(),
-            &stroke.plate,
-            history_view::supports_changed(supports, &stroke.plate),
-        );
+        let stated = stroke.scanned.header.range_error_m;
+        let assumed = || ScannerError::assumed(self.plant.range_error, stated, surfaces.now);
+        let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
+        scanner.log();
+        let task = scanner.task(&stroke.plate, history_view::supports_changed(supports, &stroke.plate));
         let reports = stroke::compare(&self.pipeline, &task, surfaces);
         let compare = comparing.elapsed();
         let verdict = stroke::verdict(&reports);
         let context = Context {
             plate: &stroke.plate,
             task: &task,
+            assumption: scanner.assumption.as_deref(),
             press: self.pipeline.press,
             stroke: Some(u64::from(stroke.key.stroke)),
             verdict,

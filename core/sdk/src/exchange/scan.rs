@@ -15,7 +15,7 @@ impl Payload for ScanHeader {
         let mut arrays = Arrays::behind::<payload::Scan>();
         let head = payload::Scan {
             struct_size: size_of::<payload::Scan>() as u32,
-            flags: u32::from(self.simulated),
+            flags: u32::from(self.simulated) | (u32::from(self.range_error_m.is_some()) << 1),
             n_rows: self.n_rows,
             n_columns: self.n_columns,
             azimuth_start: self.azimuth_start,
@@ -28,12 +28,17 @@ impl Payload for ScanHeader {
             acquired_unix_s: self.acquired_unix_s.unwrap_or(0.0),
             instrument: arrays.add(self.instrument.as_bytes()),
             notes: arrays.add(notes.as_bytes()),
+            range_error_m: self.range_error_m.unwrap_or(0.0),
         };
         arrays.encode(&head, allocate)
     }
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Scan = payload::read(bytes)?;
+        let range_error_m = (head.flags & 2 != 0).then_some(head.range_error_m);
+        if let Some(error) = range_error_m.filter(|error| !(error.is_finite() && *error >= 0.0)) {
+            return Err(DecodeError::Invalid(format!("range_error_m is {error}, must be at least 0")));
+        }
         Ok(Self {
             n_rows: head.n_rows,
             n_columns: head.n_columns,
@@ -46,6 +51,7 @@ impl Payload for ScanHeader {
             simulated: head.flags & 1 != 0,
             instrument: payload::text(bytes, head.instrument)?,
             acquired_unix_s: (head.acquired_unix_s != 0.0).then_some(head.acquired_unix_s),
+            range_error_m,
             notes: payload::text(bytes, head.notes)?.lines().map(str::to_owned).collect(),
         })
     }
@@ -182,9 +188,22 @@ mod tests {
             simulated: true,
             instrument: "maker model 7".into(),
             acquired_unix_s: Some(1.7e9),
+            range_error_m: Some(0.002),
             notes: vec!["rows reversed".into(), "units: mm".into()],
         };
-        assert_eq!(ScanHeader::decode(header.to_buffer().as_ref()), Ok(header));
+        assert_eq!(ScanHeader::decode(header.to_buffer().as_ref()), Ok(header.clone()));
+        // A driver built before the range error was appended.
+        let mut older = header.to_buffer();
+        older.as_mut()[..4].copy_from_slice(&96_u32.to_le_bytes());
+        older.as_mut()[4] &= !2;
+        let unknown = ScanHeader { range_error_m: None, ..header };
+        assert_eq!(ScanHeader::decode(older.as_ref()), Ok(unknown.clone()));
+        older.as_mut()[..4].copy_from_slice(&88_u32.to_le_bytes());
+        assert!(ScanHeader::decode(older.as_ref()).is_err());
+        let stated = |error| ScanHeader { range_error_m: Some(error), ..unknown.clone() };
+        assert!(
+            [f64::NAN, -1.0].iter().all(|e| ScanHeader::decode(stated(*e).to_buffer().as_ref()).is_err())
+        );
         let column = Column {
             index: 4,
             face: Face::Back,

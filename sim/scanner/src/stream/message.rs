@@ -75,6 +75,9 @@ pub struct ScanLayout {
     pub instrument: String,
     /// Seconds since 1970, when known.
     pub acquired_unix_s: Option<f64>,
+    /// Range error of the data sheet, one standard deviation, metres; absent when not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_error_m: Option<f64>,
     /// True for a simulated scan.
     pub simulated: bool,
     /// Deviations from the requested settings.

@@ -176,6 +176,7 @@ fn begin(lattice: &SimLattice, instrument: &Instrument, values: Values) -> ScanL
         order: order.to_owned(),
         instrument: "platen simulated scanner".to_owned(),
         acquired_unix_s: None,
+        range_error_m: Some(instrument.range_error()),
         simulated: true,
         altered: Vec::new(),
     }

@@ -6,6 +6,7 @@ use clap::Args;
 use platen_engine::calibration::Calibration;
 use platen_engine::pipeline;
 use platen_engine::plugin::Surfaces;
+use platen_engine::scanner_error::ScannerError;
 use platen_history::Stroke;
 use platen_model::units::mm;
 use platen_model::{Report, Verdict};
@@ -48,15 +49,15 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let unknown = || CliError::Failed(format!("{}: no recipe on record", name(&second)));
     let plate = PlateFile::load(&plant.plate_path(second.recipe.ok_or_else(unknown)?))?;
     let surfaces = Surfaces { now: &now, before: Some(&before), baseline: None };
-    let supports =
-        first.document.as_deref().and_then(|document| history_view::read_document(document).supports);
+    let document =
+        |stroke: &Stroke| stroke.document.as_deref().map(history_view::read_document).unwrap_or_default();
+    let (earlier, document) = (document(&first), document(&second));
     // The calibration in force today, whatever the age of the record.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
-    let task = Calibration::task(
-        calibration.as_ref(),
-        &plate,
-        history_view::supports_changed(supports.as_deref(), &plate),
-    );
+    let assumed = || ScannerError::assumed(plant.range_error, document.range_error(), &now);
+    let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
+    scanner.log();
+    let task = scanner.task(&plate, history_view::supports_changed(earlier.supports.as_deref(), &plate));
     let mut reports = Vec::new();
     for name in COMPARISONS {
         progress::phase(&format!("comparing: {name}"));
@@ -83,11 +84,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
         });
         return output::json(&json!({
             "first": first.run_id, "second": second.run_id, "comparisons": comparisons.collect::<Vec<_>>(),
+            "assumption": scanner.assumption,
             "figures": figures, "files": written,
         }));
     }
     output::line(&format!("from {} to {}", name(&first), name(&second)))?;
-    for sentence in reports.iter().flat_map(|report| &report.findings.says) {
+    for sentence in reports.iter().flat_map(|report| &report.findings.says).chain(&scanner.assumption) {
         output::line(&format!("  {sentence}"))?;
     }
     let rows = figures.iter().map(|figure| {

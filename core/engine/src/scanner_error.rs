@@ -1,0 +1,93 @@
+//! Correlated error of the scanner in the uncertainties of the comparisons: that of its calibration, and until there is one
+//! that of the instrument's data sheet.
+//!
+//! A data sheet states the accuracy of a range: an error that neighbouring cells share, which no fit averages out. The plant file
+//! has precedence over the driver; where neither states one, that of common phase scanners is assumed. A range error moves a place
+//! along the beam, thus along the normal by its cosine of incidence. Two scans differ by the errors of both, hence the factor of
+//! sqrt 2, as in a calibration by pairs of scans.
+//!
+//! Limits: one figure for the whole plate, without a wavelength; what is equal in both scans of a pair cancels, and counts here all
+//! the same.
+
+use std::f64::consts::SQRT_2;
+
+use platen_model::Task;
+use platen_model::units::mm;
+use platen_plant::PlateFile;
+use platen_shape::Surface;
+
+use crate::calibration::Calibration;
+
+/// Range error where neither the plant file nor the driver states one, one sigma, metres: the data sheets of phase scanners for
+/// buildings and plants state 1 to 3 mm (FARO Focus3D S120: 2 mm at 10 m and 25 m).
+const UNSTATED: f64 = 2e-3;
+
+/// Places along each side at which the incidence is taken.
+const PLACES: usize = 21;
+
+/// Correlated and systematic errors of a scanner at one plate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScannerError {
+    /// Correlated error of a position between two scans, one sigma, metres.
+    correlated: f64,
+    /// Systematic error of a gap, one sigma, metres; known only from an artefact.
+    systematic: Option<f64>,
+    /// Sentence that names the assumed range error; `None` with a calibration.
+    pub assumption: Option<String>,
+}
+
+impl ScannerError {
+    /// Returns the errors of a calibration.
+    pub fn calibrated(calibration: &Calibration) -> Self {
+        Self {
+            correlated: calibration.sigma_correlated,
+            systematic: calibration.sigma_true,
+            assumption: None,
+        }
+    }
+
+    /// Returns the errors of a scanner that nobody calibrated, at this plate: the range error of the plant file, else of the
+    /// driver (metres, one sigma), else the stand-in.
+    pub fn assumed(of_plant: Option<f64>, of_driver: Option<f64>, surface: &Surface) -> Self {
+        let (error, source) = match (of_plant, of_driver) {
+            (Some(error), _) => (error, "as the plant file states it"),
+            (None, Some(error)) => (error, "as its driver states it"),
+            (None, None) => {
+                (UNSTATED, "as neither its driver nor range_error_mm of the plant file states one")
+            }
+        };
+        let assumption = format!(
+            "the scanner is not calibrated: a range error of {:.2} mm (one sigma) is assumed, {source}",
+            mm(error)
+        );
+        let correlated = SQRT_2 * error * rms_cosine(surface);
+        Self { correlated, systematic: None, assumption: Some(assumption) }
+    }
+
+    /// Logs the assumption, if there is one: a warning, unless the scanner is said to have no such error.
+    pub fn log(&self) {
+        match &self.assumption {
+            Some(assumption) if self.correlated > 0.0 => tracing::warn!("{assumption}; run platen calibrate"),
+            Some(assumption) => tracing::info!("{assumption}"),
+            None => {}
+        }
+    }
+
+    /// Returns the task of the comparisons for a plate.
+    pub fn task(&self, plate: &PlateFile, supports_changed: bool) -> Task {
+        plate.task(self.correlated, self.systematic, supports_changed)
+    }
+}
+
+/// Returns the root mean square of the cosine of incidence over the places that were seen; 1 where none was.
+fn rms_cosine(surface: &Surface) -> f64 {
+    let along = |k: usize, length: f64| length * k as f64 / (PLACES - 1) as f64;
+    let places = (0..PLACES * PLACES)
+        .map(|k| [along(k % PLACES, surface.width()), along(k / PLACES, surface.height())])
+        .filter(|[u, v]| surface.mask().seen(*u, *v));
+    let squares: Vec<f64> = places
+        .map(|[u, v]| surface.face(u, v).normalize().dot(&surface.normal(u, v)).powi(2))
+        .filter(|square| square.is_finite())
+        .collect();
+    if squares.is_empty() { 1.0 } else { (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() }
+}
