@@ -6,15 +6,18 @@
 //! written as the origin. The pose is reported and not applied: the lattice stays in the scanner's frame. Cells are
 //! placed by their indices, never by their order.
 
+mod compressed_vector;
+
 use std::io::{Read, Seek, SeekFrom};
 
-use e57::{E57Reader, IndexBounds, PointCloud, RawValues, Record, RecordDataType, RecordName};
+use e57::{E57Reader, IndexBounds, PointCloud, Record, RecordDataType, RecordName};
 use platen_scan::{Direction, State};
 
 use super::error::{ReadError, Result};
 use super::{About, Cells, Source};
 use crate::header_text;
 use crate::orient::RawCell;
+use compressed_vector::{CompressedVector, Points};
 
 const FORMAT: &str = "E57";
 const PAGE: u64 = 1024;
@@ -24,7 +27,7 @@ pub(crate) const GPS_EPOCH_UNIX_S: f64 = 315_964_800.0 - 18.0;
 
 /// One scan of an E57 file.
 pub(crate) struct E57<R: Read + Seek> {
-    reader: E57Reader<R>,
+    file: R,
     cloud: PointCloud,
     fields: Fields,
     about: About,
@@ -35,8 +38,8 @@ impl<R: Read + Seek> E57<R> {
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length_note = check_length(&mut file)?;
         check_pages(&mut file)?;
-        let reader = E57Reader::new(file).map_err(|e| unsound(chain(&e)))?;
-        let cloud = choose(reader.pointclouds(), chosen)?;
+        let clouds = E57Reader::new(&mut file).map_err(|e| unsound(chain(&e)))?.pointclouds();
+        let cloud = choose(clouds, chosen)?;
         check_prototype(&cloud.prototype)?;
         let fields = Fields::find(&cloud)?;
         let mut about = About { format: fields.format(), ..describe(&cloud) };
@@ -44,7 +47,7 @@ impl<R: Read + Seek> E57<R> {
         if fields.return_index.is_some() {
             about.notes.push("several echoes per beam: the first of each is used".to_owned());
         }
-        Ok(Self { reader, cloud, fields, about })
+        Ok(Self { file, cloud, fields, about })
     }
 }
 
@@ -54,11 +57,25 @@ impl<R: Read + Seek> Source for E57<R> {
     }
 
     fn cells(&mut self) -> Result<Cells<'_>> {
-        let points = self.reader.pointcloud_raw(&self.cloud).map_err(|e| unsound(chain(&e)))?;
         let fields = &self.fields;
-        Ok(Box::new(points.enumerate().filter_map(move |(number, values)| {
-            let cell = values.map_err(|e| chain(&e)).and_then(|values| fields.cell(&values));
-            cell.map_err(|what| unsound(format!("point {number}: {what}"))).transpose()
+        let PointCloud { file_offset, prototype, records, .. } = &self.cloud;
+        let wanted = |index| fields.has(index);
+        let mut points = CompressedVector::open(&mut self.file, *file_offset, prototype, *records, wanted)
+            .map_err(unsound)?;
+        let mut number = 0_u64;
+        Ok(Box::new(std::iter::from_fn(move || {
+            loop {
+                let cell = match points.next() {
+                    Ok(None) => return None,
+                    Ok(Some(point)) => fields.cell(point),
+                    Err(what) => Err(what),
+                };
+                number += 1;
+                let wrong = |what| unsound(format!("point {}: {what}", number - 1));
+                if let Some(cell) = cell.map_err(wrong).transpose() {
+                    return Some(cell);
+                }
+            }
         })))
     }
 }
@@ -273,17 +290,23 @@ impl Fields {
         format!("{FORMAT}: {coordinates} coordinates, {numbers}, {gaps}")
     }
 
+    /// Returns true when the field at an index of the prototype is one of them.
+    fn has(&self, index: usize) -> bool {
+        let more = [&self.state, &self.intensity, &self.return_index].into_iter().flatten();
+        self.position.iter().chain([&self.row, &self.column]).chain(more).any(|field| field.index == index)
+    }
+
     /// Returns the cell of a point, `None` for the second and later echoes of a beam.
-    fn cell(&self, values: &RawValues) -> std::result::Result<Option<RawCell>, String> {
-        let whole = |field: &Field| values[field.index].to_i64(&field.data_type).map_err(|e| chain(&e));
-        let number = |field: &Field| values[field.index].to_f64(&field.data_type).map_err(|e| chain(&e));
+    fn cell(&self, point: &Points) -> std::result::Result<Option<RawCell>, String> {
+        let whole = |field: &Field| point.whole(field.index);
+        let number = |field: &Field| point.number(field.index);
         if let Some(field) = &self.return_index
-            && whole(field)? > 0
+            && whole(field) > 0
         {
             return Ok(None);
         }
         let index = |field: &Field, name: &str, (min, max): (i64, i64)| {
-            let value = whole(field)?;
+            let value = whole(field);
             u32::try_from(value)
                 .ok()
                 .filter(|_| (min..=max).contains(&value))
@@ -291,16 +314,16 @@ impl Fields {
         };
         let row = index(&self.row, "row", self.bounds[0])?;
         let column = index(&self.column, "column", self.bounds[1])?;
-        let state = match self.state.as_ref().map(whole).transpose()? {
+        let state = match self.state.as_ref().map(whole) {
             None | Some(0) => State::Valid,
             Some(1) => State::DirectionOnly,
             Some(2) => State::NoReturn,
             Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
         };
-        let [a, b, c] = [number(&self.position[0])?, number(&self.position[1])?, number(&self.position[2])?];
+        let [a, b, c] = self.position.each_ref().map(number);
         let beam = self.spherical.then(|| beam(a, b, c, state));
         let xyz = beam.map_or([a, b, c], |(range, direction)| direction.unit().map(|c| c * range));
-        let intensity = self.intensity.as_ref().map_or(Ok(0.0), number)?;
+        let intensity = self.intensity.as_ref().map_or(0.0, number);
         Ok(Some(RawCell { row, column, xyz, beam, intensity, state }))
     }
 }
@@ -322,32 +345,33 @@ fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> (f64, Directi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use e57::RecordValue;
 
     /// PDAL writes states as floats, others as the widest integers there are.
     #[test]
     fn states_of_any_type_are_read() {
-        let field = |index, data_type: &RecordDataType| Field { index, data_type: data_type.clone() };
         let double = RecordDataType::Double { min: None, max: None };
         let integer = RecordDataType::Integer { min: i64::MIN, max: i64::MAX };
         let single = RecordDataType::Single { min: None, max: None };
-        let integer_state: fn(i64) -> RecordValue = RecordValue::Integer;
-        let single_state: fn(i64) -> RecordValue = |n| RecordValue::Single(n as f32);
-        for (data_type, state) in [(&integer, integer_state), (&single, single_state)] {
+        let widest: fn(i64) -> Vec<u8> = |n| n.wrapping_sub(i64::MIN).to_le_bytes().to_vec();
+        let float: fn(i64) -> Vec<u8> = |n| (n as f32).to_le_bytes().to_vec();
+        for (data_type, bytes) in [(&integer, widest), (&single, float)] {
+            let types = [&double, &double, &double, data_type, &integer];
+            let field = |index: usize| Field { index, data_type: types[index].clone() };
             let fields = Fields {
-                position: [0, 1, 2].map(|k| field(k, &double)),
+                position: [0, 1, 2].map(field),
                 spherical: false,
-                state: Some(field(3, data_type)),
-                row: field(4, &integer),
-                column: field(4, &integer),
+                state: Some(field(3)),
+                row: field(4),
+                column: field(4),
                 bounds: bounds(None),
                 intensity: None,
                 return_index: None,
             };
             let read = |number| {
-                let mut values: RawValues = vec![RecordValue::Double(1.0); 3];
-                values.extend([state(number), RecordValue::Integer(5)]);
-                fields.cell(&values).map(|cell| cell.map(|cell| cell.state))
+                let mut streams = vec![1.0_f64.to_le_bytes().to_vec(); 3];
+                streams.extend([bytes(number), widest(5)]);
+                let points = Points::of(&types, &streams);
+                fields.cell(&points).map(|cell| cell.map(|cell| cell.state))
             };
             assert_eq!(read(0), Ok(Some(State::Valid)));
             assert_eq!(read(1), Ok(Some(State::DirectionOnly)));

@@ -1,0 +1,361 @@
+//! Binary section of a point cloud (ASTM E2807, CompressedVector): packets of bytestreams, one per field of the prototype.
+//!
+//! Whole packets are unpacked field by field into arrays of raw bits; a value is converted where it is used. The `e57` crate, which
+//! reads the rest of the file, makes an enum of every value and a vector of every point, at five times the processor time
+//! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not looked at: they were checked when the file was opened.
+
+use std::io::{Read, Seek, SeekFrom};
+
+use e57::{Record, RecordDataType};
+
+use super::PAGE;
+
+/// Bytes of a page that are content; the rest is its checksum.
+const CONTENT: usize = PAGE as usize - 4;
+
+/// Pages read at once.
+const PAGES: usize = 64;
+
+/// Bytes of the section's header.
+const HEADER: usize = 32;
+
+/// Kinds of packets.
+const INDEX: u8 = 0;
+const DATA: u8 = 1;
+const IGNORED: u8 = 2;
+
+/// Points of one section, one after the other.
+#[derive(Debug)]
+pub(super) struct CompressedVector<R> {
+    pages: Pages<R>,
+    points: Points,
+    /// Points that have not been read yet.
+    left: u64,
+    packet: Vec<u8>,
+}
+
+impl<R: Read + Seek> CompressedVector<R> {
+    /// Opens the section at a physical offset of the file. Of the fields only those that `wanted` names are unpacked.
+    ///
+    /// # Errors
+    /// The sentence for a section that cannot be read, or is none.
+    pub(super) fn open(
+        file: R,
+        offset: u64,
+        prototype: &[Record],
+        records: u64,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Self, String> {
+        let mut pages = Pages { file, content: Vec::new(), at: 0 };
+        pages.seek(offset)?;
+        let mut header = [0; HEADER];
+        pages.read(&mut header)?;
+        if header[0] != 1 {
+            return Err("its points do not begin with a header".to_owned());
+        }
+        pages.seek(header[16..24].iter().rev().fold(0, |offset, byte| offset << 8 | u64::from(*byte)))?;
+        let stream = |(k, record): (usize, &Record)| Stream::new(&record.data_type, wanted(k));
+        let points = Points { streams: prototype.iter().enumerate().map(stream).collect(), at: 0, ready: 0 };
+        Ok(Self { pages, points, left: records, packet: Vec::new() })
+    }
+
+    /// Returns the next point, `None` behind the last.
+    ///
+    /// # Errors
+    /// The sentence for a packet that cannot be read.
+    #[inline]
+    pub(super) fn next(&mut self) -> Result<Option<&Points>, String> {
+        if self.left == 0 {
+            return Ok(None);
+        }
+        self.points.at += 1;
+        while self.points.at >= self.points.ready {
+            self.next_packet()?;
+        }
+        self.left -= 1;
+        Ok(Some(&self.points))
+    }
+
+    fn next_packet(&mut self) -> Result<(), String> {
+        let mut head = [0; 4];
+        self.pages.read(&mut head)?;
+        let [kind, _, low, high] = head;
+        let length = usize::from(u16::from_le_bytes([low, high])) + 1;
+        if !matches!(kind, INDEX | DATA | IGNORED) || !length.is_multiple_of(4) {
+            return Err(format!("a packet of kind {kind} and {length} bytes"));
+        }
+        self.packet.resize(length - head.len(), 0);
+        self.pages.read(&mut self.packet)?;
+        if kind == DATA { self.points.unpack(&self.packet) } else { Ok(()) }
+    }
+}
+
+/// Unpacked points.
+#[derive(Debug)]
+pub(super) struct Points {
+    streams: Vec<Stream>,
+    /// The present point, and the number of those unpacked.
+    at: usize,
+    ready: usize,
+}
+
+impl Points {
+    /// Returns a field of the present point as a number.
+    #[inline]
+    pub(super) fn number(&self, field: usize) -> f64 {
+        let stream = &self.streams[field];
+        stream.encoding.number(stream.raw(self.at))
+    }
+
+    /// Returns a field of the present point as a whole number; PDAL writes states as floats.
+    #[inline]
+    pub(super) fn whole(&self, field: usize) -> i64 {
+        let stream = &self.streams[field];
+        stream.encoding.whole(stream.raw(self.at))
+    }
+
+    /// One packet of bytestreams of these types.
+    #[cfg(test)]
+    pub(super) fn of(types: &[&RecordDataType], bytestreams: &[Vec<u8>]) -> Self {
+        let streams = types.iter().map(|data_type| Stream::new(data_type, true)).collect();
+        let mut points = Self { streams, at: 0, ready: 0 };
+        let mut packet = (types.len() as u16).to_le_bytes().to_vec();
+        packet.extend(bytestreams.iter().flat_map(|bytes| (bytes.len() as u16).to_le_bytes()));
+        packet.extend(bytestreams.iter().flatten());
+        points.unpack(&packet).unwrap();
+        points
+    }
+
+    /// Unpacks the points that are complete with a data packet, given from behind its first four bytes.
+    fn unpack(&mut self, packet: &[u8]) -> Result<(), String> {
+        let n = self.streams.len();
+        let broken = || "a packet is shorter than its bytestreams".to_owned();
+        let u16_at = |k: usize| Some(usize::from(u16::from_le_bytes([*packet.get(k)?, *packet.get(k + 1)?])));
+        let count = u16_at(0).ok_or_else(broken)?;
+        if count != n {
+            return Err(format!("a packet of {count} bytestreams, {n} fields are declared"));
+        }
+        let mut from = 2 + 2 * n;
+        for (k, stream) in self.streams.iter_mut().enumerate() {
+            let to = from + u16_at(2 + 2 * k).ok_or_else(broken)?;
+            stream.append(packet.get(from..to).ok_or_else(broken)?);
+            from = to;
+        }
+        self.ready = self.streams.iter().filter_map(Stream::complete).min().unwrap_or(0);
+        self.at = 0;
+        for stream in &mut self.streams {
+            stream.unpack(self.ready);
+        }
+        Ok(())
+    }
+}
+
+/// Values of one field, of one packet and what the packet before left of an incomplete value.
+#[derive(Debug)]
+struct Stream {
+    encoding: Encoding,
+    /// Bits of a value, up to 64; 0 where all are equal.
+    width: usize,
+    wanted: bool,
+    bytes: Vec<u8>,
+    /// First bit not unpacked yet.
+    bit: usize,
+    values: Vec<u64>,
+}
+
+impl Stream {
+    fn new(data_type: &RecordDataType, wanted: bool) -> Self {
+        let (encoding, width) = Encoding::new(data_type);
+        Self { encoding, width, wanted, bytes: Vec::new(), bit: 0, values: Vec::new() }
+    }
+
+    fn append(&mut self, more: &[u8]) {
+        self.bytes.drain(..self.bit / 8);
+        self.bit %= 8;
+        self.bytes.extend_from_slice(more);
+    }
+
+    /// Returns the number of complete values; `None` where values take no bits.
+    fn complete(&self) -> Option<usize> {
+        (8 * self.bytes.len() - self.bit).checked_div(self.width)
+    }
+
+    fn unpack(&mut self, n: usize) {
+        let (start, width) = (self.bit, self.width);
+        self.bit += n * width;
+        self.values.clear();
+        if !self.wanted || width == 0 {
+            return;
+        }
+        let mask = u64::MAX >> (64 - width);
+        // A value of up to 64 bits lies in nine bytes.
+        let at = |bit: usize, bytes: &[u8]| {
+            let mut nine = [0; 16];
+            let from = &bytes[bit / 8..];
+            let held = from.len().min(9);
+            nine[..held].copy_from_slice(&from[..held]);
+            (u128::from_le_bytes(nine) >> (bit % 8)) as u64 & mask
+        };
+        // All but the last few are read eight bytes at a time.
+        let fast = if width <= 56 { (8 * self.bytes.len()).saturating_sub(start + 64) / width } else { 0 };
+        let bytes = &self.bytes;
+        self.values.extend((0..n.min(fast)).map(|k| {
+            let bit = start + k * width;
+            let eight = bytes[bit / 8..].first_chunk().map_or(0, |eight| u64::from_le_bytes(*eight));
+            eight >> (bit % 8) & mask
+        }));
+        self.values.extend((n.min(fast)..n).map(|k| at(start + k * width, bytes)));
+    }
+
+    #[inline]
+    fn raw(&self, at: usize) -> u64 {
+        self.values.get(at).copied().unwrap_or(0)
+    }
+}
+
+/// Encoding of a field.
+#[derive(Debug, Clone, Copy)]
+enum Encoding {
+    Single,
+    Double,
+    /// Whole numbers from `min` on.
+    Integer {
+        min: i64,
+    },
+    /// The same times `scale`, from `offset` on.
+    Scaled {
+        min: i64,
+        scale: f64,
+        offset: f64,
+    },
+}
+
+impl Encoding {
+    /// Returns the encoding and the bits of a value.
+    fn new(data_type: &RecordDataType) -> (Self, usize) {
+        let bits = |min: i64, max: i64| {
+            let range = i128::from(max) - i128::from(min);
+            if range > 0 { range.ilog2() as usize + 1 } else { 0 }
+        };
+        match *data_type {
+            RecordDataType::Single { .. } => (Self::Single, 32),
+            RecordDataType::Double { .. } => (Self::Double, 64),
+            RecordDataType::Integer { min, max } => (Self::Integer { min }, bits(min, max)),
+            RecordDataType::ScaledInteger { min, max, scale, offset } => {
+                (Self::Scaled { min, scale, offset }, bits(min, max))
+            }
+        }
+    }
+
+    #[inline]
+    fn number(self, raw: u64) -> f64 {
+        match self {
+            Self::Single => f64::from(f32::from_bits(raw as u32)),
+            Self::Double => f64::from_bits(raw),
+            Self::Integer { min } => min.wrapping_add_unsigned(raw) as f64,
+            Self::Scaled { min, scale, offset } => min.wrapping_add_unsigned(raw) as f64 * scale + offset,
+        }
+    }
+
+    #[inline]
+    fn whole(self, raw: u64) -> i64 {
+        match self {
+            Self::Integer { min } => min.wrapping_add_unsigned(raw),
+            _ => self.number(raw) as i64,
+        }
+    }
+}
+
+/// Content of the file's pages.
+#[derive(Debug)]
+struct Pages<R> {
+    file: R,
+    content: Vec<u8>,
+    at: usize,
+}
+
+impl<R: Read + Seek> Pages<R> {
+    /// Goes to a physical offset.
+    fn seek(&mut self, offset: u64) -> Result<(), String> {
+        self.file.seek(SeekFrom::Start(offset / PAGE * PAGE)).map_err(|e| e.to_string())?;
+        self.content.clear();
+        self.at = (offset % PAGE) as usize;
+        if self.at >= CONTENT { Err(format!("offset {offset} is that of a checksum")) } else { Ok(()) }
+    }
+
+    fn read(&mut self, out: &mut [u8]) -> Result<(), String> {
+        let mut filled = 0;
+        while filled < out.len() {
+            if self.at >= self.content.len() {
+                self.refill()?;
+            }
+            let from = &self.content[self.at..];
+            let n = from.len().min(out.len() - filled);
+            out[filled..filled + n].copy_from_slice(&from[..n]);
+            (filled, self.at) = (filled + n, self.at + n);
+        }
+        Ok(())
+    }
+
+    /// Reads more pages; keeps the place within them.
+    fn refill(&mut self) -> Result<(), String> {
+        self.at -= self.content.len();
+        let mut pages = Vec::with_capacity(PAGES * PAGE as usize);
+        let read = self.file.by_ref().take(PAGES as u64 * PAGE).read_to_end(&mut pages);
+        read.map_err(|e| e.to_string())?;
+        self.content.clear();
+        for page in pages.chunks_exact(PAGE as usize) {
+            self.content.extend_from_slice(&page[..CONTENT]);
+        }
+        if self.content.is_empty() { Err("the file ends before its points".to_owned()) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use e57::RecordDataType as Type;
+
+    /// One value after the other, bit by bit.
+    fn packed(values: &[u64], width: usize) -> Vec<u8> {
+        let mut bytes = vec![0; (values.len() * width).div_ceil(8)];
+        for (k, value) in values.iter().enumerate() {
+            for bit in (0..width).filter(|bit| value >> bit & 1 == 1) {
+                let at = k * width + bit;
+                bytes[at / 8] |= 1 << (at % 8);
+            }
+        }
+        bytes
+    }
+
+    #[test]
+    fn values_of_every_width_are_unpacked_however_packets_cut_them() {
+        let mut random = fastrand::Rng::with_seed(1);
+        for width in 1..=64 {
+            let max =
+                if width == 64 { i64::MAX } else { i64::MIN.wrapping_add_unsigned(u64::MAX >> (64 - width)) };
+            let values: Vec<u64> = (0..300).map(|_| random.u64(..) & u64::MAX >> (64 - width)).collect();
+            let mut stream = Stream::new(&Type::Integer { min: i64::MIN, max }, true);
+            assert_eq!(stream.width, width);
+            let (bytes, mut unpacked) = (packed(&values, width), Vec::new());
+            let mut from = 0;
+            while from < bytes.len() {
+                let to = (from + random.usize(1..100)).min(bytes.len());
+                stream.append(&bytes[from..to]);
+                stream.unpack(stream.complete().unwrap());
+                unpacked.append(&mut stream.values);
+                from = to;
+            }
+            assert_eq!(unpacked[..values.len()], values, "{width} bits");
+        }
+    }
+
+    #[test]
+    fn values_are_those_of_their_types() {
+        let scaled = Encoding::Scaled { min: -3, scale: 0.5, offset: 10.0 };
+        assert_eq!((scaled.number(1), scaled.whole(1)), (9.0, 9));
+        assert_eq!(Encoding::Integer { min: -3 }.whole(1), -2);
+        assert_eq!(Encoding::Single.whole(u64::from(2.0_f32.to_bits())), 2);
+        assert_eq!(Encoding::Double.number((-0.1_f64).to_bits()), -0.1);
+    }
+}
