@@ -1,12 +1,16 @@
 //! Mixed pixels by second differences of the inverse range: beams that straddle an edge return a range between that of the
 //! plate and that of what lies behind it. Own; Masuda et al. do not treat them.
 
+use super::background_strip;
 use super::range_noise::Noise;
 use super::window::Window;
 
 /// Bound of a second difference, in its standard deviations. A sound cell is lost with a probability of 6e-7 in one
 /// difference, and is only lost when none of those that explain it holds.
 const BOUND: f32 = 5.0;
+
+/// The same in parts of the jump between the surfaces on both sides: what is farther away is often noisier than the plate.
+const LEAST_SHARE: f32 = 0.005;
 
 /// Class of a cell by its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +47,7 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
             }
         }
     }
+    background_strip::mark_sound(window, noise, &mut pixels);
     pixels
 }
 
@@ -62,6 +67,10 @@ fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
     if (before && small(0)) || (known[1] && known[3] && small(1)) || (behind && small(2)) {
         Pixel::Sound
     } else if before && behind {
+        let off = |i: usize| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs();
+        if off(0).min(off(2)) < LEAST_SHARE * (off(0) + off(2)) {
+            return Pixel::Sound;
+        }
         Pixel::Mixed
     } else {
         Pixel::Unknown

@@ -86,6 +86,37 @@ impl Window {
         window
     }
 
+    /// Builds a window of given ranges, 0 where there is none, and whether each cell is part of the component, by column and row.
+    #[cfg(test)]
+    pub(super) fn of_ranges(header: ScanHeader, range: impl Fn(usize, usize) -> (f32, bool)) -> Self {
+        let (n_columns, n_rows) = (header.n_columns as usize, header.n_rows as usize);
+        let ranges: Vec<(f32, bool)> =
+            (0..n_columns * n_rows).map(|index| range(index / n_rows, index % n_rows)).collect();
+        let angle =
+            |start: f64, step: f64, n| (0..n).map(|i| AngleSinCos::of(start + step * i as f64)).collect();
+        Self {
+            first_column: 0,
+            first_row: 0,
+            n_columns,
+            n_rows,
+            cells: ranges
+                .iter()
+                .map(|(range_m, _)| Cell { range_m: *range_m, valid: *range_m > 0.0, ..Cell::default() })
+                .collect(),
+            inverse: ranges
+                .iter()
+                .map(|(range_m, _)| if *range_m > 0.0 { 1.0 / range_m } else { 0.0 })
+                .collect(),
+            points: vec![[0.0; 3]; ranges.len()],
+            own: ranges.iter().map(|(_, own)| *own).collect(),
+            spans: vec![0..n_rows; n_columns],
+            azimuths: angle(header.azimuth_start, header.azimuth_step, n_columns),
+            elevations: angle(header.elevation_start, -header.elevation_step, n_rows),
+            per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
+            header,
+        }
+    }
+
     /// Invalidates the first columns of each face of the scan.
     pub(super) fn leave_out(&mut self, columns: u32) {
         for start in [Some(0), self.header.seam_column].into_iter().flatten() {
