@@ -50,6 +50,8 @@ pub(super) struct FacePiece {
     pub(super) label: u32,
     pub(super) area: f64,
     pub(super) n_cells: usize,
+    /// Share of its ends on rows and columns beside which something is nearer, or nothing was measured.
+    pub(super) hidden: f64,
     /// Points on it for its extent: about one in 256 cells.
     pub(super) outline: Vec<Vec3>,
     rows: Ends,
@@ -77,7 +79,10 @@ impl FacePiece {
             .into_iter()
             .flat_map(|lines| lines.ends.iter().step_by(4).flatten().flat_map(|[a, b]| [a.point, b.point]));
         let outline = outline.collect();
-        Self { surface, label: face.label, area: face.area, n_cells: face.n_cells, outline, rows, columns }
+        let ends = || [&rows, &columns].into_iter().flat_map(|lines| lines.ends.iter().flatten().flatten());
+        let hidden = ends().filter(|end| end.hidden).count() as f64 / ends().count().max(1) as f64;
+        let (label, area, n_cells) = (face.label, face.area, face.n_cells);
+        Self { surface, label, area, n_cells, hidden, outline, rows, columns }
     }
 
     /// Returns true when `other` continues this piece behind something nearer.

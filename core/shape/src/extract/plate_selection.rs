@@ -19,6 +19,18 @@ const WIDEST_SPACING: f64 = 0.025;
 /// A face from this part of W x H on is reported as one of another size.
 const NOTABLE: f64 = 0.15;
 
+/// Where several faces fit: the plate's own differs in area from W x H by less than this, as a logarithm (the rim of a face is lost over
+/// some cells), and one of another size differs from it by more than that.
+const OWN_AREA: f64 = 0.1;
+const OTHER_AREA: f64 = 0.08;
+
+/// A face with fewer of its ends hidden is seen whole.
+const WHOLE: f64 = 0.05;
+
+/// A face lies behind the plate when that hides this part of its rectangle, and of what is missing in it: what stands on a table hides more.
+const BEHIND: f64 = 0.1;
+const BEHIND_OF_MISSING: f64 = 0.5;
+
 /// Pieces that form one face.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
@@ -27,9 +39,10 @@ pub(super) struct Candidate {
     area: f64,
     /// Side of the square of the face that a cell stands for, metres.
     spacing: f64,
+    /// Largest share of hidden ends of its pieces.
+    hidden: f64,
     centre: Vec3,
-    /// Longer and shorter side of the smallest rectangle around it, metres.
-    sides: [f64; 2],
+    rectangle: Rectangle,
 }
 
 impl Candidate {
@@ -39,14 +52,24 @@ impl Candidate {
         let area = members.iter().map(|&i| pieces[i].area).sum::<f64>();
         let n_cells: usize = members.iter().map(|&i| pieces[i].n_cells).sum();
         let spacing = (area / n_cells.max(1) as f64).sqrt();
-        Self { pieces: members, area, spacing, centre, sides: smallest_rectangle(&points, centre) }
+        let hidden = members.iter().map(|&i| pieces[i].hidden).fold(0.0, f64::max);
+        Self { pieces: members, area, spacing, hidden, centre, rectangle: Rectangle::around(&points, centre) }
     }
 
     /// Returns true when area and sides are those of the plate.
     pub(super) fn fits(&self, spec: &PlateSpec) -> bool {
         let expected = sides(spec);
         AREA.contains(&(self.area / (spec.width * spec.height)))
-            && (0..2).all(|k| SIDE.contains(&(self.sides[k] / expected[k])))
+            && (0..2).all(|k| SIDE.contains(&(self.rectangle.sides[k] / expected[k])))
+    }
+
+    /// Returns true when this face, next to the plate's, is not the plate: it is seen whole and has another size, or it lies behind the
+    /// plate, as a table does, which hides the rest of it.
+    fn is_another_than(&self, plate: &Self) -> bool {
+        let has_other_size = (self.area / plate.area).ln().abs() > OTHER_AREA;
+        let missing = 1.0 - self.area / (self.rectangle.sides[0] * self.rectangle.sides[1]);
+        let behind = self.rectangle.share_behind(&plate.rectangle);
+        has_other_size && (self.hidden < WHOLE || behind > BEHIND.max(BEHIND_OF_MISSING * missing))
     }
 }
 
@@ -69,7 +92,7 @@ pub(super) fn candidates(pieces: &[FacePiece]) -> Vec<Candidate> {
     (0..pieces.len()).map(members).filter(|m| !m.is_empty()).map(|m| Candidate::of(pieces, m)).collect()
 }
 
-/// Selects the one candidate that fits the plate. `step` is the angle between beams, radians.
+/// Selects the one candidate that fits the plate, or the one of its size where the others can be told from it. `step` is the angle between beams, radians.
 ///
 /// # Errors
 /// [`Refusal`] when none or several do, or its samples lie too far apart.
@@ -83,6 +106,12 @@ pub(super) fn select<'a>(
         [one] => check_spacing(one.spacing, step).map(|()| *one),
         [] => Err(why_none(candidates, spec, step)),
         [first, second, ..] => {
+            let off = |c: &Candidate| (c.area / (spec.width * spec.height)).ln().abs();
+            let nearest = fitting.iter().copied().fold(*first, |a, b| if off(b) < off(a) { b } else { a });
+            let is_only = |c: &&Candidate| std::ptr::eq(*c, nearest) || c.is_another_than(nearest);
+            if off(nearest) < OWN_AREA && fitting.iter().all(is_only) {
+                return check_spacing(nearest.spacing, step).map(|()| nearest);
+            }
             Err(Refusal::SeveralPlates { count: fitting.len(), first: first.centre, second: second.centre })
         }
     }
@@ -110,7 +139,7 @@ fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
             Err(too_coarse) => too_coarse,
             Ok(()) => Refusal::WrongSize {
                 at: face.centre,
-                found_mm: face.sides.map(|s| s * 1000.0),
+                found_mm: face.rectangle.sides.map(|s| s * 1000.0),
                 expected_mm: sides(spec).map(|s| s * 1000.0),
             },
         },
@@ -122,29 +151,105 @@ fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
     }
 }
 
-/// Returns the sides, longer first, of the smallest rectangle around points in their principal plane.
-fn smallest_rectangle(points: &[Vec3], centre: Vec3) -> [f64; 2] {
-    let covariance =
-        points.iter().map(|p| (p - centre) * (p - centre).transpose()).sum::<nalgebra::Matrix3<f64>>();
-    let eigen = covariance.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let axis = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
-    let (e1, e2) = (axis(0), axis(1));
-    let plane: Vec<(f64, f64)> =
-        points.iter().map(|p| ((p - centre).dot(&e1), (p - centre).dot(&e2))).collect();
-    let extent = |angle: f64| {
-        let (sin, cos) = angle.sin_cos();
-        let along = |f: &dyn Fn(&(f64, f64)) -> f64| {
-            let (low, high) =
-                plane.iter().map(f).fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-            high - low
+/// The smallest rectangle around points in their principal plane.
+#[derive(Debug, Clone, Copy)]
+struct Rectangle {
+    /// Its middle, and unit vectors along its sides.
+    middle: Vec3,
+    along: [Vec3; 2],
+    /// Longer and shorter side, metres.
+    sides: [f64; 2],
+}
+
+impl Rectangle {
+    fn around(points: &[Vec3], centre: Vec3) -> Self {
+        let covariance =
+            points.iter().map(|p| (p - centre) * (p - centre).transpose()).sum::<nalgebra::Matrix3<f64>>();
+        let eigen = covariance.symmetric_eigen();
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let [e1, e2] = [0, 1].map(|k| eigen.eigenvectors.column(order[k]).into_owned());
+        let turned = |degrees: i32| {
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            let along = [e1 * cos + e2 * sin, e2 * cos - e1 * sin];
+            let spans = along.map(|axis| {
+                let places = points.iter().map(|p| (p - centre).dot(&axis));
+                places.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)))
+            });
+            let middle = centre + (0..2).map(|k| along[k] * (0.5 * (spans[k].0 + spans[k].1))).sum::<Vec3>();
+            let [a, b] = spans.map(|(low, high)| (high - low).max(0.0));
+            if a < b {
+                Self { middle, along: [along[1], along[0]], sides: [b, a] }
+            } else {
+                Self { middle, along, sides: [a, b] }
+            }
         };
-        let a = along(&|p| p.0 * cos + p.1 * sin);
-        let b = along(&|p| p.1 * cos - p.0 * sin);
-        [a.max(b), a.min(b)]
-    };
-    // One degree is enough: the sides are compared with a tolerance of several parts in a hundred.
-    let turns = (0..90).map(|degrees| extent(f64::from(degrees).to_radians()));
-    turns.min_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1]))).unwrap_or([0.0; 2])
+        // One degree is enough: the sides are compared with a tolerance of several parts in a hundred.
+        let area = |r: &Self| r.sides[0] * r.sides[1];
+        (1..90).map(turned).fold(turned(0), |best, next| if area(&next) < area(&best) { next } else { best })
+    }
+
+    /// Returns the part of this rectangle that `front` hides from the scanner.
+    fn share_behind(&self, front: &Self) -> f64 {
+        const PARTS: usize = 16;
+        let place =
+            |i: usize, k: usize| self.along[k] * (self.sides[k] * ((i as f64 + 0.5) / PARTS as f64 - 0.5));
+        let hidden = |point: &Vec3| {
+            let normal = front.along[0].cross(&front.along[1]);
+            let part = normal.dot(&front.middle) / normal.dot(point);
+            let off = point * part - front.middle;
+            (0.0..1.0).contains(&part)
+                && (0..2).all(|k| off.dot(&front.along[k]).abs() < 0.5 * front.sides[k])
+        };
+        let points = (0..PARTS).flat_map(|i| (0..PARTS).map(move |j| (i, j)));
+        let n = points.filter(|(i, j)| hidden(&(self.middle + place(*i, 0) + place(*j, 1)))).count();
+        n as f64 / (PARTS * PARTS) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEC: PlateSpec =
+        PlateSpec { width: 3.0, height: 2.5, thickness: 0.036, face_inset: 0.0, u_axis: None, region: None };
+
+    /// A level face around `centre` of the given sides, of which `part` is seen.
+    fn face(centre: [f64; 3], [a, b]: [f64; 2], part: f64, hidden: f64) -> Candidate {
+        let centre = Vec3::from(centre);
+        let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+        let points = corners.map(|[x, y]| centre + Vec3::new(a * x, b * y, 0.0));
+        let rectangle = Rectangle::around(&points, centre);
+        Candidate { pieces: vec![0], area: part * a * b, spacing: 0.008, hidden, centre, rectangle }
+    }
+
+    fn selected(candidates: &[Candidate]) -> Result<[f64; 3], Refusal> {
+        select(candidates, &SPEC, 1e-3).map(|c| c.centre.into())
+    }
+
+    #[test]
+    fn a_smaller_stack_seen_whole_is_another_plate() {
+        let plate = face([6.0, 0.0, -3.5], [3.0, 2.5], 0.98, 0.0);
+        let at = plate.centre.into();
+        let stack = |part, hidden| face([6.0, 4.0, -3.5], [2.78, 2.32], part, hidden);
+        assert_eq!(selected(&[stack(1.0, 0.0), plate.clone()]).ok(), Some(at));
+        // Hidden in part, it may be the plate; and of the same size too.
+        assert!(matches!(selected(&[stack(1.0, 0.2), plate.clone()]), Err(Refusal::SeveralPlates { .. })));
+        let same = face([6.0, 4.0, -3.5], [3.0, 2.5], 0.95, 0.0);
+        assert!(matches!(selected(&[same, plate]), Err(Refusal::SeveralPlates { .. })));
+    }
+
+    #[test]
+    fn a_table_behind_the_plate_is_not_the_plate() {
+        let plate = face([6.0, 0.0, -3.5], [3.0, 2.5], 0.96, 0.0);
+        let at = plate.centre.into();
+        // Half a metre below; the plate hides a part of it.
+        let table = |y, part| face([6.2, y, -4.0], [2.9, 2.4], part, 0.5);
+        assert_eq!(selected(&[table(0.0, 0.55), plate.clone()]).ok(), Some(at));
+        // Beside it, something else hides it.
+        assert!(matches!(selected(&[table(4.0, 0.55), plate.clone()]), Err(Refusal::SeveralPlates { .. })));
+        // The plate itself is hidden in part: none is of its size.
+        let hidden = face([6.0, 0.0, -3.5], [3.0, 2.5], 0.8, 0.2);
+        assert!(matches!(selected(&[table(0.0, 0.55), hidden]), Err(Refusal::SeveralPlates { .. })));
+    }
 }
