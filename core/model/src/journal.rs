@@ -73,7 +73,8 @@ pub enum Acknowledgement {
     Explicit,
     /// The press continued with the next stroke while the result was in the registers.
     NextStroke,
-    /// The press continued or restarted before the result was in the registers: only the record has it.
+    /// The press gave no sign that it has read the result: it continued or restarted before the result was in the registers, or its next
+    /// trigger rose before that.
     Never,
 }
 

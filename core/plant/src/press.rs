@@ -135,8 +135,6 @@ impl Default for Timeouts {
 pub struct Policy {
     /// A stroke came while another was being measured, or the stroke number jumped.
     pub on_missed_stroke: OnMissed,
-    /// The host was restarted in the middle of a scan.
-    pub on_interrupted: OnInterrupted,
     /// Results cannot be recorded.
     pub on_storage_full: OnStorageFull,
     /// The press does not acknowledge a result.
@@ -153,16 +151,6 @@ pub enum OnMissed {
     Error,
     /// An error, and no stroke is accepted until error_reset.
     Block,
-}
-
-/// Treatment of a stroke whose scan a restart interrupted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OnInterrupted {
-    /// Reported as not measured.
-    #[default]
-    Report,
-    /// Scanned again as a new attempt if the press still waits.
-    Rescan,
 }
 
 /// Operation while results cannot be recorded.

@@ -141,7 +141,7 @@ pub enum Transition {
     StrokeResumed,
     /// A trigger that was up at the first read is accepted as a stroke.
     WaitingStrokeAccepted,
-    /// A stroke that a restart interrupted is evaluated again, scanned again or reported as interrupted.
+    /// A stroke that a restart interrupted is evaluated again or reported as interrupted.
     InterruptedStrokeRecovered,
     /// The first read is the baseline of the stroke counter; no stroke is active.
     Synchronised,

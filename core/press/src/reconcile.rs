@@ -146,6 +146,36 @@ impl Reconciler {
         Ok(done)
     }
 
+    /// Writes the registers of the error code and of the status, where they differ, one by one and the status last. A refused one does not
+    /// keep back the others.
+    ///
+    /// # Errors
+    /// The last refusal, or an error that ended the connection.
+    pub(crate) async fn withdraw<L: Link>(
+        &mut self,
+        client: &mut Client<L>,
+        image: &HostImage,
+    ) -> Result<(), LinkError> {
+        let wanted = image.encode(&self.map, self.heartbeat);
+        let offset = |output| self.map.output(output).and_then(|field| field.place.offset());
+        let code = offset(Output::ErrorCode).map(usize::from);
+        let status = (0..self.turns.len()).filter(|i| self.turns[*i] == Turn::Status);
+        let registers = code.into_iter().chain(status.filter(|i| Some(*i) != code));
+        let writable = |i: &usize| self.spans.iter().any(|span| span.contains(i));
+        let registers: Vec<usize> = registers.filter(writable).collect();
+        let mut refusal = Ok(());
+        for register in registers {
+            if self.known.as_ref().is_none_or(|known| known[register] == wanted[register]) {
+                continue;
+            }
+            match self.write_range(client, self.turns[register], &wanted, register..register + 1).await {
+                Err(error @ LinkError::Exception { .. }) => refusal = Err(error),
+                other => other?,
+            }
+        }
+        refusal
+    }
+
     /// Whether the valid result in the registers is this one: by its sequence number there, else by the last one made valid.
     fn shows_this(&self, known: &[u16], wanted: &[u16], image: &HostImage) -> bool {
         match self.map.output(Output::ResultSeq).and_then(|field| field.place.offset()) {

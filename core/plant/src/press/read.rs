@@ -8,8 +8,7 @@ mod map;
 use std::time::Duration;
 
 use super::{
-    AddressBase, Mode, NoAck, OnInterrupted, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts,
-    WriteAllow,
+    AddressBase, Mode, NoAck, OnMissed, OnStorageFull, Policy, Press, Profile, Role, Timeouts, WriteAllow,
 };
 use crate::document::Reported;
 use crate::{Located, TomlTable};
@@ -99,19 +98,12 @@ fn read_timeouts(mut table: TomlTable<'_>) -> Result<Timeouts, Reported> {
 fn read_policy(mut table: TomlTable<'_>) -> Result<Policy, Reported> {
     let missed = [("warn", OnMissed::Warn), ("error", OnMissed::Error), ("block", OnMissed::Block)];
     let on_missed_stroke = table.choice("on_missed_stroke", &missed).or(OnMissed::default());
-    let interrupted = [("report", OnInterrupted::Report), ("rescan", OnInterrupted::Rescan)];
-    let on_interrupted = table.choice("on_interrupted", &interrupted).or(OnInterrupted::default());
     let full = [("degrade", OnStorageFull::Degrade), ("stop", OnStorageFull::Stop)];
     let on_storage_full = table.choice("on_storage_full", &full).or(OnStorageFull::default());
     let no_ack = [("next-stroke", NoAck::NextStroke), ("hold", NoAck::Hold)];
     let no_ack = table.choice("no_ack", &no_ack).or(NoAck::default());
     table.finish();
-    Ok(Policy {
-        on_missed_stroke: on_missed_stroke?,
-        on_interrupted: on_interrupted?,
-        on_storage_full: on_storage_full?,
-        no_ack: no_ack?,
-    })
+    Ok(Policy { on_missed_stroke: on_missed_stroke?, on_storage_full: on_storage_full?, no_ack: no_ack? })
 }
 
 /// Reads `[press.write]`; addresses as the map counts them.

@@ -25,9 +25,16 @@ impl Handshake {
         self.obstacle().is_some() || self.press.as_ref().is_some_and(|press| !press.enable)
     }
 
-    /// Returns whether the next stroke waits for the acknowledgement of a result.
+    /// Returns whether the next stroke waits for the acknowledgement of a result, by policy.
     pub(super) fn held(&self) -> bool {
         self.work == Work::WaitAck && self.config.policy.no_ack == NoAck::Hold
+    }
+
+    /// Returns whether the trigger rose while the last stroke was being measured, so that it says nothing about the result: the
+    /// press cannot have read that.
+    pub(super) fn trigger_is_early(&self) -> bool {
+        let here = self.press.as_ref().map(|press| (press.session_id, press.stroke_id));
+        here == self.counted && self.last.is_some_and(|last| here != Some((last.session, last.stroke)))
     }
 
     /// Returns the image of the press if its trigger is debounced and there is a stroke number.
@@ -42,7 +49,8 @@ impl Handshake {
         let new = |press: &&PressImage| {
             self.last.is_none_or(|last| (press.session_id, press.stroke_id) != (last.session, last.stroke))
         };
-        !self.blocked() && !self.held() && self.settled_trigger().filter(new).is_some()
+        let early = self.work == Work::WaitAck && self.trigger_is_early();
+        !self.blocked() && !self.held() && !early && self.settled_trigger().filter(new).is_some()
     }
 
     pub(super) fn rescan_wanted(&self) -> bool {

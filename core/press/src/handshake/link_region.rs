@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use platen_plant::press::{Input, OnInterrupted};
+use platen_plant::press::Input;
 
 use super::machine::{ActiveStroke, Handshake};
 use super::messages::{Command, Effect};
@@ -95,8 +95,6 @@ impl Handshake {
     /// Resumes the last stroke of the journal after a restart.
     pub(super) fn resume(&mut self, stage: Stage, active: ActiveStroke, now: Duration) -> Transition {
         let waits = self.press_is_at(active.key);
-        let may_rescan = self.config.policy.on_interrupted == OnInterrupted::Rescan
-            && self.press.as_ref().is_some_and(|press| press.trigger && press.clear_to_scan);
         match stage {
             Stage::Finished if waits => {
                 self.ack_was_low = true;
@@ -110,7 +108,7 @@ impl Handshake {
                 self.work = Work::Evaluating;
                 Transition::InterruptedStrokeRecovered
             }
-            Stage::Accepted if waits && !may_rescan => {
+            Stage::Accepted if waits => {
                 self.active = Some(active);
                 self.finish(Measurement::not_measured(Code::Interrupted), Work::Aborted, now);
                 Transition::InterruptedStrokeRecovered
@@ -123,9 +121,6 @@ impl Handshake {
                 }
                 self.close(key, Acknowledgement::Never);
                 self.active = None;
-                if stage == Stage::Accepted && waits {
-                    return self.accept_rescan(now, Transition::InterruptedStrokeRecovered);
-                }
                 self.become_idle(now)
             }
         }

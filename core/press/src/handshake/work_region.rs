@@ -37,7 +37,9 @@ impl Handshake {
 
     pub(super) fn accept(&mut self, press: PressImage, now: Duration) {
         if let Some(key) = self.unacked.take() {
-            self.close(key, Acknowledgement::NextStroke);
+            let how =
+                if self.trigger_is_early() { Acknowledgement::Never } else { Acknowledgement::NextStroke };
+            self.close(key, how);
         }
         if self.last.is_some_and(|last| last.session != press.session_id) {
             self.attempts.clear();

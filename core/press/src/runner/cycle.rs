@@ -97,7 +97,11 @@ impl<L: Link> Runner<L> {
         self.step(Event::Tick);
         while !self.stopped() {
             if let Err(error) = self.exchange().await {
+                let was_online = self.handshake.state().link == LinkState::Online;
                 self.fail(&error);
+                if was_online && matches!(self.handshake.state().link, LinkState::Fault(_)) {
+                    self.withdraw_ready().await;
+                }
             }
             self.publish_status();
             let until = self.next_due();
@@ -233,6 +237,15 @@ impl<L: Link> Runner<L> {
                 Ok(_) => return,
                 Err(error) => tracing::warn!(%error, "writing the safe registers failed"),
             }
+        }
+    }
+
+    /// Withdraws ready and gives the reason after a fault, register by register: a controller that refuses an address or a value
+    /// elsewhere may take these.
+    async fn withdraw_ready(&mut self) {
+        let image = self.handshake.image().clone();
+        if let Err(error) = self.registers.withdraw(&mut self.client, &image).await {
+            tracing::warn!(%error, "ready could not be withdrawn; it stands until error_reset");
         }
     }
 

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use platen_model::Measure;
-use platen_model::{Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
-use platen_plant::press::{Input, Link, NoAck, OnInterrupted, OnMissed, OnStorageFull, Press};
+use platen_model::{Acknowledgement, Code, Figures, Measurement, Recalled, Record, StrokeKey, Verdict};
+use platen_plant::press::{Input, Link, NoAck, OnMissed, OnStorageFull, Press};
 use platen_press::{
     Command, Config, Effect, Event, Handshake, HostImage, LinkState, PressImage, Transition, Work, Wrong,
 };
@@ -389,12 +389,9 @@ proptest! {
     #[test]
     fn any_order_of_events_with_a_restart(
         config in configs(),
-        rescan in any::<bool>(),
         before in prop::collection::vec(act(), 0..80),
         after in prop::collection::vec(act(), 0..40),
     ) {
-        let mut config = config;
-        config.policy.on_interrupted = if rescan { OnInterrupted::Rescan } else { OnInterrupted::Report };
         let mut harness = Harness::new(config.clone());
         harness.step(Event::Scanner { ready: Ok(()), estimate: None });
         harness.step(Event::Connected);
@@ -469,6 +466,55 @@ fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
     harness.step(press(3, false, false));
     harness.step(press(3, false, true));
     assert!(!harness.machine.image().valid, "its own acknowledge");
+}
+
+/// A trigger that rises while a stroke is being measured, and still stands when its result is valid: the result keeps its time for the
+/// acknowledgement, and the record tells whether it got one.
+#[test]
+fn a_trigger_that_rose_early_waits_for_the_result_before() {
+    for acknowledges in [true, false] {
+        let mut harness = Harness::new(config());
+        harness.step(Event::Scanner { ready: Ok(()), estimate: None });
+        harness.calm_cycle(1);
+        let mut beat = 1;
+        let mut press = |stroke_id, ack| {
+            beat += 1;
+            let image = PressImage { stroke_id, trigger: true, ack, heartbeat: Some(beat), ..calm() };
+            Event::Press(Box::new(image))
+        };
+        harness.step(press(2, false));
+        harness.journal(true);
+        harness.step(press(3, false));
+        assert!(harness.alarms.contains(&Code::MissedStroke));
+        harness.acquire();
+        harness.judge();
+        while !harness.records.is_empty() {
+            harness.journal(true);
+        }
+        harness.step(Event::Written);
+        let is_valid = |harness: &Harness| {
+            let image = harness.machine.image();
+            (image.valid, image.ack_stroke_id) == (true, 2)
+        };
+        harness.step(press(3, false));
+        harness.pass(config().timeouts.ack.as_millis() as u64 - 1);
+        harness.step(press(3, false));
+        assert!(is_valid(&harness), "the early trigger has overtaken the result");
+        if acknowledges {
+            harness.step(press(3, true));
+            harness.step(press(3, false));
+        } else {
+            harness.pass(1);
+            harness.step(press(3, false));
+        }
+        let how = harness.records.iter().find_map(|record| match record {
+            Record::Acked { how, .. } => Some(*how),
+            _ => None,
+        });
+        let expected = if acknowledges { Acknowledgement::Explicit } else { Acknowledgement::Never };
+        assert_eq!(how, Some(expected));
+        assert_eq!(harness.machine.stroke().map(|key| key.stroke), Some(3), "then it is accepted");
+    }
 }
 
 /// Restart of the host with a scanner that is not ready: `error_code` beside the interrupted stroke is its own reason;

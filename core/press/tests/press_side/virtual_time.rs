@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::simulated_plc::memory::{Chaos, MemoryLink};
-use crate::simulated_plc::plc::{Habits, P};
+use crate::simulated_plc::plc::{H, Habits, P};
 use crate::simulated_plc::{Memory, Plc, SharedPlc};
 use platen_model::{Acknowledgement, Code, StrokeKey};
 use platen_plant::press::{Link, Mode, Press};
@@ -406,6 +406,29 @@ async fn the_wrong_press_is_never_written_to() {
     assert_eq!(cell.alarmed(Code::PressId), 1, "one alarm per cause");
     host.stop().await;
     assert_eq!(cell.plc().writes, 0);
+}
+
+/// A controller that refuses one register of the result: ready is withdrawn and the reason given in those that it takes.
+#[tokio::test(start_paused = true)]
+async fn ready_is_withdrawn_after_a_refused_register() {
+    for (refused, withdrawn) in [(30, true), (2, false)] {
+        let cell = Cell::new(0);
+        let host = cell.start();
+        tokio::time::sleep(MS(1000)).await;
+        assert_eq!(cell.plc().regs[H + 2] & 1, 1, "ready");
+        cell.plc().habits.refuses = Some(refused);
+        cell.plc().to_do = 1;
+        tokio::time::sleep(MS(2000)).await;
+        assert_eq!(host.status.borrow().link_error, Some(Code::IllegalAddress));
+        let (ready, error, writes) = {
+            let plc = cell.plc();
+            (plc.regs[H + 2] & 1 == 1, plc.regs[H + 6], plc.writes)
+        };
+        assert_eq!((ready, error == Code::IllegalAddress as u16), (!withdrawn, true));
+        tokio::time::sleep(MS(10_000)).await;
+        assert_eq!(cell.plc().writes, writes, "nothing else is written until the reset");
+        host.stop().await;
+    }
 }
 
 #[tokio::test(start_paused = true)]

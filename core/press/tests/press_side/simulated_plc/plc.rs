@@ -20,6 +20,8 @@ pub(crate) struct Habits {
     pub(crate) back_at: Option<usize>,
     /// Delays the tail of its block by this many cycles at each stroke.
     pub(crate) torn_cycles: u32,
+    /// Refuses writes that touch this register of the host's block.
+    pub(crate) refuses: Option<usize>,
     /// Lowers `clear_to_scan` this many ms after acceptance.
     pub(crate) unclear_after_ms: Option<u64>,
 }
@@ -123,6 +125,10 @@ impl Plc {
         self.writes += 1;
         if start < H || start + words.len() > H + 64 {
             self.outside += 1;
+            return false;
+        }
+        if self.habits.refuses.is_some_and(|register| (start..start + words.len()).contains(&(H + register)))
+        {
             return false;
         }
         let before = self.valid_result();
