@@ -15,6 +15,7 @@ mod apply;
 mod decide;
 mod fit;
 mod intensity;
+mod near_angle;
 mod occupancy;
 mod restore;
 mod survey;

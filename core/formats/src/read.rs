@@ -2,12 +2,13 @@
 //!
 //! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
 //! the CRC-32C of all cells. The second ([`ScanReader::columns`]) delivers every column once, as soon as the file has
-//! completed it. Up to 2.6 million cells (210 MB) are kept from the first pass; a larger file is decoded twice, so that
+//! completed it. Up to 2.6 million cells (126 MB, spherical ones 210) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
 mod detect;
 pub(crate) mod e57;
 mod error;
+mod kept_cells;
 mod lines;
 mod ptx;
 mod scan_order;
@@ -26,6 +27,7 @@ use crate::orient::{Columns, Expected, Mirror, Plan, RawCell, Survey};
 
 pub use error::ReadError;
 use error::Result;
+use kept_cells::KeptCells;
 
 #[cfg(test)]
 pub(crate) use detect::format;
@@ -66,10 +68,10 @@ trait Source {
 pub struct ScanReader<'a> {
     source: Box<dyn Source + 'a>,
     /// All cells, after a first pass over a small file.
-    kept: Vec<RawCell>,
+    kept: KeptCells,
 }
 
-/// Largest number of cells that are kept, 210 MB.
+/// Largest number of cells that are kept, 126 MB, of spherical ones 210.
 const MAX_KEPT: u64 = 5 << 19;
 /// Cells between two reports of progress.
 const PROGRESS_EVERY: u64 = 1 << 16;
@@ -108,7 +110,7 @@ impl<'a> ScanReader<'a> {
             Format::Xyz => Box::new(xyz::Xyz::open(file)?),
             Format::Xyb => Box::new(xyb::Xyb::open(file)?),
         };
-        Ok(Self { source, kept: Vec::new() })
+        Ok(Self { source, kept: KeptCells::default() })
     }
 
     /// First pass: decides the orientation of the lattice. `known` is what the plant declares about the scanner;
@@ -125,12 +127,12 @@ impl<'a> ScanReader<'a> {
         let (mut survey, mut checksum) = (Survey::default(), 0);
         // The declared number saves memory; the real one is decisive.
         let mut fits = about.cells <= MAX_KEPT;
-        self.kept.clear();
+        self.kept = KeptCells::with_capacity(if fits { about.cells as usize } else { 0 });
         for cell in self.source.cells()? {
             let cell = cell?;
             fits &= (self.kept.len() as u64) < MAX_KEPT;
             if fits {
-                self.kept.push(cell);
+                self.kept.push(&cell);
             }
             survey.add(&cell).map_err(ReadError::from)?;
             checksum = add_to_checksum(checksum, &cell);
@@ -139,7 +141,7 @@ impl<'a> ScanReader<'a> {
             }
         }
         if !fits {
-            self.kept = Vec::new();
+            self.kept = KeptCells::default();
         }
         let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
         let expected = Expected { intensity: about.intensity, mirror, ..*known };
@@ -159,10 +161,8 @@ impl<'a> ScanReader<'a> {
     /// # Errors
     /// When the file cannot be read from its start again.
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
-        let cells = match self.kept.as_slice() {
-            [] => self.source.cells()?,
-            kept => Box::new(kept.iter().copied().map(Ok)),
-        };
+        let cells =
+            if self.kept.len() == 0 { self.source.cells()? } else { Box::new(self.kept.iter().map(Ok)) };
         Ok(Columns::new(&oriented.plan, cells))
     }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
+use super::near_angle::NearAngle;
 use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
 use crate::read::{Cells, ReadError};
 
@@ -24,6 +25,7 @@ pub struct Columns<'a> {
     plan: &'a Plan,
     cells: Cells<'a>,
     waiting: Vec<Vec<Sample>>,
+    near: NearDirection,
     seen: u64,
     points: u64,
     /// First column not yet examined for having no stored cell.
@@ -33,7 +35,15 @@ pub struct Columns<'a> {
 impl<'a> Columns<'a> {
     /// Starts the second pass over the cells.
     pub(crate) fn new(plan: &'a Plan, cells: Cells<'a>) -> Self {
-        Self { plan, cells, waiting: vec![Vec::new(); plan.cells.len()], seen: 0, points: 0, rest: 0 }
+        Self {
+            plan,
+            cells,
+            waiting: vec![Vec::new(); plan.cells.len()],
+            near: NearDirection::default(),
+            seen: 0,
+            points: 0,
+            rest: 0,
+        }
     }
 
     /// Returns the share of cells read, 0 to 1.
@@ -84,7 +94,7 @@ impl<'a> Columns<'a> {
         if samples.len() == expected {
             return Err(self.changed());
         }
-        samples.push(self.plan.sample(cell, row));
+        samples.push(self.plan.sample(cell, row, &mut self.near));
         if samples.len() < expected {
             return Ok(None);
         }
@@ -112,6 +122,20 @@ impl Iterator for Columns<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         self.next_column().transpose()
+    }
+}
+
+/// Directions of successive positions.
+#[derive(Debug, Default)]
+struct NearDirection {
+    azimuth: NearAngle,
+    elevation: NearAngle,
+}
+
+impl NearDirection {
+    fn of(&mut self, [x, y, z]: [f64; 3]) -> Direction {
+        let azimuth = self.azimuth.of(y, x);
+        Direction { azimuth: wrap_azimuth(azimuth), elevation: self.elevation.of(z, (x * x + y * y).sqrt()) }
     }
 }
 
@@ -149,10 +173,10 @@ impl Plan {
         up_to_zenith.then(|| (range, Direction { azimuth: wrap_azimuth(direction.azimuth), ..direction }))
     }
 
-    fn sample(&self, cell: &RawCell, row: u32) -> Sample {
+    fn sample(&self, cell: &RawCell, row: u32, near: &mut NearDirection) -> Sample {
         let (range_m, direction) = self.beam(cell).unwrap_or_else(|| {
             let position = self.position(cell);
-            (position.iter().map(|c| c * c).sum::<f64>().sqrt(), Direction::of(position))
+            (position.iter().map(|c| c * c).sum::<f64>().sqrt(), near.of(position))
         });
         Sample {
             row,

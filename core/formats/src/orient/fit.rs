@@ -23,14 +23,14 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Adds a valid cell: unit vector of its beam and its elevation.
-    pub(super) fn add(&mut self, unit: [f64; 3], elevation: f64) {
+    /// Adds a valid cell: parts of its unit vector to the east, to the north and horizontal, and its elevation.
+    pub(super) fn add(&mut self, [east, north, horizontal]: [f64; 3], elevation: f64) {
         self.valid += 1;
         self.elevation += elevation;
         self.elevation2 += elevation * elevation;
-        self.east += unit[0];
-        self.north += unit[1];
-        self.horizontal += (unit[0] * unit[0] + unit[1] * unit[1]).sqrt();
+        self.east += east;
+        self.north += north;
+        self.horizontal += horizontal;
     }
 
     /// Mean and variance of the elevation.

@@ -2,6 +2,7 @@
 
 use platen_scan::State;
 
+use super::near_angle::NearAngle;
 use super::occupancy::{Inserted, Occupancy};
 use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
 
@@ -23,6 +24,7 @@ pub(crate) struct Survey {
     pub(super) rows: Vec<Line>,
     pub(super) columns: Vec<Line>,
     occupancy: Occupancy,
+    elevation: NearAngle,
     pub(super) cells: u64,
     pub(super) valid: u64,
     pub(super) unflagged: u64,
@@ -57,10 +59,12 @@ impl Survey {
             let [x, y, z] = cell.xyz;
             let across = x * x + y * y;
             let range = (across + z * z).sqrt();
-            let elevation = z.atan2(across.sqrt());
-            let unit = cell.xyz.map(|c| c / range);
-            row.add(unit, elevation);
-            column.add(unit, elevation);
+            let horizontal = across.sqrt();
+            let elevation = self.elevation.of(z, horizontal);
+            let per_range = 1.0 / range;
+            let beam = [x, y, horizontal].map(|c| c * per_range);
+            row.add(beam, elevation);
+            column.add(beam, elevation);
             self.valid += 1;
             self.above_far += u64::from(range > FAR);
             self.above_far_mm += u64::from(range > FAR * 1000.0);

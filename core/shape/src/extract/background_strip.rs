@@ -53,6 +53,7 @@ fn continues_a_plane(window: &Window, noise: &Noise, pixels: &[Pixel], index: us
     }
     let range = window.cells[index].range_m;
     let (across, down) = (window.header.azimuth_step as f32, window.header.elevation_step as f32);
+    let farthest = (STEEPEST * range).powi(2);
     let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(window.n_columns);
     let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(n_rows);
     let (mut moments, mut rhs, mut square, mut n) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0);
@@ -60,11 +61,9 @@ fn continues_a_plane(window: &Window, noise: &Noise, pixels: &[Pixel], index: us
         for r in rows.clone() {
             let at = c * n_rows + r;
             let (x, y) = (c as f32 - column as f32, r as f32 - row as f32);
-            let apart = range * (x * across).hypot(y * down);
-            if pixels[at] != Pixel::Sound
-                || window.own[at]
-                || (window.cells[at].range_m - range).abs() > STEEPEST * apart
-            {
+            let apart = x * across * x * across + y * down * y * down;
+            let deeper = window.cells[at].range_m - range;
+            if pixels[at] != Pixel::Sound || window.own[at] || deeper * deeper > farthest * apart {
                 continue;
             }
             // Departures from the cell's own inverse range: the plane at the cell is the error of the prediction.
