@@ -18,11 +18,11 @@ use platen_host::cli::{CliError, output};
 use platen_host::progress;
 use platen_model::units::{metres, mm};
 use platen_plant::Value;
-use platen_shape::Vec3;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::inspection::{Check, ShapeChecks};
+use platen_shape::inspection::{Check, ShapeChecks, edge_doubts};
 use platen_shape::measure::Measurement;
 use platen_shape::outline::{Corner, EdgeCurve, Outline};
+use platen_shape::{Blank, Vec3};
 
 use crate::accuracy::{Truth, rms};
 use crate::scene::{Scene, Setting, Shot};
@@ -253,7 +253,10 @@ impl Errors {
         checks(Kind::Diagonal, &found.diagonals, &known.diagonals);
         checks(Kind::Angle, &found.angles, &known.angles);
         checks(Kind::Twist, &found.twist, &known.twist);
-        Self { stated, corner, marker, corners_seen: outline.corners.map(|corner| corner.seen) }
+        let doubts = edge_doubts(&found, surface, Blank::rectangle(w, h).edge_lengths());
+        let corners_seen =
+            [0, 1, 2, 3].map(|k| outline.corners[k].seen && !doubts.iter().any(|d| d.has_corner(k)));
+        Self { stated, corner, marker, corners_seen }
     }
 
     fn is_gross(&self) -> bool {

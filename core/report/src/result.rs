@@ -26,7 +26,7 @@ use platen_model::units::{mm, mm_pair, readable};
 use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::{EXPANDED, Measured, Scanned, ShapeChecks, Vec3};
+use platen_shape::{Blank, EXPANDED, EdgeDoubt, Measured, Scanned, ShapeChecks, Vec3, edge_doubts};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.result/1";
@@ -62,7 +62,7 @@ pub struct ResultRecord {
     /// Expanded uncertainty (95 %) of each corner, all directions together; null in documents older than it.
     #[serde(default)]
     pub corners_uncertainty_mm: Option<[f64; 4]>,
-    /// Whether each corner was seen or extrapolated.
+    /// Whether each corner was seen; false where it was extrapolated, or an edge that meets in it has another length than was cut.
     pub corners_seen: [bool; 4],
     /// Markers.
     pub markers: Vec<MarkerRecord>,
@@ -205,6 +205,8 @@ impl ResultRecord {
     /// Assembles the document of a measurement.
     pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
         let Measured { outline, measurement, .. } = measured;
+        let checks = ShapeChecks::new(outline, &measurement.surface);
+        let doubts = edge_doubts(&checks, &measurement.surface, cut_lengths(measured, context.plate));
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
         Self {
             schema: SCHEMA.to_owned(),
@@ -214,6 +216,7 @@ impl ResultRecord {
             verdict: context.verdict,
             says: sentences(context.reports)
                 .into_iter()
+                .chain(doubts.iter().map(doubt_sentence))
                 .chain(context.assumption.map(str::to_owned))
                 .collect(),
             supports: context.plate.plate.supports.clone(),
@@ -239,8 +242,9 @@ impl ResultRecord {
             },
             corners_m: measurement.corners.map(Into::into),
             corners_uncertainty_mm: Some(corner_uncertainties(measured)),
-            corners_seen: outline.corners.each_ref().map(|corner| corner.seen),
-            shape_checks: ShapeChecksRecord::new(&ShapeChecks::new(outline, &measurement.surface)),
+            corners_seen: [0, 1, 2, 3]
+                .map(|k| outline.corners[k].seen && !doubts.iter().any(|d| d.has_corner(k))),
+            shape_checks: ShapeChecksRecord::new(&checks),
             markers: markers(measured, context.plate),
             reference_lines: lines::record(measurement, context.plate, &sound),
             grid: GridRecord::new(measurement, &sound),
@@ -276,6 +280,24 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
         says.push("nothing judged this plate: give it a [target] and a [[template]], or add a comparison that judges".into());
     }
     says
+}
+
+/// Returns the lengths of the edges as they were cut, metres.
+fn cut_lengths(measured: &Measured, plate: &PlateFile) -> [f64; 4] {
+    let ordered = Blank::rectangle(plate.plate.width, plate.plate.height);
+    measured.blank.as_ref().unwrap_or(&ordered).edge_lengths()
+}
+
+fn doubt_sentence(doubt: &EdgeDoubt) -> String {
+    let EdgeDoubt { edge, length, sigma, cut } = *doubt;
+    let (longer, by) = (if length > cut { "longer" } else { "shorter" }, mm((length - cut).abs()));
+    format!(
+        "the {} is {:.1} +- {:.1} mm long, {by:.1} mm {longer} than the plate file or the baseline says: it was located \
+         wrongly, or cut otherwise; places along it may be off by as much",
+        checks::EDGES[edge],
+        mm(length),
+        mm(EXPANDED * sigma),
+    )
 }
 
 /// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the surface.

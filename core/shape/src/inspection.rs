@@ -4,7 +4,9 @@
 mod bending_energy;
 pub mod calibration;
 mod dimension_checks;
+mod edge_doubt;
 pub mod marker_detection;
 
 pub use bending_energy::BendingEnergy;
 pub use dimension_checks::{Check, EdgeCheck, ShapeChecks};
+pub use edge_doubt::{EdgeDoubt, edge_doubts};

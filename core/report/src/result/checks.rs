@@ -42,6 +42,9 @@ pub struct CheckRecord {
     pub seen: bool,
 }
 
+/// Names of the edges, in their order.
+pub(super) const EDGES: [&str; 4] = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
+
 impl ShapeChecksRecord {
     pub(super) fn new(checks: &ShapeChecks) -> Self {
         let edge = |edge: EdgeCheck| EdgeRecord {
@@ -60,11 +63,10 @@ impl ShapeChecksRecord {
 
     /// Returns name, figure and unit of every check, in a fixed order.
     pub fn rows(&self) -> Vec<(String, CheckRecord, &'static str)> {
-        let edges = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
         let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];
         let mut rows = Vec::new();
         for (k, how) in ["along the mid-surface", "tape on the face", "straight"].into_iter().enumerate() {
-            for (name, edge) in edges.iter().zip(&self.edges) {
+            for (name, edge) in EDGES.iter().zip(&self.edges) {
                 let length = [edge.mid_mm, edge.face_mm, edge.chord_mm][k];
                 rows.push((format!("{name}, {how}"), length, "mm"));
             }

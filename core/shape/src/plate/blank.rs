@@ -44,10 +44,16 @@ impl Blank {
         self
     }
 
+    /// Returns the lengths of the edges, straight from corner to corner, metres.
+    #[must_use]
+    pub fn edge_lengths(&self) -> [f64; 4] {
+        [(0, 1), (1, 2), (2, 3), (3, 0)].map(|(a, b)| self.distance(a, b))
+    }
+
     /// Returns the mean lengths of opposite edges, straight from corner to corner: along u, along v, metres.
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
-        let [bottom, right, top, left] = [(0, 1), (1, 2), (2, 3), (3, 0)].map(|(a, b)| self.distance(a, b));
+        let [bottom, right, top, left] = self.edge_lengths();
         [0.5 * (bottom + top), 0.5 * (right + left)]
     }
 
