@@ -140,7 +140,8 @@ mod tests {
     /// Counts the cells of the table that are taken for mixed, and the mixed ones taken for sound, each beside all.
     fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
         let noise = Noise::estimate(window, &window.own);
-        let pixels = mixed_pixels::classify(window, &noise);
+        let mut pixels = mixed_pixels::classify(window, &noise);
+        mark_sound(window, &noise, &mut pixels);
         let mut counts = [[0; 2]; 2];
         let inner = |index: usize| [index / 80, index % 80].iter().all(|place| (4..76).contains(place));
         for index in (0..pixels.len()).filter(|index| inner(*index)) {

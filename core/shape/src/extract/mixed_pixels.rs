@@ -1,7 +1,6 @@
 //! Mixed pixels by second differences of the inverse range: beams that straddle an edge return a range between that of the
 //! plate and that of what lies behind it. Own; Masuda et al. do not treat them.
 
-use super::background_strip;
 use super::range_noise::Noise;
 use super::window::Window;
 
@@ -47,7 +46,6 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
             }
         }
     }
-    background_strip::mark_sound(window, noise, &mut pixels);
     pixels
 }
 

@@ -1,5 +1,6 @@
 //! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
 
+use super::background_strip;
 use super::continuity::Continuity;
 use super::faces::{self, Face};
 use super::mixed_pixels::{self, Pixel};
@@ -26,7 +27,8 @@ pub(super) struct SegmentedComponent {
 impl SegmentedComponent {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
-        let pixels = mixed_pixels::classify(&window, &noise);
+        let mut pixels = mixed_pixels::classify(&window, &noise);
+        background_strip::mark_sound(&window, &noise, &mut pixels);
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smoothed_normals::low_pass(&window, &usable, continuity);
