@@ -11,11 +11,13 @@ mod scale;
 mod section;
 mod shades;
 mod strip;
+mod view;
 
 pub use map::map;
 pub use scale::PictureScale;
 pub use section::section;
 pub use strip::{StripPoint, strip};
+pub use view::{Turn, Units, View};
 
 use platen_model::Verdict;
 
@@ -55,31 +57,9 @@ fn signed_mm(value: f64) -> String {
     }
 }
 
-/// Formats a gap with its uncertainty, millimetres with one decimal. The uncertainty is rounded up and never 0.
-pub fn with_uncertainty(gap_mm: f64, uncertainty_mm: Option<f64>) -> String {
-    let up = |mm: f64| (mm * 10.0 - 1e-9).ceil().max(1.0) / 10.0;
-    match uncertainty_mm {
-        Some(mm) => format!("{gap_mm:.1} \u{b1} {:.1}", up(mm)),
-        None => format!("{gap_mm:.1}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{signed_mm, with_uncertainty};
-
-    #[test]
-    fn an_uncertainty_is_rounded_up() {
-        let all = [
-            (0.02, "4.3 \u{b1} 0.1"),
-            (0.2, "4.3 \u{b1} 0.2"),
-            (0.21, "4.3 \u{b1} 0.3"),
-            (0.0, "4.3 \u{b1} 0.1"),
-        ];
-        for (uncertainty, expected) in all {
-            assert_eq!(with_uncertainty(4.26, Some(uncertainty)), expected);
-        }
-    }
+    use super::signed_mm;
 
     #[test]
     fn numbers_have_a_sign_and_no_more_digits_than_the_fit_knows() {

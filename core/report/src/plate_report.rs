@@ -240,7 +240,7 @@ fn table(entries: &[Entry<'_>]) -> Markup {
 
 fn gap(point: &StripPoint) -> String {
     match point.gap_mm {
-        Some(gap) => picture::with_uncertainty(gap, point.uncertainty_mm),
+        Some(gap) => picture::Units::Millimetre.with_uncertainty(gap, point.uncertainty_mm),
         None => "not measured".to_owned(),
     }
 }

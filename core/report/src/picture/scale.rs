@@ -52,6 +52,11 @@ impl PictureScale {
         per_m(self.limit_mm, self.chord_mm)
     }
 
+    /// Returns the place of a gap on the ladder, 0 for none to 1 for the largest that is told apart.
+    pub fn share(&self, gap_mm: f64) -> f64 {
+        self.gaps().position(gap_mm.abs())
+    }
+
     pub(super) fn gaps(&self) -> Scale {
         let anchors = LADDER.map(|step| step * self.limit_mm).to_vec();
         Scale { anchors, unit: "mm", factor: 1000.0, inverted: false, words: None, locked: true }

@@ -5,7 +5,7 @@ use plotters::style::RGBColor;
 use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE, STEEL, WOOD, WOOD_EDGE};
 use super::scale::nice_ceiling;
-use super::{Caption, PictureError, PictureScale, with_uncertainty};
+use super::{Caption, PictureError, PictureScale, Units};
 use crate::result::{LineRecord, TemplateRecord};
 
 const SIZE: (u32, u32) = (1200, 760);
@@ -145,7 +145,10 @@ impl Layout<'_> {
         let gap = template.gap_mm.get(self.sample(at)).copied().unwrap_or(template.max_gap_mm);
         let (x, height) = (self.x(at), y(gap));
         canvas.ring((x, height), 10, INK, 4)?;
-        let words = format!("{} mm", with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm)));
+        let words = format!(
+            "{} mm",
+            Units::Millimetre.with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm))
+        );
         let look = Text::new(30.0).bold();
         let above = height - 32.0;
         // Clear of the limit's line, and above the gap's own, which falls away from here to either side.

@@ -4,7 +4,7 @@ use platen_model::Verdict;
 
 use super::canvas::{Canvas, Text, draw};
 use super::colour::{self, INK, PALE, PAPER};
-use super::{Caption, PictureError, PictureScale, with_uncertainty};
+use super::{Caption, PictureError, PictureScale, Units};
 
 const SIZE: (u32, u32) = (1200, 560);
 const LEFT: f64 = 110.0;
@@ -108,7 +108,11 @@ fn draw_point(
     if !newest {
         return Ok(());
     }
-    let words = format!("{} mm, {}", with_uncertainty(gap, point.uncertainty_mm), point.verdict.words());
+    let words = format!(
+        "{} mm, {}",
+        Units::Millimetre.with_uncertainty(gap, point.uncertainty_mm),
+        point.verdict.words()
+    );
     // Gaps decrease: the upper right corner stays free.
     canvas.ring((x, y(gap)), 17, INK, 3)?;
     canvas.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())
