@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 /// Severity of an alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Measuring is affected: `error_code`, latched until reset.
     Error,
@@ -19,6 +20,16 @@ impl Severity {
             Self::Warning => "warning",
         }
     }
+}
+
+/// Who must act on an alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Audience {
+    /// The person at the press: shown on the operator's screen.
+    Operator,
+    /// Whoever looks after the installation: shown on the engineer's page alone.
+    Engineer,
 }
 
 /// Language of texts.
@@ -38,6 +49,8 @@ pub struct Alarm {
     pub code: Code,
     /// Severity.
     pub severity: Severity,
+    /// Who must act.
+    pub audience: Audience,
     text: [&'static str; 2],
     remedy: [&'static str; 2],
 }
@@ -56,7 +69,7 @@ impl Alarm {
 
 /// The codes and the table from one list.
 macro_rules! alarms {
-    ($($code:ident = $number:literal $severity:ident $text_en:literal $remedy_en:literal $text_ja:literal $remedy_ja:literal)*) => {
+    ($($code:ident = $number:literal $severity:ident $audience:ident $text_en:literal $remedy_en:literal $text_ja:literal $remedy_ja:literal)*) => {
         /// Number of an alarm: 1xx link and strokes, 2xx scanner, 3xx evaluation, 4xx storage, 5xx configuration.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[serde(into = "u16", try_from = "u16")]
@@ -72,6 +85,7 @@ macro_rules! alarms {
                     $(Self::$code => &Alarm {
                         code: Self::$code,
                         severity: Severity::$severity,
+                        audience: Audience::$audience,
                         text: [$text_en, $text_ja],
                         remedy: [$remedy_en, $remedy_ja],
                     },)*
@@ -82,71 +96,71 @@ macro_rules! alarms {
 }
 
 alarms! {
-    PressUnreachable = 101 Error "the press does not answer" "check that the press is on, the cable, host, port and unit in [press.link]"
+    PressUnreachable = 101 Error Operator "the press does not answer" "check that the press is on, the cable, host, port and unit in [press.link]"
         "プレスが応答しません" "プレスの電源、ケーブル、[press.link] の host・port・unit を確認してください"
-    LinkBroken = 102 Warning "the link to the press broke and is being rebuilt" "nothing if rare; else check cable, switch and response_timeout_ms"
+    LinkBroken = 102 Warning Engineer "the link to the press broke and is being rebuilt" "nothing if rare; else check cable, switch and response_timeout_ms"
         "プレスとの通信が切れ、再接続中です" "まれなら不要。頻発するならケーブル、スイッチ、response_timeout_ms を確認してください"
-    PressStale = 103 Warning "the heartbeat of the press stands still" "check that the press program runs"
+    PressStale = 103 Warning Operator "the heartbeat of the press stands still" "check that the press program runs"
         "プレスのハートビートが止まっています" "プレスのプログラムが動作しているか確認してください"
-    TornBlock = 104 Warning "the press is changing its registers at every read" "write stroke_id_tail first and stroke_id last, then leave both alone"
+    TornBlock = 104 Warning Engineer "the press is changing its registers at every read" "write stroke_id_tail first and stroke_id last, then leave both alone"
         "プレスのレジスタが読み取りのたびに変化しています" "stroke_id_tail、stroke_id の順に書き、その後は変更しないでください"
-    SecondHost = 105 Error "another host writes to this press" "stop one of the two, then reset"
+    SecondHost = 105 Error Operator "another host writes to this press" "stop one of the two, then reset"
         "別のホストがこのプレスに書き込んでいます" "どちらか一方を停止してからリセットしてください"
-    IllegalFunction = 106 Error "the press refuses the Modbus function (exception 01)" "allow functions 3 and 16 on the press controller"
+    IllegalFunction = 106 Error Operator "the press refuses the Modbus function (exception 01)" "allow functions 3 and 16 on the press controller"
         "プレスが Modbus 機能を拒否しました (例外 01)" "プレス側で機能コード 3 と 16 を許可してください"
-    IllegalAddress = 107 Error "the press refuses a register address or value (exception 02 or 03)" "compare [press.map] with the controller's register table"
+    IllegalAddress = 107 Error Operator "the press refuses a register address or value (exception 02 or 03)" "compare [press.map] with the controller's register table"
         "プレスがレジスタのアドレスまたは値を拒否しました (例外 02/03)" "[press.map] とプレス側のレジスタ表を照合してください"
-    DeviceFailure = 108 Error "the press controller reports a failure (exception 04, 08 or unknown)" "look at the controller's diagnostics, then reset"
+    DeviceFailure = 108 Error Operator "the press controller reports a failure (exception 04, 08 or unknown)" "look at the controller's diagnostics, then reset"
         "プレスの制御装置が異常を返しました (例外 04/08 等)" "制御装置の診断を確認し、リセットしてください"
-    DeviceBusy = 109 Error "the press controller has been busy for too long (exception 05 or 06)" "look at the controller's load, then reset"
+    DeviceBusy = 109 Error Operator "the press controller has been busy for too long (exception 05 or 06)" "look at the controller's load, then reset"
         "プレスの制御装置が長時間ビジーです (例外 05/06)" "制御装置の負荷を確認し、リセットしてください"
-    GatewayFailure = 110 Warning "the gateway does not reach the press (exception 0A or 0B)" "check the serial line behind the gateway and the unit id"
+    GatewayFailure = 110 Warning Engineer "the gateway does not reach the press (exception 0A or 0B)" "check the serial line behind the gateway and the unit id"
         "ゲートウェイがプレスに接続できません (例外 0A/0B)" "ゲートウェイ先のシリアル回線と unit を確認してください"
-    WriteRefused = 111 Error "a write outside the allowed registers was refused" "correct [press.write] or [press.map]; nothing was written"
+    WriteRefused = 111 Error Engineer "a write outside the allowed registers was refused" "correct [press.write] or [press.map]; nothing was written"
         "許可範囲外への書き込みを拒否しました" "[press.write] または [press.map] を修正してください。書き込みは行われていません"
-    MissedStroke = 120 Warning "a stroke was not measured: it came while another was, or unseen" "wait for ready before each stroke; reset to clear the count"
+    MissedStroke = 120 Warning Operator "a stroke was not measured: it came while another was, or unseen" "wait for ready before each stroke; reset to clear the count"
         "測定されなかったストロークがあります" "ready を待ってからプレスしてください。リセットで回数を消去します"
-    CounterBack = 121 Warning "the stroke number went back within a session" "change session_id when the counter is set back"
+    CounterBack = 121 Warning Engineer "the stroke number went back within a session" "change session_id when the counter is set back"
         "同一セッション内でストローク番号が戻りました" "番号を戻すときは session_id を変更してください"
-    AckTimeout = 122 Warning "the press did not acknowledge the result" "check the press program; the next stroke counts as acknowledge"
+    AckTimeout = 122 Warning Engineer "the press did not acknowledge the result" "check the press program; the next stroke counts as acknowledge"
         "プレスが結果を確認しませんでした" "プレスのプログラムを確認してください。次のストロークが確認とみなされます"
-    ScannerNotReady = 201 Error "the scanner is not ready" "look at the scanner: power, door, network"
+    ScannerNotReady = 201 Error Operator "the scanner is not ready" "look at the scanner: power, door, network"
         "スキャナが準備できていません" "スキャナの電源、扉、ネットワークを確認してください"
-    ScanTimeout = 202 Error "the scan took too long" "look at the scanner; raise press.timeouts.scan_ms if the scan is meant to be longer"
+    ScanTimeout = 202 Error Operator "the scan took too long" "look at the scanner; raise press.timeouts.scan_ms if the scan is meant to be longer"
         "スキャンが時間内に終わりませんでした" "スキャナを確認し、必要なら press.timeouts.scan_ms を延ばしてください"
-    ScanFailed = 203 Error "the scanner reported a failure" "the log has the scanner's own words; repeat the scan"
+    ScanFailed = 203 Error Operator "the scanner reported a failure" "the log has the scanner's own words; repeat the scan"
         "スキャナが異常を返しました" "ログでスキャナの内容を確認し、再スキャンしてください"
-    ScanAborted = 204 Error "the press gave the scan up" "request a rescan if the result is needed"
+    ScanAborted = 204 Error Operator "the press gave the scan up" "request a rescan if the result is needed"
         "プレスがスキャンを中止しました" "結果が必要なら再スキャンを要求してください"
-    PressDisabled = 205 Error "the press switched measuring off during the scan" "hold enable until scan_done; request a rescan"
+    PressDisabled = 205 Error Operator "the press switched measuring off during the scan" "hold enable until scan_done; request a rescan"
         "スキャン中に測定が無効にされました" "scan_done まで enable を保持し、再スキャンを要求してください"
-    NotClear = 206 Error "the press was no longer clear during the scan" "keep ram and plate at rest until scan_done; request a rescan"
+    NotClear = 206 Error Operator "the press was no longer clear during the scan" "keep ram and plate at rest until scan_done; request a rescan"
         "スキャン中に clear_to_scan が落ちました" "scan_done までラムと板を動かさず、再スキャンを要求してください"
-    CalibrationInvalid = 207 Error "the calibration of the scanner is not valid" "run platen calibrate"
+    CalibrationInvalid = 207 Error Operator "the calibration of the scanner is not valid" "run platen calibrate"
         "スキャナの校正が無効です" "platen calibrate を実行してください"
-    Interrupted = 208 Error "the host was restarted during the scan" "request a rescan if the result is needed"
+    Interrupted = 208 Error Operator "the host was restarted during the scan" "request a rescan if the result is needed"
         "スキャン中にホストが再起動しました" "結果が必要なら再スキャンを要求してください"
-    EvaluationFailed = 301 Error "the scan could not be evaluated" "the log says at which step; look at the scan with platen inspect"
+    EvaluationFailed = 301 Error Operator "the scan could not be evaluated" "the log says at which step; look at the scan with platen inspect"
         "スキャンを評価できませんでした" "ログで失敗した処理を確認し、platen inspect でスキャンを調べてください"
-    EvaluationTimeout = 302 Error "the evaluation took too long" "raise press.timeouts.evaluate_ms or look for load on the computer"
+    EvaluationTimeout = 302 Error Operator "the evaluation took too long" "raise press.timeouts.evaluate_ms or look for load on the computer"
         "評価が時間内に終わりませんでした" "press.timeouts.evaluate_ms を延ばすか、計算機の負荷を確認してください"
-    PlateNotFound = 303 Error "no plate of this size in the scan" "check that the plate lies in the region of interest and that the recipe is right"
+    PlateNotFound = 303 Error Operator "no plate of this size in the scan" "check that the plate lies in the region of interest and that the recipe is right"
         "スキャン内に該当する板がありません" "板が測定領域内にあるか、レシピが正しいか確認してください"
-    CoverageLow = 304 Error "too little of the plate was seen" "clear what stands between scanner and plate, then rescan"
+    CoverageLow = 304 Error Operator "too little of the plate was seen" "clear what stands between scanner and plate, then rescan"
         "板の測定範囲が不足しています" "スキャナと板の間の障害物を除き、再スキャンしてください"
-    RecipeUnknown = 305 Error "no plate file for the recipe of the press" "add plate-NNN.toml for this recipe number or correct the recipe"
+    RecipeUnknown = 305 Error Operator "no plate file for the recipe of the press" "add plate-NNN.toml for this recipe number or correct the recipe"
         "プレスのレシピに対応する板ファイルがありません" "このレシピ番号の plate-NNN.toml を追加するか、レシピを修正してください"
-    Saturated = 306 Warning "a figure is larger than its register can hold" "read the full figure in the history; look for the wrong plate or recipe"
+    Saturated = 306 Warning Engineer "a figure is larger than its register can hold" "read the full figure in the history; look for the wrong plate or recipe"
         "値がレジスタの範囲を超えました" "履歴で実際の値を確認し、板とレシピを確認してください"
-    PlateTurned = 307 Error "the plate lies turned against the stroke before" "turn it back, or let the press send plate_rot; end the part when it is another plate"
+    PlateTurned = 307 Error Operator "the plate lies turned against the stroke before" "turn it back, or let the press send plate_rot; end the part when it is another plate"
         "板が前回のストロークと異なる向きに置かれています" "板の向きを戻すか、プレスから plate_rot を送ってください。別の板なら部品終了を送ってください"
-    StorageFailed = 401 Error "the journal cannot be written" "make room on the disk or repair it, then reset"
+    StorageFailed = 401 Error Operator "the journal cannot be written" "make room on the disk or repair it, then reset"
         "記録を書き込めません" "ディスクの空きを確保するか修理し、リセットしてください"
-    StorageDegraded = 402 Warning "results go to the press but are not being recorded" "make room on the disk or repair it"
+    StorageDegraded = 402 Warning Operator "results go to the press but are not being recorded" "make room on the disk or repair it"
         "結果はプレスに送られますが記録されていません" "ディスクの空きを確保するか修理してください"
-    MapVersion = 501 Error "the press has another version of the register map" "update the press program or press.map.in.map_version"
+    MapVersion = 501 Error Operator "the press has another version of the register map" "update the press program or press.map.in.map_version"
         "プレスのレジスタマップの版が違います" "プレスのプログラムまたは press.map.in.map_version を更新してください"
-    PressId = 502 Error "this is another press than the plant file says" "correct host, unit or press_id in the plant file"
+    PressId = 502 Error Operator "this is another press than the plant file says" "correct host, unit or press_id in the plant file"
         "プラントファイルと違うプレスに接続されています" "プラントファイルの host、unit、press_id を修正してください"
 }
 

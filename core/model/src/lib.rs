@@ -29,7 +29,7 @@ mod template;
 pub mod units;
 mod verdict;
 
-pub use alarm::{Alarm, Code, Language, Severity};
+pub use alarm::{Alarm, Audience, Code, Language, Severity};
 pub use field::{Field, NodeState};
 pub use figures::{Figures, Measure};
 pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
