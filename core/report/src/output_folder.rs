@@ -12,7 +12,7 @@ use platen_shape::Surface;
 
 use crate::field_export::PlateTable;
 use crate::picture::{self, Caption, PictureError, StripPoint};
-use crate::result::{LineRecord, PlateRecord, ResultRecord};
+use crate::result::{LineRecord, Next, PlateRecord, ResultRecord};
 
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";
@@ -113,7 +113,7 @@ pub fn illustrate(
 ) -> Result<Vec<PathBuf>, FilesError> {
     let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
     let scale = &record.plate_file.scale;
-    let mut files = fields(folder, surface, reports, &record.plate_file, &caption)?;
+    let mut files = fields(folder, surface, reports, &record.plate_file, &caption, record.next.as_ref())?;
     for line in &record.reference_lines {
         for template in &line.templates {
             let section = picture::section(line, template, &caption, scale);
@@ -127,7 +127,7 @@ pub fn illustrate(
 }
 
 /// Writes the fields of the comparisons as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`) and as one
-/// map for each field of one component.
+/// map for each field of one component; `next` is framed on that of the missing curvature.
 ///
 /// # Errors
 /// [`FilesError`].
@@ -137,6 +137,7 @@ pub fn fields(
     reports: &[&Report],
     plate: &PlateRecord,
     caption: &Caption<'_>,
+    next: Option<&Next>,
 ) -> Result<Vec<PathBuf>, FilesError> {
     let table = PlateTable::new(surface, reports);
     let mut files = vec![
@@ -145,7 +146,7 @@ pub fn fields(
         put(folder, "plate.vtk", &table.vtk())?,
     ];
     for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
-        let map = picture::map(field, plate, caption, &plate.scale);
+        let map = picture::map(field, plate, caption, &plate.scale, next);
         files.push(put_picture(folder, &field.name, map)?);
     }
     Ok(files)

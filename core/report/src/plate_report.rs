@@ -172,6 +172,7 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
     html! {
         @if record.scan.simulated { p.warning { "Simulated scan: no real plate was measured." } }
         @for sentence in record.says.iter().take(2) { p.says { (sentence) } }
+        @if let Some(next) = &record.next { p.says { (next.says()) } }
         dl {
             dt { "Size" } dd { (format!("{:.0} \u{d7} {:.0} \u{d7} {:.0} mm", plate.width_mm, plate.height_mm, plate.thickness_mm)) }
             dt { "Target" } dd { (plate.target.as_deref().unwrap_or("none: nothing can be judged")) }

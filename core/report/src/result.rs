@@ -8,12 +8,14 @@
 mod checks;
 mod grid;
 mod lines;
+mod next;
 mod outline;
 mod plate;
 
 pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
 pub use grid::GridRecord;
 pub use lines::{LineRecord, PointRecord, TemplateRecord};
+pub use next::{CURVATURE_DEFICIT, Next, NextPlace, NoNext};
 pub use outline::{OutlineRecord, OutlineSource};
 pub use plate::PlateRecord;
 
@@ -76,6 +78,9 @@ pub struct ResultRecord {
     pub surface: SurfaceRecord,
     /// Findings of each comparison.
     pub comparisons: Vec<Json>,
+    /// Place of the next hit; null in documents older than it.
+    #[serde(default)]
+    pub next: Option<Next>,
     /// Quality of the measurement.
     pub quality: QualityRecord,
     /// Time of each stage.
@@ -250,6 +255,7 @@ impl ResultRecord {
             grid: GridRecord::new(measurement, &sound),
             surface: surface(measured),
             comparisons: context.reports.iter().map(comparison).collect(),
+            next: Some(Next::new(&sound, context.plate, context.verdict)),
             quality: QualityRecord {
                 coverage: measurement.quality.coverage,
                 noise_mm: mm(measurement.quality.noise),

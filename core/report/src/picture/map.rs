@@ -1,13 +1,13 @@
 //! Map of a field over the plate's rectangle (u, v).
 
-use platen_model::{Field, NodeState, Verdict};
+use platen_model::{Field, NodeState};
 
 use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE};
 use super::scale::{Scale, nice_ceiling};
 use super::shades::{self, Shades};
 use super::{Caption, PictureError, PictureScale};
-use crate::result::PlateRecord;
+use crate::result::{CURVATURE_DEFICIT, Next, NextPlace, PlateRecord};
 
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: u32 = 1200;
@@ -24,7 +24,7 @@ const SQUARE: f64 = 4.0;
 /// Parts of the plate with their mean written on them, along u and v.
 const PARTS: [usize; 2] = [5, 4];
 
-/// Draws one field over the plate.
+/// Draws one field over the plate. The map of the missing curvature frames the place of the next hit.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -33,6 +33,7 @@ pub fn map(
     plate: &PlateRecord,
     caption: &Caption<'_>,
     picture_scale: &PictureScale,
+    next: Option<&Next>,
 ) -> Result<String, PictureError> {
     let largest = (0..field.state.len())
         .filter(|&node| field.state[node] != NodeState::Unseen)
@@ -49,7 +50,10 @@ pub fn map(
         let corners = [layout.at(0.0, plate.height_mm), layout.at(plate.width_mm, 0.0)];
         Shades::of(field, &layout.scale, squares).paint(canvas, corners[0], corners[1])?;
         layout.axes(canvas)?;
-        part_means(field, &layout, canvas, caption.verdict == Verdict::Pass)?;
+        part_means(field, &layout, canvas)?;
+        if let Some(place) = next.and_then(Next::place).filter(|_| field.name == CURVATURE_DEFICIT) {
+            next_place(place, field, &layout, canvas)?;
+        }
         layout.legend(canvas, field)
     })
 }
@@ -178,54 +182,46 @@ impl Layout<'_> {
     }
 }
 
-struct Part {
-    column: usize,
-    row: usize,
-    /// Mean in the legend's unit.
-    mean: f64,
-    /// Position of the shade under its number.
-    beneath: f64,
+/// Writes the field's mean on each part of the plate.
+fn part_means(field: &Field, layout: &Layout<'_>, canvas: &Canvas<'_>) -> Result<(), PictureError> {
+    let [n_u, n_v] = PARTS.map(|n| n as f64);
+    let digits = Text::new(27.0).bold().centred();
+    for (column, row) in (0..PARTS[0] * PARTS[1]).map(|k| (k % PARTS[0], k / PARTS[0])) {
+        let share = [(column as f64 + 0.5) / n_u, (row as f64 + 0.5) / n_v];
+        let Some((mean, beneath)) = mean(field, column, row).zip(shade_at(field, &layout.scale, share))
+        else {
+            continue;
+        };
+        let at = layout.at(share[0] * layout.plate.width_mm, share[1] * layout.plate.height_mm);
+        let number = layout.scale.number(mean * layout.scale.factor);
+        canvas.text(&number, at, digits.coloured(colour::text_on(beneath)))?;
+    }
+    Ok(())
 }
 
-/// Writes the field's mean on each part of the plate. Unless the plate passed, the worst part is framed and named; a plate
-/// that passed under its templates may deviate beyond their ends, which requires no action.
-fn part_means(
+/// Frames the place of the next hit and names it inside the frame, away from the rows of the means.
+fn next_place(
+    place: &NextPlace,
     field: &Field,
     layout: &Layout<'_>,
     canvas: &Canvas<'_>,
-    done: bool,
 ) -> Result<(), PictureError> {
-    let (w, h) = (layout.plate.width_mm / PARTS[0] as f64, layout.plate.height_mm / PARTS[1] as f64);
-    let part = |k: usize| {
-        let (column, row) = (k % PARTS[0], k / PARTS[0]);
-        let beneath = shade_at(field, &layout.scale, (column as f64 + 0.5, row as f64 + 0.5))?;
-        let mean = mean(field, column, row)? * layout.scale.factor;
-        Some(Part { column, row, mean, beneath })
-    };
-    let parts: Vec<Part> = (0..PARTS[0] * PARTS[1]).filter_map(part).collect();
-    let digits = Text::new(27.0).bold().centred();
-    for part in &parts {
-        let at = layout.at((part.column as f64 + 0.5) * w, (part.row as f64 + 0.5) * h);
-        canvas.text(&layout.scale.number(part.mean), at, digits.coloured(colour::text_on(part.beneath)))?;
-    }
-    let Some(words) = layout.scale.words.filter(|_| !done) else { return Ok(()) };
-    let worst = parts.iter().max_by(|a, b| a.mean.abs().total_cmp(&b.mean.abs()));
-    let Some(worst) = worst.filter(|part| part.mean.abs() > layout.scale.anchors[0]) else { return Ok(()) };
-    let inset = 3.0 / layout.pixel_per_mm;
-    let (i, k) = (worst.column as f64, worst.row as f64);
-    let (from, to) =
-        (layout.at(i * w + inset, (k + 1.0) * h - inset), layout.at((i + 1.0) * w - inset, k * h + inset));
+    let ([u, v], [w, h]) = (place.at_mm, place.extent_mm.map(|mm| 0.5 * mm));
+    let (from, to) = (layout.at(u - w, v + h), layout.at(u + w, v - h));
     canvas.frame(from, to, INK, 4)?;
-    // At the part's lower side, where the shade may differ from that under its number.
-    let (below, row) = ((0.5 * (from.0 + to.0), to.1 - 20.0), k + (inset + 20.0 / layout.pixel_per_mm) / h);
-    let beneath = shade_at(field, &layout.scale, (i + 0.5, row)).unwrap_or(worst.beneath);
+    let row_height = layout.plate.height_mm * layout.pixel_per_mm / PARTS[1] as f64;
+    let to_a_mean = |y: f64| (((y - TOP) / row_height).fract() - 0.5).abs();
+    let (low, high) = (to.1 - 20.0, from.1 + 20.0);
+    let y = if to_a_mean(low) >= to_a_mean(high) { low } else { high };
+    let share = [u / layout.plate.width_mm, 1.0 - (y - TOP) / (layout.plate.height_mm * layout.pixel_per_mm)];
+    let beneath = shade_at(field, &layout.scale, share).unwrap_or(0.0);
     let look = Text::new(22.0).bold().centred().coloured(colour::text_on(beneath));
-    canvas.text(words[usize::from(worst.mean > 0.0)], below, look)
+    canvas.text("next hit", (0.5 * (from.0 + to.0), y), look)
 }
 
-/// Returns the position of the shade at a place given in parts of the plate along u and v; `None` where unseen.
-fn shade_at(field: &Field, scale: &Scale, (column, row): (f64, f64)) -> Option<f64> {
-    match field.sample(column / PARTS[0] as f64, row / PARTS[1] as f64, 0) {
+/// Returns the position of the shade at a share of the plate's sides; `None` where unseen.
+fn shade_at(field: &Field, scale: &Scale, [u, v]: [f64; 2]) -> Option<f64> {
+    match field.sample(u, v, 0) {
         (NodeState::Seen, value) => Some(scale.position(value * scale.factor)),
         (NodeState::Unchanged, _) => Some(0.0),
         (NodeState::Unseen, _) => None,
@@ -253,7 +249,10 @@ fn mean(field: &Field, i: usize, k: usize) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use platen_model::Verdict;
+
     use super::*;
+    use crate::result::NoNext;
 
     const SIDE: usize = 21;
 
@@ -274,10 +273,14 @@ mod tests {
     }
 
     fn drawn(field: &Field) -> String {
+        framed(field, None)
+    }
+
+    fn framed(field: &Field, next: Option<&Next>) -> String {
         let plate = PlateRecord { width_mm: 3000.0, height_mm: 2500.0, ..PlateRecord::default() };
         let caption = Caption { plate: "A<7>", stroke: Some(7), verdict: Verdict::Fail };
         let picture_scale = PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
-        map(field, &plate, &caption, &picture_scale).unwrap()
+        map(field, &plate, &caption, &picture_scale, next).unwrap()
     }
 
     /// The part of the picture that is the legend's numbers.
@@ -308,11 +311,32 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_part_is_named_in_words_and_only_beyond_the_limit() {
-        let per_mm = 0.006 / 3.0;
-        let much = drawn(&field("curvature_deficit", "1/m", |u, _| 40.0 * per_mm * u, false));
-        assert!(much.matches("bend more").count() == 2, "legend and plate");
-        let done = drawn(&field("curvature_deficit", "1/m", |u, _| 2.0 * per_mm * u, false));
-        assert!(done.matches("bend more").count() == 1, "legend alone");
+    fn the_place_of_the_next_hit_is_framed_on_the_map_of_the_missing_curvature_alone() {
+        let next = Next::Place(NextPlace {
+            at_mm: [2000.0, 1000.0],
+            extent_mm: [600.0, 800.0],
+            gap_mm: 20.0,
+            uncertainty_mm: None,
+            limit_mm: 3.0,
+            chord_mm: 2000.0,
+        });
+        let deficit = field(CURVATURE_DEFICIT, "1/m", |_, _| 0.04, false);
+        // 0.27 pixels a millimetre, 8 units a pixel; u from the left, v from below.
+        let corner = |u: f64, v: f64| {
+            let [x, y] = [LEFT + 0.27 * u, TOP + 0.27 * (2500.0 - v)].map(|pixel| (8.0 * pixel).round());
+            format!("{x},{y}")
+        };
+        let svg = framed(&deficit, Some(&next));
+        for place in [corner(1700.0, 600.0), corner(2300.0, 600.0), corner(1700.0, 1400.0)] {
+            assert!(svg.contains(&place), "{place}");
+        }
+        assert!(svg.contains("next hit"));
+        for other in [
+            framed(&deficit, None),
+            framed(&deficit, Some(&Next::Nowhere { none: NoNext::NothingStandsOut })),
+            framed(&field("deviation", "m", |_, _| 0.04, false), Some(&next)),
+        ] {
+            assert!(!other.contains("next hit") && !other.contains(&corner(1700.0, 600.0)));
+        }
     }
 }

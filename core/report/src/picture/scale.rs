@@ -9,6 +9,8 @@ use platen_model::units::{metres, mm};
 use platen_model::{Target, TargetShape};
 use platen_plant::PlateFile;
 
+use crate::result::CURVATURE_DEFICIT;
+
 /// Limit and chord of a template where the plate file has none, millimetres: the trade's 3 mm on 2 m.
 const USUAL: [f64; 2] = [3.0, 2000.0];
 
@@ -68,7 +70,7 @@ impl PictureScale {
         // Gap to curvature: delta kappa = 8 g / c^2.
         let as_gap = Scale { factor: 1.0 / per_m(1.0, self.chord_mm), ..self.gaps() };
         match name {
-            "curvature_deficit" => (
+            CURVATURE_DEFICIT => (
                 format!("Still to bend, {template}"),
                 Scale { inverted: true, words: Some(["bent too far", "bend more"]), ..as_gap },
             ),

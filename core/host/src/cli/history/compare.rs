@@ -74,7 +74,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
         let verdict = second.verdict.unwrap_or(Verdict::NotMeasured);
         let caption = Caption { plate: &title, stroke: None, verdict };
         let all: Vec<&Report> = reports.iter().collect();
-        written = output_folder::fields(out, &now, &all, &PlateRecord::new(&plate, &now, None), &caption)?;
+        let plate = PlateRecord::new(&plate, &now, None);
+        written = output_folder::fields(out, &now, &all, &plate, &caption, None)?;
     }
     let figures = platen_history::compare(&first, &second);
     if common.json {
