@@ -71,6 +71,8 @@ pub struct Status {
     pub link_error: Option<Code>,
     /// Registers of the press at the last read.
     pub press: Option<PressImage>,
+    /// Words of the last read of the whole block.
+    pub words: Vec<u16>,
     /// Desired registers of the host.
     pub host: HostImage,
     /// Counters of the link.
@@ -106,6 +108,7 @@ pub fn channels() -> (HostSide, PressSide) {
         state: State::default(),
         link_error: None,
         press: None,
+        words: Vec::new(),
         host: HostImage::default(),
         counts: Counts::default(),
         metrics: Metrics::default(),
@@ -163,6 +166,7 @@ pub async fn run_press<L: Link, J: Journal>(
                 clock: cycle::Clock::start(&press),
                 faults: cycle::Faults::default(),
                 last_press: None,
+                last_words: Vec::new(),
                 press,
             };
             runner.run().await;

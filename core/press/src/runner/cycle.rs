@@ -20,7 +20,7 @@ const TICK: Duration = Duration::from_millis(100);
 /// Torn reads in a row before the alarm.
 const TORN_LIMIT: u32 = 50;
 /// Period of the status.
-const STATUS: Duration = Duration::from_millis(200);
+pub(super) const STATUS: Duration = Duration::from_millis(200);
 /// Time for a press in the client role to read the safe registers.
 const FAREWELL: Duration = Duration::from_millis(500);
 /// Attempts to write the safe registers at the end.
@@ -38,6 +38,8 @@ pub(super) struct Runner<L> {
     pub(super) clock: Clock,
     pub(super) faults: Faults,
     pub(super) last_press: Option<PressImage>,
+    /// Words of the last read of the whole block.
+    pub(super) last_words: Vec<u16>,
 }
 
 /// Due times.
@@ -182,6 +184,9 @@ impl<L: Link> Runner<L> {
     async fn read_press(&mut self, count: u16) -> Result<Result<PressImage, Torn>, LinkError> {
         let words = self.client.read(&self.press.map.read, count).await?;
         self.faults.exceptions = 0;
+        if count == self.press.map.read.count {
+            self.last_words.clone_from(&words);
+        }
         Ok(PressImage::decode(&self.press.map, self.press.press_id, &words))
     }
 
@@ -457,6 +462,7 @@ impl<L: Link> Runner<L> {
             state: self.handshake.state(),
             link_error: self.handshake.link_error(),
             press: self.last_press.clone(),
+            words: self.last_words.clone(),
             host: self.handshake.image().clone(),
             counts: self.client.counts().clone(),
             metrics: self.metrics.clone(),

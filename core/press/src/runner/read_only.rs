@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use platen_plant::press::Press;
+use tokio::time::{Instant, sleep_until};
 
+use super::cycle::STATUS;
 use super::{Answer, Order, PressSide};
 use crate::{Client, Link, LinkError, PressImage, Torn};
 
@@ -17,7 +19,9 @@ pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut si
     let mut last = None;
     let mut backoff = press.link.backoff_min;
     loop {
-        let pause = match look(press, &mut client).await {
+        let seen = look(press, &mut client).await;
+        let words = seen.as_ref().map_or(Vec::new(), |(words, _)| words.clone());
+        let pause = match seen.map(|(_, image)| image) {
             Ok(Ok(image)) => {
                 backoff = press.link.backoff_min;
                 if last.as_ref() != Some(&image) {
@@ -36,19 +40,29 @@ pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut si
         };
         side.status.send_modify(|status| {
             status.press = last.clone();
+            status.words = words;
             status.counts = client.counts().clone();
         });
-        tokio::select! {
-            answer = side.answers.recv() => if matches!(answer, None | Some(Answer::Stop)) { return },
-            () = tokio::time::sleep(pause) => {}
+        let until = Instant::now() + pause;
+        while Instant::now() < until {
+            tokio::select! {
+                answer = side.answers.recv() => if matches!(answer, None | Some(Answer::Stop)) { return },
+                // A sign of life during a long pause.
+                () = sleep_until(until.min(Instant::now() + STATUS)) => side.status.send_modify(|_| ()),
+            }
         }
     }
 }
 
-async fn look<L: Link>(press: &Press, client: &mut Client<L>) -> Result<Result<PressImage, Torn>, LinkError> {
+/// Reads the whole block: its words, and what they mean.
+async fn look<L: Link>(
+    press: &Press,
+    client: &mut Client<L>,
+) -> Result<(Vec<u16>, Result<PressImage, Torn>), LinkError> {
     if !client.connected() {
         client.connect().await?;
     }
     let words = client.read(&press.map.read, press.map.read.count).await?;
-    Ok(PressImage::decode(&press.map, press.press_id, &words))
+    let image = PressImage::decode(&press.map, press.press_id, &words);
+    Ok((words, image))
 }
