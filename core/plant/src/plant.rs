@@ -7,11 +7,13 @@ mod calibration;
 mod frame;
 mod output;
 mod plugin_use;
+mod screen;
 
 pub use calibration::CalibrationUse;
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
 pub use plugin_use::PluginUse;
+pub use screen::Screen;
 
 use std::path::{Path, PathBuf};
 
@@ -73,6 +75,8 @@ pub struct PlantFile {
     pub comparisons: Vec<PluginUse>,
     /// Destination of results.
     pub output: Output,
+    /// Browser pages; without the table none are served.
+    pub screen: Option<Screen>,
 }
 
 /// Use of a plugin: the table of the plant file that names it.
@@ -115,6 +119,7 @@ impl Default for PlantFile {
             flattening: PluginUse::by_default(FLATTENING),
             comparisons: COMPARISONS.map(PluginUse::by_default).to_vec(),
             output: Output::in_folder(Path::new("")),
+            screen: None,
         }
     }
 }
@@ -213,6 +218,8 @@ impl PlantFile {
             Ok(plates)
         });
         let output = root.section("output").and_then(|table| Output::read(table, folder));
+        let screen = root.table("screen").optional();
+        let screen = screen.and_then(|table| table.map(|table| Screen::read(table, folder)).transpose());
         root.finish();
 
         let (name, seed) = plant?;
@@ -230,6 +237,7 @@ impl PlantFile {
             flattening: flattening?.unwrap_or(default.flattening),
             comparisons: if listed { comparisons? } else { default.comparisons },
             output: output?,
+            screen: screen?,
         })
     }
 }
