@@ -21,6 +21,8 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         (_, "platen-report") => {
             &["platen-history", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
         }
+        // Pages: no press, no plugin, no database; the host is their source.
+        (_, "platen-screen") => &["platen-model", "platen-report"],
         (_, "platen") => &[
             "platen-abi",
             "platen-engine",
@@ -31,6 +33,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
             "platen-press",
             "platen-report",
             "platen-scan",
+            "platen-screen",
             "platen-shape",
         ],
         (_, "platen-bench") => &[

@@ -185,7 +185,7 @@ pub fn replace(path: &Path, content: &[u8]) -> Result<(), FilesError> {
 }
 
 /// Returns a name as a file name: characters that a file system or a shell may interpret become `_`.
-pub(crate) fn file_name(name: &str) -> String {
+pub fn file_name(name: &str) -> String {
     let kind = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
     name.chars().map(kind).collect()
 }

@@ -1,0 +1,88 @@
+// Keeps a page up to date. Every event carries all cells of the page; nothing is computed here but staleness: a page that has heard
+// nothing for 1.5 s of its own clock, or whose press cycle stands still, shows no verdict, place or number.
+
+const meta = document.querySelector('meta[name="platen-live"]');
+const told = meta.dataset;
+const SILENCE_MS = 1500;
+const RETRY_MS = 300;
+const CELLS = 'span[id], p[id], img[id], rect[id]';
+
+let stream = null;
+let heard = performance.now();
+let stale = null;
+
+function put(id, cell) {
+  const element = document.getElementById(id);
+  if (!element) return;
+  if (cell.text !== undefined && element.textContent !== cell.text) element.textContent = cell.text;
+  for (const [name, value] of Object.entries(cell.attributes ?? {})) {
+    if (value === null) element.removeAttribute(name);
+    else if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+  }
+}
+
+// Removes everything that was heard, and says why.
+function silence(reason, words, remedy) {
+  if (stale === reason) return;
+  stale = reason;
+  for (const element of document.querySelectorAll(CELLS)) {
+    if (element.tagName === 'IMG') element.removeAttribute('src');
+    else if (element.tagName === 'rect') element.setAttribute('width', '0');
+    else element.textContent = '';
+  }
+  put('band', { attributes: { class: 'band lost' } });
+  put('mode', { attributes: { class: 'mode none' } });
+  put('alarm', { attributes: { class: 'alarm none' } });
+  put('verdict', { text: words });
+  put('why', { text: remedy });
+}
+
+function state(event) {
+  heard = performance.now();
+  stale = null;
+  for (const [id, cell] of Object.entries(JSON.parse(event.data))) put(id, cell);
+}
+
+function beat(event) {
+  heard = performance.now();
+  const { boot, cycle_age_ms: age } = JSON.parse(event.data);
+  if (boot !== told.boot) location.reload();
+  else if (age > Number(told.cycleMs)) silence('stuck', told.stuck, told.stuckRemedy);
+  else if (stale) open();
+}
+
+function close() {
+  stream?.close();
+  stream = null;
+}
+
+// Opens the events anew: the first is the whole state.
+function open() {
+  close();
+  if (document.hidden) return;
+  stream = new EventSource(meta.content);
+  stream.addEventListener('state', state);
+  stream.addEventListener('beat', beat);
+  stream.addEventListener('error', () => {
+    close();
+    setTimeout(() => stream ?? open(), RETRY_MS);
+  });
+}
+
+function watch() {
+  if (performance.now() - heard > SILENCE_MS) silence('lost', told.lost, told.lostRemedy);
+}
+
+// A hidden page holds no connection, and knows nothing when it comes back.
+function shown() {
+  if (document.hidden) close();
+  else {
+    silence('lost', told.lost, told.lostRemedy);
+    open();
+  }
+}
+
+document.addEventListener('visibilitychange', shown);
+addEventListener('pageshow', event => { if (event.persisted) shown(); });
+setInterval(watch, 100);
+open();

@@ -1,0 +1,269 @@
+//! `/`: the operator's page, read from two metres: verdict, place of the next hit, gap against its limit, states, one alarm.
+
+use maud::{Markup, html};
+use platen_model::{Audience, Severity};
+use platen_report::picture::{PictureScale, Turn};
+use platen_report::result::Next;
+
+use super::{LivePage, class, clean, document, navigation};
+use crate::cells::Cells;
+use crate::view::View;
+use crate::{PlatePart, ResultPart, Snapshot, Stage, Texts, words};
+
+/// Strokes in the strip, and the size of its drawing.
+const STRIP: usize = 16;
+const STRIP_SIZE: [f64; 2] = [640.0, 100.0];
+/// Size of the drawing of the gap against its limit.
+const BAR_SIZE: [f64; 2] = [600.0, 48.0];
+/// Fields that a map is shown of, the first that there is.
+const FIELDS: [&str; 2] = ["curvature_deficit", "deviation"];
+
+/// Returns the page.
+pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
+    let cells = cells(snapshot, view);
+    let text = |texts: Texts| texts.of(view.language);
+    let view_box = |[w, h]: [f64; 2]| format!("0 0 {w} {h}");
+    let body = html! {
+        header id="band" class=[cells.attribute("band", "class")] {
+            h1 aria-live="polite" { (cells.span("verdict")) }
+            (cells.p("why"))
+            (cells.p("mode"))
+        }
+        main data-result="" {
+            section.where {
+                div.map { (cells.img("map")) (cells.img("overlay")) }
+                svg.strip viewBox=(view_box(STRIP_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::STROKES)) {
+                    (cells.rect("strip-limit"))
+                    @for k in 0..STRIP { (cells.rect(&format!("strip-{k}"))) }
+                }
+            }
+            section.figures {
+                h2 { (cells.span("place-title")) }
+                p.figure { (cells.span("left")) " " (cells.span("left-words")) }
+                p.figure { (cells.span("near")) " " (cells.span("near-words")) }
+                h2 { (text(words::GAP)) " " (cells.span("limit")) }
+                p.figure { (cells.span("gap")) " " (cells.span("gap-more")) }
+                svg.bar viewBox=(view_box(BAR_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::GAP)) {
+                    @for id in ["bar-limit", "bar-gap", "bar-uncertainty"] { (cells.rect(id)) }
+                }
+            }
+        }
+        footer {
+            p.alarm-line { (cells.span("alarm")) }
+            (cells.p("stroke"))
+            p.states {
+                @for id in ["press", "scanner", "record"] { (cells.span(id)) }
+            }
+            (navigation(view, "/"))
+        }
+    };
+    document(view, "platen", "operator", Some((LivePage::Operator, &snapshot.boot)), body)
+}
+
+/// Returns the cells of the page.
+pub(super) fn cells(snapshot: &Snapshot, view: View) -> Cells {
+    let mut cells = Cells::default();
+    band(&mut cells, snapshot, view);
+    place(&mut cells, snapshot, view);
+    gap(&mut cells, snapshot, view);
+    strip(&mut cells, snapshot);
+    states(&mut cells, snapshot, view);
+    cells
+}
+
+/// Band: verdict of the stroke in hand, else what goes on.
+fn band(cells: &mut Cells, snapshot: &Snapshot, view: View) {
+    let text = |texts: Texts| texts.of(view.language);
+    let stage = snapshot.stroke.as_ref().map(|stroke| stroke.stage).filter(|stage| *stage != Stage::Done);
+    let (verdict, why, look) = match (&snapshot.result, stage) {
+        _ if !snapshot.press.in_step && snapshot.host.mode == "listen" => (words::LISTENING, None, "unknown"),
+        _ if !snapshot.press.in_step => (words::NO_LINK, None, "unknown"),
+        (_, Some(stage)) => (words::stage(stage), None, "busy"),
+        (Some(result), None) => {
+            let sense = sense(result);
+            (words::verdict(result.verdict, sense), result.why, class(result.verdict, sense))
+        }
+        (None, None) if snapshot.press.ready => (words::READY, None, "ready"),
+        (None, None) => (words::NOT_READY, None, "unknown"),
+    };
+    cells.text("verdict", text(verdict));
+    cells.text("why", why.map_or("", text));
+    cells.class("band", format!("band {look}"));
+    let mode = match snapshot.host.mode {
+        _ if snapshot.host.simulated => text(words::SIMULATED),
+        "dry-run" => text(words::TRIAL),
+        _ => "",
+    };
+    cells.text("mode", mode);
+    cells.class("mode", if mode.is_empty() { "mode none" } else { "mode" });
+}
+
+fn sense(result: &ResultPart) -> i8 {
+    result.worst.as_ref().map_or(0, |worst| worst.sense)
+}
+
+/// Map, and the place of the next hit.
+fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
+    let text = |texts: Texts| texts.of(view.language).to_owned();
+    let result = snapshot.result.as_ref();
+    let field =
+        result.and_then(|result| FIELDS.into_iter().find(|name| result.fields.iter().any(|f| f == name)));
+    let picture = |ending: &str| {
+        let (result, field) = (result?, field?);
+        Some(view.link(&format!("/strokes/{}/{field}.{ending}", result.run)))
+    };
+    for (id, ending) in [("map", "png"), ("overlay", "svg")] {
+        cells.set(id, "src", picture(ending));
+        cells.set(id, "alt", Some(if id == "map" { text(words::MAP) } else { String::new() }));
+    }
+    let next = result.and_then(|result| result.next.as_ref());
+    cells.text("place-title", next.map_or(String::new(), |next| text(words::next(next))));
+    let next = next.and_then(Next::place).zip(snapshot.plate.as_ref());
+    let distances =
+        next.and_then(|(next, plate)| Some((from_left_and_near(next.at_mm, plate, view.turn)?, plate)));
+    let [left, near] = distances.map_or([None; 2], |([left, near], _)| [Some(left), Some(near)]);
+    let by_press =
+        view.turn == Turn::Press && snapshot.plate.as_ref().is_some_and(|plate| plate.press_side.is_some());
+    let near_words = if by_press { words::FROM_PRESS } else { words::FROM_BOTTOM };
+    for (id, mm, texts) in [("left", left, words::FROM_LEFT), ("near", near, near_words)] {
+        cells.text(id, mm.map_or(String::new(), |mm| view.distance(mm)));
+        cells.text(format!("{id}-words"), mm.map_or(String::new(), |_| text(texts)));
+    }
+}
+
+/// Returns the distances of a place from the left and from the lower edge of the plate as it is shown: with the edge that faces the
+/// press down, or as drawn. Never mirrored.
+fn from_left_and_near([u, v]: [f64; 2], plate: &PlatePart, turn: Turn) -> Option<[f64; 2]> {
+    let [w, h] = plate.size_mm?;
+    Some(match plate.press_side.filter(|_| turn == Turn::Press) {
+        Some([0, 1]) => [w - u, h - v],
+        Some([-1, _]) => [h - v, u],
+        Some([1, _]) => [v, w - u],
+        _ => [u, v],
+    })
+}
+
+/// Worst gap against its limit.
+fn gap(cells: &mut Cells, snapshot: &Snapshot, view: View) {
+    let worst = snapshot.result.as_ref().and_then(|result| result.worst.as_ref());
+    let text = |texts: Texts| texts.of(view.language);
+    let gap =
+        worst.map(|worst| view.with_uncertainty(worst.gap_mm, worst.uncertainty_mm)).unwrap_or_default();
+    // The figure is large, its uncertainty and unit beside it are not.
+    let (gap, more) = gap.split_once(' ').unwrap_or_default();
+    cells.text("gap", gap);
+    cells.text("gap-more", more);
+    let limit = worst
+        .map_or(String::new(), |worst| format!("({} {})", text(words::LIMIT), view.length(worst.limit_mm)));
+    cells.text("limit", limit);
+    let [wide, high] = BAR_SIZE;
+    let bars = worst.map_or([[0.0; 4]; 3], |worst| {
+        let scale = PictureScale { limit_mm: worst.limit_mm, ..PictureScale::default() };
+        let x = |gap_mm: f64| wide * scale.share(gap_mm.max(0.0));
+        let gap = worst.gap_mm.abs();
+        let (low, high_end) = (x(gap - worst.uncertainty_mm), x(gap + worst.uncertainty_mm));
+        [
+            [0.0, 0.0, x(worst.limit_mm), high],
+            [0.0, 0.25 * high, x(gap), 0.5 * high],
+            [low, 0.1 * high, (high_end - low).max(3.0), 0.8 * high],
+        ]
+    });
+    let look = snapshot.result.as_ref().map_or("unknown", |result| class(result.verdict, sense(result)));
+    for (id, bar) in ["bar-limit", "bar-gap", "bar-uncertainty"].into_iter().zip(bars) {
+        cells.bar(id, bar, if id == "bar-gap" { look } else { id });
+    }
+}
+
+/// Strip of the strokes of this plate: gap against the limit.
+fn strip(cells: &mut Cells, snapshot: &Snapshot) {
+    let [wide, high] = STRIP_SIZE;
+    let worst = snapshot.result.as_ref().and_then(|result| result.worst.as_ref());
+    let scale =
+        PictureScale { limit_mm: worst.map_or(1.0, |worst| worst.limit_mm), ..PictureScale::default() };
+    let step = wide / STRIP as f64;
+    let shown =
+        if worst.is_some() { &snapshot.strip[snapshot.strip.len().saturating_sub(STRIP)..] } else { &[] };
+    for k in 0..STRIP {
+        let bar = shown.get(k).map(|stroke| {
+            let tall = stroke.gap_mm.map_or(high, |gap| (high * scale.share(gap)).max(3.0));
+            let look = if k + 1 == shown.len() { "now" } else { "earlier" };
+            let unknown = if stroke.gap_mm.is_none() { " unknown" } else { "" };
+            ([k as f64 * step + 4.0, high - tall, step - 8.0, tall], format!("{look}{unknown}"))
+        });
+        let (bar, look) = bar.unwrap_or_default();
+        cells.bar(&format!("strip-{k}"), bar, &look);
+    }
+    let limit = worst.map_or(0.0, |worst| high * scale.share(worst.limit_mm));
+    let bar = if worst.is_some() { [0.0, high - limit, wide, limit] } else { [0.0; 4] };
+    cells.bar("strip-limit", bar, "bar-limit");
+}
+
+/// Stroke and plate, three states in words, at most one alarm.
+fn states(cells: &mut Cells, snapshot: &Snapshot, view: View) {
+    let text = |texts: Texts| texts.of(view.language);
+    let stroke = snapshot.stroke.as_ref().map(|stroke| {
+        if stroke.baseline {
+            return text(words::BLANK).to_owned();
+        }
+        format!("{} {}", text(words::STROKE), words::number(stroke.number, stroke.attempt, view.language))
+    });
+    let plate = snapshot.plate.as_ref().and_then(|plate| {
+        let name = plate.id.clone().or_else(|| plate.part.map(|part| part.to_string()))?;
+        Some(format!("{} {}", text(words::PLATE), clean(&name)))
+    });
+    let parts: Vec<String> = stroke.into_iter().chain(plate).collect();
+    cells.text("stroke", if parts.is_empty() { text(words::NO_PLATE).to_owned() } else { parts.join(", ") });
+    let press = match &snapshot.press {
+        press if !press.in_step => (words::OUT_OF_STEP, false),
+        press if !press.alive => (words::STANDS, false),
+        _ => (words::IN_STEP, true),
+    };
+    let scanner =
+        (words::scanner(snapshot.scanner.state), snapshot.scanner.state == crate::ScannerState::Ready);
+    let record = (
+        if snapshot.record.complete { words::COMPLETE } else { words::LOST_RECORDS },
+        snapshot.record.complete,
+    );
+    for (id, name, (state, good)) in [
+        ("press", words::PRESS, press),
+        ("scanner", words::SCANNER, scanner),
+        ("record", words::RECORD, record),
+    ] {
+        cells.text(id, format!("{}: {}", text(name), text(state)));
+        cells.class(id, if good { "state" } else { "state bad" });
+    }
+    let mut alarms = snapshot.alarms.iter().filter(|alarm| alarm.audience == Audience::Operator);
+    let (first, more) = (alarms.next(), alarms.count());
+    let more = if more > 0 { format!(" (+{more} {})", text(words::MORE_ALARMS)) } else { String::new() };
+    cells.text("alarm", first.map_or(String::new(), |alarm| words::alarm(alarm, view.language) + &more));
+    let look = match first.map(|alarm| alarm.severity) {
+        None => "none",
+        Some(Severity::Error) => "error",
+        Some(Severity::Warning) => "warning",
+    };
+    cells.class("alarm", format!("alarm {look}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_of_the_plate_with_the_press_below() {
+        let plate = |press_side| PlatePart {
+            id: None,
+            part: None,
+            recipe: None,
+            size_mm: Some([3000.0, 2000.0]),
+            press_side,
+        };
+        let at = |press_side, turn| from_left_and_near([500.0, 300.0], &plate(press_side), turn).unwrap();
+        assert_eq!(at(Some([0, -1]), Turn::Press), [500.0, 300.0]);
+        assert_eq!(at(Some([0, 1]), Turn::Press), [2500.0, 1700.0]);
+        // With u = 0 below, v runs to the left; with u = W below, to the right.
+        assert_eq!(at(Some([-1, 0]), Turn::Press), [1700.0, 500.0]);
+        assert_eq!(at(Some([1, 0]), Turn::Press), [300.0, 2500.0]);
+        assert_eq!(at(Some([1, 0]), Turn::Drawing), [500.0, 300.0]);
+        assert_eq!(at(None, Turn::Press), [500.0, 300.0]);
+    }
+}

@@ -1,0 +1,251 @@
+//! State of press, plate, stroke and result at one moment: `platen.screen/1`, as events and as `/api/v1/state`.
+//!
+//! A snapshot is whole: a page that has missed ten shows the truth with the eleventh. What is not known is null. `result` is the
+//! result of the plate and stroke in hand or null: it never is one of an earlier stroke.
+
+use platen_model::{Audience, Code, Language, Severity, Verdict};
+use platen_report::result::Next;
+use serde::Serialize;
+
+/// Version of the document.
+pub const SCHEMA: &str = "platen.screen/1";
+
+/// State at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Another one after every start of the host.
+    pub boot: String,
+    /// Count of snapshots since the start.
+    pub seq: u64,
+    /// Host.
+    pub host: HostPart,
+    /// Press.
+    pub press: PressPart,
+    /// Scanner.
+    pub scanner: ScannerPart,
+    /// Record of strokes.
+    pub record: RecordPart,
+    /// Plate in hand.
+    pub plate: Option<PlatePart>,
+    /// Stroke in hand.
+    pub stroke: Option<StrokePart>,
+    /// Result of the stroke in hand.
+    pub result: Option<ResultPart>,
+    /// Strokes of this plate with the one in hand, oldest first.
+    pub strip: Vec<StripPart>,
+    /// Alarms that stand now, the most urgent first.
+    pub alarms: Vec<ShownAlarm>,
+}
+
+/// Host.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HostPart {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Mode of the plant file: `off`, `listen`, `dry-run`, `simulate`, `measure`.
+    pub mode: &'static str,
+    /// State of the handshake, as in `platen status`.
+    pub state: String,
+    /// Results do not come from a real plate: the mode, or a simulated scanner.
+    pub simulated: bool,
+}
+
+/// Press.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PressPart {
+    /// Its name.
+    pub name: String,
+    /// Press and host are synchronised.
+    pub in_step: bool,
+    /// Its heartbeat moves; true where it has none.
+    pub alive: bool,
+    /// The next stroke will be measured.
+    pub ready: bool,
+}
+
+/// Scanner.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScannerPart {
+    /// Its state.
+    pub state: ScannerState,
+    /// Time of one scan, where its driver plans scans.
+    pub estimate_s: Option<f64>,
+}
+
+/// State of the scanner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScannerState {
+    /// Not yet asked.
+    Unknown,
+    /// In reach.
+    Ready,
+    /// Not in reach.
+    NotReady,
+    /// In reach, but its calibration is not valid.
+    NotCalibrated,
+}
+
+/// Record of strokes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordPart {
+    /// Every stroke so far is on record.
+    pub complete: bool,
+    /// Records that could not be written.
+    pub lost: u64,
+}
+
+/// Plate in hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlatePart {
+    /// Its name: of the plate file, else of the press; null before the first measurement where the press names none.
+    pub id: Option<String>,
+    /// Number of the part at the press.
+    pub part: Option<u32>,
+    /// Recipe at the press.
+    pub recipe: Option<u16>,
+    /// Extent along u and v.
+    pub size_mm: Option<[f64; 2]>,
+    /// Edge that faces the press, as a direction in (u, v).
+    pub press_side: Option<[i8; 2]>,
+}
+
+/// Stroke in hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StrokePart {
+    /// Its record; null before it is scanned.
+    pub run: Option<u32>,
+    /// Its number at the press.
+    pub number: u16,
+    /// 0 for the first measurement of it.
+    pub attempt: u16,
+    /// A scan of the blank.
+    pub baseline: bool,
+    /// Its stage.
+    pub stage: Stage,
+    /// Start of its scan, milliseconds since 1970.
+    pub since_ms: Option<i64>,
+}
+
+/// Stage of a stroke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Accepted; waits for a clear view.
+    Accepted,
+    /// Being scanned.
+    Scanning,
+    /// Being measured.
+    Measuring,
+    /// Given up, or its result is on its way.
+    Ending,
+    /// Its result is in the registers.
+    Done,
+}
+
+/// Result of the stroke in hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResultPart {
+    /// Its record.
+    pub run: u32,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Reason of "not measured".
+    pub reason: Option<Code>,
+    /// Reason in words.
+    pub why: Option<Texts>,
+    /// Template with the largest gap per limit.
+    pub worst: Option<Worst>,
+    /// Place of the next hit, or why there is none; null in documents older than it, and where nothing was measured.
+    pub next: Option<Next>,
+    /// Names of the fields that can be shown as maps.
+    pub fields: Vec<String>,
+}
+
+/// Template with the largest gap per limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Worst {
+    /// Largest gap.
+    pub gap_mm: f64,
+    /// Its expanded uncertainty (95 %).
+    pub uncertainty_mm: f64,
+    /// Limit.
+    pub limit_mm: f64,
+    /// Its place.
+    pub at_mm: [f64; 2],
+    /// -1 under-bent, 0 within the limit, 1 bent too far.
+    pub sense: i8,
+}
+
+/// A stroke of the plate in hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StripPart {
+    /// Label.
+    pub label: String,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Largest gap.
+    pub gap_mm: Option<f64>,
+}
+
+/// A text in both languages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Texts {
+    /// English.
+    pub en: &'static str,
+    /// Japanese.
+    pub ja: &'static str,
+}
+
+impl Texts {
+    /// Returns the text in a language.
+    #[must_use]
+    pub fn of(self, language: Language) -> &'static str {
+        match language {
+            Language::En => self.en,
+            Language::Ja => self.ja,
+        }
+    }
+}
+
+/// An alarm that stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownAlarm {
+    /// Number.
+    pub code: Code,
+    /// Severity.
+    pub severity: Severity,
+    /// Who must act.
+    pub audience: Audience,
+    /// Time since when it stands, milliseconds since 1970.
+    pub since_ms: i64,
+    /// Fault.
+    pub text: Texts,
+    /// Remedy.
+    pub remedy: Texts,
+    /// How often it was raised since the start of the host.
+    pub count: u64,
+}
+
+impl ShownAlarm {
+    /// Returns an alarm of the table.
+    #[must_use]
+    pub fn new(code: Code, since_ms: i64, count: u64) -> Self {
+        let alarm = code.alarm();
+        let both = |text: fn(&platen_model::Alarm, Language) -> &'static str| Texts {
+            en: text(alarm, Language::En),
+            ja: text(alarm, Language::Ja),
+        };
+        Self {
+            code,
+            severity: alarm.severity,
+            audience: alarm.audience,
+            since_ms,
+            text: both(platen_model::Alarm::text),
+            remedy: both(platen_model::Alarm::remedy),
+            count,
+        }
+    }
+}
