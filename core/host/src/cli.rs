@@ -18,6 +18,7 @@ pub mod press;
 pub mod run;
 mod scan;
 mod scan_source;
+mod screen;
 mod setup;
 mod status;
 mod verify;
@@ -92,6 +93,8 @@ enum Verb {
     Press(press::Command),
     /// Show the state of a running host
     Status(status::Command),
+    /// Make the token of the browser pages
+    Screen(screen::Command),
     /// Query the record
     History(history::Command),
     /// List the installed plugins and their options
@@ -168,6 +171,7 @@ pub fn main() -> ExitCode {
         Verb::Check(command) => check::run(&cli.common, command),
         Verb::Press(command) => press::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
+        Verb::Screen(command) => screen::run(&cli.common, command),
         Verb::History(command) => history::run(&cli.common, command),
         Verb::Calibrate(command) => calibrate::run(&cli.common, command),
         Verb::Verify(command) => verify::run(&cli.common, command),

@@ -8,6 +8,7 @@
 //! | `journal` | steps of a stroke in the history, before each promise to the press |
 //! | `previous_scans`, `region` | the stroke before and the baseline, from the history; the window of the next scan |
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
+//! | `screen` | the browser pages, where the plant file has `[screen]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
 //! | `figures` | findings to figures of the press's registers |
 
@@ -20,6 +21,7 @@ mod previous_scans;
 mod prometheus;
 mod region;
 mod scan_retention;
+mod screen;
 mod status;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,11 +36,13 @@ use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
 pub use measurement_worker::StrokeReport;
+pub use screen::{Pages, ScreenError};
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
 use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue};
+use screen::{Screen, Teller};
 
 /// Time for the last scan to be written when the host stops.
 const LAST_SCAN: Duration = Duration::from_secs(20);
@@ -52,6 +56,9 @@ pub enum HostError {
     /// The history cannot be used.
     #[error("{0}")]
     History(#[from] HistoryError),
+    /// The browser pages could not be served.
+    #[error(transparent)]
+    Screen(#[from] ScreenError),
     /// The press side could not start.
     #[error(transparent)]
     Press(#[from] RunError<HistoryError>),
@@ -63,7 +70,7 @@ pub enum HostError {
     Worker(String),
 }
 
-/// Runs until `stop` turns true; the press's registers are then safe. `strokes` receives one report per stroke, measured or
+/// Runs until `stop` turns true; the press's registers are then safe. `pages` are served meanwhile. `strokes` receives one report per stroke, measured or
 /// not.
 ///
 /// # Errors
@@ -72,6 +79,7 @@ pub async fn run(
     plant: &PlantFile,
     press: Press,
     catalogue: &Catalogue,
+    pages: Option<Pages>,
     mut stop: watch::Receiver<bool>,
     strokes: tokio::sync::mpsc::UnboundedSender<StrokeReport>,
 ) -> Result<(), HostError> {
@@ -80,20 +88,31 @@ pub async fn run(
     let pipeline = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (commands, inbox) = std::sync::mpsc::channel();
-    let lost = Arc::default();
-    let receivers =
-        measurement_worker::Receivers { answers: host.answers.clone(), strokes, lost: Arc::clone(&lost) };
+    let beside = status::Beside::default();
+    let mut teller = Teller::default();
+    let mut screen = None;
+    if let Some(pages) = pages {
+        tracing::info!("pages on {}", pages.address());
+        let started = Screen::start(pages, plant, &press, catalogue, &host.status, &beside)?;
+        teller = started.1;
+        screen = Some(tokio::spawn(started.0.keep(host.status.clone())));
+    }
+    let receivers = measurement_worker::Receivers {
+        answers: host.answers.clone(),
+        strokes,
+        lost: Arc::clone(&beside.lost),
+        screen: teller.clone(),
+    };
     let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
     let worker = worker.map_err(HostError::Thread)?;
 
     let link = PressLink::new(&press);
-    let alarm = status::NewestAlarm::default();
     let status = tokio::spawn(status::keep(
         plant.output.folder.clone(),
         press.clone(),
         host.status.clone(),
-        status::Beside { alarm: Arc::clone(&alarm), lost },
+        beside.clone(),
         host.answers.clone(),
     ));
     let mut press_side =
@@ -117,7 +136,7 @@ pub async fn run(
                     hung = Some(HostError::Worker("a plugin hangs or the measurement failed".into()));
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
-                dispatch(order, &commands, &mut scanning, &history, &alarm);
+                dispatch(order, &commands, &mut scanning, &history, &beside.alarm, &teller);
             }
         }
     };
@@ -126,6 +145,9 @@ pub async fn run(
         token.cancel();
     }
     status.abort();
+    if let Some(screen) = screen {
+        screen.abort();
+    }
     // A scan that is still being written is finished; a plugin that hangs is not waited for.
     let end = tokio::time::Instant::now() + LAST_SCAN;
     while hung.is_none() && !worker.is_finished() && tokio::time::Instant::now() < end {
@@ -146,6 +168,7 @@ fn dispatch(
     scanning: &mut Option<(StrokeKey, CancelToken)>,
     history: &Arc<Mutex<History>>,
     newest: &status::NewestAlarm,
+    screen: &Teller,
 ) {
     match order {
         Order::Command(Command::Cancel(key)) => {
@@ -154,6 +177,7 @@ fn dispatch(
             }
         }
         Order::Command(Command::PartEnd) => {
+            screen.tell(screen::Event::PartEnded);
             let ended = history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
             if let Err(error) = ended {
                 tracing::error!("end of part: {error}");
@@ -161,13 +185,15 @@ fn dispatch(
         }
         Order::Command(command) => {
             let token = CancelToken::default();
-            if let Command::Scan { key, .. } = &command {
+            if let Command::Scan { key, run_id, data } = &command {
+                screen.tell(screen::Event::Accepted { key: *key, run_id: *run_id, data: data.clone() });
                 *scanning = Some((*key, token.clone()));
             }
             // The dispatcher notices a worker that has ended.
             let _ = commands.send((command, token));
         }
         Order::Alarm { code, stroke, detail } => {
+            screen.tell(screen::Event::Alarm(code));
             let alarm = code.alarm();
             let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
             let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();

@@ -2,49 +2,63 @@
 
 mod files;
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use platen_model::Verdict;
-use platen_plant::PlantFile;
+use platen_plant::{PlantFile, Screen};
 
 use super::cell::{AcceptedResult, Cell};
 use super::run::{runtime, stop_signal};
 use super::{CliError, Common, output};
 use crate::progress;
-use crate::run::{self, StrokeReport};
+use crate::run::{self, HostError, Pages, StrokeReport};
 
 use tokio::sync::{mpsc, watch};
 
 /// Longest time of a demo that is not stuck.
 const LIMIT: Duration = Duration::from_secs(300);
+/// Most strokes of the demo, of `config/sim-press.toml`, with the blank.
+const MOST_STROKES: u32 = 15;
 
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  platen demo\n\n\
+#[command(after_help = "Examples:\n  platen demo\n  platen demo --screen --pace 20\n\n\
                         Only steel and light are simulated: platen-sim bends the plate and serves Modbus, the simulated scanner casts rays, \
                         the host measures with the plugin libraries beside the program and writes the results to the press.")]
 pub(super) struct Command {
     /// Folder for the results; an earlier demo there is replaced
     #[arg(long, value_name = "DIR", default_value = "platen-demo")]
     out: PathBuf,
+    /// Serve the browser pages during the demo, on this address, and stay until Ctrl-C
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8380")]
+    screen: Option<SocketAddr>,
+    /// Pause between two strokes, as in a shop: seconds
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(0..=3600))]
+    pace: Option<u32>,
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let start = Instant::now();
     files::prepare(&command.out)?;
-    let mut cell = Cell::start(&files::press_file(&command.out)?, &["--modbus-port", "0"])?;
+    let mut cell = Cell::start(&files::press_file(&command.out, command.pace)?, &["--modbus-port", "0"])?;
     let Some(modbus) = cell.modbus else {
         return Err(CliError::Failed("the demo's press serves no Modbus TCP".into()));
     };
     let plant_file = files::plant_file(&command.out, modbus, cell.plate)?;
-    let plant = PlantFile::load(&plant_file)?;
+    let mut plant = PlantFile::load(&plant_file)?;
+    plant.screen = command.screen.map(Screen::on);
+    let pages = Pages::open(&plant).map_err(HostError::from)?;
     let Some(press) = plant.press.clone() else {
         return Err(CliError::Failed("the demo's plant file has no [press]".into()));
     };
     if !common.json {
         output::line(&format!("simulated press on {modbus}, plate on {}", cell.plate))?;
+        if let Some(pages) = &pages {
+            output::line(&format!("pages: {}", pages.address()))?;
+        }
     }
     let mut reports = Vec::new();
     let (ended, registers) = runtime()?.block_on(async {
@@ -52,9 +66,10 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let (stop, stopped) = watch::channel(false);
         let mut interrupted = stop_signal()?;
         let catalogue = common.catalogue();
-        let host = run::run(&plant, press, &catalogue, stopped, sender);
+        let host = run::run(&plant, press, &catalogue, pages, stopped, sender);
         tokio::pin!(host);
-        let limit = tokio::time::sleep(LIMIT);
+        let pauses = Duration::from_secs(u64::from(command.pace.unwrap_or(0))) * MOST_STROKES;
+        let limit = tokio::time::sleep(LIMIT + pauses);
         tokio::pin!(limit);
         let mut look = tokio::time::interval(Duration::from_millis(100));
         loop {
@@ -67,6 +82,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 _ = look.tick() => if cell.is_done()? { break },
                 _ = interrupted.changed() => break,
                 () = &mut limit => return Err(CliError::Failed(format!("the demo has not ended after {} s", LIMIT.as_secs()))),
+            }
+        }
+        if command.screen.is_some() && !*interrupted.borrow() {
+            progress::phase("the demo has ended; its pages stay until Ctrl-C");
+            tokio::select! {
+                ended = &mut host => return Ok((ended, None)),
+                _ = interrupted.changed() => {}
             }
         }
         let registers = cell.registers()?;

@@ -8,7 +8,7 @@ use platen_model::Verdict;
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
-use crate::run::{self, HostError, StrokeReport};
+use crate::run::{self, HostError, Pages, StrokeReport};
 
 use tokio::sync::{mpsc, watch};
 
@@ -28,7 +28,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let file = command.plant.display();
     let missing = || CliError::Usage(format!("{file}: has no [press]; add the one to serve"));
     let press = plant.press.clone().ok_or_else(missing)?;
+    let pages = Pages::open(&plant).map_err(HostError::from)?;
     let json = common.json;
+    if let Some(pages) = pages.as_ref().filter(|_| !json) {
+        output::line(&format!("pages: {}", pages.address()))?;
+    }
     runtime()?.block_on(async {
         let (reports, mut strokes) = mpsc::unbounded_channel();
         let printer = tokio::spawn(async move {
@@ -37,7 +41,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 let _ = print(&report, json);
             }
         });
-        let ended = run::run(&plant, press, &common.catalogue(), stop_signal()?, reports).await;
+        let ended = run::run(&plant, press, &common.catalogue(), pages, stop_signal()?, reports).await;
         // The printer ends with the last sender.
         let _ = printer.await;
         ended.map_err(CliError::from)

@@ -29,6 +29,7 @@ use super::figures;
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
+use super::screen::{Event, MeasuredStroke, Teller};
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -102,6 +103,7 @@ pub(super) struct Receivers {
     pub(super) strokes: UnboundedSender<StrokeReport>,
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
+    pub(super) screen: Teller,
 }
 
 impl MeasurementWorker {
@@ -155,6 +157,10 @@ impl MeasurementWorker {
     }
 
     fn answer(&self, answer: Answer) {
+        if let Answer::Scanner { ready, estimate } = &answer {
+            let estimate_s = estimate.map(|time| time.as_secs_f64());
+            self.receivers.screen.tell(Event::Scanner { ready: *ready, estimate_s });
+        }
         // The press side may have ended.
         let _ = self.receivers.answers.send(answer);
     }
@@ -318,6 +324,7 @@ impl MeasurementWorker {
             Ok(JudgedStroke { answer, record, surface, reports, folder }) => {
                 self.answer(Answer::Result(key, Box::new(answer)));
                 let elapsed = started.elapsed();
+                self.show(stroke.run_id, &record, &reports);
                 // The press waits for its answer, not for pictures.
                 if let Some(folder) = &folder {
                     self.illustrate(&stroke, folder, &record, &surface, &reports);
@@ -333,6 +340,22 @@ impl MeasurementWorker {
         };
         self.archive.keep(folder, buffer);
         hung
+    }
+
+    /// Passes a result on to the pages, if there are any.
+    fn show(&self, run_id: u32, record: &ResultRecord, reports: &[Result<Report, PluginError>]) {
+        if !self.receivers.screen.is_heard() {
+            return;
+        }
+        let sound: Vec<&Report> = reports.iter().flatten().collect();
+        let strokes = platen_history::Archive::open(&self.plant.output.history)
+            .and_then(|archive| history_view::strokes_until(&archive, run_id, record));
+        let strokes = strokes.unwrap_or_else(|why| {
+            tracing::warn!(run_id, "the screen shows no strokes before this one: {why}");
+            Vec::new()
+        });
+        let measured = MeasuredStroke::new(run_id, record, &sound, strokes);
+        self.receivers.screen.tell(Event::Measured(Box::new(measured)));
     }
 
     fn folder(&self, run_id: u32) -> PathBuf {

@@ -19,7 +19,7 @@ use super::disk;
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
 
 /// Facts from outside the press side.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Beside {
     pub(super) alarm: NewestAlarm,
     /// Number of strokes whose documents could not be written.
@@ -116,7 +116,7 @@ pub struct LinkRecord {
 }
 
 impl StatusRecord {
-    fn of(
+    pub(super) fn of(
         press: &Press,
         folder: &Path,
         status: &Status,

@@ -16,9 +16,11 @@ pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
     Ok(std::fs::write(out.join("plates/plate-009.toml"), PLATE)?)
 }
 
-pub(super) fn press_file(out: &Path) -> Result<PathBuf, CliError> {
+/// Writes the press's file, with a pause between two strokes where one is given, seconds.
+pub(super) fn press_file(out: &Path, pace_s: Option<u32>) -> Result<PathBuf, CliError> {
     let path = out.join("press.toml");
-    std::fs::write(&path, PRESS)?;
+    let pause = pace_s.map(|s| format!("\n[timings]\nbetween_ms = {}\n", u64::from(s) * 1000));
+    std::fs::write(&path, format!("{PRESS}{}", pause.unwrap_or_default()))?;
     Ok(path)
 }
 

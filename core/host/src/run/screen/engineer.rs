@@ -1,0 +1,128 @@
+//! Figures of the engineer's page: registers, link, scanner, disk, plugins, alarms, files in force.
+
+use std::path::Path;
+
+use platen_history::Filter;
+use platen_model::{Language, Verdict};
+use platen_press::{describe_inputs, describe_outputs};
+use platen_report::history_view;
+use platen_screen::{Engineer, RegisterRow, TimelineRow};
+
+use super::lock;
+use super::site::Site;
+
+/// Strokes of the timeline.
+const TIMELINE: u32 = 20;
+
+/// Collects the figures of this moment.
+pub(super) fn figures(site: &Site) -> Engineer {
+    Engineer {
+        registers: registers(site),
+        timeline: timeline(site),
+        plugins: site.plugins.clone(),
+        alarms: alarms(site),
+        figures: status(site),
+        files: files(site),
+    }
+}
+
+fn registers(site: &Site) -> [Vec<RegisterRow>; 2] {
+    let status = lock(&site.board.status).0.clone();
+    let map = &site.press.map;
+    let written = status.host.encode(map, 0);
+    let inputs = describe_inputs(map, &status.words).into_iter().filter_map(|(input, value)| {
+        let field = map.input(input)?;
+        Some(row(map.read.start, field, input.to_string(), value))
+    });
+    let outputs = describe_outputs(map, &written).into_iter().filter_map(|(output, value)| {
+        let field = map.output(output)?;
+        Some(row(map.write.start, field, output.to_string(), value))
+    });
+    [inputs.collect(), outputs.collect()]
+}
+
+fn row(start: u16, field: &platen_plant::press::RegisterField, name: String, value: String) -> RegisterRow {
+    RegisterRow { address: start + field.place.offset().unwrap_or(0), words: field.registers(), name, value }
+}
+
+fn timeline(site: &Site) -> Vec<TimelineRow> {
+    let filter = Filter { newest: Some(TIMELINE), ..Filter::default() };
+    let strokes = site.archive().ok().and_then(|archive| archive.strokes(&filter).ok()).unwrap_or_default();
+    let row = |stroke: &platen_history::Stroke| {
+        let since = |at: Option<jiff::Timestamp>| {
+            at.map(|at| at.duration_since(stroke.accepted).as_secs_f64() * 1000.0)
+        };
+        TimelineRow {
+            stroke: history_view::label(stroke),
+            verdict: stroke.verdict.unwrap_or(Verdict::NotMeasured),
+            steps_ms: [since(stroke.scanned), since(stroke.finished), since(stroke.acked)],
+        }
+    };
+    strokes.iter().rev().map(row).collect()
+}
+
+fn alarms(site: &Site) -> Vec<(u16, String, u64)> {
+    let facts = lock(&site.board.facts);
+    let row = |(code, n): (&platen_model::Code, &u64)| {
+        (code.number(), code.alarm().text(Language::En).to_owned(), *n)
+    };
+    facts.raised().iter().map(row).collect()
+}
+
+fn status(site: &Site) -> Vec<(String, String)> {
+    let record = site.board.status_record(&site.press, &site.plant.output.folder, &site.beside);
+    let ms = |[median, most]: [Option<f64>; 2]| match (median, most) {
+        (Some(median), Some(most)) => format!("median {median:.0} ms, 99 % within {most:.0} ms"),
+        _ => "none yet".to_owned(),
+    };
+    let snapshot = site.board.snapshots.borrow().clone();
+    let estimate = snapshot.scanner.estimate_s.map_or(String::new(), |s| format!(", a scan takes {s:.0} s"));
+    let calibration = site.plant.calibration.as_ref().map_or_else(
+        || "none: the range error of the data sheet counts".to_owned(),
+        |wanted| wanted.file.display().to_string(),
+    );
+    let rows = [
+        (
+            "strokes",
+            format!(
+                "{} accepted, {} measured, {} not measured, {} missed",
+                record.strokes, record.measured, record.not_measured, record.missed
+            ),
+        ),
+        ("trigger to busy", ms(record.trigger_to_busy_ms)),
+        ("stroke to result", ms(record.stroke_to_result_ms)),
+        ("result to acknowledge", ms(record.result_to_ack_ms)),
+        ("journal", ms(record.journal_ms)),
+        (
+            "link",
+            format!(
+                "{} requests, {} writes, {} connections, {} dropped, {} timeouts",
+                record.link.requests,
+                record.link.writes,
+                record.link.connections,
+                record.link.poisoned,
+                record.link.timeouts
+            ),
+        ),
+        ("out of step", format!("{:.1} s", record.link_down_s)),
+        ("torn reads, rewrites", format!("{}, {}", record.torn_reads, record.rewrites)),
+        ("scanner", format!("{:?}{estimate}", snapshot.scanner.state)),
+        ("calibration", calibration),
+        (
+            "disk free",
+            record.disk_free.map_or("unknown".to_owned(), |bytes| format!("{:.1} GB", bytes as f64 / 1e9)),
+        ),
+        ("records lost", record.records_lost.to_string()),
+        ("clock", jiff::Timestamp::now().strftime("%F %T UTC").to_string()),
+    ];
+    rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+fn files(site: &Site) -> Vec<(String, String)> {
+    let plates = platen_plant::plant::plate_files(&site.plant.plates).unwrap_or_default();
+    let sum = |path: &Path| match std::fs::read(path) {
+        Ok(bytes) => format!("crc32c {:08x}", crc32c::crc32c(&bytes)),
+        Err(error) => error.to_string(),
+    };
+    plates.iter().map(|(_, path)| (path.display().to_string(), sum(path))).collect()
+}

@@ -1,0 +1,228 @@
+//! Answers of the host to the pages: strokes and plates of the record, documents and files of strokes, maps of the newest one.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use platen_engine::pipeline;
+use platen_engine::plugin::{Catalogue, Surfaces};
+use platen_history::{Archive, Filter, Stroke};
+use platen_model::{Field, Task, Verdict};
+use platen_plant::press::{Mode, Press};
+use platen_plant::{PlantFile, PluginUse};
+use platen_report::result::ResultRecord;
+use platen_report::sequence::Sequence;
+use platen_report::{history_view, output_folder, plate_report};
+use platen_screen::{Engineer, FILES, PlateRow, PluginRow, Snapshot, Source, SourceError, StrokeRow};
+use platen_shape::Surface;
+use tokio::sync::watch;
+
+use super::{Beside, Board, MeasuredStroke, engineer, lock};
+
+/// Nodes along each side of the mesh.
+const NODES: usize = 101;
+
+/// Source of the pages.
+#[derive(Debug)]
+pub(super) struct Site {
+    pub(super) board: Arc<Board>,
+    pub(super) plant: PlantFile,
+    pub(super) press: Press,
+    catalogue: Catalogue,
+    pub(super) plugins: Vec<PluginRow>,
+    pub(super) beside: Beside,
+    /// Sequences by plate, with the number of strokes for which they were made.
+    sequences: Mutex<HashMap<u32, (usize, Option<Sequence>)>>,
+}
+
+fn unreadable(error: impl std::fmt::Display) -> SourceError {
+    SourceError::Unreadable(error.to_string())
+}
+
+impl Site {
+    pub(super) fn new(
+        board: Arc<Board>,
+        plant: &PlantFile,
+        press: &Press,
+        catalogue: &Catalogue,
+        beside: &Beside,
+    ) -> Self {
+        Self {
+            board,
+            plant: plant.clone(),
+            press: press.clone(),
+            catalogue: catalogue.clone(),
+            plugins: plugins(plant, catalogue),
+            beside: beside.clone(),
+            sequences: Mutex::default(),
+        }
+    }
+
+    /// Opens the record; a reader of its own, so that the journal never waits for a page.
+    pub(super) fn archive(&self) -> Result<Archive, SourceError> {
+        Archive::open(&self.plant.output.history).map_err(unreadable)
+    }
+
+    fn stroke(&self, run: u32) -> Result<Stroke, SourceError> {
+        self.archive()?.stroke(run).map_err(|error| SourceError::NotFound(error.to_string()))
+    }
+
+    fn document(&self, run: u32) -> Result<PathBuf, SourceError> {
+        let missing = || SourceError::NotFound(format!("run {run} was not measured: it has no result"));
+        self.stroke(run)?.document.ok_or_else(missing)
+    }
+
+    /// Returns a stroke measured before this start, without its maps.
+    pub(super) fn recorded(&self, run: u32) -> Option<MeasuredStroke> {
+        let record = self.result(run).ok()?;
+        let strokes = history_view::strokes_until(&self.archive().ok()?, run, &record).ok()?;
+        Some(MeasuredStroke { run_id: run, record, fields: Vec::new(), strokes })
+    }
+
+    fn newest(&self, run: u32) -> Option<MeasuredStroke> {
+        lock(&self.board.facts).measured().filter(|measured| measured.run_id == run).cloned()
+    }
+
+    fn evaluated(&self, plate: u32) -> Option<Sequence> {
+        let curvature = pipeline::comparison(&self.catalogue, &PluginUse::by_default("curvature")).ok()?;
+        let compare = |task: &Task, before: &Surface, now: &Surface| {
+            let surfaces = Surfaces { now, before: Some(before), baseline: None };
+            curvature.compare(task, surfaces).map_err(|error| error.to_string())
+        };
+        let sequence = Sequence::of(&self.archive().ok()?, &self.plant, plate, &compare, &|_| ());
+        sequence.inspect_err(|why| tracing::warn!(plate, "pages: bends are missing: {why}")).ok()
+    }
+}
+
+impl Source for Site {
+    fn snapshots(&self) -> watch::Receiver<Arc<Snapshot>> {
+        self.board.snapshots.subscribe()
+    }
+
+    fn cycle_age(&self) -> Duration {
+        // Switched off, there is no cycle.
+        if self.press.mode == Mode::Off { Duration::ZERO } else { lock(&self.board.status).1.elapsed() }
+    }
+
+    fn plates(&self) -> Result<Vec<PlateRow>, SourceError> {
+        let archive = self.archive()?;
+        let mut rows = Vec::new();
+        for record in archive.plates().map_err(unreadable)? {
+            let newest = Filter { plate: Some(record.plate), newest: Some(1), ..Filter::default() };
+            let last = archive.strokes(&newest).map_err(unreadable)?;
+            rows.push(PlateRow {
+                plate: record.plate,
+                name: record.part_name.unwrap_or_else(|| format!("plate {}", record.plate)),
+                part: record.part_id,
+                first: time(record.began),
+                strokes: record.strokes as usize,
+                verdict: record.verdict.unwrap_or(Verdict::NotMeasured),
+                sense: last.first().map_or(0, |stroke| history_view::of_stroke(stroke).sense),
+            });
+        }
+        rows.reverse();
+        Ok(rows)
+    }
+
+    fn strokes(&self, plate: u32) -> Result<Vec<StrokeRow>, SourceError> {
+        let filter = Filter { plate: Some(plate), ..Filter::default() };
+        let strokes = self.archive()?.strokes(&filter).map_err(unreadable)?;
+        if strokes.is_empty() {
+            return Err(SourceError::NotFound(format!("no stroke of plate {plate} is on record")));
+        }
+        Ok(strokes.iter().map(row).collect())
+    }
+
+    fn sequence(&self, plate: u32) -> Result<Option<Sequence>, SourceError> {
+        let n = self.strokes(plate)?.len();
+        let known = lock(&self.sequences).get(&plate).filter(|(of, _)| *of == n).cloned();
+        let (_, sequence) = known.unwrap_or_else(|| (n, self.evaluated(plate)));
+        lock(&self.sequences).insert(plate, (n, sequence.clone()));
+        Ok(sequence)
+    }
+
+    fn result(&self, run: u32) -> Result<Arc<ResultRecord>, SourceError> {
+        if let Some(measured) = self.newest(run) {
+            return Ok(measured.record);
+        }
+        let path = self.document(run)?;
+        let failed = |why: String| SourceError::Unreadable(format!("{}: {why}", path.display()));
+        let text = std::fs::read(&path).map_err(|e| failed(e.to_string()))?;
+        serde_json::from_slice(&text).map(Arc::new).map_err(|e| failed(e.to_string()))
+    }
+
+    fn field(&self, run: u32, name: &str) -> Result<Arc<Field>, SourceError> {
+        let field = self
+            .newest(run)
+            .and_then(|measured| measured.fields.into_iter().find(|field| field.name == name));
+        field.ok_or_else(|| {
+            SourceError::NotFound(format!("{name} of run {run} is on record as /files/{run}/{name}.svg only"))
+        })
+    }
+
+    fn positions(&self, run: u32) -> Result<(usize, Vec<[f32; 3]>), SourceError> {
+        let surface = output_folder::surface_beside(&self.document(run)?).map_err(SourceError::Unreadable)?;
+        let along = |k: usize, length: f64| length * k as f64 / (NODES - 1) as f64;
+        let node = |k: usize| {
+            let (u, v) = (along(k % NODES, surface.width()), along(k / NODES, surface.height()));
+            let seen = surface.mask().seen(u, v);
+            let place: [f64; 3] = surface.face(u, v).into();
+            place.map(|x| if seen { x as f32 } else { f32::NAN })
+        };
+        Ok((NODES, (0..NODES * NODES).map(node).collect()))
+    }
+
+    fn file(&self, run: u32, name: &str) -> Result<Vec<u8>, SourceError> {
+        let path = self.document(run)?.with_file_name(name);
+        std::fs::read(&path).map_err(|error| SourceError::NotFound(format!("{name} of run {run}: {error}")))
+    }
+
+    fn report(&self, plate: u32) -> Result<String, SourceError> {
+        plate_report::report(&self.archive()?, &self.plant.name, plate)
+            .map_err(|e| SourceError::NotFound(e.to_string()))
+    }
+
+    fn engineer(&self) -> Engineer {
+        engineer::figures(self)
+    }
+
+    fn metrics(&self) -> String {
+        self.board.status_record(&self.press, &self.plant.output.folder, &self.beside).prometheus(true)
+    }
+}
+
+/// Returns the plugins in force, by their use.
+fn plugins(plant: &PlantFile, catalogue: &Catalogue) -> Vec<PluginRow> {
+    let scanner = plant.scanner.iter().map(|used| ("scanner", used));
+    let comparisons = plant.comparisons.iter().map(|used| ("comparison", used));
+    let row = |(role, used): (&str, &PluginUse)| {
+        let library = catalogue.load(&used.plugin).ok();
+        let version = library.as_ref().map_or(String::new(), |library| library.descriptor().version.clone());
+        let file = library.map_or(String::new(), |library| library.path().display().to_string());
+        PluginRow { role: role.to_owned(), name: used.plugin.clone(), version, file }
+    };
+    scanner.chain([("flattening", &plant.flattening)]).chain(comparisons).map(row).collect()
+}
+
+fn row(stroke: &Stroke) -> StrokeRow {
+    let point = history_view::of_stroke(stroke);
+    let exists =
+        |name: &&str| stroke.document.as_deref().is_some_and(|path| path.with_file_name(name).exists());
+    StrokeRow {
+        run: stroke.run_id,
+        label: point.label,
+        accepted: time(stroke.accepted),
+        verdict: point.verdict,
+        reason: stroke.reason.clone(),
+        gap_mm: point.gap_mm,
+        uncertainty_mm: point.uncertainty_mm,
+        sense: point.sense,
+        files: FILES.into_iter().filter(exists).map(str::to_owned).collect(),
+    }
+}
+
+/// Formats a time as in the lists of the command line.
+fn time(at: jiff::Timestamp) -> String {
+    at.strftime("%F %T UTC").to_string()
+}
