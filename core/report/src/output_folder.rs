@@ -11,7 +11,7 @@ use platen_sdk::exchange::{AlignedBuffer, Payload};
 use platen_shape::Surface;
 
 use crate::field_export::PlateTable;
-use crate::picture::{self, Caption, PictureError, StripPoint};
+use crate::picture::{self, Caption, PictureError, StripPoint, View};
 use crate::result::{LineRecord, Next, PlateRecord, ResultRecord};
 
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
@@ -116,7 +116,7 @@ pub fn illustrate(
     let mut files = fields(folder, surface, reports, &record.plate_file, &caption, record.next.as_ref())?;
     for line in &record.reference_lines {
         for template in &line.templates {
-            let section = picture::section(line, template, &caption, scale);
+            let section = picture::section(line, template, &caption, scale, View::FILE);
             files.push(put_picture(folder, &format!("section-{}", template.name), section)?);
         }
     }

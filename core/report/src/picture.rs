@@ -1,4 +1,5 @@
-//! Pictures of a stroke as SVG: maps of the plate, sections under templates, the strip of strokes so far.
+//! Pictures of a stroke as SVG: maps of the plate, sections under templates, the strip of strokes so far; for the screen a map as a
+//! raster under an SVG of its words.
 //!
 //! Legible at two metres. Scales of colours and heights follow from the plate file alone ([`PictureScale`]), never from the
 //! stroke, so that two strokes can be compared side by side. The colour map diverges from neutral gray, blue against orange,
@@ -8,18 +9,21 @@ mod canvas;
 mod colour;
 mod map;
 mod scale;
+mod screen_map;
 mod section;
 mod shades;
 mod strip;
 mod view;
+mod words;
 
 pub use map::map;
 pub use scale::PictureScale;
+pub use screen_map::{ScreenMap, screen_map};
 pub use section::section;
 pub use strip::{StripPoint, strip};
-pub use view::{Turn, Units, View};
+pub use view::{SeenPlate, Turn, Units, View};
 
-use platen_model::Verdict;
+use platen_model::{Language, Verdict};
 
 /// Failure of the drawing library.
 #[derive(Debug, thiserror::Error)]
@@ -38,35 +42,10 @@ pub struct Caption<'a> {
 }
 
 impl Caption<'_> {
-    fn title(&self) -> String {
+    fn title(&self, language: Language) -> String {
         match self.stroke {
-            Some(number) => format!("{}, stroke {number}", self.plate),
+            Some(number) => format!("{}, {} {number}", self.plate, words::STROKE.of(language)),
             None => self.plate.to_owned(),
-        }
-    }
-}
-
-/// Formats millimetres with their sign, one decimal below 10 and none above; the minus sign is U+2212.
-fn signed_mm(value: f64) -> String {
-    let size = value.abs();
-    let digits = if size < 9.95 { format!("{size:.1}") } else { format!("{size:.0}") };
-    match digits.trim_matches(|c| c == '0' || c == '.').is_empty() {
-        true => "0".to_owned(),
-        false if value < 0.0 => format!("\u{2212}{digits}"),
-        false => format!("+{digits}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::signed_mm;
-
-    #[test]
-    fn numbers_have_a_sign_and_no_more_digits_than_the_fit_knows() {
-        let all =
-            [(0.04, "0"), (0.26, "+0.3"), (-9.94, "\u{2212}9.9"), (9.96, "+10"), (-123.4, "\u{2212}123")];
-        for (value, expected) in all {
-            assert_eq!(signed_mm(value), expected);
         }
     }
 }

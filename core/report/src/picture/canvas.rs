@@ -4,7 +4,10 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use platen_model::Language;
+
 use super::colour::{self, INK, PAPER};
+use super::words;
 use super::{Caption, PictureError};
 
 /// Position on the canvas, pixels.
@@ -51,8 +54,19 @@ impl Text {
     }
 }
 
-/// Returns the SVG of the shapes drawn by `paint`.
+/// Returns the SVG of the shapes drawn by `paint` on paper.
 pub(super) fn draw(
+    size: (u32, u32),
+    paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
+) -> Result<String, PictureError> {
+    overlay(size, |canvas| {
+        canvas.area.fill(&PAPER).map_err(failed)?;
+        paint(canvas)
+    })
+}
+
+/// Returns the SVG of the shapes drawn by `paint` on nothing.
+pub(super) fn overlay(
     size: (u32, u32),
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
 ) -> Result<String, PictureError> {
@@ -60,7 +74,6 @@ pub(super) fn draw(
     {
         let fine = [size.0, size.1].map(|pixels| pixels * FINE as u32);
         let area = SVGBackend::with_string(&mut svg, fine.into()).into_drawing_area();
-        area.fill(&PAPER).map_err(failed)?;
         let canvas = Canvas { area, width: f64::from(size.0) };
         paint(&canvas)?;
         canvas.area.present().map_err(failed)?;
@@ -137,12 +150,18 @@ impl Canvas<'_> {
     }
 
     /// Draws the heading: plate and stroke, title of the picture, verdict at the right.
-    pub(super) fn head(&self, caption: &Caption<'_>, title: &str) -> Result<(), PictureError> {
-        self.text(&caption.title(), (24.0, 34.0), Text::new(38.0).bold())?;
+    pub(super) fn head(
+        &self,
+        caption: &Caption<'_>,
+        title: &str,
+        language: Language,
+    ) -> Result<(), PictureError> {
+        self.text(&caption.title(language), (24.0, 34.0), Text::new(38.0).bold())?;
         self.text(title, (24.0, 78.0), Text::new(24.0))?;
-        let words = caption.verdict.words().to_uppercase();
-        // A capital letter of a bold sans serif is about 0.72 of its height wide.
-        let chip = 0.72 * 34.0 * words.len() as f64 + 40.0;
+        let words = words::verdict(caption.verdict).of(language).to_uppercase();
+        // Widths in a bold sans serif: a capital letter about 0.72 of its height, a Japanese one all of it.
+        let letters = words.chars().map(|c| if c.is_ascii() { 0.72 } else { 1.0 });
+        let chip = 34.0 * letters.sum::<f64>() + 40.0;
         let right = self.width - 24.0;
         self.fill((right - chip, 12.0), (right, 58.0), colour::verdict(caption.verdict))?;
         let look = Text::new(34.0).bold().centred().coloured(PAPER);

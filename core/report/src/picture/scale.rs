@@ -9,6 +9,8 @@ use platen_model::units::{metres, mm};
 use platen_model::{Target, TargetShape};
 use platen_plant::PlateFile;
 
+use super::words::{self, Word};
+use super::{Units, View};
 use crate::result::CURVATURE_DEFICIT;
 
 /// Limit and chord of a template where the plate file has none, millimetres: the trade's 3 mm on 2 m.
@@ -61,33 +63,36 @@ impl PictureScale {
 
     pub(super) fn gaps(&self) -> Scale {
         let anchors = LADDER.map(|step| step * self.limit_mm).to_vec();
-        Scale { anchors, unit: "mm", factor: 1000.0, inverted: false, words: None, locked: true }
+        Scale { anchors, unit: Unit::Length, factor: 1000.0, inverted: false, words: None, locked: true }
     }
 
     /// Returns title and scale of a field; `largest` is its largest value, for fields without a scale of the plate.
-    pub(super) fn field(&self, name: &str, unit: &str, largest: f64) -> (String, Scale) {
-        let template = format!("as the gap it makes under a {:.0} mm template", self.chord_mm);
+    pub(super) fn field(&self, name: &str, unit: &str, largest: f64, view: View) -> (String, Scale) {
+        let titled = |text: Word, value: &str| words::fill(text.of(view.language), &[value]);
+        let (template, towards) = (view.units.whole(self.chord_mm), words::TOWARDS.of(view.language));
         // Gap to curvature: delta kappa = 8 g / c^2.
         let as_gap = Scale { factor: 1.0 / per_m(1.0, self.chord_mm), ..self.gaps() };
         match name {
             CURVATURE_DEFICIT => (
-                format!("Still to bend, {template}"),
-                Scale { inverted: true, words: Some(["bent too far", "bend more"]), ..as_gap },
+                titled(words::STILL_TO_BEND, &template),
+                Scale { inverted: true, words: Some([words::TOO_FAR, words::BEND_MORE]), ..as_gap },
             ),
-            "curvature_change" => (format!("Bent by this stroke, {template}"), as_gap),
-            "deviation" => ("Deviation from the target, + towards the scanner".into(), self.gaps()),
-            "displacement_normal" => {
-                ("Moved since the previous scan, + towards the scanner".into(), self.gaps())
-            }
+            "curvature_change" => (titled(words::BENT, &template), as_gap),
+            "deviation" => (titled(words::DEVIATION, towards), self.gaps()),
+            "displacement_normal" => (titled(words::MOVED, towards), self.gaps()),
             _ if unit == "m" => (name.replace('_', " "), self.gaps()),
-            _ if unit == "1/m" => (curvature_words(name), Scale::even(1.5 * self.bend_per_m, "1/m", true)),
+            _ if unit == "1/m" => {
+                let words = curvature_words(name).map(|text| titled(text, towards));
+                let scale = Scale::even(1.5 * self.bend_per_m, "1/m", true);
+                (words.unwrap_or_else(|| name.replace('_', " ")), scale)
+            }
             _ if unit == "1/m2" => {
                 (name.replace('_', " "), Scale::even(1.5 * self.bend_per_m.powi(2), "1/m\u{b2}", true))
             }
-            _ => (
-                format!("{}; scale of this stroke alone", name.replace('_', " ")),
-                Scale::even(largest, "", false),
-            ),
+            _ => {
+                let title = name.replace('_', " ") + words::OWN_SCALE.of(view.language);
+                (title, Scale::even(largest, "", false))
+            }
         }
     }
 }
@@ -106,31 +111,39 @@ fn smallest_radius(target: &Target) -> Option<f64> {
     }
 }
 
-fn curvature_words(name: &str) -> String {
-    let what = match name {
-        "kappa_u" => "Curvature along u",
-        "kappa_v" => "Curvature along v",
-        "kappa_uv" => "Twist",
-        "kappa_max" => "Larger principal curvature",
-        "kappa_min" => "Smaller principal curvature",
-        other => return other.replace('_', " "),
-    };
-    format!("{what}, + towards the scanner")
+fn curvature_words(name: &str) -> Option<Word> {
+    match name {
+        "kappa_u" => Some(words::KAPPA_U),
+        "kappa_v" => Some(words::KAPPA_V),
+        "kappa_uv" => Some(words::KAPPA_UV),
+        "kappa_max" => Some(words::KAPPA_MAX),
+        "kappa_min" => Some(words::KAPPA_MIN),
+        _ => None,
+    }
+}
+
+/// Unit of the numbers of a scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unit {
+    /// Millimetres, shown in the unit of lengths of the view.
+    Length,
+    /// Another one, as it is shown.
+    Other(&'static str),
 }
 
 /// Symmetric scale: values at equal steps of colour or height.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
-    /// Ascending positive values in the unit shown.
+    /// Ascending positive values in the unit of the scale.
     pub(super) anchors: Vec<f64>,
-    /// Unit shown.
-    pub(super) unit: &'static str,
-    /// Factor from the field's unit to the one shown.
+    /// Unit.
+    pub(super) unit: Unit,
+    /// Factor from the field's unit to that of the scale.
     pub(super) factor: f64,
     /// The positive side is blue.
     pub(super) inverted: bool,
     /// Names of the negative and the positive side.
-    pub(super) words: Option<[&'static str; 2]>,
+    pub(super) words: Option<[Word; 2]>,
     /// Whether it is the same for every stroke of the plate.
     pub(super) locked: bool,
 }
@@ -139,10 +152,10 @@ impl Scale {
     fn even(full: f64, unit: &'static str, locked: bool) -> Self {
         let full = nice_ceiling(full.max(1e-12));
         let anchors = (1..=EVEN).map(|k| full * k as f64 / EVEN as f64).collect();
-        Self { anchors, unit, factor: 1.0, inverted: false, words: None, locked }
+        Self { anchors, unit: Unit::Other(unit), factor: 1.0, inverted: false, words: None, locked }
     }
 
-    /// Returns the position of a value in the unit shown, -1 to 1; values beyond the scale are at its ends.
+    /// Returns the position of a value in the unit of the scale, -1 to 1; values beyond the scale are at its ends.
     pub(super) fn position(&self, value: f64) -> f64 {
         let size = value.abs();
         let above = self.anchors.iter().take_while(|anchor| **anchor <= size).count();
@@ -162,10 +175,18 @@ impl Scale {
         if self.inverted { -position } else { position }
     }
 
+    /// Returns the symbol of the unit shown.
+    pub(super) fn symbol(&self, units: Units) -> &'static str {
+        match self.unit {
+            Unit::Length => units.symbol(),
+            Unit::Other(symbol) => symbol,
+        }
+    }
+
     /// Formats a number with its sign.
-    pub(super) fn number(&self, value: f64) -> String {
-        if self.unit == "mm" {
-            return super::signed_mm(value);
+    pub(super) fn number(&self, value: f64, units: Units) -> String {
+        if self.unit == Unit::Length {
+            return units.signed(value);
         }
         // Three digits of the scale's end.
         let last = self.anchors.last().copied().unwrap_or(1.0);
@@ -193,6 +214,10 @@ mod tests {
     const PICTURE_SCALE: PictureScale =
         PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 1.0 / 9.0 };
 
+    fn field(name: &str, unit: &str, largest: f64) -> (String, Scale) {
+        PICTURE_SCALE.field(name, unit, largest, View::FILE)
+    }
+
     #[test]
     fn scales_end_on_round_numbers() {
         for (value, expected) in [(0.7, 1.0), (1.0, 1.0), (1.2, 2.0), (3.3, 5.0), (7.0, 10.0), (420.0, 500.0)]
@@ -216,18 +241,15 @@ mod tests {
     fn the_scale_is_that_of_the_plate_whatever_the_stroke_holds() {
         for name in ["deviation", "displacement_normal", "curvature_deficit", "kappa_u"] {
             let unit = if name.starts_with('d') { "m" } else { "1/m" };
-            assert_eq!(PICTURE_SCALE.field(name, unit, 1e-3).1, PICTURE_SCALE.field(name, unit, 1e3).1);
-            assert!(PICTURE_SCALE.field(name, unit, 1.0).1.locked);
+            assert_eq!(field(name, unit, 1e-3).1, field(name, unit, 1e3).1);
+            assert!(field(name, unit, 1.0).1.locked);
         }
-        assert!(
-            !PICTURE_SCALE.field("somebody_elses", "K", 1.0).1.locked,
-            "and the title names it where it is not"
-        );
+        assert!(!field("somebody_elses", "K", 1.0).1.locked, "and the title names it where it is not");
     }
 
     #[test]
     fn missing_curvature_is_shown_as_the_gap_under_the_template_blue_where_more_is_wanted() {
-        let (_, scale) = PICTURE_SCALE.field("curvature_deficit", "1/m", 1.0);
+        let (_, scale) = field("curvature_deficit", "1/m", 1.0);
         // 3 mm on 2 m is 0.006 1/m.
         assert!((0.006 * scale.factor - 3.0).abs() < 1e-9);
         assert!(scale.colour_position(3.0) < 0.0 && scale.colour_position(-3.0) > 0.0);

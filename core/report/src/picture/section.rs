@@ -2,10 +2,13 @@
 
 use plotters::style::RGBColor;
 
+use platen_model::Seat;
+
 use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE, STEEL, WOOD, WOOD_EDGE};
 use super::scale::nice_ceiling;
-use super::{Caption, PictureError, PictureScale, Units};
+use super::words::{self, Word};
+use super::{Caption, PictureError, PictureScale, View};
 use crate::result::{LineRecord, TemplateRecord};
 
 const SIZE: (u32, u32) = (1200, 760);
@@ -18,7 +21,7 @@ const GAP: [f64; 2] = [470.0, 660.0];
 const TEMPLATE: f64 = 44.0;
 const PLATE: f64 = 20.0;
 
-/// Draws the section of the plate under a template.
+/// Draws the section of the plate under a template. The sentence of the comparison keeps its language and millimetres.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -27,17 +30,23 @@ pub fn section(
     template: &TemplateRecord,
     caption: &Caption<'_>,
     picture_scale: &PictureScale,
+    view: View,
 ) -> Result<String, PictureError> {
     draw(SIZE, |canvas| {
         let caption = Caption { verdict: template.verdict, ..*caption };
-        let seat = serde_json::to_value(template.seat).ok();
-        let seat = seat.as_ref().and_then(|seat| seat.as_str()).unwrap_or_default();
-        let rocks = if template.rocks { ", it rocks" } else { "" };
-        let TemplateRecord { name, chord_mm, .. } = template;
-        let title = format!("Template {name} of {chord_mm:.0} mm on line {}, seat {seat}{rocks}", line.name);
-        canvas.head(&caption, &title)?;
+        let word = |text: Word| text.of(view.language);
+        let seat = match template.seat {
+            Seat::Gravity => words::GRAVITY,
+            Seat::Balanced => words::BALANCED,
+            Seat::Held => words::HELD,
+        };
+        let rocks = if template.rocks { word(words::ROCKS) } else { "" };
+        let chord = view.units.whole(template.chord_mm);
+        let title =
+            words::fill(word(words::SECTION), &[&template.name, &chord, &line.name, word(seat), rocks]);
+        canvas.head(&caption, &title, view.language)?;
         canvas.text(&template.says, (24.0, 126.0), Text::new(26.0).bold())?;
-        let layout = Layout { line, template, top_mm: top_of_gaps(template, picture_scale) };
+        let layout = Layout { line, template, top_mm: top_of_gaps(template, picture_scale), view };
         layout.profile(canvas)?;
         layout.gap(canvas)
     })
@@ -55,9 +64,14 @@ struct Layout<'a> {
     line: &'a LineRecord,
     template: &'a TemplateRecord,
     top_mm: f64,
+    view: View,
 }
 
 impl Layout<'_> {
+    fn word(&self, text: Word) -> &'static str {
+        text.of(self.view.language)
+    }
+
     /// Returns the pixel of a share of the template's length.
     fn x(&self, share: f64) -> f64 {
         LEFT + (RIGHT - LEFT) * share
@@ -93,7 +107,7 @@ impl Layout<'_> {
         let all = || heights.iter().chain(&edge).copied();
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
         if heights.len() < 2 || heights.len() != gaps.len() || !(high - low).is_finite() {
-            return canvas.text("no profile", (LEFT, PROFILE[0]), Text::new(22.0));
+            return canvas.text(self.word(words::NO_PROFILE), (LEFT, PROFILE[0]), Text::new(22.0));
         }
         let room = PROFILE[1] - PROFILE[0] - TEMPLATE - PLATE;
         let pixel_per_mm = room / (high - low).max(self.top_mm);
@@ -117,9 +131,13 @@ impl Layout<'_> {
             let (x, y) = (self.x(share), y(heights[self.sample(share)]));
             canvas.area(&[(x, y + 2.0), (x - 12.0, y + 24.0), (x + 12.0, y + 24.0)], INK)?;
         }
-        canvas.text("template", (LEFT + 12.0, top + 20.0), Text::new(20.0).coloured(WOOD_EDGE))?;
+        canvas.text(
+            self.word(words::TEMPLATE),
+            (LEFT + 12.0, top + 20.0),
+            Text::new(20.0).coloured(WOOD_EDGE),
+        )?;
         let scale = pixel_per_mm / ((RIGHT - LEFT) / template.chord_mm);
-        let note = format!("heights {scale:.0} times enlarged; triangles: contacts");
+        let note = words::fill(self.word(words::ENLARGED), &[&format!("{scale:.0}")]);
         canvas.text(&note, (RIGHT, PROFILE[1] + 26.0), Text::new(20.0).coloured(PALE).right())
     }
 
@@ -139,16 +157,15 @@ impl Layout<'_> {
         self.axes(canvas, &y, low_mm)?;
         let text = Text::new(22.0);
         canvas.dashed((LEFT, y(template.limit_mm)), (RIGHT, y(template.limit_mm)), INK, 2)?;
-        let limit = format!("limit {:.1}", template.limit_mm);
+        let units = self.view.units;
+        let limit = format!("{} {}", self.word(words::LIMIT), units.number(template.limit_mm));
         canvas.text(&limit, (RIGHT + 10.0, y(template.limit_mm)), text.bold())?;
         let Some(at) = self.along(template.max_gap_at_mm) else { return Ok(()) };
         let gap = template.gap_mm.get(self.sample(at)).copied().unwrap_or(template.max_gap_mm);
         let (x, height) = (self.x(at), y(gap));
         canvas.ring((x, height), 10, INK, 4)?;
-        let words = format!(
-            "{} mm",
-            Units::Millimetre.with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm))
-        );
+        let number = units.with_uncertainty(template.max_gap_mm, Some(template.uncertainty_mm));
+        let words = format!("{number} {}", units.symbol());
         let look = Text::new(30.0).bold();
         let above = height - 32.0;
         // Clear of the limit's line, and above the gap's own, which falls away from here to either side.
@@ -163,15 +180,16 @@ impl Layout<'_> {
     }
 
     fn axes(&self, canvas: &Canvas<'_>, y: &dyn Fn(f64) -> f64, low_mm: f64) -> Result<(), PictureError> {
-        let text = Text::new(22.0);
+        let (text, units) = (Text::new(22.0), self.view.units);
         canvas.line(&[(LEFT, GAP[0]), (LEFT, GAP[1])], INK, 2)?;
         canvas.line(&[(LEFT, y(0.0)), (RIGHT, y(0.0))], INK, 2)?;
         for mm in [low_mm, 0.0, 0.5 * self.top_mm, self.top_mm] {
             canvas.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-            canvas.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
+            canvas.text(&units.tick(mm), (LEFT - 14.0, y(mm)), text.right())?;
         }
-        canvas.text("gap, mm", (LEFT - 86.0, GAP[0] - 30.0), text)?;
-        let (start, chord) = (self.template.start_mm, self.template.chord_mm);
+        let title = |word: Word| format!("{}, {}", self.word(word), units.symbol());
+        canvas.text(&title(words::GAP), (LEFT - 86.0, GAP[0] - 30.0), text)?;
+        let [start, chord] = [self.template.start_mm, self.template.chord_mm].map(|mm| units.of_mm(mm));
         let step = nice_ceiling(chord / 6.0);
         let first = (start / step).ceil() as i64;
         let last = ((start + chord) / step).floor() as i64;
@@ -180,7 +198,8 @@ impl Layout<'_> {
             canvas.line(&[(x, GAP[1]), (x, GAP[1] + 8.0)], INK, 2)?;
             canvas.text(&format!("{}", k as f64 * step), (x, GAP[1] + 24.0), text.centred())?;
         }
-        canvas.text("along the line, mm \u{2192}", (RIGHT, GAP[1] + 58.0), text.right())
+        let along = title(words::ALONG) + " \u{2192}";
+        canvas.text(&along, (RIGHT, GAP[1] + 58.0), text.right())
     }
 
     /// Hatches the unseen parts.
@@ -195,9 +214,10 @@ impl Layout<'_> {
 
 #[cfg(test)]
 mod tests {
-    use platen_model::{Seat, Verdict};
+    use platen_model::{Language, Seat, Verdict};
 
     use super::*;
+    use crate::picture::Units;
     use crate::result::PointRecord;
 
     fn template(gap_mm: Vec<f64>, seen: Vec<bool>) -> TemplateRecord {
@@ -223,12 +243,16 @@ mod tests {
     }
 
     fn drawn(template: &TemplateRecord) -> String {
+        drawn_in(template, View::FILE)
+    }
+
+    fn drawn_in(template: &TemplateRecord, view: View) -> String {
         let point = |u_mm: f64| PointRecord { u_mm, v_mm: 0.0, position_m: [0.0; 3], seen: true };
         let points = vec![point(0.0), point(3000.0)];
         let line = LineRecord { name: "R1".into(), points, templates: Vec::new() };
         let caption = Caption { plate: "A", stroke: None, verdict: Verdict::Pass };
         let picture_scale = PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
-        section(&line, template, &caption, &picture_scale).unwrap()
+        section(&line, template, &caption, &picture_scale, view).unwrap()
     }
 
     #[test]
@@ -236,6 +260,21 @@ mod tests {
         let svg = drawn(&template(vec![4.1, 2.0, 0.0, 2.0, 4.0], vec![true; 5]));
         for text in ["4.1 \u{b1} 0.2 mm", "limit 3.0", "FAIL", "not bent enough", "T&lt;1&gt;"] {
             assert!(svg.contains(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn it_is_drawn_in_japanese_and_in_inches() {
+        let view = View { language: Language::Ja, units: Units::Inch, ..View::FILE };
+        let svg = drawn_in(&template(vec![4.1, 2.0, 0.0, 2.0, 4.0], vec![true; 5]), view);
+        // 4.1 mm, 0.2 mm rounded up, 3 mm, 2 m; a tick of the gap at 15 mm.
+        for text in
+            ["0.16 \u{b1} 0.01 in", "許容値 0.12", "78.74 in", "不合格", "自重", "すき間, in", "\n0.24\n"]
+        {
+            assert!(svg.contains(text), "{text}");
+        }
+        for text in [" mm", "limit", "gap", "FAIL"] {
+            assert!(!svg.contains(text), "{text}");
         }
     }
 

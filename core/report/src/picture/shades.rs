@@ -1,4 +1,4 @@
-//! Rasterised field: few rectangles of few colours, and hatching where unseen.
+//! Rasterised field: few rectangles of few colours or a palette PNG, and hatching where unseen.
 
 use std::collections::BTreeMap;
 
@@ -46,11 +46,17 @@ pub(super) struct Shades {
 type Run = (usize, usize, Option<i32>);
 
 impl Shades {
-    /// Rasterises a field of one component into `n_x` times `n_y` squares.
-    pub(super) fn of(field: &Field, scale: &Scale, [n_x, n_y]: [usize; 2]) -> Self {
+    /// Rasterises a field of one component into `n_x` times `n_y` squares. `on_plate` converts shares from the left and from below to
+    /// shares of the plate's sides u and v.
+    pub(super) fn of(
+        field: &Field,
+        scale: &Scale,
+        [n_x, n_y]: [usize; 2],
+        on_plate: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> Self {
         let n_shades = count(scale);
         let shade = |x: usize, y: usize| {
-            let (u, v) = ((x as f64 + 0.5) / n_x as f64, 1.0 - (y as f64 + 0.5) / n_y as f64);
+            let [u, v] = on_plate([(x as f64 + 0.5) / n_x as f64, 1.0 - (y as f64 + 0.5) / n_y as f64]);
             let (state, value) = field.sample(u, v, 0);
             match state {
                 NodeState::Unseen => None,
@@ -75,11 +81,49 @@ impl Shades {
             let colour = shade.map_or(PAPER, |shade| colour_of(shade, self.n_shades));
             canvas.fill((x(from), y(rows[0])), (x(to) + OVERLAP, y(rows[1]) + OVERLAP), colour)?;
         }
+        self.hatch(canvas, (left, top), (right, bottom))
+    }
+
+    /// Hatches the unseen area.
+    pub(super) fn hatch(
+        &self,
+        canvas: &Canvas<'_>,
+        (left, top): At,
+        (right, bottom): At,
+    ) -> Result<(), PictureError> {
         for [from, to] in self.hatching() {
-            let corner = |[column, row]: [usize; 2]| (x(column), y(row));
+            let corner = |[column, row]: [usize; 2]| {
+                let (x, y) = (column as f64 / self.n_x as f64, row as f64 / self.n_y as f64);
+                (left + (right - left) * x, top + (bottom - top) * y)
+            };
             canvas.line(&[corner(from), corner(to)], PALE, 2)?;
         }
         Ok(())
+    }
+
+    /// Encodes one pixel a square as a palette PNG of `size` pixels, white around the field, whose first square is at `corner`.
+    pub(super) fn png(&self, size: [usize; 2], corner: [usize; 2]) -> Result<Vec<u8>, png::EncodingError> {
+        // Paper, then the shades from the most negative.
+        let colours = (-self.n_shades..=self.n_shades).map(|shade| colour_of(shade, self.n_shades));
+        let palette: Vec<u8> =
+            std::iter::once(PAPER).chain(colours).flat_map(|RGBColor(r, g, b)| [r, g, b]).collect();
+        let index = |shade: i32| (shade + self.n_shades + 1) as u8;
+        let mut pixels = vec![0; size[0] * size[1]];
+        for (row, squares) in self.shade.chunks(self.n_x).enumerate() {
+            let first = (corner[1] + row) * size[0] + corner[0];
+            for (pixel, shade) in pixels.iter_mut().skip(first).zip(squares) {
+                *pixel = shade.map_or(0, index);
+            }
+        }
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, size[0] as u32, size[1] as u32);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_palette(palette);
+        encoder.set_compression(png::Compression::High);
+        encoder.set_filter(png::Filter::NoFilter);
+        encoder.write_header()?.write_image_data(&pixels)?;
+        Ok(file)
     }
 
     /// Returns maximal rectangles in a fixed order: runs (from, to, shade) with the rows that repeat them.

@@ -1,6 +1,6 @@
 //! Strip of a plate's strokes so far: worst gap with its uncertainty against the limit.
 
-use platen_model::Verdict;
+use platen_model::{Language, Verdict};
 
 use super::canvas::{Canvas, Text, draw};
 use super::colour::{self, INK, PALE, PAPER};
@@ -42,7 +42,7 @@ pub fn strip(
     let step = (RIGHT - LEFT) / points.len().max(12) as f64;
     let x = |k: usize| LEFT + (k as f64 + 0.5) * step;
     draw(SIZE, |canvas| {
-        canvas.head(caption, "Worst gap under a template, mm, stroke by stroke")?;
+        canvas.head(caption, "Worst gap under a template, mm, stroke by stroke", Language::En)?;
         canvas.fill((LEFT, y(picture_scale.limit_mm)), (RIGHT, BOTTOM), colour::diverging(0.0))?;
         axes(canvas, &y, picture_scale)?;
         let known = |k: usize| points[k].gap_mm.map(|gap| (x(k), y(gap)));

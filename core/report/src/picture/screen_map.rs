@@ -1,0 +1,216 @@
+//! Map for a screen: the colours as a palette PNG, one pixel a square, under an SVG of words and numbers. Colours, scale and marks are
+//! those of the map in the files; letters are larger, and the plate is seen as the operator sees it.
+
+use platen_model::Field;
+
+use super::canvas::{Text, overlay};
+use super::map::{Layout, Look, SQUARE};
+use super::{PictureError, View};
+use crate::result::{Next, PlateRecord};
+
+/// Layout on a screen.
+const LOOK: Look =
+    Look { left: 112.0, top: 104.0, below: 136.0, letters: 1.35, press_line: 74.0, title_line: 114.0 };
+
+/// Two images of one shape: the PNG is shown as wide as the SVG, its pixels unsmoothed, and the SVG over it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScreenMap {
+    /// Colours, white around the plate.
+    pub png: Vec<u8>,
+    /// Words, numbers, marks and hatching, on nothing.
+    pub svg: String,
+}
+
+/// Draws one field over the plate, with the scale of the plate's pictures. The map of the missing curvature frames the place of the
+/// next hit.
+///
+/// # Errors
+/// An encoder fails.
+pub fn screen_map(
+    field: &Field,
+    plate: &PlateRecord,
+    view: View,
+    next: Option<&Next>,
+) -> Result<ScreenMap, PictureError> {
+    let layout = Layout::new(field, plate, &plate.scale, view, LOOK);
+    let (size, (from, to)) = (layout.size(), layout.corners());
+    let shades = layout.shades(field);
+    let squares = |pixels: f64| (pixels / SQUARE) as usize;
+    let pixels = [size.0, size.1].map(|pixels| squares(f64::from(pixels)));
+    let png = shades.png(pixels, [squares(from.0), squares(from.1)]);
+    let svg = overlay(size, |canvas| {
+        canvas.text(&layout.title, (24.0, 34.0), Text::new(24.0 * LOOK.letters).bold())?;
+        shades.hatch(canvas, from, to)?;
+        layout.words(field, next, canvas)
+    })?;
+    Ok(ScreenMap { png: png.map_err(|e| PictureError(e.to_string()))?, svg })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::io::Cursor;
+
+    use platen_model::{Language, NodeState, Verdict};
+
+    use super::*;
+    use crate::picture::{Caption, Turn, Units, map};
+    use crate::result::{CURVATURE_DEFICIT, NextPlace};
+
+    const SIDE: usize = 101;
+    /// Curvature that opens 1 mm under the template of 2 m, 1/m.
+    const ONE_MM: f64 = 2e-3;
+
+    fn plate(press_side: Option<[i8; 2]>) -> PlateRecord {
+        PlateRecord { width_mm: 3000.0, height_mm: 2000.0, press_side, ..PlateRecord::default() }
+    }
+
+    /// Missing curvature by place in shares of the sides; `None` where unseen, unchanged where 0.
+    fn field(missing: impl Fn(f64, f64) -> Option<f64>) -> Field {
+        let share = |k: usize| k as f64 / (SIDE - 1) as f64;
+        let nodes: Vec<_> = (0..SIDE * SIDE).map(|k| missing(share(k % SIDE), share(k / SIDE))).collect();
+        let state = |value: &Option<f64>| match value {
+            None => NodeState::Unseen,
+            Some(0.0) => NodeState::Unchanged,
+            Some(_) => NodeState::Seen,
+        };
+        Field {
+            name: CURVATURE_DEFICIT.into(),
+            unit: "1/m".into(),
+            nodes: [SIDE; 2],
+            components: 1,
+            state: nodes.iter().map(state).collect(),
+            values: nodes.iter().map(|value| value.unwrap_or(f64::NAN)).collect(),
+        }
+    }
+
+    /// Every shade of the scale from left to right, gray in the middle, an unseen corner.
+    fn rainbow() -> Field {
+        field(|u, v| match u - 0.5 {
+            _ if u > 0.8 && v > 0.8 => None,
+            x if x.abs() < 0.03 => Some(0.0),
+            x => Some(x.signum() * 160.0 * ONE_MM * (2.0 * x).powi(2)),
+        })
+    }
+
+    fn drawn(field: &Field, press_side: Option<[i8; 2]>, view: View) -> ScreenMap {
+        screen_map(field, &plate(press_side), view, None).unwrap()
+    }
+
+    /// Colours of a PNG, row by row from above, with its width.
+    fn decoded(png: &[u8]) -> (usize, Vec<String>) {
+        let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
+        let palette = reader.info().palette.clone().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let frame = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(frame.color_type, png::ColorType::Indexed);
+        let colour = |index: &u8| {
+            let rgb = &palette[3 * usize::from(*index)..][..3];
+            format!("#{:02X}{:02X}{:02X}", rgb[0], rgb[1], rgb[2])
+        };
+        (frame.width as usize, pixels.iter().map(colour).collect())
+    }
+
+    /// Colours in which an SVG fills rectangles.
+    fn fills(svg: &str) -> BTreeSet<String> {
+        let rectangles = svg.lines().filter(|line| line.starts_with("<rect"));
+        rectangles.filter_map(|line| Some(line.split_once("fill=\"")?.1[..7].to_owned())).collect()
+    }
+
+    #[test]
+    fn the_colours_of_the_pixels_are_those_of_the_legend_and_of_the_map_in_the_files() {
+        let field = rainbow();
+        let ScreenMap { png, svg } = drawn(&field, None, View::default());
+        let pixels: BTreeSet<String> = decoded(&png).1.into_iter().collect();
+        let legend = fills(&svg);
+        let shades: BTreeSet<String> = pixels.iter().filter(|colour| *colour != "#FFFFFF").cloned().collect();
+        assert!(shades.len() > 40, "{} shades", shades.len());
+        assert!(shades.is_subset(&legend), "not in the legend: {:?}", shades.difference(&legend));
+        let plate = plate(None);
+        let caption = Caption { plate: "A", stroke: None, verdict: Verdict::Fail };
+        let file = fills(&map(&field, &plate, &caption, &plate.scale, None).unwrap());
+        assert!(pixels.is_subset(&file), "not in the file: {:?}", pixels.difference(&file));
+    }
+
+    #[test]
+    fn the_pixels_lie_under_the_overlay_s_plate() {
+        let ScreenMap { png, svg } = drawn(&field(|_, _| Some(20.0 * ONE_MM)), None, View::default());
+        let (width, pixels) = decoded(&png);
+        let size = |name: &str| {
+            let text = svg.split_once(&format!(" {name}=\"")).unwrap().1;
+            text[..text.find('"').unwrap()].parse::<usize>().unwrap()
+        };
+        assert_eq!([size("width"), size("height")], [4 * width, 4 * pixels.len() / width]);
+        // 808 pixels for 3 m, so 540 for 2 m.
+        let coloured = |k: usize| pixels[k] != "#FFFFFF";
+        let inside = |k: usize| (28..230).contains(&(k % width)) && (26..161).contains(&(k / width));
+        assert!((0..pixels.len()).all(|k| coloured(k) == inside(k)));
+        let corner = |x: usize, y: usize| format!("{},{}", 32 * x, 32 * y);
+        assert!(svg.contains(&corner(28, 26)) && svg.contains(&corner(230, 161)), "frame");
+    }
+
+    #[test]
+    fn the_press_is_below_whatever_its_side() {
+        // A strong patch in the corner u = W, v = 0.
+        let field = field(|u, v| Some(if u > 0.9 && v < 0.1 { 140.0 } else { 4.0 } * ONE_MM));
+        // Right and below as drawn; turned by quarters clockwise with the edge v = 0, u = W, v = H, u = 0 below.
+        for (side, at) in
+            [([0, -1], [0.95, 0.95]), ([1, 0], [0.05, 0.95]), ([0, 1], [0.05, 0.05]), ([-1, 0], [0.95, 0.05])]
+        {
+            let ScreenMap { png, svg } = drawn(&field, Some(side), View::default());
+            let (width, pixels) = decoded(&png);
+            let plate: Vec<usize> = (0..pixels.len()).filter(|k| pixels[*k] != "#FFFFFF").collect();
+            let (first, last) = (plate[0], plate[plate.len() - 1]);
+            let extent = [last % width - first % width, last / width - first / width];
+            let [x, y] = [0, 1].map(|i| (at[i] * extent[i] as f64) as usize);
+            let strong = &pixels[first + y * width + x];
+            let patch = plate.iter().filter(|k| pixels[**k] == *strong).count();
+            assert!((1..plate.len() / 20).contains(&patch), "{side:?}: the patch is at {at:?}");
+            assert_eq!(extent[1] > extent[0], side[0] != 0, "{side:?}: a quarter turn makes it tall");
+            assert!(svg.contains("from the press") && svg.contains("press\n"));
+        }
+        let drawing = drawn(&field, Some([1, 0]), View::FILE);
+        assert!(drawing.svg.contains("u, mm") && !drawing.svg.contains("from the"));
+    }
+
+    #[test]
+    fn words_and_numbers_follow_language_and_unit() {
+        let next = Next::Place(NextPlace {
+            at_mm: [2400.0, 1000.0],
+            extent_mm: [600.0, 800.0],
+            gap_mm: 20.0,
+            uncertainty_mm: None,
+            limit_mm: 3.0,
+            chord_mm: 2000.0,
+        });
+        let view = View { language: Language::Ja, units: Units::Inch, turn: Turn::Press };
+        let svg = screen_map(&rainbow(), &plate(Some([0, 1])), view, Some(&next)).unwrap().svg;
+        // The ladder ends at 150 mm, the template is 2 m long, the plate 118 in.
+        for text in [
+            "曲げ不足",
+            "曲げ過ぎ",
+            "次に押す位置",
+            "プレス",
+            "+5.91",
+            "78.74 in",
+            "\n100\n",
+            "左から, in",
+            "データなし",
+        ] {
+            assert!(svg.contains(text), "{text}");
+        }
+        let english = |text: &str| text.chars().filter(|c| c.is_ascii_alphabetic()).count() > 2;
+        let words = svg.lines().filter(|line| !line.starts_with('<') && english(line));
+        assert_eq!(words.collect::<Vec<_>>(), Vec::<&str>::new(), "English words");
+    }
+
+    #[test]
+    fn a_map_is_light() {
+        let wavy = field(|u, v| {
+            Some((30.0 * u + 3.0 * (60.0 * u + 9.0 * v).sin() + 2.0 * (70.0 * v).cos()) * ONE_MM)
+        });
+        let ScreenMap { png, svg } = drawn(&wavy, Some([0, -1]), View::default());
+        // Found: 3.7 and 15.7 kB.
+        assert!(png.len() < 8_000 && svg.len() < 32_000, "{} {}", png.len(), svg.len());
+    }
+}
