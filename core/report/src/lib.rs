@@ -3,7 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `result` | the result document `platen.result/1` |
-//! | `picture` | maps, sections and the strip of strokes as SVG |
+//! | `picture` | maps, sections and the strip of strokes as SVG; maps for a screen |
 //! | `field_export` | the fields of the comparisons as CSV, PLY and VTK |
 //! | `output_folder` | the files of one measurement, complete or absent |
 //! | `history_view` | strokes on record in the form of pictures and reports |

@@ -121,7 +121,7 @@ pub fn illustrate(
         }
     }
     if !strokes.is_empty() {
-        files.push(put_picture(folder, "strokes", picture::strip(strokes, &caption, scale))?);
+        files.push(put_picture(folder, "strokes", picture::strip(strokes, &caption, scale, View::FILE))?);
     }
     Ok(files)
 }

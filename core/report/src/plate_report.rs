@@ -13,7 +13,7 @@ use platen_model::Verdict;
 
 use crate::history_view;
 use crate::output_folder::{self, FilesError};
-use crate::picture::{self, Caption, StripPoint};
+use crate::picture::{self, Caption, StripPoint, View};
 use crate::result::{CalibrationRecord, ResultRecord};
 
 const STYLE: &str = include_str!("plate_report/style.css");
@@ -157,7 +157,7 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
     let plate = &record.plate_file;
     let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
     let points: Vec<StripPoint> = entries.iter().map(|entry| entry.point.clone()).collect();
-    let strip = picture::strip(&points, &caption, &plate.scale).ok().map(PreEscaped);
+    let strip = picture::strip(&points, &caption, &plate.scale, View::FILE).ok().map(PreEscaped);
     let templates: Vec<String> = record
         .reference_lines
         .iter()

@@ -1,10 +1,10 @@
 //! Strip of a plate's strokes so far: worst gap with its uncertainty against the limit.
 
-use platen_model::{Language, Verdict};
+use platen_model::Verdict;
 
 use super::canvas::{Canvas, Text, draw};
 use super::colour::{self, INK, PALE, PAPER};
-use super::{Caption, PictureError, PictureScale, Units};
+use super::{Caption, PictureError, PictureScale, View, words};
 
 const SIZE: (u32, u32) = (1200, 560);
 const LEFT: f64 = 110.0;
@@ -27,7 +27,7 @@ pub struct StripPoint {
     pub verdict: Verdict,
 }
 
-/// Draws the strip of the strokes so far, oldest first.
+/// Draws the strip of the strokes so far, oldest first; labels are drawn as they are given.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -35,6 +35,7 @@ pub fn strip(
     points: &[StripPoint],
     caption: &Caption<'_>,
     picture_scale: &PictureScale,
+    view: View,
 ) -> Result<String, PictureError> {
     let scale = picture_scale.gaps();
     let y = |mm: f64| BOTTOM - scale.position(mm.max(0.0)) * (BOTTOM - TOP);
@@ -42,9 +43,10 @@ pub fn strip(
     let step = (RIGHT - LEFT) / points.len().max(12) as f64;
     let x = |k: usize| LEFT + (k as f64 + 0.5) * step;
     draw(SIZE, |canvas| {
-        canvas.head(caption, "Worst gap under a template, mm, stroke by stroke", Language::En)?;
+        let title = words::fill(words::STRIP.of(view.language), &[view.units.symbol()]);
+        canvas.head(caption, &title, view.language)?;
         canvas.fill((LEFT, y(picture_scale.limit_mm)), (RIGHT, BOTTOM), colour::diverging(0.0))?;
-        axes(canvas, &y, picture_scale)?;
+        axes(canvas, &y, picture_scale, view)?;
         let known = |k: usize| points[k].gap_mm.map(|gap| (x(k), y(gap)));
         for k in 1..points.len() {
             if let (Some(from), Some(to)) = (known(k - 1), known(k)) {
@@ -52,14 +54,18 @@ pub fn strip(
             }
         }
         for (k, point) in points.iter().enumerate() {
-            draw_point(canvas, point, x(k), &y, k + 1 == points.len())?;
+            draw_point(canvas, point, x(k), &y)?;
             // Labels stay apart however many strokes there are.
             let every = (34.0 / step).ceil() as usize;
             if (points.len() - 1 - k).is_multiple_of(every) {
                 canvas.text(&point.label, (x(k), BOTTOM + 24.0), Text::new(22.0).centred())?;
             }
         }
-        canvas.text("stroke \u{2192}", (RIGHT, BOTTOM + 58.0), Text::new(22.0).right())
+        if let Some((k, newest)) = points.iter().enumerate().next_back() {
+            draw_newest(canvas, newest, x(k), &y, view)?;
+        }
+        let along = format!("{} \u{2192}", words::STROKE.of(view.language));
+        canvas.text(&along, (RIGHT, BOTTOM + 58.0), Text::new(22.0).right())
     })
 }
 
@@ -67,16 +73,17 @@ fn axes(
     canvas: &Canvas<'_>,
     y: &dyn Fn(f64) -> f64,
     picture_scale: &PictureScale,
+    view: View,
 ) -> Result<(), PictureError> {
     let text = Text::new(22.0);
     canvas.line(&[(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], INK, 2)?;
     for mm in std::iter::once(0.0).chain(picture_scale.gaps().anchors) {
         canvas.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
-        canvas.text(&format!("{mm}"), (LEFT - 14.0, y(mm)), text.right())?;
+        canvas.text(&view.units.tick(mm), (LEFT - 14.0, y(mm)), text.right())?;
     }
     let limit = y(picture_scale.limit_mm);
     canvas.dashed((LEFT, limit), (RIGHT, limit), INK, 2)?;
-    canvas.text("limit", (RIGHT - 8.0, limit - 15.0), text.bold().right())
+    canvas.text(words::LIMIT.of(view.language), (RIGHT - 8.0, limit - 15.0), text.bold().right())
 }
 
 fn draw_point(
@@ -84,7 +91,6 @@ fn draw_point(
     point: &StripPoint,
     x: f64,
     y: &dyn Fn(f64) -> f64,
-    newest: bool,
 ) -> Result<(), PictureError> {
     let Some(gap) = point.gap_mm else {
         let (cross, at) = (9.0, BOTTOM - 18.0);
@@ -104,31 +110,45 @@ fn draw_point(
         (_, sense) => colour::diverging(0.75 * f64::from(sense)),
     };
     canvas.dot((x, y(gap)), 11, colour)?;
-    canvas.ring((x, y(gap)), 11, INK, 3)?;
-    if !newest {
-        return Ok(());
-    }
-    let words = format!(
-        "{} mm, {}",
-        Units::Millimetre.with_uncertainty(gap, point.uncertainty_mm),
-        point.verdict.words()
-    );
-    // Gaps decrease: the upper right corner stays free.
+    canvas.ring((x, y(gap)), 11, INK, 3)
+}
+
+/// Rings the newest stroke and writes its gap and verdict.
+fn draw_newest(
+    canvas: &Canvas<'_>,
+    point: &StripPoint,
+    x: f64,
+    y: &dyn Fn(f64) -> f64,
+    view: View,
+) -> Result<(), PictureError> {
+    let Some(gap) = point.gap_mm else { return Ok(()) };
+    let number = view.units.with_uncertainty(gap, point.uncertainty_mm);
+    let verdict = words::verdict(point.verdict).of(view.language);
+    let words = format!("{number} {}, {verdict}", view.units.symbol());
     canvas.ring((x, y(gap)), 17, INK, 3)?;
+    // Gaps decrease: the upper right corner stays free.
     canvas.text(&words, (RIGHT, TOP + 4.0), Text::new(34.0).bold().right())
 }
 
 #[cfg(test)]
 mod tests {
+    use platen_model::Language;
+
     use super::*;
+    use crate::picture::Units;
 
     fn point(label: usize, gap_mm: Option<f64>, verdict: Verdict) -> StripPoint {
         StripPoint { label: label.to_string(), gap_mm, uncertainty_mm: Some(0.2), sense: -1, verdict }
     }
 
     fn drawn(points: &[StripPoint]) -> String {
+        drawn_in(points, View::FILE)
+    }
+
+    fn drawn_in(points: &[StripPoint], view: View) -> String {
         let caption = Caption { plate: "A", stroke: Some(2), verdict: Verdict::Pass };
-        strip(points, &caption, &PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 }).unwrap()
+        let scale = PictureScale { limit_mm: 3.0, chord_mm: 2000.0, bend_per_m: 0.1 };
+        strip(points, &caption, &scale, view).unwrap()
     }
 
     #[test]
@@ -137,6 +157,16 @@ mod tests {
         assert!(few.contains("2.2 \u{b1} 0.2 mm, pass"));
         let small = drawn(&[point(1, Some(0.5), Verdict::Pass)]);
         assert!(small.contains("150") && few.contains("150"), "the axis does not follow the data");
+    }
+
+    #[test]
+    fn it_is_drawn_in_japanese_and_in_inches() {
+        let view = View { language: Language::Ja, units: Units::Inch, ..View::FILE };
+        let svg = drawn_in(&[point(1, Some(60.0), Verdict::Fail), point(2, Some(2.2), Verdict::Pass)], view);
+        for text in ["0.09 \u{b1} 0.01 in, 合格", "許容値", "ストローク", "\n5.91\n"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(!svg.contains("limit") && !svg.contains(" mm"));
     }
 
     #[test]

@@ -52,6 +52,7 @@ words! {
     GAP "gap" "すき間"
     LIMIT "limit" "許容値"
     ALONG "along the line" "基準線に沿って"
+    STRIP "Worst gap under a template, {}, stroke by stroke" "ストロークごとの型板の最大すき間, {}"
     STROKE "stroke" "ストローク"
     PASS "pass" "合格"
     CANNOT_TELL "cannot tell" "判定不能"
