@@ -111,25 +111,43 @@ mod tests {
         (frame.width as usize, pixels.iter().map(colour).collect())
     }
 
-    /// Colours in which an SVG fills rectangles.
-    fn fills(svg: &str) -> BTreeSet<String> {
-        let rectangles = svg.lines().filter(|line| line.starts_with("<rect"));
-        rectangles.filter_map(|line| Some(line.split_once("fill=\"")?.1[..7].to_owned())).collect()
+    /// Filled rectangles of an SVG: extent along x and y, pixels, and colour.
+    fn rectangles(svg: &str) -> Vec<([[f64; 2]; 2], String)> {
+        let value = |line: &str, name: &str| {
+            let text = line.split_once(&format!(" {name}=\"")).unwrap().1;
+            text[..text.find('"').unwrap()].to_owned()
+        };
+        let of = |line: &str| {
+            let [x, y, width, height] =
+                ["x", "y", "width", "height"].map(|name| value(line, name).parse::<f64>().unwrap() / 8.0);
+            ([[x, x + width], [y, y + height]], value(line, "fill"))
+        };
+        svg.lines().filter(|line| line.starts_with("<rect")).map(of).collect()
     }
 
     #[test]
     fn the_colours_of_the_pixels_are_those_of_the_legend_and_of_the_map_in_the_files() {
         let field = rainbow();
         let ScreenMap { png, svg } = drawn(&field, None, View::default());
-        let pixels: BTreeSet<String> = decoded(&png).1.into_iter().collect();
-        let legend = fills(&svg);
+        let (width, pixels) = decoded(&png);
+        let legend: BTreeSet<String> = rectangles(&svg).into_iter().map(|(_, colour)| colour).collect();
         let shades: BTreeSet<String> = pixels.iter().filter(|colour| *colour != "#FFFFFF").cloned().collect();
         assert!(shades.len() > 40, "{} shades", shades.len());
         assert!(shades.is_subset(&legend), "not in the legend: {:?}", shades.difference(&legend));
+
         let plate = plate(None);
         let caption = Caption { plate: "A", stroke: None, verdict: Verdict::Fail };
-        let file = fills(&map(&field, &plate, &caption, &plate.scale, None).unwrap());
-        assert!(pixels.is_subset(&file), "not in the file: {:?}", pixels.difference(&file));
+        let file = rectangles(&map(&field, &plate, &caption, &plate.scale, None).unwrap());
+        // The plate lies 24 pixels higher on the screen; later rectangles cover earlier ones.
+        let colour_at = |x: f64, y: f64| {
+            let covers = |span: [f64; 2], at: f64| span[0] <= at && at <= span[1];
+            let mut all = file.iter().rev();
+            all.find(|(span, _)| covers(span[0], x) && covers(span[1], y + 24.0)).map(|(_, colour)| colour)
+        };
+        for (x, y) in (28..230).flat_map(|x| (26..161).map(move |y| (x, y))) {
+            let found = &pixels[y * width + x];
+            assert_eq!(Some(found), colour_at(4.0 * x as f64 + 2.0, 4.0 * y as f64 + 2.0), "{x}, {y}");
+        }
     }
 
     #[test]
@@ -199,6 +217,7 @@ mod tests {
         ] {
             assert!(svg.contains(text), "{text}");
         }
+        assert!(!svg.contains("mm"));
         let english = |text: &str| text.chars().filter(|c| c.is_ascii_alphabetic()).count() > 2;
         let words = svg.lines().filter(|line| !line.starts_with('<') && english(line));
         assert_eq!(words.collect::<Vec<_>>(), Vec::<&str>::new(), "English words");
