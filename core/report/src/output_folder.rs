@@ -12,10 +12,13 @@ use platen_shape::Surface;
 
 use crate::field_export::PlateTable;
 use crate::picture::{self, Caption, PictureError, StripPoint, View};
-use crate::result::{LineRecord, Next, PlateRecord, ResultRecord};
+use crate::result::{CURVATURE_DEFICIT, LineRecord, Next, PlateRecord, ResultRecord};
 
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";
+
+/// Fields whose colours are written as a picture of the plate alone, for the plate in 3D.
+pub const TEXTURES: [&str; 2] = [CURVATURE_DEFICIT, "deviation"];
 
 /// Failure to write the files of a measurement.
 #[derive(Debug, thiserror::Error)]
@@ -148,6 +151,14 @@ pub fn fields(
     for field in reports.iter().flat_map(|report| &report.fields).filter(|field| field.components == 1) {
         let map = picture::map(field, plate, caption, &plate.scale, next);
         files.push(put_picture(folder, &field.name, map)?);
+    }
+    for field in
+        reports.iter().flat_map(|report| &report.fields).filter(|field| TEXTURES.contains(&&*field.name))
+    {
+        let name = format!("{}.png", field.name);
+        let png = picture::texture(field, plate);
+        let png = png.map_err(|e| FilesError::Picture { name: name.clone(), why: e.to_string() })?;
+        files.push(put(folder, &name, &png)?);
     }
     Ok(files)
 }

@@ -18,7 +18,7 @@ mod words;
 
 pub use map::map;
 pub use scale::PictureScale;
-pub use screen_map::{ScreenMap, screen_map};
+pub use screen_map::{ScreenMap, screen_map, texture};
 pub use section::section;
 pub use strip::{StripPoint, strip};
 pub use view::{SeenPlate, Turn, Units, View};

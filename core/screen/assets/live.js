@@ -31,7 +31,6 @@ function silence(reason, words, remedy) {
     else element.textContent = '';
   }
   put('band', { attributes: { class: 'band lost' } });
-  put('mode', { attributes: { class: 'mode none' } });
   put('alarm', { attributes: { class: 'alarm none' } });
   put('verdict', { text: words });
   put('why', { text: remedy });

@@ -10,7 +10,7 @@ const FRAGMENT = `#version 300 es
 precision highp float; in vec2 uv; in vec3 up; uniform sampler2D map; out vec4 colour;
 void main() { float light = 0.72 + 0.28 * abs(dot(normalize(up), normalize(vec3(0.3, -0.4, 0.86)))); colour = vec4(texture(map, uv).rgb * light, 1.0); }`;
 
-const view = { height: 5, azimuth: -0.6, elevation: 0.6, distance: 2.4 };
+const view = { height: 5, azimuth: -0.6, elevation: 0.6, distance: 1.5 };
 const FROM = { scanner: [-0.6, 0.6], press: [0, 0.25], above: [0, Math.PI / 2] };
 let mesh = null;
 
@@ -23,7 +23,7 @@ const unit = a => a.map(x => x / Math.hypot(...a));
 function flattened(buffer) {
   const side = new DataView(buffer).getUint32(0, true);
   const raw = new Float32Array(buffer.slice(4));
-  const node = k => [raw[3 * k], raw[3 * k + 1], raw[3 * k + 2]];
+  const node = k => [raw[4 * k], raw[4 * k + 1], raw[4 * k + 2]];
   const corner = [0, side - 1, side * side - 1, side * (side - 1)].map(node);
   const along = unit(minus(corner[1], corner[0]));
   const normal = unit(cross(along, minus(corner[3], corner[0])));
@@ -37,7 +37,7 @@ function flattened(buffer) {
     const from = minus(node(k), middle);
     places.push([dot(from, along) * scale, dot(from, across) * scale, up * dot(from, normal) * scale]);
   }
-  return { side, places, mirrored: up < 0 };
+  return { side, places, seen: places.map((_, k) => raw[4 * k + 3] > 0) };
 }
 
 // Vertices with the height of the view: place, normal, place on the map.
@@ -58,13 +58,12 @@ function vertices({ side, places }) {
   return new Float32Array(data);
 }
 
-function triangles({ side, places }) {
+function triangles({ side, seen }) {
   const index = [];
-  const known = (...nodes) => nodes.every(n => places[n].every(Number.isFinite));
   for (let k = 0; k + 1 < side; k++) {
     for (let i = 0; i + 1 < side; i++) {
       const [a, b, c, d] = [k * side + i, k * side + i + 1, (k + 1) * side + i, (k + 1) * side + i + 1];
-      if (known(a, b, c, d)) index.push(a, b, c, b, d, c);
+      if ([a, b, c, d].every(n => seen[n])) index.push(a, b, c, b, d, c);
     }
   }
   return new Uint32Array(index);
@@ -134,6 +133,8 @@ function start(buffer, image) {
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
   gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
   draw();
   canvas.dataset.drawn = String(mesh.count / 3);
 }

@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use crate::Snapshot;
 
 /// Files of a stroke that may be read; sections of its templates (`section-NAME.svg`) beside them.
-pub const FILES: [&str; 10] = [
+pub const FILES: [&str; 11] = [
     "result.json",
     "reference_lines.csv",
     "grid.csv",
@@ -23,6 +23,7 @@ pub const FILES: [&str; 10] = [
     "curvature_deficit.svg",
     "deviation.svg",
     "curvature_deficit.png",
+    "deviation.png",
 ];
 
 /// Failure to read for a page.
@@ -74,12 +75,12 @@ pub trait Source: Send + Sync + 'static {
     /// No such stroke or field.
     fn field(&self, run: u32, name: &str) -> Result<Arc<Field>, SourceError>;
 
-    /// Returns the positions of the mid-surface of a stroke on an even grid, v outer, u inner, metres, scanner frame; nodes that
-    /// were not seen as `NaN`.
+    /// Returns the scanned face of a stroke on an even grid, v outer, u inner: nodes of a side, and of each node x, y, z, metres,
+    /// scanner frame, and 1 where it was seen, else 0.
     ///
     /// # Errors
     /// No such stroke, or it was not measured.
-    fn positions(&self, run: u32) -> Result<(usize, Vec<[f32; 3]>), SourceError>;
+    fn mesh(&self, run: u32) -> Result<(usize, Vec<[f32; 4]>), SourceError>;
 
     /// Returns a file of a stroke's folder; the server asks for names of a fixed list only.
     ///

@@ -125,8 +125,8 @@ impl Source for Stand {
         Err(SourceError::NotFound(name.into()))
     }
 
-    fn positions(&self, _: u32) -> Result<(usize, Vec<[f32; 3]>), SourceError> {
-        Ok((1, vec![[1.0, 2.0, f32::NAN]]))
+    fn mesh(&self, _: u32) -> Result<(usize, Vec<[f32; 4]>), SourceError> {
+        Ok((1, vec![[1.0, 2.0, 3.0, 0.0]]))
     }
 
     fn file(&self, run: u32, name: &str) -> Result<Vec<u8>, SourceError> {
@@ -249,8 +249,9 @@ fn the_first_paint_says_the_truth_without_script() {
     let (_, _, page) = site.get("/");
     for text in [
         "BEND MORE",
-        "4.3 \u{b1} 0.2 mm",
-        "limit 3.0 mm",
+        ">4.3</span>",
+        "\u{b1} 0.2 mm",
+        "(limit 3.0 mm)",
         "Stroke 4, Plate",
         "Press: in step",
         "103 the heartbeat",
@@ -287,7 +288,7 @@ fn out_of_step_with_the_press_nothing_is_good() {
     next.press.in_step = false;
     site.stand.snapshots.send_replace(Arc::new(next));
     let (_, _, page) = site.get("/");
-    assert!(page.contains("NO CONNECTION TO THE PRESS") && !page.contains(">DONE<"));
+    assert!(page.contains("NO CONNECTION") && !page.contains(">DONE<"));
 }
 
 /// Next event of a stream: its name and data.

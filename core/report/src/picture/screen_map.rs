@@ -46,6 +46,16 @@ pub fn screen_map(
     Ok(ScreenMap { png: png.map_err(|e| PictureError(e.to_string()))?, svg })
 }
 
+/// Returns the colours of a field as a PNG of the plate alone, u to the right, v up.
+///
+/// # Errors
+/// The encoder fails.
+pub fn texture(field: &Field, plate: &PlateRecord) -> Result<Vec<u8>, PictureError> {
+    let layout = Layout::new(field, plate, &plate.scale, View::FILE, LOOK);
+    let png = layout.shades(field).png(layout.squares, [0, 0]);
+    png.map_err(|e| PictureError(e.to_string()))
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;

@@ -3,8 +3,6 @@
 
 use platen_model::Language;
 
-use crate::result::PlateRecord;
-
 /// View of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct View {
@@ -53,16 +51,16 @@ pub struct SeenPlate {
 }
 
 impl Turn {
-    /// Returns a plate as it is seen.
-    pub fn of(self, plate: &PlateRecord) -> SeenPlate {
-        let press = plate.press_side.filter(|_| self == Self::Press);
+    /// Returns a plate as it is seen: extent along u and v, and the edge that faces the press as a direction in (u, v).
+    pub fn of(self, size_mm: [f64; 2], press_side: Option<[i8; 2]>) -> SeenPlate {
+        let press = press_side.filter(|_| self == Self::Press);
         let quarters = match press {
             Some([1, _]) => 1,
             Some([_, 1]) => 2,
             Some([-1, _]) => 3,
             _ => 0,
         };
-        SeenPlate { quarters, size_mm: [plate.width_mm, plate.height_mm], press_below: press.is_some() }
+        SeenPlate { quarters, size_mm, press_below: press.is_some() }
     }
 }
 
@@ -203,14 +201,9 @@ mod tests {
 
     #[test]
     fn the_press_is_below_and_nothing_is_mirrored() {
-        let plate = |press_side| PlateRecord {
-            width_mm: 3000.0,
-            height_mm: 2000.0,
-            press_side,
-            ..PlateRecord::default()
-        };
+        let size = [3000.0, 2000.0];
         for side in [[0, -1], [0, 1], [1, 0], [-1, 0]] {
-            let seen = Turn::Press.of(&plate(Some(side)));
+            let seen = Turn::Press.of(size, Some(side));
             let edge = [0, 1].map(|i| 0.5 * [3000.0, 2000.0][i] * (1.0 + f64::from(side[i])));
             let [x, y] = seen.place_mm(edge);
             assert_eq!([2.0 * x, y], [seen.extent_mm()[0], 0.0], "{side:?}: the middle of the edge is below");
@@ -220,9 +213,9 @@ mod tests {
             assert_eq!(way(v), [-way(u)[1], way(u)[0]], "{side:?}");
             assert_eq!(seen.at_mm(seen.place_mm([700.0, 300.0])), [700.0, 300.0], "{side:?}");
             assert!(seen.press_below);
-            assert_eq!(Turn::Drawing.of(&plate(Some(side))).place_mm([700.0, 300.0]), [700.0, 300.0]);
+            assert_eq!(Turn::Drawing.of(size, Some(side)).place_mm([700.0, 300.0]), [700.0, 300.0]);
         }
-        let unplaced = Turn::Press.of(&plate(None));
+        let unplaced = Turn::Press.of(size, None);
         assert!(!unplaced.press_below && unplaced.place_mm([700.0, 300.0]) == [700.0, 300.0]);
     }
 }

@@ -1,7 +1,7 @@
 //! `/compare?a=RUN&b=RUN`: two strokes on the same scale: maps side by side, sections, and their figures with their difference.
 
 use maud::{Markup, html};
-use platen_report::result::{ResultRecord, TemplateRecord};
+use platen_report::result::{CURVATURE_DEFICIT, ResultRecord, TemplateRecord};
 
 use super::{chip, clean, document, navigation};
 use crate::view::View;
@@ -73,16 +73,16 @@ fn difference(values: [Option<(f64, f64)>; 2], view: View) -> String {
 }
 
 /// Returns the name of the map that shows what is still to bend: of curvature where that was compared, else of height.
-fn map(record: &ResultRecord) -> &'static str {
+pub(super) fn map(record: &ResultRecord) -> &'static str {
     let is_curvature = |comparison: &serde_json::Value| comparison["plugin"] == "curvature";
-    if record.comparisons.iter().any(is_curvature) { "curvature_deficit" } else { "deviation" }
+    if record.comparisons.iter().any(is_curvature) { CURVATURE_DEFICIT } else { "deviation" }
 }
 
 fn templates(record: &ResultRecord) -> impl Iterator<Item = &TemplateRecord> {
     record.reference_lines.iter().flat_map(|line| &line.templates)
 }
 
-fn worst_sense(record: &ResultRecord) -> i8 {
+pub(super) fn worst_sense(record: &ResultRecord) -> i8 {
     platen_report::history_view::worst_template(record).map_or(0, |template| template.sense)
 }
 

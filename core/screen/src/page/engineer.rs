@@ -14,8 +14,8 @@ const TIMELINE: usize = 20;
 pub(crate) fn page(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Markup {
     let text = |texts: Texts| texts.of(view.language);
     let cells = cells(snapshot, engineer, view);
-    let table = |head: &[&str], rows: Markup| {
-        html! { table { thead { tr { @for name in head { th scope="col" { (name) } } } } tbody { (rows) } } }
+    let table = |head: &[Texts], rows: Markup| {
+        html! { table { thead { tr { @for name in head { th scope="col" { (text(*name)) } } } } tbody { (rows) } } }
     };
     let registers = |block: usize| {
         html! { @for (k, row) in engineer.registers[block].iter().enumerate() { tr {
@@ -37,24 +37,24 @@ pub(crate) fn page(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Mark
             p { (cells.span("verdict")) " " (cells.span("why")) }
             p { a href="/api/v1/diagnosis" download="platen-diagnosis.json" { (text(words::DIAGNOSIS)) } }
             div.pair {
-                section { h2 { (text(words::STATE)) } (table(&["", ""], pairs(&engineer.figures, Some("figure")))) }
-                section { h2 { (text(words::ALARMS)) } (table(&["", "", ""], html! {
+                section { h2 { (text(words::STATE)) } (table(&[words::NAME, words::VALUE], pairs(&engineer.figures, Some("figure")))) }
+                section { h2 { (text(words::ALARMS)) } (table(&[words::CODE, words::TEXT, words::COUNT], html! {
                     @for k in 0..ALARMS { tr { @for part in ["code", "text", "count"] { td { (cells.span(&format!("alarm-{k}-{part}"))) } } } }
                 })) }
             }
-            section { h2 { (text(words::TIMELINE)) } (table(&["", text(words::VERDICT), "scan", "result", "ack"], html! {
+            section { h2 { (text(words::TIMELINE)) } (table(&[words::STROKE, words::VERDICT, words::SCAN_END, words::RESULT, words::ACKNOWLEDGED], html! {
                 @for k in 0..TIMELINE { tr { @for part in ["stroke", "verdict", "0", "1", "2"] { td { (cells.span(&format!("time-{k}-{part}"))) } } } }
             })) }
             div.pair {
-                section { h2 { (text(words::REGISTERS_READ)) } (table(&["0..", "4xxxx", "n", "", ""], registers(0))) }
-                section { h2 { (text(words::REGISTERS_WRITTEN)) } (table(&["0..", "4xxxx", "n", "", ""], registers(1))) }
+                section { h2 { (text(words::REGISTERS_READ)) } (table(&[words::ADDRESS, words::CODE, words::WORDS, words::NAME, words::VALUE], registers(0))) }
+                section { h2 { (text(words::REGISTERS_WRITTEN)) } (table(&[words::ADDRESS, words::CODE, words::WORDS, words::NAME, words::VALUE], registers(1))) }
             }
-            section { h2 { (text(words::PLUGINS)) } (table(&["", "", "", ""], html! {
+            section { h2 { (text(words::PLUGINS)) } (table(&[words::USE, words::NAME, words::VERSION, words::FILE], html! {
                 @for plugin in &engineer.plugins { tr {
                     td { (plugin.role) } th scope="row" { (clean(&plugin.name)) } td { (clean(&plugin.version)) } td { (clean_path(&plugin.file)) }
                 } }
             })) }
-            section { h2 { (text(words::FILES_IN_FORCE)) } (table(&["", ""], pairs(&engineer.files, None))) }
+            section { h2 { (text(words::FILES_IN_FORCE)) } (table(&[words::FILE, words::CHECKSUM], pairs(&engineer.files, None))) }
         }
     };
     document(view, text(words::ENGINEER), "page", Some((LivePage::Engineer, &snapshot.boot)), body)

@@ -2,13 +2,13 @@
 
 use maud::{Markup, html};
 use platen_model::{Audience, Severity};
-use platen_report::picture::{PictureScale, Turn};
+use platen_report::picture::PictureScale;
 use platen_report::result::Next;
 
 use super::{LivePage, class, clean, document, navigation};
 use crate::cells::Cells;
 use crate::view::View;
-use crate::{PlatePart, ResultPart, Snapshot, Stage, Texts, words};
+use crate::{ResultPart, Snapshot, Stage, Texts, words};
 
 /// Strokes in the strip, and the size of its drawing.
 const STRIP: usize = 16;
@@ -41,7 +41,7 @@ pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
                 h2 { (cells.span("place-title")) }
                 p.figure { (cells.span("left")) " " (cells.span("left-words")) }
                 p.figure { (cells.span("near")) " " (cells.span("near-words")) }
-                h2 { (text(words::GAP)) " " (cells.span("limit")) }
+                h2 { (cells.span("gap-title")) " " (cells.span("limit")) }
                 p.figure { (cells.span("gap")) " " (cells.span("gap-more")) }
                 svg.bar viewBox=(view_box(BAR_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::GAP)) {
                     @for id in ["bar-limit", "bar-gap", "bar-uncertainty"] { (cells.rect(id)) }
@@ -77,7 +77,7 @@ fn band(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let stage = snapshot.stroke.as_ref().map(|stroke| stroke.stage).filter(|stage| *stage != Stage::Done);
     let (verdict, why, look) = match (&snapshot.result, stage) {
         _ if !snapshot.press.in_step && snapshot.host.mode == "listen" => (words::LISTENING, None, "unknown"),
-        _ if !snapshot.press.in_step => (words::NO_LINK, None, "unknown"),
+        _ if !snapshot.press.in_step => (words::NO_LINK, Some(words::NO_LINK_WHY), "unknown"),
         (_, Some(stage)) => (words::stage(stage), None, "busy"),
         (Some(result), None) => {
             let sense = sense(result);
@@ -95,7 +95,6 @@ fn band(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         _ => "",
     };
     cells.text("mode", mode);
-    cells.class("mode", if mode.is_empty() { "mode none" } else { "mode" });
 }
 
 fn sense(result: &ResultPart) -> i8 {
@@ -119,28 +118,14 @@ fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let next = result.and_then(|result| result.next.as_ref());
     cells.text("place-title", next.map_or(String::new(), |next| text(words::next(next))));
     let next = next.and_then(Next::place).zip(snapshot.plate.as_ref());
-    let distances =
-        next.and_then(|(next, plate)| Some((from_left_and_near(next.at_mm, plate, view.turn)?, plate)));
-    let [left, near] = distances.map_or([None; 2], |([left, near], _)| [Some(left), Some(near)]);
-    let by_press =
-        view.turn == Turn::Press && snapshot.plate.as_ref().is_some_and(|plate| plate.press_side.is_some());
+    let seen = next.and_then(|(place, plate)| Some((place, view.turn.of(plate.size_mm?, plate.press_side))));
+    let [left, near] = seen.map_or([None; 2], |(place, seen)| seen.place_mm(place.at_mm).map(Some));
+    let by_press = seen.is_some_and(|(_, seen)| seen.press_below);
     let near_words = if by_press { words::FROM_PRESS } else { words::FROM_BOTTOM };
     for (id, mm, texts) in [("left", left, words::FROM_LEFT), ("near", near, near_words)] {
         cells.text(id, mm.map_or(String::new(), |mm| view.distance(mm)));
         cells.text(format!("{id}-words"), mm.map_or(String::new(), |_| text(texts)));
     }
-}
-
-/// Returns the distances of a place from the left and from the lower edge of the plate as it is shown: with the edge that faces the
-/// press down, or as drawn. Never mirrored.
-fn from_left_and_near([u, v]: [f64; 2], plate: &PlatePart, turn: Turn) -> Option<[f64; 2]> {
-    let [w, h] = plate.size_mm?;
-    Some(match plate.press_side.filter(|_| turn == Turn::Press) {
-        Some([0, 1]) => [w - u, h - v],
-        Some([-1, _]) => [h - v, u],
-        Some([1, _]) => [v, w - u],
-        _ => [u, v],
-    })
 }
 
 /// Worst gap against its limit.
@@ -151,6 +136,7 @@ fn gap(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         worst.map(|worst| view.with_uncertainty(worst.gap_mm, worst.uncertainty_mm)).unwrap_or_default();
     // The figure is large, its uncertainty and unit beside it are not.
     let (gap, more) = gap.split_once(' ').unwrap_or_default();
+    cells.text("gap-title", worst.map_or("", |_| text(words::GAP)));
     cells.text("gap", gap);
     cells.text("gap-more", more);
     let limit = worst
@@ -242,28 +228,4 @@ fn states(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         Some(Severity::Warning) => "warning",
     };
     cells.class("alarm", format!("alarm {look}"));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn distances_are_those_of_the_plate_with_the_press_below() {
-        let plate = |press_side| PlatePart {
-            id: None,
-            part: None,
-            recipe: None,
-            size_mm: Some([3000.0, 2000.0]),
-            press_side,
-        };
-        let at = |press_side, turn| from_left_and_near([500.0, 300.0], &plate(press_side), turn).unwrap();
-        assert_eq!(at(Some([0, -1]), Turn::Press), [500.0, 300.0]);
-        assert_eq!(at(Some([0, 1]), Turn::Press), [2500.0, 1700.0]);
-        // With u = 0 below, v runs to the left; with u = W below, to the right.
-        assert_eq!(at(Some([-1, 0]), Turn::Press), [1700.0, 500.0]);
-        assert_eq!(at(Some([1, 0]), Turn::Press), [300.0, 2500.0]);
-        assert_eq!(at(Some([1, 0]), Turn::Drawing), [500.0, 300.0]);
-        assert_eq!(at(None, Turn::Press), [500.0, 300.0]);
-    }
 }

@@ -11,25 +11,27 @@ use crate::{Texts, words};
 /// Returns the page.
 pub(crate) fn page(run: u32, record: &ResultRecord, view: View) -> Markup {
     let text = |texts: Texts| texts.of(view.language);
-    let map = |ending: &str| view.link(&format!("/strokes/{run}/curvature_deficit.{ending}"));
+    let map = |ending: &str| format!("/files/{run}/{}.{ending}", super::compare::map(record));
     let number = record.stroke.map_or(String::new(), |n| n.to_string());
     let body = html! {
         script type="module" src=(assets::address("plate.js")) {}
         (navigation(view, "/plate"))
         main {
-            h1 { (text(words::PLATE)) " " (clean(&record.plate)) ", " (text(words::STROKE)) " " (number) " " (chip(view, record.verdict, 0)) }
+            h1 { (text(words::PLATE)) " " (clean(&record.plate)) ", " (text(words::STROKE)) " " (number) " " (chip(view, record.verdict, super::compare::worst_sense(record))) }
             p.buttons {
                 @for height in [1, 5, 20] {
                     button type="button" data-height=(height) aria-pressed=(if height == 5 { "true" } else { "false" }) { (text(words::HEIGHT)) " x" (height) }
                 }
-                @for name in ["scanner", "press", "above"] { button type="button" data-from=(name) { (name) } }
+                @for (name, texts) in [("scanner", words::SCANNER), ("press", words::PRESS), ("above", words::ABOVE)] {
+                    button type="button" data-from=(name) { (text(texts)) }
+                }
             }
             canvas id="plate" data-mesh=(format!("/strokes/{run}/mesh.bin")) data-map=(map("png")) tabindex="0"
                 aria-label=(text(words::MAP)) {}
-            p id="height" {}
+            p id="height" { (text(words::HEIGHT)) " x5" }
             div.map id="flat" hidden {
                 p { (text(words::NO_WEBGL)) }
-                img src=(map("png")) alt=(text(words::MAP)); img src=(map("svg")) alt="";
+                img src=(map("svg")) alt=(text(words::MAP));
             }
         }
     };

@@ -108,7 +108,7 @@ fn row(stroke: &StrokeRow, bends: Option<&SequenceStroke>, k: usize, n: usize, v
         }
         td.files {
             @if measured { a href=(view.link(&format!("/plate?run={}", stroke.run))) { (text(words::PLATE_3D)) } }
-            @for file in &stroke.files { " " a href=(format!("/files/{}/{file}", stroke.run)) { (file) } }
+            @for file in stroke.files.iter().filter(|file| !file.ends_with(".png")) { " " a href=(format!("/files/{}/{file}", stroke.run)) { (file) } }
         }
     } }
 }

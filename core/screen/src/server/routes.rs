@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Extension, Router};
 use maud::Markup;
-use platen_report::picture::{self, Caption};
+use platen_report::picture;
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 
@@ -246,29 +246,22 @@ async fn stroke_picture(
         let (field, ending) = name.rsplit_once('.').unwrap_or((&name, ""));
         let record = source.result(run)?;
         let values = source.field(run, field)?;
-        let caption = Caption { plate: &record.plate, stroke: record.stroke, verdict: record.verdict };
-        let map = picture::map(
-            &values,
-            &record.plate_file,
-            &caption,
-            &record.plate_file.scale,
-            record.next.as_ref(),
-        );
-        let _ = view.picture();
+        let map = picture::screen_map(&values, &record.plate_file, view.picture(), record.next.as_ref());
         let map = map.map_err(|e| SourceError::Unreadable(e.to_string()))?;
         match ending {
-            "svg" => Ok((map.into_bytes(), "image/svg+xml")),
+            "png" => Ok((map.png, "image/png")),
+            "svg" => Ok((map.svg.into_bytes(), "image/svg+xml")),
             _ => Err(SourceError::NotFound(format!("no picture {name}; ask for {field}.png"))),
         }
     });
     finished(answer.await)
 }
 
-/// Returns positions on an even grid: number of nodes of a side, then x, y, z of each node as 32-bit floats, little endian.
+/// Returns the mesh: number of nodes of a side, then x, y, z, seen of each node as 32-bit floats, little endian.
 fn mesh(source: &dyn Source, run: u32) -> Result<Vec<u8>, SourceError> {
-    let (side, positions) = source.positions(run)?;
+    let (side, nodes) = source.mesh(run)?;
     let side = (side as u32).to_le_bytes();
-    Ok(side.into_iter().chain(positions.iter().flatten().flat_map(|x| x.to_le_bytes())).collect())
+    Ok(side.into_iter().chain(nodes.iter().flatten().flat_map(|x| x.to_le_bytes())).collect())
 }
 
 async fn file(State(site): State<Site>, Path((run, name)): Path<(u32, String)>) -> Response {

@@ -161,14 +161,13 @@ impl Source for Site {
         })
     }
 
-    fn positions(&self, run: u32) -> Result<(usize, Vec<[f32; 3]>), SourceError> {
+    fn mesh(&self, run: u32) -> Result<(usize, Vec<[f32; 4]>), SourceError> {
         let surface = output_folder::surface_beside(&self.document(run)?).map_err(SourceError::Unreadable)?;
         let along = |k: usize, length: f64| length * k as f64 / (NODES - 1) as f64;
         let node = |k: usize| {
             let (u, v) = (along(k % NODES, surface.width()), along(k / NODES, surface.height()));
-            let seen = surface.mask().seen(u, v);
-            let place: [f64; 3] = surface.face(u, v).into();
-            place.map(|x| if seen { x as f32 } else { f32::NAN })
+            let [x, y, z] = <[f64; 3]>::from(surface.face(u, v)).map(|x| x as f32);
+            [x, y, z, f32::from(u8::from(surface.mask().seen(u, v)))]
         };
         Ok((NODES, (0..NODES * NODES).map(node).collect()))
     }

@@ -40,7 +40,7 @@ pub(in crate::picture) struct Layout<'a> {
     pub(super) look: Look,
     pub(super) seen: SeenPlate,
     /// Squares from left to right and from top to bottom.
-    squares: [usize; 2],
+    pub(in crate::picture) squares: [usize; 2],
     pub(super) scale: Scale,
     pub(in crate::picture) title: String,
 }
@@ -58,7 +58,7 @@ impl<'a> Layout<'a> {
             .map(|node| field.values[node].abs())
             .fold(0.0, f64::max);
         let (title, scale) = picture_scale.field(&field.name, &field.unit, largest, view);
-        let seen = view.turn.of(plate);
+        let seen = view.turn.of([plate.width_mm, plate.height_mm], plate.press_side);
         let extent = seen.extent_mm();
         let pixel_per_mm = (PLATE[0] / extent[0]).min(PLATE[1] / extent[1]);
         let squares = extent.map(|mm| ((mm * pixel_per_mm / SQUARE).round() as usize).max(1));
