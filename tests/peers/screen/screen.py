@@ -11,6 +11,7 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.keys import Keys
 
 from cell import ROOT, Host, Press, cell, chromium, resize, settled, shown, wait
+from firefox import Firefox
 
 GOLDEN = ROOT / "tests/golden/screen"
 RESULT = ["left", "near", "gap-title", "gap", "gap-more", "limit", "map", "overlay"]
@@ -139,6 +140,32 @@ def check_a_stroke_takes_the_result_away(browser):
         said(f"SIGSTOP of the press: told after {time.monotonic() - start:.2f} s")
         assert time.monotonic() - start < 3.0 and nothing_is_left(browser)
         press.process.send_signal(signal.SIGCONT)
+
+
+def check_a_second_engine_obeys_the_rules(_):
+    """Firefox ESR: the operator's page, a silent host, the next trigger, a new start."""
+    firefox = Firefox()
+    try:
+        with cell(strokes=2) as (press, host):
+            opened(firefox, host)
+            said(f"{shown(firefox)['verdict']}, {shown(firefox)['gap']} {shown(firefox)['gap-more']}")
+            took = gone_after(firefox, lambda: host.process.send_signal(signal.SIGSTOP), 2.0)
+            host.process.send_signal(signal.SIGCONT)
+            wait("the result is back", lambda: shown(firefox)["gap"], 10)
+            before = press.counts()["results"]
+            assert press.ask({"do": "stroke"}).get("ok")
+            wait("the trigger hides the result", lambda: nothing_is_left(firefox), 5)
+            wait("result", lambda: press.counts()["results"] > before, 60)
+            wait("the next result", lambda: shown(firefox)["gap"], 10)
+            firefox.execute_script("window.before = true")
+            killed = gone_after(firefox, lambda: host.process.send_signal(signal.SIGKILL), 2.0)
+            host.process.wait()
+            again = Host(host.plant.parent, press, port=host.port)
+            wait("the page has loaded itself", lambda: not firefox.execute_script("return window.before === true"), 10)
+            again.end()
+            said(f"gone after {took:.2f} s of SIGSTOP, {killed:.2f} s after kill -9; the trigger hides it; loads itself anew")
+    finally:
+        firefox.quit()
 
 
 def check_names_of_others_are_text(browser):
