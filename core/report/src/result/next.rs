@@ -10,7 +10,7 @@
 //! The template is the plate file's shortest, along the direction in which the target bends; across it the mean has the same
 //! weights over the same length, or over the plate where that is shorter. Curvature below the level of detection counts as nothing,
 //! and so does the area beyond the plate, so that a narrow band gives its own middle wherever it lies. Unseen area takes the mean of
-//! the seen area beside it, which must have half of the weight.
+//! the seen area beside it, which must have half of the weight; area of uncertain curvature counts as unseen (`trusted` of `curvature`).
 //!
 //! The figure is a place: neither the force nor the depth of a stroke follows from it.
 
@@ -66,7 +66,8 @@ pub enum NoNext {
     BentTooFar,
     /// No target, no template, or no comparison with the curvature of the target.
     NoTarget,
-    /// Nothing stands out where the plate was seen, and a part of it was not seen by half.
+    /// Nothing stands out where the curvature is known, and in a part of the plate less than half of it is: not seen, or too uncertain,
+    /// as everywhere with the range error that is assumed of an uncalibrated scanner.
     NotEnoughSeen,
 }
 
@@ -99,7 +100,9 @@ impl Next {
             NoNext::NoTarget => {
                 "no place of a next hit is known: the plate file has no target or no template, or the plant no comparison `curvature`"
             }
-            NoNext::NotEnoughSeen => "no place of a next hit is known: not enough of the plate was seen",
+            NoNext::NotEnoughSeen => {
+                "no place of a next hit is known: too little of the plate was seen, or its curvature is too uncertain; calibrate the scanner"
+            }
         }
         .to_owned()
     }
@@ -287,8 +290,9 @@ impl<'a> Gaps<'a> {
     }
 
     fn at(&self, node: usize) -> [f64; 2] {
-        let n_u = self.field.nodes[0];
-        [(node % n_u) as f64 * self.step[0], (node / n_u) as f64 * self.step[1]]
+        let [n_u, n_v] = self.field.nodes;
+        let along = |k: usize, n: usize, length: f64| length * k as f64 / (n.max(2) - 1) as f64;
+        [along(node % n_u, n_u, self.size[0]), along(node / n_u, n_v, self.size[1])]
     }
 }
 
