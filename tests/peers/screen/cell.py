@@ -1,5 +1,5 @@
 """A simulated press and a host with pages, as child processes, and browsers to read them."""
-import json, os, re, shutil, signal, socket, subprocess, tempfile, time, urllib.request
+import json, os, re, signal, socket, subprocess, tempfile, time, urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -68,15 +68,15 @@ class Press:
 class Host:
     """`platen run` with pages on a free port, or on `port`."""
 
-    def __init__(self, folder, press, port=0, more=""):
+    def __init__(self, folder, press, port=0, more="", plate=lambda text: text, listen="127.0.0.1"):
         text = (ROOT / "config/sim-plant.toml").read_text()
         text = text.replace("port = 15020", f"port = {press.modbus.rsplit(':', 1)[1]}").replace("127.0.0.1:15021", press.plate)
         text = text.replace('folder = "../platen-results"', 'folder = "results"')
         folder = Path(folder)
         (folder / "plates").mkdir(exist_ok=True)
-        shutil.copy(ROOT / "config/plates/plate-009.toml", folder / "plates")
+        (folder / "plates/plate-009.toml").write_text(plate((ROOT / "config/plates/plate-009.toml").read_text()))
         self.plant = folder / "plant.toml"
-        self.plant.write_text(f'{text}\n[screen]\nlisten = "127.0.0.1:{port}"\n{more}')
+        self.plant.write_text(f'{text}\n[screen]\nlisten = "{listen}:{port}"\n{more}')
         self.log = open(folder / "host.log", "a")
         self.process = subprocess.Popen([BIN / "platen", "run", self.plant], stdout=subprocess.PIPE, stderr=self.log, text=True)
         line = self.process.stdout.readline()
@@ -84,10 +84,12 @@ class Host:
         assert found, f"platen run said {line!r}; see {folder / 'host.log'}"
         self.address = found[1]
         self.port = int(self.address.rsplit(":", 1)[1])
+        token = re.search(r'token_file = "(.*)"', more)
+        self.headers = {"Authorization": f"Bearer {Path(token[1]).read_text().strip()}"} if token else {}
         wait("ready", lambda: self.state()["press"]["ready"], 30)
 
     def get(self, path):
-        with urllib.request.urlopen(self.address + path, timeout=10) as answer:
+        with urllib.request.urlopen(urllib.request.Request(self.address + path, headers=self.headers), timeout=10) as answer:
             return answer.read()
 
     def state(self):
@@ -101,11 +103,11 @@ class Host:
 
 
 @contextmanager
-def cell(name="C9", strokes=0, more=""):
+def cell(name="C9", strokes=0, **host):
     """A press and a host in a folder of their own, after a blank and some strokes."""
     with tempfile.TemporaryDirectory() as folder:
         press = Press(folder, name)
-        host = Host(folder, press, more=more)
+        host = Host(folder, press, **host)
         try:
             for k in range(strokes):
                 press.stroke("baseline" if k == 0 else "stroke")
@@ -115,8 +117,8 @@ def cell(name="C9", strokes=0, more=""):
             press.end()
 
 
-def chromium(width=1280, height=800):
-    """A headless Chromium whose page has this size."""
+def chromium(width=1280, height=800, driver=None):
+    """A headless Chromium whose page has this size; started by a driver elsewhere, or by one of its own."""
     options = Options()
     options.binary_location = "/usr/bin/chromium"
     for argument in ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -124,8 +126,11 @@ def chromium(width=1280, height=800):
                      "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]:
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = webdriver.Chrome(options=options, service=Service("/usr/bin/chromedriver"))
-    resize(browser, width, height)
+    if driver:
+        browser = webdriver.Remote(command_executor=driver, options=options)
+    else:
+        browser = webdriver.Chrome(options=options, service=Service("/usr/bin/chromedriver"))
+        resize(browser, width, height)
     return browser
 
 

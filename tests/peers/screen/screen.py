@@ -3,14 +3,15 @@
 Runs the release build's `platen run` beside `platen-sim press`, both as child processes. Every check prints one line; the first that
 fails ends the program with exit code 1. `--bless` writes the screenshots of tests/golden/screen anew; `--only WORD` runs some checks.
 """
-import argparse, io, json, os, signal, socket, statistics, sys, tempfile, threading, time, urllib.error, urllib.request
+import argparse, io, json, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
 from pathlib import Path
 
+import jsonschema
 from PIL import Image, ImageChops
 from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.keys import Keys
 
-from cell import ROOT, Host, Press, cell, chromium, resize, settled, shown, wait
+from cell import BIN, ROOT, Host, Press, cell, chromium, resize, settled, shown, wait
 from firefox import Firefox
 
 GOLDEN = ROOT / "tests/golden/screen"
@@ -48,6 +49,11 @@ def opened(browser, host, path="/"):
         wait("a result on the page", lambda: shown(browser)["gap"], 10)
 
 
+def passes(plate):
+    """The plate file with limits under which the blank passes."""
+    return re.sub(r"limit_mm = [0-9.]+", "limit_mm = 300.0", plate)
+
+
 def check_a_person_sees_what_to_do(browser):
     """Stroke by stroke: verdict, place and gap; the figures are those of result.json, report and registers."""
     with cell(strokes=3) as (press, host):
@@ -61,7 +67,8 @@ def check_a_person_sees_what_to_do(browser):
         assert page["limit"] == f"(limit {worst['limit_mm']:.1f} mm)"
         report = host.get("/plates/1/report.html").decode()
         assert f"{worst['max_gap_mm']:.1f} \u00b1" in report
-        words = press.ask({"get": "stats"})["stats"]["taken"][-1]["words"]
+        registers = {row["name"]: row["value"] for row in json.loads(host.get("/api/v1/engineer"))["registers"][1]}
+        assert f"{float(registers['gap_max'].split()[0]):.1f}" == page["gap"], registers["gap_max"]
         if record["next"] and record["next"].get("at_mm"):
             u, v = record["next"]["at_mm"]
             side = record["plate_file"]["press_side"]
@@ -70,10 +77,35 @@ def check_a_person_sees_what_to_do(browser):
         said(f"{page['verdict']}; {page['place-title']}: {page['left']} {page['left-words']}, {page['near']} {page['near-words']}; {page['gap']} {page['gap-more']} {page['limit']}")
 
 
+def check_every_event_is_of_the_schema(_):
+    """Every state of a blank and two strokes against core/screen/schema, and none over 8 kB."""
+    schema = jsonschema.Draft202012Validator(json.loads((ROOT / "core/screen/schema/platen.screen-1.json").read_text()))
+    with cell() as (press, host):
+        events = []
+
+        def read():
+            with urllib.request.urlopen(host.address + "/api/v1/stream", timeout=30) as stream:
+                for line in stream:
+                    if line.startswith(b"data: ") and b"platen.screen/1" in line:
+                        events.append(line[6:])
+
+        threading.Thread(target=read, daemon=True).start()
+        for what in ["baseline", "stroke", "stroke"]:
+            press.stroke(what)
+        wait("a result", lambda: b'"verdict"' in events[-1], 10)
+        for event in events:
+            faults = list(schema.iter_errors(json.loads(event)))
+            assert not faults, faults[0]
+            assert len(event) <= 8192
+        stages = [stage for stage in ("accepted", "scanning", "measuring", "done") if any(f'"stage":"{stage}"'.encode() in e for e in events)]
+        said(f"{len(events)} states, at most {max(map(len, events))} bytes; stages seen: {', '.join(stages)}")
+
+
 def check_a_dead_host_leaves_no_result(browser):
     """kill -9, SIGSTOP, a closed lid: within 2 s no verdict, place or number."""
-    with cell(strokes=2) as (press, host):
+    with cell(strokes=2, plate=passes) as (press, host):
         opened(browser, host)
+        assert shown(browser)["verdict"] == "DONE", shown(browser)
         said(f"SIGSTOP of the host: gone after {gone_after(browser, lambda: host.process.send_signal(signal.SIGSTOP), 2.0):.2f} s")
         assert "NO CONNECTION" in shown(browser)["verdict"]
         host.process.send_signal(signal.SIGCONT)
@@ -169,8 +201,10 @@ def check_a_second_engine_obeys_the_rules(_):
 
 
 def check_names_of_others_are_text(browser):
-    """A plate named like markup, from TOML and register: text on every page, no report of the policy, no console error."""
-    with cell(name="<img src=x>", strokes=3) as (press, host):
+    """A plate named like markup, from register and plate file: text on every page, no report of the policy, no console error."""
+    evil = '"><img onerror=alert(1) src=x>' + "\u202e" * 3000
+    named = lambda plate: plate.replace('id = "C9"', f"id = {json.dumps(evil)}")
+    with cell(name="<img src=x>", strokes=3, plate=named) as (press, host):
         browser.get_log("browser")
         for path in PAGES:
             browser.get(host.address + path)
@@ -264,8 +298,6 @@ def check_fifty_readers_cost_the_press_little(browser):
 
 def check_access_is_refused_and_told(browser):
     """Wrong methods, names and tokens; an open address without a token does not start."""
-    import subprocess
-    from cell import BIN
     with tempfile.TemporaryDirectory() as folder:
         token = Path(folder) / "token"
         made = subprocess.run([BIN / "platen", "screen", "token", token], capture_output=True, text=True, check=True).stdout
@@ -292,6 +324,93 @@ def check_access_is_refused_and_told(browser):
             said(refused.stderr.strip().splitlines()[-1][:160])
 
 
+def check_it_stands_behind_a_proxy(_):
+    """The nginx configuration of config/screen passes pages and events over TLS; Caddy and systemd take theirs."""
+    files = ROOT / "config/screen"
+    with cell(strokes=1, more='names = ["press3.plant.example"]\n') as (press, host), tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=press3.plant.example", "-keyout", folder / "key", "-out", folder / "pem"],
+                       check=True, capture_output=True)
+        (folder / "htpasswd").write_text("operator:{PLAIN}press\n")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        text = (files / "nginx.conf").read_text()
+        for a, b in [("listen 443 ssl", f"listen 127.0.0.1:{port} ssl"), ("/etc/ssl/certs/press3.plant.example.pem", f"{folder}/pem"),
+                     ("/etc/ssl/private/press3.plant.example.key", f"{folder}/key"), ("/etc/nginx/platen.htpasswd", f"{folder}/htpasswd"),
+                     ("127.0.0.1:8380", f"127.0.0.1:{host.port}")]:
+            assert a in text, a
+            text = text.replace(a, b)
+        (folder / "nginx.conf").write_text(f"daemon off; pid {folder}/pid; error_log {folder}/log; events {{}} http {{ access_log off; client_body_temp_path {folder}; proxy_temp_path {folder}; {text} }}")
+        nginx = subprocess.Popen(["nginx", "-c", folder / "nginx.conf", "-p", folder, "-e", folder / "log"])
+        try:
+            def answer(path, authorization="Authorization: Basic b3BlcmF0b3I6cHJlc3M=\r\n"):
+                stream = ssl._create_unverified_context().wrap_socket(socket.create_connection(("127.0.0.1", port), 5), server_hostname="press3.plant.example")
+                stream.sendall(f"GET {path} HTTP/1.1\r\nHost: press3.plant.example\r\n{authorization}\r\n".encode())
+                return stream
+            def up():
+                try:
+                    return b" 200 " in answer("/").recv(200)
+                except OSError:
+                    return False
+            wait("nginx", up, 10)
+            assert b" 401 " in answer("/", "").recv(200)
+            stream, text, start = answer("/live/operator"), b"", time.monotonic()
+            while text.count(b"event: beat") < 3:
+                text += stream.recv(65536)
+            took = time.monotonic() - start
+            assert b"event: state" in text and took < 2.5, took
+            said(f"three beats through nginx in {took:.2f} s")
+        finally:
+            nginx.terminate()
+            nginx.wait()
+    subprocess.run(["caddy", "adapt", "--config", files / "Caddyfile", "--validate"], check=True, capture_output=True)
+    with tempfile.TemporaryDirectory() as folder:
+        unit = Path(folder) / "platen-kiosk.service"
+        unit.write_text((files / "platen-kiosk.service").read_text())
+        checked = subprocess.run(["systemd-analyze", "verify", "--user", "--man=no", unit], capture_output=True, text=True)
+        ours = [line for line in checked.stderr.splitlines() if "platen-kiosk" in line]
+        assert not ours, ours
+
+
+def check_a_cut_cable_leaves_no_result(_):
+    """Host and browser in two network namespaces: the cable between them is cut, and put back."""
+    run = lambda *command: subprocess.run(command, check=True, capture_output=True)
+    name = f"platen{time.time_ns() % 10000}"
+    run("ip", "netns", "add", name)
+    try:
+        # One cable for the page, one for the browser's driver.
+        for cable, net in [("a", "10.213.1"), ("b", "10.213.2")]:
+            run("ip", "link", "add", f"{name}{cable}", "type", "veth", "peer", "name", f"{name}{cable}2", "netns", name)
+            run("ip", "addr", "add", f"{net}.1/24", "dev", f"{name}{cable}")
+            run("ip", "link", "set", f"{name}{cable}", "up")
+            run("ip", "netns", "exec", name, "ip", "addr", "add", f"{net}.2/24", "dev", f"{name}{cable}2")
+            run("ip", "netns", "exec", name, "ip", "link", "set", f"{name}{cable}2", "up")
+        run("ip", "netns", "exec", name, "ip", "link", "set", "lo", "up")
+        with tempfile.TemporaryDirectory() as folder:
+            token = Path(folder) / "token"
+            run(BIN / "platen", "screen", "token", token)
+            driver = subprocess.Popen(["ip", "netns", "exec", name, "chromedriver", "--port=9515", "--allowed-ips=", "--allowed-origins=*"], stdout=subprocess.DEVNULL)
+            try:
+                with cell(strokes=2, listen="10.213.1.1", more=f'token_file = "{token}"\n') as (press, host):
+                    wait("driver", lambda: socket.socket().connect_ex(("10.213.2.2", 9515)) == 0, 20)
+                    browser = chromium(driver="http://10.213.2.2:9515")
+                    try:
+                        opened(browser, host, f"/?token={token.read_text().strip()}")
+                        assert "token" not in browser.current_url
+                        took = gone_after(browser, lambda: run("ip", "link", "set", f"{name}a", "down"), 2.0)
+                        run("ip", "link", "set", f"{name}a", "up")
+                        _, back = wait("the result is back", lambda: shown(browser)["gap"], 30)
+                        said(f"cable cut: gone after {took:.2f} s; put back: shown again after {back:.2f} s")
+                    finally:
+                        browser.quit()
+            finally:
+                driver.terminate()
+                driver.wait()
+    finally:
+        run("ip", "netns", "del", name)
+
+
 def check_everybody_can_read_it(browser):
     """axe-core finds nothing on any page, theme and language; all is reached by keyboard; a deuteranope tells more from too far."""
     axe = Path(arguments.axe).read_text()
@@ -312,12 +431,15 @@ def check_everybody_can_read_it(browser):
         said(f"axe-core: no violation on {n} views")
         for path in PAGES:
             opened(browser, host, path)
-            wanted = browser.execute_script("return document.querySelectorAll('a[href], button, input:not([type=hidden]), canvas[tabindex]').length")
+            name = "e => e.tagName + (e.href ?? e.textContent)"
+            wanted = set(browser.execute_script(f"return [...document.querySelectorAll('a[href], button')].map({name})"))
             reached = set()
-            for _ in range(wanted + 5):
+            for _ in range(len(wanted) + 60):
                 browser.switch_to.active_element.send_keys(Keys.TAB)
-                reached.add(browser.execute_script("const e = document.activeElement; return e.tagName + (e.href ?? e.textContent ?? '') + (e.name ?? '')"))
-            assert len(reached) > 3, (path, reached)
+                reached.add(browser.execute_script(f"return ({name})(document.activeElement)"))
+                if wanted <= reached:
+                    break
+            assert wanted <= reached, (path, wanted - reached)
     colours = {"more": (0x11, 0x4c, 0x8f), "far": (0x81, 0x30, 0x00), "done": (0x16, 0x6e, 0x5a)}
     lightness = {}
     for name, (r, g, b) in colours.items():
@@ -419,23 +541,22 @@ def check_a_week_needs_no_reload(browser):
         opened(browser, host)
         heap = lambda: (browser.execute_cdp_cmd("HeapProfiler.collectGarbage", {}),
                         browser.execute_cdp_cmd("Runtime.getHeapUsage", {})["usedSize"])[1]
-        # The page's own event handler, fed with its own last event.
-        browser.execute_async_script("""
-            const [address, done] = arguments; const stream = new EventSource(address); let last;
-            stream.addEventListener('state', e => { stream.close(); window.last = e.data; done(); });""", host.address + "/live/operator")
+        # The page's own handler, fed with its own last state: two that differ, in turn.
+        browser.execute_cdp_cmd("Page.enable", {})
+        keep = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": """
+            const Own = EventSource;
+            window.EventSource = class extends Own { constructor(...a) { super(...a); window.stream = this; this.addEventListener('state', e => { window.last ??= e.data; }); } };"""})
+        opened(browser, host)
         feed = """
-            const cells = JSON.parse(window.last);
-            for (let k = 0; k < arguments[0]; k++) for (const [id, cell] of Object.entries(JSON.parse(window.last))) {
-              const e = document.getElementById(id); if (!e) continue;
-              if (cell.text !== undefined) e.textContent = cell.text + (k % 2 ? ' ' : '');
-              for (const [n, v] of Object.entries(cell.attributes ?? {})) v === null ? e.removeAttribute(n) : e.setAttribute(n, v);
-            }"""
+            const states = [window.last, window.last.replaceAll('"class":"band more"', '"class":"band unknown"').replace(/"text":"[^"]*"/g, '"text":"changed"')];
+            for (let k = 0; k < arguments[0]; k++) window.stream.dispatchEvent(new MessageEvent('state', {data: states[k % 2]}));"""
         browser.execute_script(feed, 500)
         before = heap()
         browser.execute_script(feed, 10000)
         after = heap()
         said(f"heap {before / 1e6:.2f} -> {after / 1e6:.2f} MB after 10,000 updates")
         assert after < 1.1 * before
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", keep)
         foreign = browser.execute_script("return performance.getEntriesByType('resource').map(e => e.name).filter(n => !n.startsWith(arguments[0]))", host.address)
         assert not foreign, foreign
         weight = browser.execute_script("return performance.getEntriesByType('resource').filter(e => e.initiatorType !== 'other').reduce((s, e) => s + e.encodedBodySize, 0)")
