@@ -35,7 +35,7 @@ words! {
     PRESS_AT "PRESS HERE" "次に押す位置"
     NOWHERE "No single place stands out" "突出した箇所はありません"
     NO_TARGET "No target to bend to" "目標形状がありません"
-    NOT_SEEN "Not enough was seen" "測定範囲が不足しています"
+    NOT_SEEN "Too little seen, or the scanner is not calibrated" "測定範囲不足または校正なし"
     TURN_PLATE "No place to press: turn the plate" "押す位置なし: 板を裏返してください"
     NOTHING_TO_DO "Nothing to do" "作業不要"
     FROM_LEFT "from the left" "左から"

@@ -58,6 +58,10 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let total =
         |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>() * grid.cell();
     let (missing, wanted) = (total(&value), total(&goal));
+    if wanted == 0.0 {
+        // Not a node is known: there is no share.
+        return;
+    }
     let figures = &mut report.findings.figures;
     figures.push(Figure::new("gaussian.missing", missing, "1"));
     figures.push(Figure::new("gaussian.wanted", wanted, "1"));

@@ -203,6 +203,18 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
 }
 
 #[test]
+fn without_a_known_node_every_figure_is_a_number() {
+    let target = TargetShape::Sphere { radius: 8.0 };
+    let mut inputs = inputs(plate(SIGMA, 5, |_| 1.0 / 8.0), None, Some((target, Facing::Inside)));
+    // The error of a data sheet, as without a calibration.
+    inputs.task.sigma_correlated = 0.01;
+    let report = run(&inputs);
+    assert!(field(&report, "curvature_deficit").state.iter().all(|state| *state == NodeState::Unseen));
+    let wrong = report.findings.figures.iter().find(|figure| !figure.value.is_finite());
+    assert!(wrong.is_none(), "{wrong:?}");
+}
+
+#[test]
 fn the_strain_is_that_of_the_material_map() {
     // Stretched by 2 in a thousand along u, squeezed by 1 along v, and sheared.
     let surface = plate(1e-6, 7, |_| 0.0);
