@@ -88,7 +88,8 @@ pub async fn run(
     let pipeline = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (commands, inbox) = std::sync::mpsc::channel();
-    let beside = status::Beside::default();
+    let address = pages.as_ref().map(Pages::address);
+    let beside = status::Beside { pages: address, ..status::Beside::default() };
     let mut teller = Teller::default();
     let mut screen = None;
     if let Some(pages) = pages {

@@ -18,4 +18,5 @@ mod scanner_cell;
 mod scanner_light;
 mod scanner_link;
 mod scanner_record;
+mod screen;
 mod verbs;

@@ -42,6 +42,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             "{}: host {alive} (pid {}, status {age_s:.0} s old), {}",
             status.press, status.pid, status.state
         ))?;
+        if let Some(pages) = &status.pages {
+            output::line(&format!("pages: {pages}"))?;
+        }
         for (what, text) in
             [("link", &status.link_error), ("error", &status.error), ("warning", &status.warning)]
         {

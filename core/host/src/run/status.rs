@@ -24,6 +24,8 @@ pub(super) struct Beside {
     pub(super) alarm: NewestAlarm,
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
+    /// Address of the pages, where they are served.
+    pub(super) pages: Option<String>,
 }
 
 /// Its name in the output folder.
@@ -92,6 +94,9 @@ pub struct StatusRecord {
     pub link: LinkRecord,
     /// Time of the last manual reset.
     pub reset_at: Option<jiff::Timestamp>,
+    /// Address of the browser pages; null where none are served.
+    #[serde(default)]
+    pub pages: Option<String>,
 }
 
 /// Counters of the link since the start.
@@ -165,6 +170,7 @@ impl StatusRecord {
                 round_trips: status.counts.round_trips.to_vec(),
             },
             reset_at,
+            pages: beside.pages.clone(),
         }
     }
 
