@@ -6,7 +6,7 @@ mod marks;
 
 use platen_model::Field;
 
-use super::canvas::draw;
+use super::canvas::{Canvas, draw};
 use super::{Caption, PictureError, PictureScale, View};
 use crate::result::{Next, PlateRecord};
 pub(super) use layout::{Layout, Look, SQUARE};
@@ -31,8 +31,21 @@ pub fn map(
         canvas.head(caption, &layout.title, layout.view.language)?;
         let (from, to) = layout.corners();
         layout.shades(field).paint(canvas, from, to)?;
-        layout.words(field, next, canvas)
+        words(&layout, field, next, canvas)
     })
+}
+
+/// Draws everything that lies on the colours or beside them.
+pub(super) fn words(
+    layout: &Layout<'_>,
+    field: &Field,
+    next: Option<&Next>,
+    canvas: &Canvas<'_>,
+) -> Result<(), PictureError> {
+    layout.axes(canvas)?;
+    marks::part_means(field, layout, canvas)?;
+    marks::next_place(next, field, layout, canvas)?;
+    legend::draw(field, layout, canvas)
 }
 
 #[cfg(test)]

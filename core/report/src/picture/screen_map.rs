@@ -4,7 +4,7 @@
 use platen_model::Field;
 
 use super::canvas::{Text, overlay};
-use super::map::{Layout, Look, SQUARE};
+use super::map::{self, Layout, Look, SQUARE};
 use super::{PictureError, View};
 use crate::result::{Next, PlateRecord};
 
@@ -41,7 +41,7 @@ pub fn screen_map(
     let svg = overlay(size, |canvas| {
         canvas.text(&layout.title, (24.0, 34.0), Text::new(24.0 * LOOK.letters).bold())?;
         shades.hatch(canvas, from, to)?;
-        layout.words(field, next, canvas)
+        map::words(&layout, field, next, canvas)
     })?;
     Ok(ScreenMap { png: png.map_err(|e| PictureError(e.to_string()))?, svg })
 }

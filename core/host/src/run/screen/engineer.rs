@@ -2,32 +2,50 @@
 
 use std::path::Path;
 
-use platen_history::Filter;
+use platen_history::{Archive, Filter};
 use platen_model::{Language, Verdict};
-use platen_press::{describe_inputs, describe_outputs};
+use platen_plant::PlantFile;
+use platen_plant::press::Press;
+use platen_press::{ROUND_TRIP_LIMITS_MS, describe_inputs, describe_outputs};
 use platen_report::history_view;
-use platen_screen::{Engineer, RegisterRow, TimelineRow};
+use platen_screen::{Engineer, PluginRow, RegisterRow, TimelineRow};
 
-use super::lock;
-use super::site::Site;
+use super::{Board, lock};
+use crate::run::status::{Beside, StatusRecord};
 
 /// Strokes of the timeline.
 const TIMELINE: u32 = 20;
 
+/// Where the figures come from.
+#[derive(Debug)]
+pub(super) struct Installation {
+    pub(super) plant: PlantFile,
+    pub(super) press: Press,
+    pub(super) beside: Beside,
+    pub(super) plugins: Vec<PluginRow>,
+}
+
+impl Installation {
+    /// Returns the status record of this moment, as `platen status` prints it.
+    pub(super) fn status(&self, board: &Board) -> StatusRecord {
+        StatusRecord::of(&self.press, &self.plant.output.folder, &lock(&board.status).0, &self.beside, None)
+    }
+}
+
 /// Collects the figures of this moment.
-pub(super) fn figures(site: &Site) -> Engineer {
+pub(super) fn figures(site: &Installation, board: &Board, archive: Option<&Archive>) -> Engineer {
     Engineer {
-        registers: registers(site),
-        timeline: timeline(site),
+        registers: registers(site, board),
+        timeline: archive.map(timeline).unwrap_or_default(),
         plugins: site.plugins.clone(),
-        alarms: alarms(site),
-        figures: status(site),
+        alarms: alarms(board),
+        figures: status(site, board),
         files: files(site),
     }
 }
 
-fn registers(site: &Site) -> [Vec<RegisterRow>; 2] {
-    let status = lock(&site.board.status).0.clone();
+fn registers(site: &Installation, board: &Board) -> [Vec<RegisterRow>; 2] {
+    let status = lock(&board.status).0.clone();
     let map = &site.press.map;
     let written = status.host.encode(map, 0);
     let inputs = describe_inputs(map, &status.words).into_iter().filter_map(|(input, value)| {
@@ -45,9 +63,9 @@ fn row(start: u16, field: &platen_plant::press::RegisterField, name: String, val
     RegisterRow { address: start + field.place.offset().unwrap_or(0), words: field.registers(), name, value }
 }
 
-fn timeline(site: &Site) -> Vec<TimelineRow> {
+fn timeline(archive: &Archive) -> Vec<TimelineRow> {
     let filter = Filter { newest: Some(TIMELINE), ..Filter::default() };
-    let strokes = site.archive().ok().and_then(|archive| archive.strokes(&filter).ok()).unwrap_or_default();
+    let strokes = archive.strokes(&filter).unwrap_or_default();
     let row = |stroke: &platen_history::Stroke| {
         let since = |at: Option<jiff::Timestamp>| {
             at.map(|at| at.duration_since(stroke.accepted).as_secs_f64() * 1000.0)
@@ -61,21 +79,21 @@ fn timeline(site: &Site) -> Vec<TimelineRow> {
     strokes.iter().rev().map(row).collect()
 }
 
-fn alarms(site: &Site) -> Vec<(u16, String, u64)> {
-    let facts = lock(&site.board.facts);
+fn alarms(board: &Board) -> Vec<(u16, String, u64)> {
+    let facts = lock(&board.facts);
     let row = |(code, n): (&platen_model::Code, &u64)| {
         (code.number(), code.alarm().text(Language::En).to_owned(), *n)
     };
     facts.raised().iter().map(row).collect()
 }
 
-fn status(site: &Site) -> Vec<(String, String)> {
-    let record = site.board.status_record(&site.press, &site.plant.output.folder, &site.beside);
+fn status(site: &Installation, board: &Board) -> Vec<(String, String)> {
+    let record = site.status(board);
     let ms = |[median, most]: [Option<f64>; 2]| match (median, most) {
         (Some(median), Some(most)) => format!("median {median:.0} ms, 99 % within {most:.0} ms"),
         _ => "none yet".to_owned(),
     };
-    let snapshot = site.board.snapshots.borrow().clone();
+    let snapshot = board.snapshots.borrow().clone();
     let estimate = snapshot.scanner.estimate_s.map_or(String::new(), |s| format!(", a scan takes {s:.0} s"));
     let calibration = site.plant.calibration.as_ref().map_or_else(
         || "none: the range error of the data sheet counts".to_owned(),
@@ -104,6 +122,8 @@ fn status(site: &Site) -> Vec<(String, String)> {
                 record.link.timeouts
             ),
         ),
+        ("round trips", round_trips(&record.link.round_trips)),
+        ("press cycle", format!("{} ms ago", lock(&board.status).1.elapsed().as_millis())),
         ("out of step", format!("{:.1} s", record.link_down_s)),
         ("torn reads, rewrites", format!("{}, {}", record.torn_reads, record.rewrites)),
         ("scanner", format!("{:?}{estimate}", snapshot.scanner.state)),
@@ -118,7 +138,14 @@ fn status(site: &Site) -> Vec<(String, String)> {
     rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-fn files(site: &Site) -> Vec<(String, String)> {
+/// Counts of round trips by their time.
+fn round_trips(counts: &[u64]) -> String {
+    let limits = ROUND_TRIP_LIMITS_MS.iter().map(|ms| format!("up to {ms} ms")).chain(["longer".to_owned()]);
+    let parts = limits.zip(counts).filter(|(_, n)| **n > 0).map(|(limit, n)| format!("{n} {limit}"));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+fn files(site: &Installation) -> Vec<(String, String)> {
     let plates = platen_plant::plant::plate_files(&site.plant.plates).unwrap_or_default();
     let sum = |path: &Path| match std::fs::read(path) {
         Ok(bytes) => format!("crc32c {:08x}", crc32c::crc32c(&bytes)),

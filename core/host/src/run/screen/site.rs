@@ -18,7 +18,8 @@ use platen_screen::{Engineer, FILES, PlateRow, PluginRow, Snapshot, Source, Sour
 use platen_shape::Surface;
 use tokio::sync::watch;
 
-use super::{Beside, Board, MeasuredStroke, engineer, lock};
+use super::engineer::{self, Installation};
+use super::{Beside, Board, MeasuredStroke, lock};
 
 /// Nodes along each side of the mesh.
 const NODES: usize = 101;
@@ -26,12 +27,9 @@ const NODES: usize = 101;
 /// Source of the pages.
 #[derive(Debug)]
 pub(super) struct Site {
-    pub(super) board: Arc<Board>,
-    pub(super) plant: PlantFile,
-    pub(super) press: Press,
+    board: Arc<Board>,
+    installation: Installation,
     catalogue: Catalogue,
-    pub(super) plugins: Vec<PluginRow>,
-    pub(super) beside: Beside,
     /// Sequences by plate, with the number of strokes for which they were made.
     sequences: Mutex<HashMap<u32, (usize, Option<Sequence>)>>,
 }
@@ -50,18 +48,20 @@ impl Site {
     ) -> Self {
         Self {
             board,
-            plant: plant.clone(),
-            press: press.clone(),
+            installation: Installation {
+                plant: plant.clone(),
+                press: press.clone(),
+                beside: beside.clone(),
+                plugins: plugins(plant, catalogue),
+            },
             catalogue: catalogue.clone(),
-            plugins: plugins(plant, catalogue),
-            beside: beside.clone(),
             sequences: Mutex::default(),
         }
     }
 
     /// Opens the record; a reader of its own, so that the journal never waits for a page.
-    pub(super) fn archive(&self) -> Result<Archive, SourceError> {
-        Archive::open(&self.plant.output.history).map_err(unreadable)
+    fn archive(&self) -> Result<Archive, SourceError> {
+        Archive::open(&self.installation.plant.output.history).map_err(unreadable)
     }
 
     fn stroke(&self, run: u32) -> Result<Stroke, SourceError> {
@@ -90,7 +90,8 @@ impl Site {
             let surfaces = Surfaces { now, before: Some(before), baseline: None };
             curvature.compare(task, surfaces).map_err(|error| error.to_string())
         };
-        let sequence = Sequence::of(&self.archive().ok()?, &self.plant, plate, &compare, &|_| ());
+        let sequence =
+            Sequence::of(&self.archive().ok()?, &self.installation.plant, plate, &compare, &|_| ());
         sequence.inspect_err(|why| tracing::warn!(plate, "pages: bends are missing: {why}")).ok()
     }
 }
@@ -102,7 +103,11 @@ impl Source for Site {
 
     fn cycle_age(&self) -> Duration {
         // Switched off, there is no cycle.
-        if self.press.mode == Mode::Off { Duration::ZERO } else { lock(&self.board.status).1.elapsed() }
+        if self.installation.press.mode == Mode::Off {
+            Duration::ZERO
+        } else {
+            lock(&self.board.status).1.elapsed()
+        }
     }
 
     fn plates(&self) -> Result<Vec<PlateRow>, SourceError> {
@@ -178,16 +183,16 @@ impl Source for Site {
     }
 
     fn report(&self, plate: u32) -> Result<String, SourceError> {
-        plate_report::report(&self.archive()?, &self.plant.name, plate)
+        plate_report::report(&self.archive()?, &self.installation.plant.name, plate)
             .map_err(|e| SourceError::NotFound(e.to_string()))
     }
 
     fn engineer(&self) -> Engineer {
-        engineer::figures(self)
+        engineer::figures(&self.installation, &self.board, self.archive().ok().as_ref())
     }
 
     fn metrics(&self) -> String {
-        self.board.status_record(&self.press, &self.plant.output.folder, &self.beside).prometheus(true)
+        self.installation.status(&self.board).prometheus(true)
     }
 }
 

@@ -2,13 +2,12 @@
 
 use platen_model::{Field, NodeState};
 
-use super::{legend, marks};
 use crate::picture::canvas::{At, Canvas, Text};
 use crate::picture::colour::INK;
 use crate::picture::scale::{Scale, nice_ceiling};
 use crate::picture::shades::Shades;
 use crate::picture::{PictureError, PictureScale, SeenPlate, View, words};
-use crate::result::{Next, PlateRecord};
+use crate::result::PlateRecord;
 
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: f64 = 1200.0;
@@ -82,19 +81,6 @@ impl<'a> Layout<'a> {
         Shades::of(field, &self.scale, self.squares, |share| self.on_plate(share))
     }
 
-    /// Draws everything that lies on the colours or beside them.
-    pub(in crate::picture) fn words(
-        &self,
-        field: &Field,
-        next: Option<&Next>,
-        canvas: &Canvas<'_>,
-    ) -> Result<(), PictureError> {
-        self.axes(canvas)?;
-        marks::part_means(field, self, canvas)?;
-        marks::next_place(next, field, self, canvas)?;
-        legend::draw(field, self, canvas)
-    }
-
     /// Returns the extent of the plate, pixels.
     pub(super) fn extent(&self) -> [f64; 2] {
         self.squares.map(|n| n as f64 * SQUARE)
@@ -124,7 +110,7 @@ impl<'a> Layout<'a> {
         Text::new(22.0 * self.look.letters)
     }
 
-    fn axes(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
+    pub(super) fn axes(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let (from, to) = self.corners();
         canvas.frame(from, to, INK, 3)?;
         let (units, look) = (self.view.units, self.look);
