@@ -19,7 +19,7 @@ use platen_host::progress;
 use platen_model::units::{metres, mm};
 use platen_plant::Value;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::inspection::{Check, ShapeChecks, edge_doubts};
+use platen_shape::inspection::{Check, ShapeChecks, corners_seen, edge_doubts};
 use platen_shape::measure::Measurement;
 use platen_shape::outline::{Corner, EdgeCurve, Outline};
 use platen_shape::{Blank, Vec3};
@@ -254,9 +254,7 @@ impl Errors {
         checks(Kind::Angle, &found.angles, &known.angles);
         checks(Kind::Twist, &found.twist, &known.twist);
         let doubts = edge_doubts(&found, surface, Blank::rectangle(w, h).edge_lengths());
-        let corners_seen =
-            [0, 1, 2, 3].map(|k| outline.corners[k].seen && !doubts.iter().any(|d| d.has_corner(k)));
-        Self { stated, corner, marker, corners_seen }
+        Self { stated, corner, marker, corners_seen: corners_seen(outline, &doubts) }
     }
 
     fn is_gross(&self) -> bool {

@@ -28,7 +28,9 @@ use platen_model::units::{mm, mm_pair, readable};
 use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
-use platen_shape::{Blank, EXPANDED, EdgeDoubt, Measured, Scanned, ShapeChecks, Vec3, edge_doubts};
+use platen_shape::{
+    Blank, EXPANDED, EdgeDoubt, Measured, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
+};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.result/1";
@@ -247,8 +249,7 @@ impl ResultRecord {
             },
             corners_m: measurement.corners.map(Into::into),
             corners_uncertainty_mm: Some(corner_uncertainties(measured)),
-            corners_seen: [0, 1, 2, 3]
-                .map(|k| outline.corners[k].seen && !doubts.iter().any(|d| d.has_corner(k))),
+            corners_seen: corners_seen(outline, &doubts),
             shape_checks: ShapeChecksRecord::new(&checks),
             markers: markers(measured, context.plate),
             reference_lines: lines::record(measurement, context.plate, &sound),

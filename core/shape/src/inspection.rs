@@ -9,4 +9,4 @@ pub mod marker_detection;
 
 pub use bending_energy::BendingEnergy;
 pub use dimension_checks::{Check, EdgeCheck, ShapeChecks};
-pub use edge_doubt::{EdgeDoubt, edge_doubts};
+pub use edge_doubt::{EdgeDoubt, corners_seen, edge_doubts};

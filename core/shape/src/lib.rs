@@ -36,7 +36,7 @@ pub mod target_surface;
 pub use correspondence::{BlankError, Reorientation, reorientation};
 pub use extract::{Beyond, Crossing, Patch, Sample};
 pub use flatten::{Chart, Flatten, FlattenError};
-pub use inspection::{BendingEnergy, Check, EdgeCheck, EdgeDoubt, ShapeChecks, edge_doubts};
+pub use inspection::{BendingEnergy, Check, EdgeCheck, EdgeDoubt, ShapeChecks, corners_seen, edge_doubts};
 pub use measure::{MeasureError, Measured, Measurement, Scanned, measure};
 pub use mesh::{DiskMesh, DiskParts, MeshError};
 pub use outline::{Corner, EdgeCurve, HeightField, Outline, OutlineError};

@@ -7,7 +7,7 @@
 //! so, nor two edges that are off to the same side; on double curvature the strain that it allows hides some.
 
 use super::dimension_checks::{Check, ShapeChecks};
-use crate::Surface;
+use crate::{Outline, Surface};
 
 /// Largest error of a cut in the length of an edge, metres.
 const CUT: f64 = 2e-3;
@@ -30,8 +30,7 @@ pub struct EdgeDoubt {
 
 impl EdgeDoubt {
     /// Returns true when the edge runs from or to a corner, in the order (0,0), (W,0), (W,H), (0,H).
-    #[must_use]
-    pub fn has_corner(&self, corner: usize) -> bool {
+    fn has_corner(&self, corner: usize) -> bool {
         corner == self.edge || corner == (self.edge + 1) % 4
     }
 }
@@ -52,6 +51,12 @@ pub fn edge_doubts(checks: &ShapeChecks, surface: &Surface, cut: [f64; 4]) -> Ve
         .collect();
     let gaussian = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
     unexplained(checks.edges.map(|edge| edge.mid), gaussian, size, cut)
+}
+
+/// Returns which corners were seen: not extrapolated, and no edge that meets in them is doubtful.
+#[must_use]
+pub fn corners_seen(outline: &Outline, doubts: &[EdgeDoubt]) -> [bool; 4] {
+    std::array::from_fn(|k| outline.corners[k].seen && !doubts.iter().any(|doubt| doubt.has_corner(k)))
 }
 
 fn unexplained(edges: [Check; 4], gaussian: f64, [w, h]: [f64; 2], cut: [f64; 4]) -> Vec<EdgeDoubt> {
