@@ -14,11 +14,22 @@ let stale = null;
 function put(id, cell) {
   const element = document.getElementById(id);
   if (!element) return;
-  if (cell.text !== undefined && element.textContent !== cell.text) element.textContent = cell.text;
+  if (cell.text !== undefined && element.textContent !== cell.text) {
+    element.textContent = cell.text;
+    changed(element);
+  }
   for (const [name, value] of Object.entries(cell.attributes ?? {})) {
     if (value === null) element.removeAttribute(name);
     else if (element.getAttribute(name) !== value) element.setAttribute(name, value);
   }
+}
+
+// Marks what has changed in a table, for a moment.
+function changed(element) {
+  if (!element.closest('td')) return;
+  element.className = 'changed';
+  clearTimeout(element.fading);
+  element.fading = setTimeout(() => element.removeAttribute('class'), 3000);
 }
 
 // Removes everything that was heard, and says why.

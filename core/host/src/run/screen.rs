@@ -22,7 +22,7 @@ use platen_screen::{Access, Listener, Server, ServerError, Snapshot, Token, Toke
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::watch;
 
-use super::status::{Beside, StatusRecord};
+use super::status::Beside;
 use site::Site;
 use snapshot::Facts;
 
@@ -218,13 +218,5 @@ impl Screen {
             }
             changed
         });
-    }
-}
-
-impl Board {
-    /// Returns the status record of this moment, as `platen status` prints it.
-    fn status_record(&self, press: &Press, folder: &std::path::Path, beside: &Beside) -> StatusRecord {
-        let (status, _) = &*lock(&self.status);
-        StatusRecord::of(press, folder, status, beside, None)
     }
 }
