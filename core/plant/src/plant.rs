@@ -51,6 +51,8 @@ pub enum ScanWindow {
 /// Checked plant file. Options of plugins are not checked yet: the plugins declare them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantFile {
+    /// Its path; empty without a file.
+    pub file: PathBuf,
     /// Name for people; the file's name where none is given.
     pub name: String,
     /// Seed of every random choice, so that a measurement can be repeated to the last bit.
@@ -107,6 +109,7 @@ impl Default for PlantFile {
     /// The values of an empty plant file in the current folder.
     fn default() -> Self {
         Self {
+            file: PathBuf::new(),
             name: "no plant file".to_owned(),
             seed: 1,
             press: None,
@@ -225,6 +228,7 @@ impl PlantFile {
         let (name, seed) = plant?;
         let (scanner, scan_window, range_error) = scanner?;
         Ok(Self {
+            file: PathBuf::new(),
             name,
             seed,
             press: press?,
@@ -250,7 +254,7 @@ impl Survey {
         let mut survey =
             Self { plant: Ok(PlantFile::default()), plugins: Vec::new(), plates: None, has_press: false };
         let plant = PlantFile::read(document.root(), &stem, folder, &mut survey);
-        survey.plant = document.finish(plant);
+        survey.plant = document.finish(plant).map(|plant| PlantFile { file: path.to_path_buf(), ..plant });
         survey
     }
 }

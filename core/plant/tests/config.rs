@@ -157,11 +157,29 @@ fn the_plate_files_of_a_plant_are_those_that_a_recipe_number_finds() {
 #[test]
 fn an_empty_plant_file_says_what_the_default_says() {
     let plant = PlantFile::parse("plant-north.toml", "").unwrap();
-    assert_eq!(plant, PlantFile { name: "plant-north".to_owned(), ..PlantFile::default() });
+    let file = std::path::PathBuf::from("plant-north.toml");
+    assert_eq!(plant, PlantFile { file, name: "plant-north".to_owned(), ..PlantFile::default() });
     assert!(plant.scanner.is_none() && plant.frame.u_axis.is_none());
     assert!(PlantFile::parse("p.toml", "comparison = []").unwrap().comparisons.is_empty());
     let always = PlantFile::parse("p.toml", "[output]\nkeep_scans = 'always'").unwrap();
     assert_eq!(always.output.keep_scans, KeepScans::Always);
+}
+
+#[test]
+fn pages_are_for_this_computer_unless_a_token_is_named() {
+    let screen = |text: &str| PlantFile::parse("plant/p.toml", text).map(|plant| plant.screen);
+    assert_eq!(screen("").unwrap(), None);
+    let own = screen("[screen]").unwrap().unwrap();
+    assert_eq!((own.listen.to_string().as_str(), &own.token_file), ("127.0.0.1:8380", &None));
+    let fault = screen("[screen]\nlisten = \"0.0.0.0:8380\"").unwrap_err().to_string();
+    assert!(fault.contains("platen screen token") && fault.contains(":2:"), "{fault}");
+    let all =
+        screen("[screen]\nlisten = \"0.0.0.0:8380\"\ntoken_file = \"t\"\nnames = [\"p\"]").unwrap().unwrap();
+    assert_eq!((all.token_file.unwrap(), all.names), ("plant/t".into(), vec!["p".to_owned()]));
+    assert!(
+        screen("[screen]\nlisten = \"localhost\"").unwrap_err().to_string().contains("an address and a port")
+    );
+    assert!(screen("[screen]\nport = 80").unwrap_err().to_string().contains("listen"));
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub trait Source: Send + Sync + 'static {
     /// Returns the time since the press cycle has last reported: it grows while the cycle stands.
     fn cycle_age(&self) -> Duration;
 
-    /// Returns the plates on record, newest first.
+    /// Returns the newest plates on record, newest first.
     ///
     /// # Errors
     /// The record cannot be read.

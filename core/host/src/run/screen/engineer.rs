@@ -145,11 +145,21 @@ fn round_trips(counts: &[u64]) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
+/// Returns plant file, calibration and plate files with their checksums.
 fn files(site: &Installation) -> Vec<(String, String)> {
-    let plates = platen_plant::plant::plate_files(&site.plant.plates).unwrap_or_default();
-    let sum = |path: &Path| match std::fs::read(path) {
+    let plant = &site.plant;
+    let plates = platen_plant::plant::plate_files(&plant.plates).unwrap_or_default();
+    let calibration = plant.calibration.iter().map(|wanted| wanted.file.clone());
+    let files = std::iter::once(plant.file.clone())
+        .chain(calibration)
+        .chain(plates.into_iter().map(|(_, path)| path));
+    files.map(|path| (path.display().to_string(), checksum(&path))).collect()
+}
+
+/// Returns the checksum of a file, or why it cannot be read.
+pub(super) fn checksum(path: &Path) -> String {
+    match std::fs::read(path) {
         Ok(bytes) => format!("crc32c {:08x}", crc32c::crc32c(&bytes)),
         Err(error) => error.to_string(),
-    };
-    plates.iter().map(|(_, path)| (path.display().to_string(), sum(path))).collect()
+    }
 }

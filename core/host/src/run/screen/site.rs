@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use platen_engine::pipeline;
 use platen_engine::plugin::{Catalogue, Surfaces};
-use platen_history::{Archive, Filter, Stroke};
+use platen_history::{Archive, Filter, PlateRecord, Stroke};
 use platen_model::{Field, Task, Verdict};
 use platen_plant::press::{Mode, Press};
 use platen_plant::{PlantFile, PluginUse};
@@ -23,6 +23,10 @@ use super::{Beside, Board, MeasuredStroke, lock};
 
 /// Nodes along each side of the mesh.
 const NODES: usize = 101;
+/// Plates in the list, the newest.
+const PLATES: usize = 100;
+/// Age up to which the engineer's figures are shown again, however many read them.
+const FRESH: Duration = Duration::from_millis(500);
 
 /// Source of the pages.
 #[derive(Debug)]
@@ -32,6 +36,7 @@ pub(super) struct Site {
     catalogue: Catalogue,
     /// Sequences by plate, with the number of strokes for which they were made.
     sequences: Mutex<HashMap<u32, (usize, Option<Sequence>)>>,
+    engineer: Mutex<Option<(Instant, Engineer)>>,
 }
 
 fn unreadable(error: impl std::fmt::Display) -> SourceError {
@@ -56,6 +61,7 @@ impl Site {
             },
             catalogue: catalogue.clone(),
             sequences: Mutex::default(),
+            engineer: Mutex::default(),
         }
     }
 
@@ -112,22 +118,21 @@ impl Source for Site {
 
     fn plates(&self) -> Result<Vec<PlateRow>, SourceError> {
         let archive = self.archive()?;
-        let mut rows = Vec::new();
-        for record in archive.plates().map_err(unreadable)? {
+        let plates = archive.plates().map_err(unreadable)?;
+        let row = |record: &PlateRecord| {
             let newest = Filter { plate: Some(record.plate), newest: Some(1), ..Filter::default() };
             let last = archive.strokes(&newest).map_err(unreadable)?;
-            rows.push(PlateRow {
+            Ok(PlateRow {
                 plate: record.plate,
-                name: record.part_name.unwrap_or_else(|| format!("plate {}", record.plate)),
+                name: record.part_name.clone().unwrap_or_else(|| format!("plate {}", record.plate)),
                 part: record.part_id,
                 first: time(record.began),
                 strokes: record.strokes as usize,
                 verdict: record.verdict.unwrap_or(Verdict::NotMeasured),
                 sense: last.first().map_or(0, |stroke| history_view::of_stroke(stroke).sense),
-            });
-        }
-        rows.reverse();
-        Ok(rows)
+            })
+        };
+        plates.iter().rev().take(PLATES).map(row).collect()
     }
 
     fn strokes(&self, plate: u32) -> Result<Vec<StrokeRow>, SourceError> {
@@ -188,7 +193,15 @@ impl Source for Site {
     }
 
     fn engineer(&self) -> Engineer {
-        engineer::figures(&self.installation, &self.board, self.archive().ok().as_ref())
+        let mut known = lock(&self.engineer);
+        if let Some((made, figures)) = &*known
+            && made.elapsed() < FRESH
+        {
+            return figures.clone();
+        }
+        let figures = engineer::figures(&self.installation, &self.board, self.archive().ok().as_ref());
+        *known = Some((Instant::now(), figures.clone()));
+        figures
     }
 
     fn metrics(&self) -> String {
@@ -203,7 +216,9 @@ fn plugins(plant: &PlantFile, catalogue: &Catalogue) -> Vec<PluginRow> {
     let row = |(role, used): (&str, &PluginUse)| {
         let library = catalogue.load(&used.plugin).ok();
         let version = library.as_ref().map_or(String::new(), |library| library.descriptor().version.clone());
-        let file = library.map_or(String::new(), |library| library.path().display().to_string());
+        let file = library.map_or(String::new(), |library| {
+            format!("{} ({})", library.path().display(), engineer::checksum(library.path()))
+        });
         PluginRow { role: role.to_owned(), name: used.plugin.clone(), version, file }
     };
     scanner.chain([("flattening", &plant.flattening)]).chain(comparisons).map(row).collect()
