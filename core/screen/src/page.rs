@@ -4,6 +4,7 @@ mod compare;
 mod engineer;
 mod operator;
 mod plate;
+mod section;
 mod strokes;
 
 pub(crate) use compare::page as compare;

@@ -33,7 +33,7 @@ pub struct Snapshot {
     pub stroke: Option<StrokePart>,
     /// Result of the stroke in hand.
     pub result: Option<ResultPart>,
-    /// Strokes of this plate with the one in hand, oldest first.
+    /// The newest strokes of this plate with the one in hand, oldest first.
     pub strip: Vec<StripPart>,
     /// Alarms that stand now, the most urgent first.
     pub alarms: Vec<ShownAlarm>,

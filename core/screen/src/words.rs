@@ -78,6 +78,7 @@ words! {
     NO_STROKES "No stroke is on record yet." "記録されたストロークはありません。"
     CHOOSE_TWO "Choose two strokes of a plate on the page of its strokes." "ストロークのページで二つ選んでください。"
     FIGURE "Figure" "項目"
+    SECTIONS "section under the template, a dashed, b solid; height of the picture" "型板下の断面 (a 破線, b 実線)、図の高さ"
     NO_CHANGE "no significant change" "有意な変化なし"
     OTHER_PLATE "Two different plates or plate files: figures only, no maps side by side." "板または板ファイルが異なるため、数値のみ比較します。"
     REGISTERS_READ "Registers read from the press" "プレスから読むレジスタ"

@@ -1,9 +1,9 @@
-//! `/compare?a=RUN&b=RUN`: two strokes on the same scale: maps side by side, sections, and their figures with their difference.
+//! `/compare?a=RUN&b=RUN`: two strokes on the same scale: maps side by side, sections over each other, and their figures with their difference.
 
 use maud::{Markup, html};
 use platen_report::result::{CURVATURE_DEFICIT, ResultRecord, TemplateRecord};
 
-use super::{chip, clean, document, navigation};
+use super::{chip, clean, document, navigation, section};
 use crate::view::View;
 use crate::{Texts, words};
 
@@ -40,14 +40,17 @@ fn compared(strokes: [(u32, &ResultRecord); 2], view: View) -> Markup {
                     h2 { (clean(&record.plate)) ", " (text(words::STROKE)) " " (record.stroke.map_or(String::new(), |n| n.to_string())) " " (chip(view, record.verdict, worst_sense(record))) }
                     @if alike {
                         img.wide src=(format!("/files/{run}/{}.svg", map(record))) alt=(text(words::MAP));
-                        @for template in templates(record) {
-                            img.wide src=(format!("/files/{run}/section-{}.svg", platen_report::output_folder::file_name(&template.name))) alt=(clean(&template.name));
-                        }
                     }
                 }
             }
         }
-        @if !alike { p { (text(words::OTHER_PLATE)) } }
+        @if alike {
+            div.pair {
+                @for template in templates(a) {
+                    @if let Some(other) = templates(b).find(|other| other.name == template.name) { (section::overlaid(template, other, view)) }
+                }
+            }
+        } @else { p { (text(words::OTHER_PLATE)) } }
         table {
             thead { tr {
                 th scope="col" { (text(words::FIGURE)) } th.n scope="col" { "a" } th.n scope="col" { "b" }

@@ -21,6 +21,9 @@ use platen_screen::{
 
 use super::{Event, MeasuredStroke};
 
+/// Strokes of the strip, the newest: a snapshot stays small however long a plate takes.
+const STRIP: usize = 32;
+
 /// What dispatcher and worker have told.
 #[derive(Debug)]
 pub(super) struct Facts {
@@ -268,7 +271,7 @@ fn strip(measured: &MeasuredStroke) -> Vec<StripPart> {
         verdict: point.verdict,
         gap_mm: point.gap_mm,
     };
-    measured.strokes.iter().map(part).collect()
+    measured.strokes[measured.strokes.len().saturating_sub(STRIP)..].iter().map(part).collect()
 }
 
 #[cfg(test)]
