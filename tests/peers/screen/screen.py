@@ -163,7 +163,7 @@ def check_a_stroke_takes_the_result_away(browser):
             drawn.append(moments[-1][1] / 1000 - accepted)
             assert not moments[0][0]
         worst = sorted(hidden)[-1]
-        said(f"trigger (with the ram's way of 0.3 s) to hidden: median {statistics.median(hidden) * 1000:.0f}, most {worst * 1000:.0f} ms; "
+        said(f"trigger to hidden: median {statistics.median(hidden) * 1000:.0f}, most {worst * 1000:.0f} ms; "
              f"result in the registers to the page: median {statistics.median(drawn) * 1000:.0f}, most {max(drawn) * 1000:.0f} ms")
         assert max(drawn) < 0.4
         start = time.monotonic()
