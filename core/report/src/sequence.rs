@@ -235,7 +235,7 @@ fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Ve
             bent_back: bent_back(file, [u, v], direction.value, angle.value),
         };
         let last = earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first());
-        bend.feed_mm = last.map(|last| bend.apart(last)[0]);
+        bend.feed_mm = last.map(|last| bend.apart(last.at_mm)[0]);
         bend.rehit_of = earlier
             .iter()
             .find(|stroke| stroke.bends.iter().flatten().any(|other| bend.lies_on(other)))
@@ -263,16 +263,22 @@ fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> 
 const SAME_DIRECTION_DEG: f64 = 20.0;
 
 impl Bend {
-    /// Returns the distances of another bend's centre across and along this one's straight lines.
-    fn apart(&self, other: &Self) -> [f64; 2] {
+    /// Returns the distances of a place (u, v) from the centre, across and along the straight lines.
+    fn apart(&self, place_mm: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.direction_deg.to_radians().sin_cos();
-        let [du, dv] = [0, 1].map(|k| other.at_mm[k] - self.at_mm[k]);
+        let [du, dv] = [0, 1].map(|k| place_mm[k] - self.at_mm[k]);
         [(cos * dv - sin * du).abs(), (cos * du + sin * dv).abs()]
+    }
+
+    /// Returns whether a place (u, v) lies on the band.
+    pub fn holds(&self, place_mm: [f64; 2]) -> bool {
+        let [across, along] = self.apart(place_mm);
+        across <= 0.5 * self.width_mm && along <= 0.5 * self.length_mm
     }
 
     fn lies_on(&self, other: &Self) -> bool {
         let turn = (self.direction_deg - other.direction_deg).to_radians().rem_euclid(PI);
-        let [across, along] = self.apart(other);
+        let [across, along] = self.apart(other.at_mm);
         turn.min(PI - turn).to_degrees() < SAME_DIRECTION_DEG
             && across < 0.5 * self.width_mm.min(other.width_mm)
             && along < 0.5 * (self.length_mm + other.length_mm)
@@ -344,8 +350,15 @@ mod tests {
     }
 
     #[test]
+    fn a_place_lies_on_a_bend_within_its_length_and_width() {
+        let across = bend([1000.0, 1250.0], 90.0);
+        assert!(across.holds([1045.0, 300.0]) && across.holds([960.0, 2200.0]));
+        assert!(!across.holds([1055.0, 1250.0]) && !across.holds([1000.0, 2260.0]));
+    }
+
+    #[test]
     fn a_feed_is_measured_across_the_bend() {
-        let [across, along] = bend([1300.0, 1250.0], 90.0).apart(&bend([1000.0, 850.0], 90.0));
+        let [across, along] = bend([1300.0, 1250.0], 90.0).apart([1000.0, 850.0]);
         assert!((across - 300.0).abs() < 1e-9 && (along - 400.0).abs() < 1e-9);
     }
 

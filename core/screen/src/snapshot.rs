@@ -160,6 +160,8 @@ pub struct ResultPart {
     pub worst: Option<Worst>,
     /// Place of the next hit, or why there is none; null in documents older than it, and where nothing was measured.
     pub next: Option<Next>,
+    /// An earlier stroke bent the plate at this place; false while that is not known.
+    pub again: bool,
     /// Names of the fields that can be shown as maps.
     pub fields: Vec<String>,
 }

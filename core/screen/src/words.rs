@@ -33,6 +33,7 @@ words! {
     SIMULATED "SIMULATED: no real plate" "シミュレーション: 実物ではありません"
     TRIAL "TRIAL: nothing counts" "試運転"
     PRESS_AT "PRESS HERE" "次に押す位置"
+    PRESS_AGAIN "PRESS HERE AGAIN" "同じ位置をもう一度"
     NOWHERE "No single place stands out" "突出した箇所はありません"
     NO_TARGET "No target to bend to" "目標形状がありません"
     NOT_SEEN "Too little seen, or the scanner is not calibrated" "測定範囲不足または校正なし"
@@ -120,9 +121,10 @@ pub(crate) fn verdict(verdict: Verdict, sense: i8) -> Texts {
     }
 }
 
-/// Returns the heading over the place of the next hit.
-pub(crate) fn next(next: &Next) -> Texts {
+/// Returns the heading over the place of the next hit; `again` where an earlier stroke bent the plate there.
+pub(crate) fn next(next: &Next, again: bool) -> Texts {
     match next {
+        Next::Place(_) if again => PRESS_AGAIN,
         Next::Place(_) => PRESS_AT,
         Next::Nowhere { none } => match none {
             NoNext::Passed => NOTHING_TO_DO,

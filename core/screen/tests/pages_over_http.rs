@@ -70,6 +70,7 @@ fn result(verdict: Verdict, sense: i8) -> ResultPart {
             sense,
         }),
         next: None,
+        again: false,
         fields: vec!["curvature_deficit".into()],
     }
 }

@@ -3,7 +3,7 @@
 Runs the release build's `platen run` beside `platen-sim press`, both as child processes. Every check prints one line; the first that
 fails ends the program with exit code 1. `--bless` writes the screenshots of tests/golden/screen anew; `--only WORD` runs some checks.
 """
-import argparse, io, json, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
+import argparse, io, json, math, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
 from pathlib import Path
 
 import jsonschema
@@ -75,6 +75,39 @@ def check_a_person_sees_what_to_do(browser):
             left = {(0, 1): record["plate_file"]["width_mm"] - u}.get(tuple(side) if side else None, u)
             assert page["left"] == f"{left / 1000:.1f} m", (page["left"], record["next"])
         said(f"{page['verdict']}; {page['place-title']}: {page['left']} {page['left-words']}, {page['near']} {page['near-words']}; {page['gap']} {page['gap-more']} {page['limit']}")
+
+
+def heading(host):
+    """The heading over the place of the next hit, from the record's bends; None where there is no place."""
+    state, _ = wait("the result", lambda: (s := host.state())["result"] and s)
+    place = (state["result"]["next"] or {}).get("at_mm")
+    if not place:
+        return None
+
+    def holds(bend):
+        turn = math.radians(bend["direction_deg"])
+        x, y = place[0] - bend["at_mm"][0], place[1] - bend["at_mm"][1]
+        return (abs(x * math.cos(turn) + y * math.sin(turn)) <= bend["length_mm"] / 2
+                and abs(y * math.cos(turn) - x * math.sin(turn)) <= bend["width_mm"] / 2)
+
+    strokes = json.loads(host.get("/api/v1/plates/1/sequence"))["strokes"]
+    again = any(holds(bend) for stroke in strokes for bend in stroke["bends"] or [])
+    return "PRESS HERE AGAIN" if again else "PRESS HERE"
+
+
+def check_a_place_bent_before_is_told(browser):
+    """The heading says "again" exactly where a bend of the record lies on the place."""
+    with cell(strokes=1) as (press, host):
+        opened(browser, host)
+        told = []
+        for _ in range(9):
+            press.stroke()
+            wanted = heading(host)
+            if wanted:
+                wait(wanted, lambda: shown(browser)["place-title"] == wanted, 5)
+                told.append(wanted)
+        said(f"{len(told)} places, {told.count('PRESS HERE AGAIN')} of them bent before")
+        assert len(set(told)) == 2
 
 
 def check_every_event_is_of_the_schema(_):
@@ -502,6 +535,8 @@ def check_the_pictures_are_those_that_a_person_has_seen(browser):
     """Golden screenshots: sizes, languages, units, themes, stale, alarm."""
     worst = 0
     with cell(strokes=4) as (press, host):
+        again = heading(host) == "PRESS HERE AGAIN"
+        wait("again, where it is", lambda: host.state()["result"]["again"] == again)
         for name, size, view in [("en", (1280, 800), ""), ("ja", (1280, 800), "?lang=ja"), ("inch", (1280, 800), "?units=in"),
                                  ("dark", (1280, 800), "?theme=dark"), ("large", (1920, 1080), ""), ("large-ja-dark", (1920, 1080), "?lang=ja&theme=dark"),
                                  ("drawing", (1280, 800), "?turn=drawing")]:

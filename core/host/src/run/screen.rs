@@ -17,7 +17,7 @@ use platen_plant::PlantFile;
 use platen_plant::press::Press;
 use platen_press::Status;
 use platen_report::picture::StripPoint;
-use platen_report::result::ResultRecord;
+use platen_report::result::{Next, ResultRecord};
 use platen_screen::{Access, Listener, Server, ServerError, Snapshot, Token, TokenError};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::watch;
@@ -55,6 +55,8 @@ pub(super) enum Event {
     Scanner { ready: Result<(), Code>, estimate_s: Option<f64> },
     /// A stroke was measured; sent after the answer to the press.
     Measured(Box<MeasuredStroke>),
+    /// The place of the next hit after this stroke was bent before.
+    Again(u32),
 }
 
 /// A measured stroke, as the pages show it.
@@ -146,6 +148,7 @@ pub(super) struct Screen {
     board: Arc<Board>,
     site: Arc<Site>,
     events: UnboundedReceiver<Event>,
+    teller: Teller,
     _server: Server,
 }
 
@@ -175,7 +178,8 @@ impl Screen {
         let source = Arc::clone(&site) as Arc<dyn platen_screen::Source>;
         let server = Server::start(pages.listener, pages.access, source)?;
         let (sender, events) = unbounded_channel();
-        Ok((Self { board, site, events, _server: server }, Teller(Some(sender))))
+        let teller = Teller(Some(sender));
+        Ok((Self { board, site, events, teller: teller.clone(), _server: server }, teller))
     }
 
     /// Keeps the pages up to date until the press side ends.
@@ -190,10 +194,26 @@ impl Screen {
                     self.recall(&now);
                     *lock(&self.board.status) = (now, Instant::now());
                 }
-                Some(event) = self.events.recv() => lock(&self.board.facts).take(event),
+                Some(event) = self.events.recv() => {
+                    self.look_for_earlier_bends(&event);
+                    lock(&self.board.facts).take(event);
+                }
             }
             self.publish();
         }
+    }
+
+    /// Finds out, beside everything else, whether an earlier stroke bent the plate where the next hit should be.
+    fn look_for_earlier_bends(&self, event: &Event) {
+        let Event::Measured(measured) = event else { return };
+        let next = measured.record.next.as_ref().and_then(Next::place);
+        let Some(place) = next.map(|next| next.at_mm) else { return };
+        let (site, teller, run_id) = (Arc::clone(&self.site), self.teller.clone(), measured.run_id);
+        tokio::task::spawn_blocking(move || {
+            if site.was_bent(run_id, place) {
+                teller.tell(Event::Again(run_id));
+            }
+        });
     }
 
     /// Reads the record of a result that was published before this start.

@@ -115,8 +115,9 @@ fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         cells.set(id, "src", picture(ending));
         cells.set(id, "alt", Some(if id == "map" { text(words::MAP) } else { String::new() }));
     }
+    let again = result.is_some_and(|result| result.again);
     let next = result.and_then(|result| result.next.as_ref());
-    cells.text("place-title", next.map_or(String::new(), |next| text(words::next(next))));
+    cells.text("place-title", next.map_or(String::new(), |next| text(words::next(next, again))));
     let next = next.and_then(Next::place).zip(snapshot.plate.as_ref());
     let seen = next.and_then(|(place, plate)| Some((place, view.turn.of(plate.size_mm?, plate.press_side))));
     let [left, near] = seen.map_or([None; 2], |(place, seen)| seen.place_mm(place.at_mm).map(Some));

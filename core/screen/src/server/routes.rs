@@ -57,6 +57,7 @@ pub(super) fn router(source: Arc<dyn Source>, gate: Gate) -> Router {
         .route("/api/v1/stream", get(api_stream))
         .route("/api/v1/plates", get(api_plates))
         .route("/api/v1/plates/{plate}", get(api_strokes))
+        .route("/api/v1/plates/{plate}/sequence", get(api_sequence))
         .route("/api/v1/strokes/{run}", get(api_stroke))
         .route("/api/v1/engineer", get(api_engineer))
         .route("/api/v1/diagnosis", get(api_diagnosis))
@@ -305,6 +306,10 @@ async fn api_plates(State(site): State<Site>) -> Response {
 
 async fn api_strokes(State(site): State<Site>, Path(plate): Path<u32>) -> Response {
     json(site.ask(move |source| source.strokes(plate)).await)
+}
+
+async fn api_sequence(State(site): State<Site>, Path(plate): Path<u32>) -> Response {
+    json(site.ask(move |source| source.sequence(plate)).await)
 }
 
 async fn api_stroke(State(site): State<Site>, Path(run): Path<u32>) -> Response {

@@ -90,6 +90,17 @@ impl Site {
         lock(&self.board.facts).measured().filter(|measured| measured.run_id == run).cloned()
     }
 
+    /// Returns whether a stroke of the plate up to this one bent it at a place (u, v); false where that cannot be told.
+    pub(super) fn was_bent(&self, run: u32, place_mm: [f64; 2]) -> bool {
+        let sequence = self.stroke(run).and_then(|stroke| self.sequence(stroke.plate)).ok().flatten();
+        let strokes = sequence.map(|sequence| sequence.strokes).unwrap_or_default();
+        let bends = strokes
+            .iter()
+            .filter(|stroke| stroke.run_id <= run)
+            .flat_map(|stroke| stroke.bends.iter().flatten());
+        bends.into_iter().any(|bend| bend.holds(place_mm))
+    }
+
     fn evaluated(&self, plate: u32) -> Option<Sequence> {
         let curvature = pipeline::comparison(&self.catalogue, &PluginUse::by_default("curvature")).ok()?;
         let compare = |task: &Task, before: &Surface, now: &Surface| {

@@ -35,6 +35,8 @@ pub(super) struct Facts {
     measured: Option<MeasuredStroke>,
     /// A result of an earlier start whose record was looked for.
     recalled: Option<u32>,
+    /// A stroke after which the place of the next hit was bent before.
+    again: Option<u32>,
     /// Record of the last stroke of a part that has ended.
     ended: Option<u32>,
     raised: BTreeMap<Code, u64>,
@@ -65,6 +67,7 @@ impl Facts {
             hand: None,
             measured: None,
             recalled: None,
+            again: None,
             ended: None,
             raised: BTreeMap::new(),
             standing: BTreeMap::new(),
@@ -87,6 +90,7 @@ impl Facts {
                 self.scanner = ScannerPart { state, estimate_s };
             }
             Event::Measured(measured) => self.measured = Some(*measured),
+            Event::Again(run_id) => self.again = Some(run_id),
         }
     }
 
@@ -150,7 +154,7 @@ impl Facts {
             },
             plate: self.plate(status, measured),
             stroke: self.stroke(status),
-            result: result.map(|result| shown(result, measured)),
+            result: result.map(|result| shown(result, measured, self.again)),
             strip: measured.map(strip).unwrap_or_default(),
             alarms: self.alarms(),
         }
@@ -244,7 +248,7 @@ fn stage(work: Work) -> Stage {
 }
 
 /// Returns the result with what its document adds.
-fn shown(result: &Publication, measured: Option<&MeasuredStroke>) -> ResultPart {
+fn shown(result: &Publication, measured: Option<&MeasuredStroke>, again: Option<u32>) -> ResultPart {
     let record = measured.map(|measured| &*measured.record);
     let worst = record.and_then(worst_template).map(|template| Worst {
         gap_mm: template.max_gap_mm,
@@ -261,6 +265,7 @@ fn shown(result: &Publication, measured: Option<&MeasuredStroke>) -> ResultPart 
         why: reason.map(|code| ShownAlarm::new(code, 0, 0).text),
         worst,
         next: record.and_then(|record| record.next.clone()),
+        again: again == Some(result.run_id),
         fields: measured.map(|m| m.fields.iter().map(|f| f.name.clone()).collect()).unwrap_or_default(),
     }
 }
