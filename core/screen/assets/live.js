@@ -48,9 +48,9 @@ function silence(reason, words, remedy) {
 }
 
 function state(event) {
+  for (const [id, cell] of Object.entries(JSON.parse(event.data))) put(id, cell);
   heard = performance.now();
   stale = null;
-  for (const [id, cell] of Object.entries(JSON.parse(event.data))) put(id, cell);
 }
 
 function beat(event) {
@@ -79,7 +79,12 @@ function open() {
   });
 }
 
+let looked = Date.now();
+
 function watch() {
+  // Time has passed that the page's own clock has not seen: the computer slept.
+  if (Date.now() - looked > SILENCE_MS) shown();
+  looked = Date.now();
   if (performance.now() - heard > SILENCE_MS) silence('lost', told.lost, told.lostRemedy);
 }
 

@@ -18,6 +18,7 @@ use platen_model::Verdict;
 
 use crate::cells::Cells;
 use crate::server::assets;
+use crate::source::present;
 use crate::view::{Theme, View};
 use crate::{CYCLE_LIMIT, Source, Texts, words};
 
@@ -46,7 +47,7 @@ impl LivePage {
 
     /// Returns its present cells.
     pub(crate) fn cells(self, source: &dyn Source, view: View) -> Cells {
-        let snapshot = source.snapshots().borrow().clone();
+        let snapshot = present(source);
         match self {
             Self::Operator => operator::cells(&snapshot, view),
             Self::Engineer => engineer::cells(&snapshot, &source.engineer(), view),

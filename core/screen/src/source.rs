@@ -9,7 +9,7 @@ use platen_report::sequence::Sequence;
 use serde::Serialize;
 use tokio::sync::watch;
 
-use crate::Snapshot;
+use crate::{CYCLE_LIMIT, PressPart, Snapshot};
 
 /// Files of a stroke that may be read; sections of its templates (`section-NAME.svg`) beside them.
 pub const FILES: [&str; 11] = [
@@ -99,6 +99,16 @@ pub trait Source: Send + Sync + 'static {
 
     /// Returns the metrics in the Prometheus text format.
     fn metrics(&self) -> String;
+}
+
+/// Returns the present snapshot; while the press cycle stands, without the result, which may be that of an earlier stroke (rule R2).
+pub(crate) fn present(source: &dyn Source) -> Arc<Snapshot> {
+    let snapshot = source.snapshots().borrow().clone();
+    if source.cycle_age() <= CYCLE_LIMIT {
+        return snapshot;
+    }
+    let press = PressPart { in_step: false, ready: false, ..snapshot.press.clone() };
+    Arc::new(Snapshot { press, result: None, strip: Vec::new(), ..Snapshot::clone(&snapshot) })
 }
 
 /// Sign of life.

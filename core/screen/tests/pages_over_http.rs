@@ -335,6 +335,22 @@ fn the_stream_starts_whole_follows_changes_and_beats() {
 }
 
 #[test]
+fn while_the_press_cycle_stands_no_result_is_given() {
+    let site = site();
+    site.stand.cycle_age.store(10_000, Ordering::Relaxed);
+    let (_, _, page) = site.get("/");
+    assert!(
+        !page.contains("BEND MORE") && !page.contains(">4.3<") && !page.contains("curvature_deficit"),
+        "{page}"
+    );
+    let (_, _, state) = site.get("/api/v1/state");
+    let state: serde_json::Value = serde_json::from_str(&state).unwrap();
+    assert!(state["result"].is_null() && state["press"]["in_step"] == false);
+    let mut stream = site.open("GET", "/live/operator", "");
+    assert_eq!(event_named(&mut stream, "state")["gap"]["text"], "");
+}
+
+#[test]
 fn health_follows_the_press_cycle() {
     let site = site();
     assert_eq!(site.get("/healthz").0, 200);

@@ -18,6 +18,7 @@ use super::assets;
 use super::connection::Peer;
 use super::stream::{self, Feed};
 use crate::page::{self, LivePage};
+use crate::source::present;
 use crate::view::{View, ViewQuery};
 use crate::{CYCLE_LIMIT, FILES, Source, SourceError};
 
@@ -165,12 +166,12 @@ fn finished(answer: Result<(Vec<u8>, &'static str), SourceError>) -> Response {
 }
 
 async fn operator(State(site): State<Site>, Query(view): Query<ViewQuery>) -> Response {
-    let snapshot = site.source.snapshots().borrow().clone();
+    let snapshot = present(&*site.source);
     html(page::operator(&snapshot, view.into()))
 }
 
 async fn engineer(State(site): State<Site>, Query(view): Query<ViewQuery>) -> Response {
-    let snapshot = site.source.snapshots().borrow().clone();
+    let snapshot = present(&*site.source);
     html(page::engineer(&snapshot, &site.source.engineer(), view.into()))
 }
 
@@ -292,7 +293,7 @@ async fn live(State(site): State<Site>, Path(name): Path<String>, Query(view): Q
 }
 
 async fn api_state(State(site): State<Site>) -> Response {
-    let snapshot = site.source.snapshots().borrow().clone();
+    let snapshot = present(&*site.source);
     json(Ok(&*snapshot))
 }
 
@@ -323,7 +324,7 @@ async fn api_engineer(State(site): State<Site>) -> Response {
 
 /// State, figures and metrics in one file, for whoever helps.
 async fn api_diagnosis(State(site): State<Site>) -> Response {
-    let snapshot = site.source.snapshots().borrow().clone();
+    let snapshot = present(&*site.source);
     json(Ok(serde_json::json!({
         "schema": "platen.diagnosis/1", "at": jiff::Timestamp::now(), "state": &*snapshot, "engineer": site.source.engineer(),
         "metrics": site.source.metrics(),

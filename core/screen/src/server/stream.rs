@@ -12,6 +12,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, sleep_until};
 
 use crate::page::LivePage;
+use crate::source::present;
 use crate::{Beat, Snapshot, Source, View};
 
 /// Period of beats.
@@ -83,10 +84,10 @@ impl Reader {
 
     fn state(&mut self) -> Option<Event> {
         self.next_state = Instant::now() + APART;
-        let snapshot = self.snapshots.borrow_and_update().clone();
+        self.snapshots.mark_unchanged();
         let event = Event::default().event("state");
         match self.feed {
-            Feed::Snapshots => event.json_data(&*snapshot),
+            Feed::Snapshots => event.json_data(&*present(&*self.source)),
             Feed::Page(page, view) => event.json_data(page.cells(&*self.source, view)),
         }
         .ok()
