@@ -35,8 +35,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let mut bytes = [0; 32];
     getrandom::fill(&mut bytes).map_err(|e| CliError::Failed(format!("no random numbers: {e}")))?;
     let token = URL_SAFE_NO_PAD.encode(bytes);
-    let failed = |why: std::io::Error| {
-        CliError::Failed(format!("{}: {why}; an existing token is not replaced", file.display()))
+    let failed = |why: std::io::Error| match why.kind() {
+        std::io::ErrorKind::AlreadyExists => CliError::Failed(format!(
+            "{}: exists already and is not replaced; remove it first",
+            file.display()
+        )),
+        _ => CliError::Failed(format!("{}: {why}", file.display())),
     };
     let mut out = OpenOptions::new().write(true).create_new(true).mode(0o600).open(file).map_err(failed)?;
     writeln!(out, "{token}").and_then(|()| out.sync_all()).map_err(failed)?;
