@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::{Language, Texts};
+
 /// Severity of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -32,16 +34,6 @@ pub enum Audience {
     Engineer,
 }
 
-/// Language of texts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Language {
-    /// English.
-    #[default]
-    En,
-    /// Japanese.
-    Ja,
-}
-
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Alarm {
@@ -51,19 +43,21 @@ pub struct Alarm {
     pub severity: Severity,
     /// Who must act.
     pub audience: Audience,
-    text: [&'static str; 2],
-    remedy: [&'static str; 2],
+    /// Fault.
+    pub texts: Texts,
+    /// Remedy.
+    pub remedies: Texts,
 }
 
 impl Alarm {
     /// Returns the fault.
     pub fn text(&self, language: Language) -> &'static str {
-        self.text[language as usize]
+        self.texts.of(language)
     }
 
     /// Returns the remedy.
     pub fn remedy(&self, language: Language) -> &'static str {
-        self.remedy[language as usize]
+        self.remedies.of(language)
     }
 }
 
@@ -86,8 +80,8 @@ macro_rules! alarms {
                         code: Self::$code,
                         severity: Severity::$severity,
                         audience: Audience::$audience,
-                        text: [$text_en, $text_ja],
-                        remedy: [$remedy_en, $remedy_ja],
+                        texts: Texts { en: $text_en, ja: $text_ja },
+                        remedies: Texts { en: $remedy_en, ja: $remedy_ja },
                     },)*
                 }
             }

@@ -11,6 +11,7 @@
 //! | `verdict`, `figures`, `publication` | [`Verdict`], [`Figures`], [`Publication`]: the result as the press receives it |
 //! | `journal` | [`Record`], [`Recalled`]: the steps of a stroke that survive a power cut |
 //! | `alarm` | [`Code`]: numbers, texts and remedies of the alarms |
+//! | `language` | [`Language`], [`Texts`]: texts for people in each language |
 //!
 //! Lengths in metres, angles in radians, places as (u, v) on the original rectangle. [`units`] converts to the units of
 //! people. Plain data with serde: no I/O, no clock.
@@ -20,6 +21,7 @@ mod field;
 mod figures;
 mod findings;
 mod journal;
+mod language;
 mod plate;
 mod publication;
 mod stroke;
@@ -29,11 +31,12 @@ mod template;
 pub mod units;
 mod verdict;
 
-pub use alarm::{Alarm, Audience, Code, Language, Severity};
+pub use alarm::{Alarm, Audience, Code, Severity};
 pub use field::{Field, NodeState};
 pub use figures::{Figures, Measure};
 pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
 pub use journal::{Acknowledgement, Entry, Recalled, Record, Stage};
+pub use language::{Language, Texts};
 pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support};
 pub use publication::{Judgement, Measurement, Publication};
 pub use stroke::{StrokeData, StrokeKey, Timestamp};

@@ -14,13 +14,13 @@ pub(crate) use plate::page as plate;
 pub(crate) use strokes::{plates, strokes};
 
 use maud::{DOCTYPE, Markup, html};
-use platen_model::Verdict;
+use platen_model::{Texts, Verdict};
 
 use crate::cells::Cells;
 use crate::server::assets;
 use crate::source::present;
 use crate::view::{Theme, View};
-use crate::{CYCLE_LIMIT, Source, Texts, words};
+use crate::{CYCLE_LIMIT, Source, words};
 
 /// A page that keeps itself up to date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

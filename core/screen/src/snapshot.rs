@@ -3,7 +3,7 @@
 //! A snapshot is whole: a page that has missed ten shows the truth with the eleventh. What is not known is null. `result` is the
 //! result of the plate and stroke in hand or null: it never is one of an earlier stroke.
 
-use platen_model::{Audience, Code, Language, Severity, Verdict};
+use platen_model::{Audience, Code, Severity, Texts, Verdict};
 use platen_report::result::Next;
 use serde::Serialize;
 
@@ -192,26 +192,6 @@ pub struct StripPart {
     pub gap_mm: Option<f64>,
 }
 
-/// A text in both languages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Texts {
-    /// English.
-    pub en: &'static str,
-    /// Japanese.
-    pub ja: &'static str,
-}
-
-impl Texts {
-    /// Returns the text in a language.
-    #[must_use]
-    pub fn of(self, language: Language) -> &'static str {
-        match language {
-            Language::En => self.en,
-            Language::Ja => self.ja,
-        }
-    }
-}
-
 /// An alarm that stands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShownAlarm {
@@ -236,17 +216,13 @@ impl ShownAlarm {
     #[must_use]
     pub fn new(code: Code, since_ms: i64, count: u64) -> Self {
         let alarm = code.alarm();
-        let both = |text: fn(&platen_model::Alarm, Language) -> &'static str| Texts {
-            en: text(alarm, Language::En),
-            ja: text(alarm, Language::Ja),
-        };
         Self {
             code,
             severity: alarm.severity,
             audience: alarm.audience,
             since_ms,
-            text: both(platen_model::Alarm::text),
-            remedy: both(platen_model::Alarm::remedy),
+            text: alarm.texts,
+            remedy: alarm.remedies,
             count,
         }
     }

@@ -1,18 +1,11 @@
 //! Texts of the pages in both languages. The texts of alarms are in the table of alarms (`platen_model::Code`).
 
-use platen_model::{Language, Verdict};
+use platen_model::{Language, Texts, Verdict, texts};
 use platen_report::result::{Next, NoNext};
 
-use crate::{ScannerState, Stage, Texts};
+use crate::{ScannerState, Stage};
 
-/// Makes one constant for each text: name, English, Japanese.
-macro_rules! words {
-    ($($name:ident $en:literal $ja:literal)*) => {
-        $(pub(crate) const $name: Texts = Texts { en: $en, ja: $ja };)*
-    };
-}
-
-words! {
+texts! { pub(crate),
     DONE "DONE" "完了"
     BEND_MORE "BEND MORE" "曲げ不足"
     TOO_FAR "BENT TOO FAR" "曲げ過ぎ"

@@ -6,10 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use platen_model::units::{metres, mm};
-use platen_model::{Target, TargetShape};
+use platen_model::{Target, TargetShape, Texts};
 use platen_plant::PlateFile;
 
-use super::words::{self, Word};
+use super::words;
 use super::{Units, View};
 use crate::result::CURVATURE_DEFICIT;
 
@@ -68,7 +68,7 @@ impl PictureScale {
 
     /// Returns title and scale of a field; `largest` is its largest value, for fields without a scale of the plate.
     pub(super) fn field(&self, name: &str, unit: &str, largest: f64, view: View) -> (String, Scale) {
-        let titled = |text: Word, value: &str| words::fill(text.of(view.language), &[value]);
+        let titled = |text: Texts, value: &str| words::fill(text.of(view.language), &[value]);
         let (template, towards) = (view.units.whole(self.chord_mm), words::TOWARDS.of(view.language));
         // Gap to curvature: delta kappa = 8 g / c^2.
         let as_gap = Scale { factor: 1.0 / per_m(1.0, self.chord_mm), ..self.gaps() };
@@ -111,7 +111,7 @@ fn smallest_radius(target: &Target) -> Option<f64> {
     }
 }
 
-fn curvature_words(name: &str) -> Option<Word> {
+fn curvature_words(name: &str) -> Option<Texts> {
     match name {
         "kappa_u" => Some(words::KAPPA_U),
         "kappa_v" => Some(words::KAPPA_V),
@@ -143,7 +143,7 @@ pub(super) struct Scale {
     /// The positive side is blue.
     pub(super) inverted: bool,
     /// Names of the negative and the positive side.
-    pub(super) words: Option<[Word; 2]>,
+    pub(super) words: Option<[Texts; 2]>,
     /// Whether it is the same for every stroke of the plate.
     pub(super) locked: bool,
 }

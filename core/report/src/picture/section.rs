@@ -2,12 +2,12 @@
 
 use plotters::style::RGBColor;
 
-use platen_model::Seat;
+use platen_model::{Seat, Texts};
 
 use super::canvas::{At, Canvas, Text, draw};
 use super::colour::{self, INK, PALE, STEEL, WOOD, WOOD_EDGE};
 use super::scale::nice_ceiling;
-use super::words::{self, Word};
+use super::words;
 use super::{Caption, PictureError, PictureScale, View};
 use crate::result::{LineRecord, TemplateRecord};
 
@@ -34,7 +34,7 @@ pub fn section(
 ) -> Result<String, PictureError> {
     draw(SIZE, |canvas| {
         let caption = Caption { verdict: template.verdict, ..*caption };
-        let word = |text: Word| text.of(view.language);
+        let word = |text: Texts| text.of(view.language);
         let seat = match template.seat {
             Seat::Gravity => words::GRAVITY,
             Seat::Balanced => words::BALANCED,
@@ -68,7 +68,7 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    fn word(&self, text: Word) -> &'static str {
+    fn word(&self, text: Texts) -> &'static str {
         text.of(self.view.language)
     }
 
@@ -187,7 +187,7 @@ impl Layout<'_> {
             canvas.line(&[(LEFT - 8.0, y(mm)), (LEFT, y(mm))], INK, 2)?;
             canvas.text(&units.tick(mm), (LEFT - 14.0, y(mm)), text.right())?;
         }
-        let title = |word: Word| format!("{}, {}", self.word(word), units.symbol());
+        let title = |word: Texts| format!("{}, {}", self.word(word), units.symbol());
         canvas.text(&title(words::GAP), (LEFT - 86.0, GAP[0] - 30.0), text)?;
         let [start, chord] = [self.template.start_mm, self.template.chord_mm].map(|mm| units.of_mm(mm));
         let step = nice_ceiling(chord / 6.0);

@@ -1,25 +1,8 @@
 //! Words of pictures in each language, one row each.
 
-use platen_model::{Language, Verdict};
+use platen_model::{Texts, Verdict, texts};
 
-/// A text in each language, in the order of [`Language`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Word([&'static str; 2]);
-
-impl Word {
-    pub(super) fn of(self, language: Language) -> &'static str {
-        self.0[language as usize]
-    }
-}
-
-/// Makes one constant for each text: name, English, Japanese.
-macro_rules! words {
-    ($($name:ident $en:literal $ja:literal)*) => {
-        $(pub(super) const $name: Word = Word([$en, $ja]);)*
-    };
-}
-
-words! {
+texts! { pub(super),
     BEND_MORE "bend more" "曲げ不足"
     TOO_FAR "bent too far" "曲げ過ぎ"
     ENOUGH "enough" "十分"
@@ -61,7 +44,7 @@ words! {
 }
 
 /// Returns the words of a verdict.
-pub(super) fn verdict(verdict: Verdict) -> Word {
+pub(super) fn verdict(verdict: Verdict) -> Texts {
     match verdict {
         Verdict::Pass => PASS,
         Verdict::CannotTell => CANNOT_TELL,
@@ -79,6 +62,8 @@ pub(super) fn fill(text: &str, values: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use platen_model::Language;
+
     use super::*;
 
     #[test]

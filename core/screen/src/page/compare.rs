@@ -1,11 +1,12 @@
 //! `/compare?a=RUN&b=RUN`: two strokes on the same scale: maps side by side, sections over each other, and their figures with their difference.
 
 use maud::{Markup, html};
+use platen_model::Texts;
 use platen_report::result::{CURVATURE_DEFICIT, ResultRecord, TemplateRecord};
 
 use super::{chip, clean, document, navigation, section};
 use crate::view::View;
-use crate::{Texts, words};
+use crate::words;
 
 /// A figure of both strokes, with its expanded uncertainty (95 %).
 struct Row {

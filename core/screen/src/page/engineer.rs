@@ -1,11 +1,12 @@
 //! `/engineer`: registers, timeline, link, scanner, plugins, alarms and files, renewed every second.
 
 use maud::{Markup, html};
+use platen_model::Texts;
 
 use super::{LivePage, clean, document, navigation};
 use crate::cells::Cells;
 use crate::view::View;
-use crate::{Engineer, Snapshot, Texts, words};
+use crate::{Engineer, Snapshot, words};
 
 /// Strokes of the timeline.
 const TIMELINE: usize = 20;

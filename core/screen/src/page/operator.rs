@@ -1,14 +1,14 @@
 //! `/`: the operator's page, read from two metres: verdict, place of the next hit, gap against its limit, states, one alarm.
 
 use maud::{Markup, html};
-use platen_model::{Audience, Severity};
+use platen_model::{Audience, Severity, Texts};
 use platen_report::picture::PictureScale;
 use platen_report::result::Next;
 
 use super::{LivePage, class, clean, document, navigation};
 use crate::cells::Cells;
 use crate::view::View;
-use crate::{ResultPart, Snapshot, Stage, Texts, words};
+use crate::{ResultPart, Snapshot, Stage, words};
 
 /// Strokes in the strip, and the size of its drawing.
 const STRIP: usize = 16;

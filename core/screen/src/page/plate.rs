@@ -1,12 +1,13 @@
 //! `/plate?run=RUN`: the plate in 3D with the colours of its map; where the browser has no WebGL, the map.
 
 use maud::{Markup, html};
+use platen_model::Texts;
 use platen_report::result::ResultRecord;
 
 use super::{chip, clean, document, navigation};
 use crate::server::assets;
 use crate::view::View;
-use crate::{Texts, words};
+use crate::words;
 
 /// Returns the page.
 pub(crate) fn page(run: u32, record: &ResultRecord, view: View) -> Markup {

@@ -1,11 +1,12 @@
 //! `/strokes`: the plates on record; `/strokes?plate=N`: the strokes of one plate, as pictures, table and files.
 
 use maud::{Markup, html};
+use platen_model::Texts;
 use platen_report::sequence::{Sequence, SequenceStroke};
 
 use super::{chip, clean, document, navigation};
 use crate::view::View;
-use crate::{PlateRow, StrokeRow, Texts, words};
+use crate::{PlateRow, StrokeRow, words};
 
 /// Returns the page of all plates.
 pub(crate) fn plates(plates: &[PlateRow], view: View) -> Markup {
