@@ -104,9 +104,10 @@ impl Facts {
         }
     }
 
-    /// Returns whether the record of a result is here, or was looked for.
+    /// Returns whether the record of a result is here or on its way, or was looked for.
     pub(super) fn knows(&self, run_id: u32) -> bool {
-        self.recalled == Some(run_id) || self.hand.as_ref().is_some_and(|hand| hand.run_id == run_id)
+        let is_in_hand = self.hand.as_ref().is_some_and(|hand| hand.run_id == run_id);
+        is_in_hand || self.recalled == Some(run_id) || self.record_of(run_id).is_some()
     }
 
     /// Takes the record of a result that was published before this start.
