@@ -11,7 +11,7 @@ int main(void) {
   SIZE(platen_error), FIELD(platen_error, message), FIELD(platen_error, hint);
   SIZE(platen_job), FIELD(platen_job, deadline_mono_ns);
   SIZE(platen_buffer), FIELD(platen_buffer, token);
-  SIZE(platen_frame), FIELD(platen_frame, format), FIELD(platen_frame, buffer), FIELD(platen_frame, n_attrs);
+  SIZE(platen_frame), FIELD(platen_frame, format), FIELD(platen_frame, buffer), FIELD(platen_frame, role);
   SIZE(platen_option), FIELD(platen_option, name), FIELD(platen_option, min), FIELD(platen_option, choices);
   SIZE(platen_value), FIELD(platen_value, i), FIELD(platen_value, list), FIELD(platen_value, n);
   SIZE(platen_desc), FIELD(platen_desc, license), FIELD(platen_desc, options), FIELD(platen_desc, n_options);
@@ -28,5 +28,7 @@ int main(void) {
   SIZE(platen_surface), FIELD(platen_surface, thickness), FIELD(platen_surface, seen);
   SIZE(platen_grid), FIELD(platen_grid, components), FIELD(platen_grid, state);
   SIZE(platen_estimate), FIELD(platen_estimate, scan_seconds);
+  SIZE(platen_health), FIELD(platen_health, tilt);
+  SIZE(platen_health_source), FIELD(platen_health_source, health);
   return 0;
 }

@@ -43,3 +43,42 @@ pub fn library(name: &str) -> PathBuf {
         format!("{}{}{}", std::env::consts::DLL_PREFIX, name.replace('-', "_"), std::env::consts::DLL_SUFFIX);
     built().join(file)
 }
+
+/// Compiles a C file against the plugin header: a program, or with `-shared -fPIC` a library.
+pub fn compile_c(source: &Path, out: &Path, arguments: &[&str]) {
+    let include = repository().join("core/abi/include");
+    let status = Command::new("cc")
+        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
+        .arg(include)
+        .args(arguments)
+        .arg("-o")
+        .arg(out)
+        .arg(source)
+        .arg("-lm")
+        .status();
+    assert!(status.is_ok_and(|s| s.success()), "cc {}", source.display());
+}
+
+/// A C source of the tests.
+pub fn c_source(name: &str) -> PathBuf {
+    repository().join("tests/contract").join(name)
+}
+
+/// Puts a faulty plugin into `folder`, in place of the project's `name`: it hands all calls on to that one, and does `fault` in the
+/// call `place` of jobs at `stroke`, at every one for 0 (`tests/contract/faulty.c`).
+pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) {
+    let target = library(name);
+    assert!(std::fs::create_dir_all(folder).is_ok());
+    // Beside its final place, then renamed: a host may be loading it.
+    let new = folder.join("new.so");
+    let defines = [
+        format!("-DTARGET=\"{}\"", target.display()),
+        format!("-DWHERE={place}"),
+        format!("-DFAULT={fault}"),
+        format!("-DSTROKE={stroke}"),
+    ];
+    let arguments = ["-shared", "-fPIC", "-w"].into_iter().chain(defines.iter().map(String::as_str));
+    compile_c(&c_source("faulty.c"), &new, &arguments.collect::<Vec<_>>());
+    let place = target.file_name().map(|name| folder.join(name));
+    assert!(place.is_some_and(|place| std::fs::rename(new, place).is_ok()));
+}

@@ -1,14 +1,21 @@
-/* platen.h - C interface between platen and its plugins, major version 1.
+/* platen.h - C interface between platen and its plugins, major version 2.
  *
- * A plugin is a shared library that exports one constant, `const platen_entry platen_entry_1`.
- * Structs begin with struct_size and grow only at their end: a reader MUST use only the fields that both sides have.
+ * A plugin is a shared library that exports one constant:
+ *
+ *   PLATEN_EXPORT const platen_entry platen_entry_2 = {sizeof(platen_entry), PLATEN_ABI_MINOR, init, ...};
+ *
+ * Structs begin with struct_size and grow only at their end: a reader takes the members that both sides have, zero for the rest.
  *
  *   [inst]  calls of one instance: serialised, always the same thread
  *   [any]   any thread, may run at the same time as an [inst] call
  *
- * A plugin MUST let no exception leave a call (C++: catch (...) in each) and MUST NOT write to inputs. Memory of frames comes
- * from buffer_alloc and MUST be emitted or freed before run returns. run MUST return by the deadline or soon after cancel;
- * cancel MUST return at once. PLATEN_OK from run means complete data. Metres, radians, UTF-8 with NUL, little endian.
+ * Each instance lives in a process of its own (`platen worker`). A plugin
+ *   - lets no exception leave a call (C++: catch (...) in each), and does not write to inputs;
+ *   - takes memory of frames from buffer_alloc, and emits or frees it before run returns;
+ *   - returns from run by the deadline, and within 0.5 s after cancel: what is late is killed;
+ *   - leaves alone what belongs to the process: signals, standard input and output, working folder, locale, rounding mode;
+ *   - as a flattening or comparison reads its files in create: afterwards no file, socket or program can be opened.
+ * PLATEN_OK from run means complete data. Metres, radians, UTF-8 with NUL, little endian.
  */
 #ifndef PLATEN_H
 #define PLATEN_H
@@ -16,12 +23,17 @@
 #include <stdint.h>
 
 #ifdef __cplusplus
+#define PLATEN_EXPORT extern "C" __attribute__((visibility("default")))
 extern "C" {
+#else
+#define PLATEN_EXPORT __attribute__((visibility("default")))
 #endif
 
 #define PLATEN_ABI_MINOR 0
 
-typedef int32_t platen_status; /* < 0: failure; <= PLATEN_E_VENDOR: defined by the plugin */
+/* After a failure the host reopens the instance (TIMEOUT, DISCONNECTED, IO) or gives the plugin a fresh process (MEMORY, STATE,
+ * INTERNAL); it may repeat the job (TIMEOUT, DISCONNECTED, BUSY, or flag RETRYABLE). <= PLATEN_E_VENDOR: the plugin's, as IO. */
+typedef int32_t platen_status;
 enum {
   PLATEN_OK = 0,
   PLATEN_E_CANCELLED = -1,
@@ -41,12 +53,12 @@ enum {
   PLATEN_E_VENDOR = -10000
 };
 
-enum { PLATEN_ERROR_RETRYABLE = 1, PLATEN_ERROR_DEVICE_LOST = 2, PLATEN_ERROR_RECREATE = 4 };
+enum { PLATEN_ERROR_RETRYABLE = 1 };
 
 /* Memory of the caller; the callee fills it when it fails. */
 typedef struct platen_error {
   uint32_t struct_size, flags;
-  int32_t vendor_code;
+  int32_t vendor_code; /* of the device, shown behind the message; 0: none */
   uint32_t reserved;
   char message[512]; /* what happened, one sentence */
   char hint[256];    /* what to do, one sentence */
@@ -64,20 +76,11 @@ typedef struct platen_buffer {
   uint64_t bytes, token;
 } platen_buffer;
 
-typedef struct platen_attr {
-  const char *key, *value;
-} platen_attr;
-
-enum { PLATEN_FRAME_INCOMPLETE = 1, PLATEN_FRAME_SIMULATED = 2, PLATEN_FRAME_LAST = 4 };
-
 typedef struct platen_frame {
-  uint32_t struct_size, flags;
-  const char *format, *frame_id; /* "platen.column/2", "scanner" */
-  int64_t mono_ns;
-  uint64_t count;
-  platen_buffer buffer; /* emit() takes it */
-  const platen_attr *attrs;
-  uint32_t n_attrs, reserved;
+  uint32_t struct_size, reserved;
+  const char *format;   /* "platen.column/2" */
+  const char *role;     /* of an input where several have one format: now, before, baseline; else NULL */
+  platen_buffer buffer; /* emit takes it */
 } platen_frame;
 
 enum {
@@ -135,39 +138,36 @@ typedef struct platen_desc {
 typedef struct platen_host platen_host;
 struct platen_host { /* all [any]; valid until deinit returns */
   uint32_t struct_size, abi_minor;
-  void *ctx;
-  const char *name, *version;
+  const char *version; /* of the host, for logs */
   int (*log_enabled)(const platen_host *, int32_t level);
   void (*log)(const platen_host *, uint64_t job_id, int32_t level, const char *message);
   void (*progress)(const platen_host *, uint64_t job_id, double fraction, const char *phase);
   int (*cancelled)(const platen_host *, uint64_t job_id);
-  platen_status (*buffer_alloc)(const platen_host *, uint64_t job_id, uint64_t bytes, uint32_t align, platen_buffer *);
+  /* Aligned to 8 bytes, contents undefined. Waits until the host has taken earlier frames. */
+  platen_status (*buffer_alloc)(const platen_host *, uint64_t job_id, uint64_t bytes, platen_buffer *);
   void (*buffer_free)(const platen_host *, platen_buffer *);
-  platen_status (*emit)(const platen_host *, uint64_t job_id, const platen_frame *);
-  const void *(*get_extension)(const platen_host *, const char *id);
-  int64_t (*now_mono_ns)(const platen_host *);
+  platen_status (*emit)(const platen_host *, uint64_t job_id, const platen_frame *); /* takes the buffer, also when it fails */
+  int64_t (*now_mono_ns)(const platen_host *);                                       /* CLOCK_MONOTONIC */
 };
 
 typedef struct platen_instance platen_instance;
 struct platen_instance {
   uint32_t struct_size, reserved;
   void *data;
-  const platen_desc *desc;
-  platen_status (*open)(platen_instance *, platen_error *);                   /* [inst] connects, may block */
-  platen_status (*arm)(platen_instance *, const platen_job *, platen_error *); /* [inst] or NULL */
+  platen_status (*open)(platen_instance *, platen_error *); /* [inst] connects, may block */
   platen_status (*run)(platen_instance *, const platen_job *, const platen_frame *in, uint32_t n_in,
-                       platen_error *);                  /* [inst] one job, emits its results */
-  void (*cancel)(platen_instance *, uint64_t job_id);    /* [any] wakes run, returns at once */
-  void (*close)(platen_instance *);                      /* [inst] joins its own threads */
-  void (*destroy)(platen_instance *);                    /* [inst] no host call after it */
-  const void *(*get_extension)(platen_instance *, const char *id); /* [any] */
+                       platen_error *);               /* [inst] one job, emits its results */
+  void (*cancel)(platen_instance *, uint64_t job_id); /* [any] wakes run, returns at once; or NULL */
+  void (*close)(platen_instance *);                   /* [inst] disconnects, joins its own threads; open may follow */
+  void (*destroy)(platen_instance *);                 /* [inst] no host call after it */
+  const void *(*get_extension)(platen_instance *, const char *id); /* [any] or NULL */
 };
 
 typedef struct platen_entry {
   uint32_t struct_size, abi_minor;
   platen_status (*init)(const platen_host *, const char *library_dir, platen_error *); /* once, before create */
-  void (*deinit)(void);
-  uint32_t (*count)(void);
+  void (*deinit)(void);                                                              /* once, at the end; or NULL */
+  uint32_t (*count)(void);                                                           /* plugins in this library */
   const platen_desc *(*desc)(uint32_t index); /* constant, also before init; NULL when there is none */
   platen_status (*create)(const platen_host *, const char *id, const platen_value *values, uint32_t n,
                           platen_instance **, platen_error *); /* touches no hardware */
@@ -185,7 +185,7 @@ typedef struct platen_span {
 #define PLATEN_FORMAT_WINDOW "platen.window/1"     /* host -> driver, optional */
 #define PLATEN_FORMAT_MESH "platen.mesh/2"         /* host -> flattening */
 #define PLATEN_FORMAT_CHART "platen.chart/1"       /* flattening -> host */
-#define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison; attribute role: now, before, baseline */
+#define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison; role: now, before, baseline */
 #define PLATEN_FORMAT_TASK "platen.task/1"         /* host -> comparison, JSON */
 #define PLATEN_FORMAT_FINDINGS "platen.findings/1" /* comparison -> host, JSON */
 #define PLATEN_FORMAT_GRID "platen.grid/1"         /* comparison -> host */
@@ -259,12 +259,23 @@ typedef struct platen_grid {
   platen_span state;      /* u8 a node: 0 no data, 1 data, 2 data and unchanged */
 } platen_grid;
 
-/* Extension of a scanner instance. */
+/* Extensions of a scanner instance. */
 #define PLATEN_EXT_ESTIMATE "platen.ext.estimate/1"
 typedef struct platen_estimate {
   uint32_t struct_size, reserved;
   double (*scan_seconds)(platen_instance *, const platen_window *); /* [inst] negative: unknown */
 } platen_estimate;
+
+#define PLATEN_EXT_HEALTH "platen.ext.health/1"
+enum { PLATEN_HEALTH_DIRTY = 1, PLATEN_HEALTH_ON_BATTERY = 2, PLATEN_HEALTH_WARMING_UP = 4 };
+typedef struct platen_health { /* NAN: not known */
+  uint32_t struct_size, flags;
+  double temperature_c, battery, tilt; /* battery 0 to 1; tilt of the vertical axis against the plumb line */
+} platen_health;
+typedef struct platen_health_source {
+  uint32_t struct_size, reserved;
+  platen_status (*health)(platen_instance *, platen_health *); /* [inst] after open or a job, within 100 ms */
+} platen_health_source;
 
 #ifdef __cplusplus
 }

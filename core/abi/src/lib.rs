@@ -7,8 +7,9 @@
 //! # Versions
 //!
 //! The major version is part of the symbol's name. Within a major version structs begin with `struct_size` and grow only at
-//! their end, so either side may be the older one: a reader MUST use only the fields that both sides have. [`ABI_MINOR`] is the
-//! minor version; payload formats carry their own version in their name (`platen.mesh/2`).
+//! their end, so either side may be the older one: a reader takes the members that both sides have, and zero for the rest
+//! ([`Table::read`], [`payload::read`]). [`ABI_MINOR`] is the minor version; payload formats carry their own version in their
+//! name (`platen.mesh/2`).
 //!
 //! # Rules
 //!
@@ -16,6 +17,7 @@
 //! - `[inst]` calls of one instance are serialised and always come from the same thread. `[any]` calls may come from any
 //!   thread at any time.
 //! - No exception and no panic MAY cross the boundary. Strings are UTF-8 with a terminating NUL.
+//! - A plugin leaves alone what belongs to the process: signals, standard input and output, working folder, locale, rounding mode.
 //! - Lengths are in metres, angles in radians, times in nanoseconds or seconds as named.
 //!
 //! [`payload`] describes the contents of a [`Frame`]'s buffer.
@@ -27,7 +29,7 @@ mod table;
 pub use table::*;
 
 /// Name of the exported constant of type [`Entry`].
-pub const ENTRY_SYMBOL: &std::ffi::CStr = c"platen_entry_1";
+pub const ENTRY_SYMBOL: &std::ffi::CStr = c"platen_entry_2";
 
 /// Minor version of the boundary.
 pub const ABI_MINOR: u32 = 0;

@@ -186,7 +186,7 @@ header! {
 
 header! {
     /// Place (u, v) of every vertex on the flat plate, flattening to host.
-    Chart = c"platen.chart/1" {
+    Chart = c"platen.chart/1", first 24 bytes {
         /// 0.
         reserved: u32,
         /// f64, 2 a vertex.
@@ -199,7 +199,7 @@ header! {
 }
 
 header! {
-    /// Mid-surface S(u, v) as a bicubic B-spline, host to comparison. Attribute `role`: now, before or baseline.
+    /// Mid-surface S(u, v) as a bicubic B-spline, host to comparison. Role of the frame: now, before or baseline.
     Surface = c"platen.surface/1" {
         /// Mask cells along u.
         mask_u: u32,

@@ -2,40 +2,41 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// Result of a call: one of [`status`]; values at or below [`status::VENDOR`] are defined by the plugin.
+/// Result of a call: one of [`status`]. Values at or below [`status::VENDOR`] are defined by the plugin and count as
+/// [`status::IO`].
 pub type Status = i32;
 
-/// Values of [`Status`].
+/// Values of [`Status`], and what the host does after each.
 pub mod status {
     /// Done.
     pub const OK: i32 = 0;
-    /// The job was cancelled.
+    /// The job was cancelled or its deadline passed. Without either: a fault of the plugin.
     pub const CANCELLED: i32 = -1;
-    /// The deadline passed, or a device did not answer in time.
+    /// A device did not answer in time. Reopened; a retry may succeed.
     pub const TIMEOUT: i32 = -2;
-    /// The options contradict each other or the plant.
+    /// The options contradict each other or the plant. Not repeated.
     pub const CONFIG: i32 = -3;
-    /// The plugin does not support the request.
+    /// The plugin does not support the request. Not repeated.
     pub const UNSUPPORTED: i32 = -4;
-    /// The named file, device or plugin does not exist.
+    /// The named file or device does not exist. Not repeated.
     pub const NOT_FOUND: i32 = -5;
-    /// The device is not reachable.
+    /// The device is not reachable. Reopened; a retry may succeed.
     pub const DISCONNECTED: i32 = -6;
-    /// The device or file is in use.
+    /// The device or file is in use. A retry may succeed.
     pub const BUSY: i32 = -7;
-    /// Access was refused.
+    /// Access was refused. Not repeated.
     pub const DENIED: i32 = -8;
-    /// Reading or writing failed.
+    /// Reading or writing failed. Reopened.
     pub const IO: i32 = -9;
-    /// No data is available.
+    /// No data is available. Not repeated.
     pub const NO_DATA: i32 = -10;
-    /// The input or the device's data is invalid.
+    /// The input or the device's data is invalid. Not repeated.
     pub const BAD_DATA: i32 = -11;
-    /// Memory is exhausted.
+    /// Memory is exhausted. The plugin gets a fresh process.
     pub const MEMORY: i32 = -12;
-    /// The call is not allowed in the state of the instance.
+    /// The call is not allowed in the state of the instance, or the job has ended. A fault of the plugin.
     pub const STATE: i32 = -13;
-    /// A fault of the plugin itself.
+    /// A fault of the plugin itself. It gets a fresh process.
     pub const INTERNAL: i32 = -14;
     /// First of the plugin's own codes, downwards.
     pub const VENDOR: i32 = -10_000;
@@ -43,12 +44,8 @@ pub mod status {
 
 /// Bits of [`Error::flags`].
 pub mod error_flag {
-    /// A retry may succeed.
+    /// A retry may succeed, whatever the status says.
     pub const RETRYABLE: u32 = 1;
-    /// The device is lost until it is opened again.
-    pub const DEVICE_LOST: u32 = 2;
-    /// The instance must be destroyed and created again.
-    pub const RECREATE: u32 = 4;
 }
 
 /// Error struct: memory of the caller, filled by the callee when it fails.
@@ -101,50 +98,20 @@ pub struct Buffer {
     pub token: u64,
 }
 
-/// Attribute of a frame: a named text.
-#[repr(C)]
-#[derive(Debug, Clone, Copy)]
-pub struct Attr {
-    /// Name.
-    pub key: *const c_char,
-    /// Value.
-    pub value: *const c_char,
-}
-
-/// Bits of [`Frame::flags`].
-pub mod frame_flag {
-    /// Data is missing.
-    pub const INCOMPLETE: u32 = 1;
-    /// No real instrument stood there.
-    pub const SIMULATED: u32 = 2;
-    /// The last frame of a successful job.
-    pub const LAST: u32 = 4;
-}
-
 /// Frame: one payload with its format.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
     /// Size of this struct.
     pub struct_size: u32,
-    /// Bits of [`frame_flag`].
-    pub flags: u32,
-    /// Format of the payload, e.g. `platen.column/2`.
-    pub format: *const c_char,
-    /// Coordinate frame, e.g. `scanner`.
-    pub frame_id: *const c_char,
-    /// Time of measurement, host's monotonic clock; 0: unknown.
-    pub mono_ns: i64,
-    /// Number of elements (points, vertices).
-    pub count: u64,
-    /// Payload. Emitting transfers it to the host.
-    pub buffer: Buffer,
-    /// Attributes.
-    pub attrs: *const Attr,
-    /// Number of elements.
-    pub n_attrs: u32,
     /// 0.
     pub reserved: u32,
+    /// Format of the payload, e.g. `platen.column/2`.
+    pub format: *const c_char,
+    /// Role of an input where several have one format: `now`, `before`, `baseline`; else null.
+    pub role: *const c_char,
+    /// Payload. Emitting transfers it to the host.
+    pub buffer: Buffer,
 }
 
 /// Values of [`OptionDecl::kind`].
@@ -159,7 +126,7 @@ pub mod option_type {
     pub const STRING: i32 = 4;
     /// `s`, one of the choices.
     pub const CHOICE: i32 = 5;
-    /// `s`, absolute or relative to the plant file; the host makes it absolute.
+    /// `s`, absolute: the host resolves what the plant file names beside itself.
     pub const PATH: i32 = 6;
     /// `f`, seconds.
     pub const DURATION: i32 = 7;
@@ -286,11 +253,7 @@ pub struct Host {
     pub struct_size: u32,
     /// Minor version of the boundary, host side.
     pub abi_minor: u32,
-    /// Private data of the host.
-    pub ctx: *mut c_void,
-    /// Name of the host.
-    pub name: *const c_char,
-    /// Its version.
+    /// Version of the host, for logs.
     pub version: *const c_char,
     /// Returns non-zero when messages of this level are logged.
     pub log_enabled: unsafe extern "C" fn(*const Host, Level) -> c_int,
@@ -300,21 +263,20 @@ pub struct Host {
     pub progress: unsafe extern "C" fn(*const Host, u64, f64, *const c_char),
     /// Returns non-zero when the job was cancelled or its deadline has passed.
     pub cancelled: unsafe extern "C" fn(*const Host, u64) -> c_int,
-    /// Allocates a buffer for one frame of a job: bytes, alignment (a power of two).
-    pub buffer_alloc: unsafe extern "C" fn(*const Host, u64, u64, u32, *mut Buffer) -> Status,
+    /// Allocates a buffer for one frame of a job, aligned to 8 bytes, its contents undefined. Waits until the host has taken
+    /// earlier frames, at most until the job is cancelled or its deadline has passed.
+    pub buffer_alloc: unsafe extern "C" fn(*const Host, u64, u64, *mut Buffer) -> Status,
     /// Frees a buffer that will not be emitted.
     pub buffer_free: unsafe extern "C" fn(*const Host, *mut Buffer),
-    /// Transfers a frame with its buffer to the host, whatever the returned status.
+    /// Transfers a frame with its buffer to the host. Only a frame whose buffer is unknown stays with the plugin.
     pub emit: unsafe extern "C" fn(*const Host, u64, *const Frame) -> Status,
-    /// Returns an extension table by name, or null.
-    pub get_extension: unsafe extern "C" fn(*const Host, *const c_char) -> *const c_void,
-    /// Returns the host's monotonic clock.
+    /// Returns nanoseconds of the host's monotonic clock (`CLOCK_MONOTONIC`).
     pub now_mono_ns: unsafe extern "C" fn(*const Host) -> i64,
 }
 
-/// Instance of a plugin with its options.
+/// Instance of a plugin with its options. Functions are required unless their text says otherwise.
 #[repr(C)]
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Instance {
     /// Size of this struct.
     pub struct_size: u32,
@@ -322,49 +284,99 @@ pub struct Instance {
     pub reserved: u32,
     /// Private data of the plugin.
     pub data: *mut c_void,
-    /// Descriptor.
-    pub desc: *const Desc,
     /// `[inst]` Connects to devices; may block.
-    pub open: unsafe extern "C" fn(*mut Instance, *mut Error) -> Status,
-    /// `[inst]` Prepares for the next trigger; may be null.
-    pub arm: Option<unsafe extern "C" fn(*mut Instance, *const Job, *mut Error) -> Status>,
+    pub open: Option<unsafe extern "C" fn(*mut Instance, *mut Error) -> Status>,
     /// `[inst]` Runs one job and emits its results.
-    pub run: unsafe extern "C" fn(*mut Instance, *const Job, *const Frame, u32, *mut Error) -> Status,
-    /// `[any]` Wakes a blocked `run` of this job and returns at once.
-    pub cancel: unsafe extern "C" fn(*mut Instance, u64),
-    /// `[inst]` Disconnects, and joins the threads of the plugin.
-    pub close: unsafe extern "C" fn(*mut Instance),
+    pub run: Option<unsafe extern "C" fn(*mut Instance, *const Job, *const Frame, u32, *mut Error) -> Status>,
+    /// `[any]` Wakes a blocked `run` of this job and returns at once. Null: `run` asks `cancelled` often enough.
+    pub cancel: Option<unsafe extern "C" fn(*mut Instance, u64)>,
+    /// `[inst]` Disconnects, and joins the threads of the plugin; `open` may follow.
+    pub close: Option<unsafe extern "C" fn(*mut Instance)>,
     /// `[inst]` Ends the instance; no host call after it.
-    pub destroy: unsafe extern "C" fn(*mut Instance),
-    /// `[any]` Returns an extension table by name, or null.
-    pub get_extension: unsafe extern "C" fn(*mut Instance, *const c_char) -> *const c_void,
+    pub destroy: Option<unsafe extern "C" fn(*mut Instance)>,
+    /// `[any]` Returns an extension table by name, or null. Null: the instance has none.
+    pub get_extension: Option<unsafe extern "C" fn(*mut Instance, *const c_char) -> *const c_void>,
 }
 
-/// Exported table of a library.
+/// Exported table of a library. Functions are required unless their text says otherwise.
 #[repr(C)]
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Entry {
     /// Size of this struct.
     pub struct_size: u32,
     /// Minor version of the boundary, plugin side.
     pub abi_minor: u32,
     /// Called once, before `create`, with the host and the folder of the library.
-    pub init: unsafe extern "C" fn(*const Host, *const c_char, *mut Error) -> Status,
-    /// Called once, after the last `destroy`.
-    pub deinit: unsafe extern "C" fn(),
+    pub init: Option<unsafe extern "C" fn(*const Host, *const c_char, *mut Error) -> Status>,
+    /// Called once, after the last `destroy`; may be null.
+    pub deinit: Option<unsafe extern "C" fn()>,
     /// Returns the number of plugins in the library.
-    pub count: unsafe extern "C" fn() -> u32,
+    pub count: Option<unsafe extern "C" fn() -> u32>,
     /// Returns the descriptor of plugin `index`, null when there is none; constant, also before `init`.
-    pub desc: unsafe extern "C" fn(u32) -> *const Desc,
-    /// Creates an instance from checked values; accesses no hardware.
-    pub create: unsafe extern "C" fn(
-        *const Host,
-        *const c_char,
-        *const Value,
-        u32,
-        *mut *mut Instance,
-        *mut Error,
-    ) -> Status,
+    pub desc: Option<unsafe extern "C" fn(u32) -> *const Desc>,
+    /// Creates an instance of plugin `id` from checked values; accesses no hardware.
+    pub create: Option<
+        unsafe extern "C" fn(
+            *const Host,
+            *const c_char,
+            *const Value,
+            u32,
+            *mut *mut Instance,
+            *mut Error,
+        ) -> Status,
+    >,
+}
+
+/// A struct of a plugin that the host reads as far as both sides know it.
+///
+/// # Safety
+/// Implementors are `repr(C)`, begin with `struct_size: u32`, and all zeros is a valid value.
+pub unsafe trait Table: Copy {
+    /// Name in the header, for messages.
+    const NAME: &'static str;
+    /// Size up to and with the last member that no plugin can do without.
+    const LEAST: usize;
+
+    /// Reads the struct; members that the plugin's version did not have are zero.
+    ///
+    /// # Errors
+    /// Its size, when it is less than [`LEAST`](Self::LEAST).
+    ///
+    /// # Safety
+    /// `at` points to a struct as long as its `struct_size` says.
+    unsafe fn read(at: *const Self) -> Result<Self, u32> {
+        let mut table = std::mem::MaybeUninit::<Self>::zeroed();
+        // SAFETY: the struct is at least as long as it says, and zeros fill the rest.
+        unsafe {
+            let stated = at.cast::<u32>().read();
+            if (stated as usize) < Self::LEAST {
+                return Err(stated);
+            }
+            let n = (stated as usize).min(size_of::<Self>());
+            std::ptr::copy_nonoverlapping(at.cast::<u8>(), table.as_mut_ptr().cast(), n);
+            Ok(table.assume_init())
+        }
+    }
+}
+
+macro_rules! tables {
+    ($($name:ident = $c:literal up to $last:ident of $bytes:literal bytes;)*) => { $(
+        // SAFETY: numbers, raw pointers and optional functions; `struct_size` comes first.
+        unsafe impl Table for $name {
+            const NAME: &'static str = $c;
+            const LEAST: usize = std::mem::offset_of!($name, $last) + $bytes;
+        }
+    )* };
+}
+
+tables! {
+    Entry = "platen_entry" up to create of 8 bytes;
+    Desc = "platen_desc" up to kind of 8 bytes;
+    OptionDecl = "platen_option" up to default_text of 8 bytes;
+    Instance = "platen_instance" up to destroy of 8 bytes;
+    Frame = "platen_frame" up to buffer of 24 bytes;
+    Estimate = "platen_estimate" up to scan_seconds of 8 bytes;
+    HealthSource = "platen_health_source" up to health of 8 bytes;
 }
 
 /// Extension of a scanner instance: duration of a scan.
@@ -379,7 +391,48 @@ pub struct Estimate {
     /// 0.
     pub reserved: u32,
     /// `[inst]` Returns the duration of a scan of the window (null: all of it) in seconds, negative when unknown.
-    pub scan_seconds: unsafe extern "C" fn(*mut Instance, *const crate::payload::Window) -> f64,
+    pub scan_seconds: Option<unsafe extern "C" fn(*mut Instance, *const crate::payload::Window) -> f64>,
+}
+
+/// Extension of a scanner instance: state of the instrument.
+pub const EXT_HEALTH: &std::ffi::CStr = c"platen.ext.health/1";
+
+/// Bits of [`Health::flags`].
+pub mod health_flag {
+    /// Mirror or window must be cleaned.
+    pub const DIRTY: u32 = 1;
+    /// The instrument runs on its battery.
+    pub const ON_BATTERY: u32 = 2;
+    /// The instrument has not reached its working temperature.
+    pub const WARMING_UP: u32 = 4;
+}
+
+/// State of an instrument; NaN where it is not known.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Health {
+    /// Size of this struct.
+    pub struct_size: u32,
+    /// Bits of [`health_flag`].
+    pub flags: u32,
+    /// Temperature inside, degrees Celsius.
+    pub temperature_c: f64,
+    /// Charge of the battery, 0 to 1.
+    pub battery: f64,
+    /// Angle between the instrument's vertical axis and the plumb line, radians.
+    pub tilt: f64,
+}
+
+/// Table of [`EXT_HEALTH`].
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HealthSource {
+    /// Size of this struct.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// `[inst]` Writes what is known after `open` or a job, without asking for more than 100 ms.
+    pub health: Option<unsafe extern "C" fn(*mut Instance, *mut Health) -> Status>,
 }
 
 // Sizes on a 64-bit machine; the C header asserts the same.
@@ -387,11 +440,11 @@ pub struct Estimate {
 const _: () = {
     assert!(size_of::<Error>() == 784);
     assert!(size_of::<Job>() == 48);
-    assert!(size_of::<Frame>() == 80);
+    assert!(size_of::<Frame>() == 48);
     assert!(size_of::<OptionDecl>() == 72);
     assert!(size_of::<Value>() == 56);
     assert!(size_of::<Desc>() == 104);
-    assert!(size_of::<Host>() == 104);
-    assert!(size_of::<Instance>() == 80);
+    assert!(size_of::<Host>() == 80);
+    assert!(size_of::<Instance>() == 64);
     assert!(size_of::<Entry>() == 48);
 };

@@ -4,14 +4,16 @@ use std::time::Duration;
 
 use platen_plant::plant::RigidTransform;
 use platen_plant::{
-    Error as PlantError, Faults, OptionValue, PlantFile, PlateFile, PluginUse, Value, check_options,
+    Error as PlantError, Faults, OptionValue, PlantFile, PlateFile, PluginUse, Value, Worker, check_options,
 };
 use platen_shape::{PlateSpec, RegionOfInterest, Vec3};
 
-use crate::plugin::{Catalogue, Comparison, Flattening, Library, PluginError, Scanner};
+use crate::plugin::{
+    Catalogue, Comparison, Flattening, Instance, Isolation, Library, Limits, PluginError, Scanner, Settings,
+};
 
-/// Deadline of a flattening or a comparison.
-pub(crate) const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
+/// Deadline of a flattening or a comparison without a press; with one, its `timeouts.evaluate_ms`.
+const EVALUATION_LIMIT: Duration = Duration::from_secs(10);
 
 /// Configured plugins of a plant, ready to measure.
 #[derive(Debug)]
@@ -49,7 +51,7 @@ pub enum PipelineError {
 /// # Errors
 /// The library cannot be used, or every fault of its options.
 pub fn load(catalogue: &Catalogue, wanted: &PluginUse) -> Result<(Library, Vec<OptionValue>), PipelineError> {
-    let library = catalogue.load(&wanted.plugin)?;
+    let library = catalogue.load(&wanted.plugin)?.with(settings(&wanted.worker));
     let values = check_options(&wanted.plugin, &wanted.options, &library.descriptor().options)?;
     Ok((library, values))
 }
@@ -71,7 +73,13 @@ pub fn load_with<'a>(
     Ok((library, values))
 }
 
-/// Creates a comparison with the deadline of a stroke.
+fn settings(wanted: &Worker) -> Settings {
+    let isolation = if wanted.in_process { Isolation::InProcess } else { Isolation::Process };
+    let limits = Limits { memory: wanted.memory_mib << 20, files: wanted.files, pool: wanted.pool_mib << 20 };
+    Settings { isolation, limits }
+}
+
+/// Creates a comparison outside a plant.
 ///
 /// # Errors
 /// The library cannot be used, or every fault of its options.
@@ -86,9 +94,13 @@ impl Pipeline {
     /// # Errors
     /// The first plugin that cannot be used.
     pub fn of(plant: &PlantFile, catalogue: &Catalogue) -> Result<Self, PipelineError> {
+        let limit = plant.press.as_ref().map_or(EVALUATION_LIMIT, |press| press.timeouts.evaluate);
         let (library, values) = load(catalogue, &plant.flattening)?;
-        let flattening = Flattening::create(&library, &values, EVALUATION_LIMIT)?;
-        let comparisons = plant.comparisons.iter().map(|wanted| comparison(catalogue, wanted));
+        let flattening = Flattening::create(&library, &values, limit)?;
+        let comparisons = plant.comparisons.iter().map(|wanted| {
+            let (library, values) = load(catalogue, wanted)?;
+            Ok(Comparison::create(&library, &values, limit)?)
+        });
         let comparisons = comparisons.collect::<Result<_, PipelineError>>()?;
         Ok(Self {
             flattening,
@@ -102,6 +114,19 @@ impl Pipeline {
                 .region_of_interest
                 .map(|r| RegionOfInterest { min: r.min.into(), max: r.max.into() }),
         })
+    }
+
+    /// Returns the plugins that evaluate a scan.
+    pub fn instances(&self) -> impl Iterator<Item = &Instance> {
+        std::iter::once(self.flattening.instance()).chain(self.comparisons.iter().map(Comparison::instance))
+    }
+
+    /// Makes sure that every plugin has its worker.
+    ///
+    /// # Errors
+    /// The first that is out of use.
+    pub fn revive(&self) -> Result<(), PluginError> {
+        self.instances().try_for_each(Instance::revive)
     }
 
     /// Returns the plate for the geometry: size, inset, direction of u, region of interest.

@@ -1,33 +1,42 @@
-//! Plugin libraries: found by name, checked as data before any of their code runs, loaded once, never unloaded.
+//! Plugins: found by name, each in a process of its own, started again after a fault.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `catalogue` | the plugin folders, and the libraries in them |
-//! | `library`, `descriptor` | a loaded library, and a copy of its static description |
-//! | `instance`, `job`, `host_table`, `values` | one configured plugin on a thread of its own; calls through the tables of `platen.h` |
+//! | `library`, `descriptor` | a plugin of a library, and its description |
 //! | `scanner`, `flattening`, `comparison` | the three kinds behind safe types |
+//! | `instance`, `job` | one configured plugin, and what it is asked for |
+//! | `faults`, `quarantine` | when a plugin rests, and when it is given up |
+//! | `worker` | its process: messages, shared memory, limits; both ends |
+//! | `local` | its library inside the worker: the calls through the tables of `platen.h` |
 //! | `error` | reasons why a plugin cannot be used or has failed |
 //!
-//! All `unsafe` of the host is in this module.
+//! All `unsafe` of the host is in this module, nearly all of it runs in workers.
 
 mod catalogue;
+mod clock;
 mod comparison;
 mod descriptor;
 mod error;
+mod faults;
 mod flattening;
-mod host_table;
 mod instance;
 mod job;
 mod library;
+mod local;
+mod quarantine;
 mod scanner;
-mod values;
+mod worker;
 
 pub use catalogue::{Catalogue, Listed};
 pub use comparison::{Comparison, Surfaces};
 pub use descriptor::{Descriptor, Kind};
 pub use error::PluginError;
 pub use flattening::Flattening;
-pub use instance::{Emitted, Instance, RunningJob};
+use instance::InputFrame;
+pub use instance::{Emitted, Instance, RunningJob, WorkerState};
 pub use job::{CancelToken, JobSpec};
-pub use library::Library;
+pub use library::{Isolation, Library, Settings};
+pub use quarantine::{Quarantine, Quarantined};
 pub use scanner::{RunningScan, Scanner};
+pub use worker::{Confinement, Limits, serve_stdin};

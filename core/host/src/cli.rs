@@ -22,6 +22,7 @@ mod screen;
 mod setup;
 mod status;
 mod verify;
+mod worker;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,7 +30,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 
 use platen_engine::pipeline::PipelineError;
-use platen_engine::plugin::{Catalogue, PluginError};
+use platen_engine::plugin::{Catalogue, Isolation, PluginError};
 use platen_formats::WriteError;
 use platen_history::Error as HistoryError;
 use platen_report::output_folder::FilesError;
@@ -60,12 +61,16 @@ pub struct Common {
     /// Print the result as JSON
     #[arg(long, global = true)]
     pub json: bool,
+    /// Run plugins in threads of this process, for a debugger
+    #[arg(long, global = true, hide_short_help = true)]
+    pub in_process: bool,
 }
 
 impl Common {
     /// Returns the catalogue of the plugin folders, that of `--plugins` first.
     pub fn catalogue(&self) -> Catalogue {
-        Catalogue::new(self.plugins.as_deref())
+        let isolation = if self.in_process { Isolation::InProcess } else { Isolation::Process };
+        Catalogue::new(self.plugins.as_deref()).isolated(isolation)
     }
 }
 
@@ -103,6 +108,9 @@ enum Verb {
     Bench(bench::BenchArguments),
     /// Generate man pages or shell completions
     Generate(generate::Command),
+    /// Carry one plugin; started by platen itself
+    #[command(hide = true)]
+    Worker(worker::Command),
 }
 
 /// Failure of a verb, by exit code.
@@ -179,6 +187,7 @@ pub fn main() -> ExitCode {
         Verb::Plugins(command) => plugins::run(&cli.common, command),
         Verb::Bench(_) => bench::start(),
         Verb::Generate(command) => generate::run(&cli.common, command, Cli::command()),
+        Verb::Worker(_) => worker::run(),
     })
 }
 
@@ -208,7 +217,9 @@ fn run_program(run: impl FnOnce(&Cli) -> Result<ExitCode, CliError>) -> ExitCode
             return ExitCode::from(code);
         }
     };
-    start_log();
+    if !matches!(cli.verb, Verb::Worker(_)) {
+        start_log();
+    }
     match run(&cli) {
         Ok(code) => code,
         Err(error) => {

@@ -1,5 +1,6 @@
 //! The program `platen`: command line, and `run`, which serves a press.
 
 pub mod cli;
+mod plugin_records;
 pub mod progress;
 pub mod run;

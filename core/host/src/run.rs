@@ -17,6 +17,7 @@ mod measurement_worker;
 
 mod figures;
 mod journal;
+mod plugin_status;
 mod previous_scans;
 mod prometheus;
 mod region;
@@ -36,12 +37,13 @@ use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
 pub use measurement_worker::StrokeReport;
+pub use plugin_status::PluginStatus;
 pub use screen::{Pages, ScreenError};
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
 use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
-use platen_engine::plugin::{CancelToken, Catalogue};
+use platen_engine::plugin::{CancelToken, Catalogue, Quarantine};
 use screen::{Screen, Teller};
 
 /// Time for the last scan to be written when the host stops.
@@ -85,6 +87,7 @@ pub async fn run(
 ) -> Result<(), HostError> {
     let history = History::open(&plant.output.history, press.press_id, Timestamp::now())?;
     let history = Arc::new(Mutex::new(history));
+    let catalogue = &catalogue.clone().with_quarantine(Quarantine::beside(&plant.output.history));
     let pipeline = Pipeline::of(plant, catalogue)?;
     let (mut host, side) = channels();
     let (commands, inbox) = std::sync::mpsc::channel();
@@ -103,6 +106,7 @@ pub async fn run(
         strokes,
         lost: Arc::clone(&beside.lost),
         screen: teller.clone(),
+        plugins: Arc::clone(&beside.plugins),
     };
     let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));

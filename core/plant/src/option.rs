@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::document::{Document, Reported};
 use crate::key::TomlKey;
 use crate::nearest;
@@ -14,7 +16,7 @@ use crate::unit::Unit;
 use crate::{Fault, Faults};
 
 /// Type of an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum OptionType {
     /// True or false.
     Bool,
@@ -51,7 +53,7 @@ impl OptionType {
 }
 
 /// Declaration of one option by its plugin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OptionDecl {
     /// The key: `[a-z][a-z0-9_]*`.
     pub name: String,
@@ -76,7 +78,7 @@ pub struct OptionDecl {
 }
 
 /// Checked value. Numbers are in the declared unit, durations in seconds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Value {
     /// Of a [`OptionType::Bool`].
     Bool(bool),
@@ -95,7 +97,7 @@ pub enum Value {
 }
 
 /// Value of one option and its origin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OptionValue {
     /// Name of the option.
     pub name: String,

@@ -12,7 +12,7 @@ mod screen;
 pub use calibration::CalibrationUse;
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
-pub use plugin_use::PluginUse;
+pub use plugin_use::{PluginUse, Worker};
 pub use screen::Screen;
 
 use std::path::{Path, PathBuf};

@@ -11,6 +11,7 @@ mod lines;
 mod next;
 mod outline;
 mod plate;
+mod plugins;
 
 pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
 pub use grid::GridRecord;
@@ -18,6 +19,7 @@ pub use lines::{LineRecord, PointRecord, TemplateRecord};
 pub use next::{CURVATURE_DEFICIT, Next, NextPlace, NoNext};
 pub use outline::{OutlineRecord, OutlineSource};
 pub use plate::PlateRecord;
+pub use plugins::PluginRecord;
 
 use std::fmt::Display;
 
@@ -85,6 +87,9 @@ pub struct ResultRecord {
     pub next: Option<Next>,
     /// Quality of the measurement.
     pub quality: QualityRecord,
+    /// Plugins that took part; none in documents older than it.
+    #[serde(default)]
+    pub plugins: Vec<PluginRecord>,
     /// Time of each stage.
     pub timings_ms: TimingsRecord,
 }
@@ -262,8 +267,18 @@ impl ResultRecord {
                 noise_mm: mm(measurement.quality.noise),
                 lattice_step_mm: mm(measurement.quality.lattice_step),
             },
+            plugins: Vec::new(),
             timings_ms: timings(scanned, measured, context.compare),
         }
+    }
+
+    /// Adds the plugins that took part; one that was repeated is told.
+    pub fn name_plugins(&mut self, plugins: Vec<PluginRecord>) {
+        let repeated = plugins.iter().filter(|plugin| plugin.retried);
+        self.says.extend(
+            repeated.map(|p| format!("{} failed once; this is its result in a fresh process", p.plugin)),
+        );
+        self.plugins = plugins;
     }
 
     /// Returns the extent of the plate along u and v, millimetres.

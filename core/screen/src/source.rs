@@ -216,4 +216,6 @@ pub struct PluginRow {
     pub version: String,
     /// File of its library.
     pub file: String,
+    /// State of its process.
+    pub state: String,
 }

@@ -2,8 +2,8 @@
 
 use std::ffi::{CStr, c_char};
 
+use platen_abi::desc_flag;
 use platen_abi::payload::{self, Header};
-use platen_abi::{desc_flag, frame_flag};
 use platen_model::{Report, Task};
 use platen_shape::Surface;
 
@@ -86,9 +86,9 @@ impl<C: Comparison> Plugin for ComparisonPlugin<C> {
         let report = self.0.compare(job, &read(inputs)?)?;
         for field in &report.fields {
             check(field).map_err(|e| Error::new(ErrorKind::Internal, e.to_string()))?;
-            job.send(field, 0)?;
+            job.send(field)?;
         }
-        job.send(&report.findings, frame_flag::LAST)
+        job.send(&report.findings)
     }
 }
 

@@ -68,13 +68,6 @@ impl Error {
         self
     }
 
-    /// Marks the device as lost until it is opened again.
-    #[must_use]
-    pub fn device_lost(mut self) -> Self {
-        self.flags |= error_flag::DEVICE_LOST;
-        self
-    }
-
     /// Returns the kind.
     pub fn kind(&self) -> ErrorKind {
         self.kind

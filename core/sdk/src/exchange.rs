@@ -57,12 +57,7 @@ pub trait Payload: Sized {
     /// Name of the format.
     const FORMAT: &'static CStr;
 
-    /// Returns the number of items for `count` of the frame; 0 where the format has none.
-    fn count(&self) -> u64 {
-        0
-    }
-
-    /// Writes the value into a zeroed buffer of as many bytes as `allocate` is asked for.
+    /// Writes the value into a buffer of as many bytes as `allocate` is asked for.
     ///
     /// # Errors
     /// Those of `allocate`.

@@ -52,6 +52,6 @@ impl<F: Flattening> Plugin for FlatteningPlugin<F> {
         let mesh = DiskMesh::decode(input.bytes).map_err(|e| refused(&e))?;
         let chart = self.0.flatten(job, &mesh)?;
         chart.check(&mesh).map_err(|e| Error::new(ErrorKind::Internal, e.to_string()))?;
-        job.send(&chart, platen_abi::frame_flag::LAST)
+        job.send(&chart)
     }
 }

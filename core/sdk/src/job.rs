@@ -1,6 +1,6 @@
 //! Job of a plugin: deadline, cancellation, progress, host memory.
 
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -46,7 +46,7 @@ impl<'a> Job<'a> {
         if unsafe { (self.host.cancelled)(self.host, self.raw.job_id) } == 0 {
             Ok(())
         } else {
-            Err(Error::new(ErrorKind::Cancelled, "the job was cancelled or its deadline passed"))
+            Err(cancelled())
         }
     }
 
@@ -72,12 +72,15 @@ impl<'a> Job<'a> {
         CancelGuard { waker: self.waker }
     }
 
-    /// Allocates a zeroed buffer of the host.
+    /// Allocates a buffer of the host.
     fn buffer(&self, bytes: usize) -> Result<OwnedBuffer<'a>> {
         let mut raw = abi::Buffer { data: std::ptr::null_mut(), bytes: 0, token: 0 };
         // SAFETY: `raw` lives for the call.
         let status =
-            unsafe { (self.host.buffer_alloc)(self.host, self.raw.job_id, bytes as u64, 8, &raw mut raw) };
+            unsafe { (self.host.buffer_alloc)(self.host, self.raw.job_id, bytes as u64, &raw mut raw) };
+        if status == abi::status::CANCELLED {
+            return Err(cancelled());
+        }
         if status != abi::status::OK || raw.data.is_null() || raw.bytes < bytes as u64 {
             return Err(Error::new(ErrorKind::Memory, format!("the host has no buffer of {bytes} bytes")));
         }
@@ -85,35 +88,29 @@ impl<'a> Job<'a> {
     }
 
     /// Sends a value to the host.
-    pub(crate) fn send<T: Payload>(&self, value: &T, flags: u32) -> Result<()> {
+    pub(crate) fn send<T: Payload>(&self, value: &T) -> Result<()> {
         let buffer = value.encode(|bytes| self.buffer(bytes))?;
-        self.emit(T::FORMAT, value.count(), flags, buffer)
-    }
-
-    /// Passes a buffer to the host as a frame of `format`.
-    fn emit(&self, format: &CStr, count: u64, flags: u32, buffer: OwnedBuffer<'_>) -> Result<()> {
         let frame = abi::Frame {
             struct_size: size_of::<abi::Frame>() as u32,
-            flags,
-            format: format.as_ptr(),
-            frame_id: c"scanner".as_ptr(),
-            mono_ns: 0,
-            count,
-            buffer: buffer.raw,
-            attrs: std::ptr::null(),
-            n_attrs: 0,
             reserved: 0,
+            format: T::FORMAT.as_ptr(),
+            role: std::ptr::null(),
+            buffer: buffer.raw,
         };
         std::mem::forget(buffer);
         // SAFETY: the frame lives for the call; the buffer is the host's from here on.
         match unsafe { (self.host.emit)(self.host, self.raw.job_id, &raw const frame) } {
             abi::status::OK => Ok(()),
-            abi::status::CANCELLED => Err(Error::new(ErrorKind::Cancelled, "the job was cancelled")),
+            abi::status::CANCELLED => Err(cancelled()),
             status => {
                 Err(Error::new(ErrorKind::BadData, format!("the host refused a frame (status {status})")))
             }
         }
     }
+}
+
+fn cancelled() -> Error {
+    Error::new(ErrorKind::Cancelled, "the job was cancelled or its deadline passed")
 }
 
 /// Registration of a waker; ends when dropped.
@@ -142,7 +139,7 @@ struct OwnedBuffer<'a> {
 
 impl AsMut<[u8]> for OwnedBuffer<'_> {
     fn as_mut(&mut self) -> &mut [u8] {
-        // SAFETY: the host gave at least `bytes` zeroed bytes, which are ours until emitted or freed.
+        // SAFETY: the host gave at least `bytes` bytes of memory that was written before, which are ours until emitted or freed.
         unsafe { std::slice::from_raw_parts_mut(self.raw.data.cast(), self.bytes) }
     }
 }

@@ -68,6 +68,7 @@
 
 mod error;
 pub mod exchange;
+mod health;
 mod info;
 mod job;
 mod logging;
@@ -90,6 +91,7 @@ pub use error::{Error, ErrorKind, Result};
 pub use flattening::Flattening;
 #[cfg(feature = "comparison")]
 pub use grid::PlateGrid;
+pub use health::Health;
 pub use info::Info;
 pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};

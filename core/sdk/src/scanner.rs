@@ -2,10 +2,9 @@
 
 use std::time::Duration;
 
-use platen_abi::frame_flag;
 use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
-use crate::{Error, ErrorKind, Info, Job, Options, Result};
+use crate::{Error, ErrorKind, Health, Info, Job, Options, Result};
 
 /// Plugin that turns a trigger into a lattice, column by column.
 pub trait Scanner: Send + Sized + 'static {
@@ -34,12 +33,9 @@ pub trait Scanner: Send + Sized + 'static {
         None
     }
 
-    /// Prepares for the next trigger.
-    ///
-    /// # Errors
-    /// When the device is not ready to scan.
-    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
-        job.check()
+    /// Returns what is known of the instrument after `open` or a scan, without asking it for longer than 100 ms.
+    fn health(&mut self) -> Option<Health> {
+        None
     }
 
     /// Scans: calls [`ScanSink::begin`] once, [`ScanSink::column`] for the columns in any order, [`ScanSink::end`] once.
@@ -95,7 +91,6 @@ pub struct ScanSink<'a> {
     pub(crate) job: Job<'a>,
     pub(crate) window: Option<Window>,
     pub(crate) n_rows: Option<u32>,
-    pub(crate) simulated: bool,
     pub(crate) ended: bool,
 }
 
@@ -114,8 +109,7 @@ impl ScanSink<'_> {
             return Err(Error::new(ErrorKind::Internal, "begin was called twice for one scan"));
         }
         self.n_rows = Some(header.n_rows);
-        self.simulated = header.simulated;
-        self.job.send(header, self.flags())
+        self.job.send(header)
     }
 
     /// Sends one column.
@@ -127,7 +121,7 @@ impl ScanSink<'_> {
             .n_rows
             .ok_or_else(|| Error::new(ErrorKind::Internal, "a column was sent before the header"))?;
         column.check(n_rows).map_err(|e| Error::new(ErrorKind::BadData, e.to_string()))?;
-        self.job.send(column, self.flags())
+        self.job.send(column)
     }
 
     /// Ends the scan. Must be called once, last: a scan without end is discarded.
@@ -139,10 +133,6 @@ impl ScanSink<'_> {
             return Err(Error::new(ErrorKind::Internal, "end was called without begin, or twice"));
         }
         self.ended = true;
-        self.job.send(end, self.flags() | frame_flag::LAST)
-    }
-
-    fn flags(&self) -> u32 {
-        if self.simulated { frame_flag::SIMULATED } else { 0 }
+        self.job.send(end)
     }
 }

@@ -10,7 +10,7 @@ use platen_abi as abi;
 
 use crate::exchange::{DecodeError, Payload, from_raw_window};
 pub use crate::option::{Declared, declare};
-use crate::{Error, ErrorKind, Info, Job, Options, Result, Scanner, Values, job, logging};
+use crate::{Error, ErrorKind, Health, Info, Job, Options, Result, Scanner, Values, job, logging};
 
 /// Input frame from the host.
 #[derive(Debug, Clone, Copy)]
@@ -31,12 +31,12 @@ pub trait Plugin: Send + Sized + 'static {
     fn open(&mut self) -> Result<()> {
         Ok(())
     }
-    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
-        job.check()
-    }
     fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()>;
     fn estimate_s(&mut self, window: Option<&platen_scan::Window>) -> Option<f64> {
         let _ = window;
+        None
+    }
+    fn health(&mut self) -> Option<Health> {
         None
     }
     fn close(&mut self) {}
@@ -90,18 +90,18 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
     fn open(&mut self) -> Result<()> {
         self.0.open()
     }
-    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
-        self.0.arm(job)
-    }
     fn estimate_s(&mut self, window: Option<&platen_scan::Window>) -> Option<f64> {
         self.0.estimate_s(window)
+    }
+    fn health(&mut self) -> Option<Health> {
+        self.0.health()
     }
     fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()> {
         let window = inputs.iter().find(|input| input.format == platen_scan::Window::FORMAT);
         let window = window
             .map(|input| platen_scan::Window::decode(input.bytes).map_err(|e| refused(&e)))
             .transpose()?;
-        let mut sink = crate::ScanSink { job: *job, window, n_rows: None, simulated: false, ended: false };
+        let mut sink = crate::ScanSink { job: *job, window, n_rows: None, ended: false };
         self.0.capture(job, &mut sink)?;
         if sink.ended {
             Ok(())
@@ -128,6 +128,7 @@ pub(crate) fn refused(error: &DecodeError) -> Error {
 struct State<P> {
     raw: abi::Instance,
     estimate: abi::Estimate,
+    health: abi::HealthSource,
     host: &'static abi::Host,
     waker: job::Waker,
     plugin: P,
@@ -147,10 +148,8 @@ unsafe fn guard(out: *mut abi::Error, work: impl FnOnce() -> Result<()>) -> abi:
         Ok(Err(error)) => error,
         Err(payload) => {
             let text = LAST_PANIC.take().unwrap_or_else(|| panic_text(payload.as_ref()));
-            let mut error = Error::new(ErrorKind::Internal, format!("the plugin panicked: {text}"))
-                .hint("this is a fault of the plugin: report it with the scan and the plant file");
-            error.flags |= abi::error_flag::RECREATE;
-            error
+            Error::new(ErrorKind::Internal, format!("the plugin panicked: {text}"))
+                .hint("this is a fault of the plugin: report it with the scan and the plant file")
         }
     };
     // SAFETY: as the caller promises; a shorter struct of an older host is left alone.
@@ -183,16 +182,76 @@ fn copy_text(out: &mut [c_char], text: &str) {
     }
 }
 
-/// Makes the exported table of a library with one plugin.
-pub const fn entry<P: Plugin>() -> abi::Entry {
+/// One plugin of a library.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    desc: &'static abi::Desc,
+    create: unsafe fn(&'static abi::Host, &[abi::Value]) -> Result<*mut abi::Instance>,
+}
+
+// SAFETY: a descriptor is constant and leads to constants.
+unsafe impl Sync for Row {}
+
+/// Makes the row of a plugin.
+pub const fn row<P: Plugin>() -> Row {
+    Row { desc: const { &P::DESC }, create: create::<P> }
+}
+
+/// Functions that depend on the plugins of the library.
+type Desc = unsafe extern "C" fn(u32) -> *const abi::Desc;
+type Create = unsafe extern "C" fn(
+    *const abi::Host,
+    *const c_char,
+    *const abi::Value,
+    u32,
+    *mut *mut abi::Instance,
+    *mut abi::Error,
+) -> abi::Status;
+
+/// Makes the exported table of a library.
+pub const fn entry(count: unsafe extern "C" fn() -> u32, desc: Desc, create: Create) -> abi::Entry {
     abi::Entry {
         struct_size: size_of::<abi::Entry>() as u32,
         abi_minor: abi::ABI_MINOR,
-        init,
-        deinit,
-        count,
-        desc: desc::<P>,
-        create: create::<P>,
+        init: Some(init),
+        deinit: None,
+        count: Some(count),
+        desc: Some(desc),
+        create: Some(create),
+    }
+}
+
+/// Returns the descriptor of a plugin, null when there is none.
+pub fn desc(rows: &'static [Row], index: u32) -> *const abi::Desc {
+    rows.get(index as usize).map_or(std::ptr::null(), |row| std::ptr::from_ref(row.desc))
+}
+
+/// Creates an instance of the plugin `id`.
+///
+/// # Safety
+/// The arguments are the host's, valid for the call, as the header demands.
+pub unsafe fn create_one(
+    rows: &'static [Row],
+    host: *const abi::Host,
+    id: *const c_char,
+    values: (*const abi::Value, u32),
+    out: *mut *mut abi::Instance,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: as the caller promises.
+    unsafe {
+        guard(error, || {
+            let host = checked_host(host)?;
+            let is_named = |row: &&Row| !id.is_null() && CStr::from_ptr(id) == CStr::from_ptr(row.desc.id);
+            let row = rows
+                .iter()
+                .find(is_named)
+                .ok_or_else(|| Error::new(ErrorKind::NotFound, "this library has no plugin of that name"))?;
+            let (values, n) = values;
+            let values = if n == 0 { &[] } else { std::slice::from_raw_parts(values, n as usize) };
+            *out = (row.create)(host, values)?;
+            Ok(())
+        })
     }
 }
 
@@ -228,59 +287,36 @@ unsafe fn checked_host(host: *const abi::Host) -> Result<&'static abi::Host> {
     Ok(host)
 }
 
-unsafe extern "C" fn deinit() {}
-
-unsafe extern "C" fn count() -> u32 {
-    1
-}
-
-unsafe extern "C" fn desc<P: Plugin>(index: u32) -> *const abi::Desc {
-    if index == 0 { const { &P::DESC } } else { std::ptr::null() }
-}
-
-unsafe extern "C" fn create<P: Plugin>(
-    host: *const abi::Host,
-    id: *const c_char,
-    values: *const abi::Value,
-    n: u32,
-    out: *mut *mut abi::Instance,
-    error: *mut abi::Error,
-) -> abi::Status {
-    // SAFETY: the arguments are the host's, valid for the call, as the header demands.
-    unsafe {
-        guard(error, || {
-            let host = checked_host(host)?;
-            if id.is_null() || CStr::from_ptr(id) != CStr::from_ptr(P::DESC.id) {
-                return Err(Error::new(ErrorKind::NotFound, "this library has no plugin of that name"));
-            }
-            let values = if n == 0 { &[] } else { std::slice::from_raw_parts(values, n as usize) };
-            let state = Box::new(State {
-                raw: abi::Instance {
-                    struct_size: size_of::<abi::Instance>() as u32,
-                    reserved: 0,
-                    data: std::ptr::null_mut(),
-                    desc: const { &P::DESC },
-                    open: open::<P>,
-                    arm: Some(arm::<P>),
-                    run: run::<P>,
-                    cancel: cancel::<P>,
-                    close: close::<P>,
-                    destroy: destroy::<P>,
-                    get_extension: get_extension::<P>,
-                },
-                estimate: abi::Estimate {
-                    struct_size: size_of::<abi::Estimate>() as u32,
-                    reserved: 0,
-                    scan_seconds: scan_seconds::<P>,
-                },
-                host,
-                waker: Mutex::new(None),
-                plugin: P::create(&Values(values))?,
-            });
-            *out = Box::into_raw(state).cast();
-            Ok(())
-        })
-    }
+/// # Safety
+/// The host's table lives until `deinit`; the values live for the call.
+unsafe fn create<P: Plugin>(host: &'static abi::Host, values: &[abi::Value]) -> Result<*mut abi::Instance> {
+    let state = Box::new(State {
+        raw: abi::Instance {
+            struct_size: size_of::<abi::Instance>() as u32,
+            reserved: 0,
+            data: std::ptr::null_mut(),
+            open: Some(open::<P>),
+            run: Some(run::<P>),
+            cancel: Some(cancel::<P>),
+            close: Some(close::<P>),
+            destroy: Some(destroy::<P>),
+            get_extension: Some(get_extension::<P>),
+        },
+        estimate: abi::Estimate {
+            struct_size: size_of::<abi::Estimate>() as u32,
+            reserved: 0,
+            scan_seconds: Some(scan_seconds::<P>),
+        },
+        health: abi::HealthSource {
+            struct_size: size_of::<abi::HealthSource>() as u32,
+            reserved: 0,
+            health: Some(health::<P>),
+        },
+        host,
+        waker: Mutex::new(None),
+        plugin: P::create(&Values(values))?,
+    });
+    Ok(Box::into_raw(state).cast())
 }
 
 /// Returns the parts of an instance that an `[inst]` call uses.
@@ -296,21 +332,6 @@ unsafe fn parts<'a, P>(instance: *mut abi::Instance) -> (&'a mut P, &'static abi
 unsafe extern "C" fn open<P: Plugin>(instance: *mut abi::Instance, error: *mut abi::Error) -> abi::Status {
     // SAFETY: `[inst]` call on an instance from `create`.
     unsafe { guard(error, || parts::<P>(instance).0.open()) }
-}
-
-unsafe extern "C" fn arm<P: Plugin>(
-    instance: *mut abi::Instance,
-    job: *const abi::Job,
-    error: *mut abi::Error,
-) -> abi::Status {
-    // SAFETY: `[inst]` call on an instance from `create`; the job is borrowed for the call.
-    unsafe {
-        guard(error, || {
-            let (plugin, host, waker) = parts::<P>(instance);
-            let raw = &*job;
-            logging::in_job(raw.job_id, || plugin.arm(&Job { raw, host, waker }))
-        })
-    }
 }
 
 unsafe extern "C" fn run<P: Plugin>(
@@ -338,12 +359,7 @@ unsafe extern "C" fn run<P: Plugin>(
 unsafe fn input(frame: &abi::Frame) -> Input<'_> {
     // SAFETY: as the caller promises.
     unsafe {
-        let attrs = if frame.n_attrs == 0 {
-            &[]
-        } else {
-            std::slice::from_raw_parts(frame.attrs, frame.n_attrs as usize)
-        };
-        let role = attrs.iter().find(|a| CStr::from_ptr(a.key) == c"role").map(|a| CStr::from_ptr(a.value));
+        let role = (!frame.role.is_null()).then(|| CStr::from_ptr(frame.role));
         let bytes = if frame.buffer.bytes == 0 {
             &[]
         } else {
@@ -390,13 +406,29 @@ unsafe extern "C" fn get_extension<P: Plugin>(
     instance: *mut abi::Instance,
     id: *const c_char,
 ) -> *const c_void {
-    // SAFETY: `[any]` call; the estimate table never changes, the id is NUL-terminated.
+    // SAFETY: `[any]` call; the tables never change, the id is NUL-terminated.
     unsafe {
-        if !id.is_null() && CStr::from_ptr(id) == abi::EXT_ESTIMATE {
-            (&raw const (*instance.cast::<State<P>>()).estimate).cast()
-        } else {
-            std::ptr::null()
+        let state = instance.cast::<State<P>>();
+        match id {
+            _ if id.is_null() => std::ptr::null(),
+            _ if CStr::from_ptr(id) == abi::EXT_ESTIMATE => (&raw const (*state).estimate).cast(),
+            _ if CStr::from_ptr(id) == abi::EXT_HEALTH => (&raw const (*state).health).cast(),
+            _ => std::ptr::null(),
         }
+    }
+}
+
+unsafe extern "C" fn health<P: Plugin>(instance: *mut abi::Instance, out: *mut abi::Health) -> abi::Status {
+    // SAFETY: `[inst]` call on an instance from `create`; `out` is the host's struct, as long as it says.
+    unsafe {
+        guard(std::ptr::null_mut(), || {
+            let known = parts::<P>(instance).0.health();
+            let known = known.ok_or_else(|| Error::new(ErrorKind::NoData, "nothing is known"))?;
+            if let Some(out) = out.as_mut() {
+                *out = known.to_raw();
+            }
+            Ok(())
+        })
     }
 }
 
@@ -416,27 +448,46 @@ unsafe extern "C" fn scan_seconds<P: Plugin>(
     seconds
 }
 
-/// Exports a plugin: `export!(scanner Type);`, `export!(flattening Type);` or `export!(comparison Type);`.
+/// Exports the plugins of a library: `export!(scanner Type);`, `export!(flattening Type);`, `export!(comparison Type);`, or several:
+/// `export!(flattening One, flattening Two);`.
 #[macro_export]
 macro_rules! export {
-    (scanner $plugin:ty) => {
-        $crate::export!(@entry $crate::shim::ScannerPlugin<$plugin>);
-    };
-    (flattening $plugin:ty) => {
-        $crate::export!(@entry $crate::shim::FlatteningPlugin<$plugin>);
-    };
-    (comparison $plugin:ty) => {
-        $crate::export!(@entry $crate::shim::ComparisonPlugin<$plugin>);
-    };
-    (@entry $shim:ty) => {
+    ($($kind:ident $plugin:ty),+ $(,)?) => {
         #[cfg(panic = "abort")]
         compile_error!("a plugin must be built with panic = \"unwind\": its panics become errors");
 
-        /// Table of the library.
-        #[allow(non_upper_case_globals, unsafe_code, reason = "the name is the boundary's")]
-        #[unsafe(no_mangle)]
-        pub static platen_entry_1: $crate::abi::Entry = $crate::shim::entry::<$shim>();
+        #[allow(unsafe_code, reason = "the boundary")]
+        const _: () = {
+            use $crate::abi;
+
+            static ROWS: &[$crate::shim::Row] = &[$($crate::shim::row::<$crate::export!(@adapter $kind $plugin)>()),+];
+
+            unsafe extern "C" fn count() -> u32 {
+                ROWS.len() as u32
+            }
+            unsafe extern "C" fn desc(index: u32) -> *const abi::Desc {
+                $crate::shim::desc(ROWS, index)
+            }
+            unsafe extern "C" fn create(
+                host: *const abi::Host,
+                id: *const ::std::ffi::c_char,
+                values: *const abi::Value,
+                n: u32,
+                out: *mut *mut abi::Instance,
+                error: *mut abi::Error,
+            ) -> abi::Status {
+                // SAFETY: as the header demands of the host.
+                unsafe { $crate::shim::create_one(ROWS, host, id, (values, n), out, error) }
+            }
+
+            #[allow(non_upper_case_globals, reason = "the name is the boundary's")]
+            #[unsafe(no_mangle)]
+            static platen_entry_2: abi::Entry = $crate::shim::entry(count, desc, create);
+        };
     };
+    (@adapter scanner $plugin:ty) => { $crate::shim::ScannerPlugin<$plugin> };
+    (@adapter flattening $plugin:ty) => { $crate::shim::FlatteningPlugin<$plugin> };
+    (@adapter comparison $plugin:ty) => { $crate::shim::ComparisonPlugin<$plugin> };
 }
 
 #[cfg(feature = "comparison")]

@@ -134,11 +134,6 @@ impl Scanner for FaroFile {
         self.look()
     }
 
-    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
-        job.check()?;
-        self.look()
-    }
-
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let alive = || job.check().is_ok();
         let mut progress = device::progress(job, "looking at the lattice");

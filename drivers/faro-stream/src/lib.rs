@@ -91,11 +91,6 @@ impl Scanner for FaroStream {
         self.ask(window).ok().flatten()
     }
 
-    fn arm(&mut self, job: &Job<'_>) -> Result<()> {
-        job.check()?;
-        self.ask(None).map(drop)
-    }
-
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let request = self.request(job.id(), out.window());
         device::scan(&self.options.address, request, out).map_err(|error| error.at(&self.options.address))

@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Descriptor, Library, PluginError};
+use super::{Descriptor, Isolation, Library, PluginError, Quarantine, Settings};
 
-/// Plugin folders, in the order of the search.
+/// Plugin folders, in the order of the search, and how their plugins run.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     folders: Vec<PathBuf>,
+    isolation: Isolation,
+    quarantine: Option<Quarantine>,
 }
 
 /// One library file of the plugin folders.
@@ -16,8 +18,8 @@ pub struct Catalogue {
 pub struct Listed {
     /// File.
     pub path: PathBuf,
-    /// Its description, or the reason why it cannot be used.
-    pub plugin: Result<Descriptor, PluginError>,
+    /// Its plugins, or the reason why it cannot be used.
+    pub plugins: Result<Vec<Descriptor>, PluginError>,
 }
 
 impl Catalogue {
@@ -26,29 +28,49 @@ impl Catalogue {
         let program = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
         let installed = program.as_ref().map(|folder| folder.join("../lib/platen/plugins"));
         let folders = [given.map(Path::to_path_buf), installed, program];
-        Self { folders: folders.into_iter().flatten().filter(|folder| folder.is_dir()).collect() }
+        let folders = folders.into_iter().flatten().filter(|folder| folder.is_dir()).collect();
+        Self { folders, isolation: Isolation::Process, quarantine: None }
     }
 
-    /// Loads the plugin named `name` in plant files.
+    /// Returns the same with plugins in another place.
+    #[must_use]
+    pub fn isolated(self, isolation: Isolation) -> Self {
+        Self { isolation, ..self }
+    }
+
+    /// Returns the same with plugins that are given up when they fail too often.
+    #[must_use]
+    pub fn with_quarantine(self, quarantine: Quarantine) -> Self {
+        Self { quarantine: Some(quarantine), ..self }
+    }
+
+    /// Loads the plugin named `name` in plant files: from the library of that name, else from any that holds it.
     ///
     /// # Errors
     /// [`PluginError::NotFound`], or the reason why the library found cannot be used.
     pub fn load(&self, name: &str) -> Result<Library, PluginError> {
-        let file = format!(
-            "{}{}{}",
-            std::env::consts::DLL_PREFIX,
-            name.replace('-', "_"),
-            std::env::consts::DLL_SUFFIX
-        );
-        match self.folders.iter().map(|folder| folder.join(&file)).find(|path| path.is_file()) {
-            Some(path) => Library::load(&path),
-            None => Err(PluginError::NotFound {
-                name: name.to_owned(),
-                nearest: self.nearest(name),
-                file,
-                looked_in: self.folders.clone(),
-            }),
+        let files = self.files();
+        let stem = name.replace('-', "_");
+        let named =
+            |libraries: Vec<Library>| libraries.into_iter().find(|found| found.descriptor().id == name);
+        if let Some(path) = files.get(&stem)
+            && let Some(found) = named(self.read(path)?)
+        {
+            return Ok(found);
         }
+        let others = files.iter().filter(|(other, _)| **other != stem);
+        let found = others.filter_map(|(_, path)| self.read(path).ok()).find_map(named);
+        found.ok_or_else(|| PluginError::NotFound {
+            name: name.to_owned(),
+            nearest: self.nearest(name),
+            file: format!("{}{stem}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX),
+            looked_in: self.folders.clone(),
+        })
+    }
+
+    fn read(&self, path: &Path) -> Result<Vec<Library>, PluginError> {
+        let settings = Settings { isolation: self.isolation, ..Settings::default() };
+        Library::load(path, settings, self.quarantine.as_ref())
     }
 
     /// Returns the installed plugin with the name nearest to `name`, if one is near.
@@ -75,8 +97,11 @@ impl Catalogue {
 
     /// Lists every library file of the folders with its description.
     pub fn list(&self) -> Vec<Listed> {
-        let describe =
-            |path: PathBuf| Listed { plugin: Library::load(&path).map(|l| l.descriptor().clone()), path };
+        let describe = |path: PathBuf| {
+            let found = self.read(&path);
+            let plugins = found.map(|all| all.iter().map(|library| library.descriptor().clone()).collect());
+            Listed { path, plugins }
+        };
         self.files().into_values().map(describe).collect()
     }
 

@@ -7,8 +7,7 @@ use platen_plant::OptionValue;
 use platen_sdk::exchange::DecodeError;
 use platen_shape::Surface;
 
-use super::instance::InputFrame;
-use super::{Instance, JobSpec, Kind, Library, PluginError};
+use super::{InputFrame, Instance, Kind, Library, PluginError};
 
 /// A configured comparison.
 #[derive(Debug)]
@@ -44,36 +43,46 @@ impl Comparison {
         self.instance.name()
     }
 
+    /// Returns the instance.
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
     /// Runs the comparison and checks its output.
     ///
     /// # Errors
     /// The plugin's reason, the deadline, or the violation in its output.
     pub fn compare(&self, task: &Task, surfaces: Surfaces<'_>) -> Result<Report, PluginError> {
-        let misbehaved = |what: String| self.instance.misbehaved(what);
-        let mut inputs = vec![InputFrame::new(task, None), InputFrame::new(surfaces.now, Some(c"now"))];
-        inputs.extend(surfaces.before.map(|s| InputFrame::new(s, Some(c"before"))));
-        inputs.extend(surfaces.baseline.map(|s| InputFrame::new(s, Some(c"baseline"))));
+        let input = |surface: &Surface, role| self.instance.input(surface, Some(role));
+        let mut inputs = vec![self.instance.input(task, None)?, input(surfaces.now, c"now")?];
+        for (surface, role) in [(surfaces.before, c"before"), (surfaces.baseline, c"baseline")] {
+            inputs.extend(surface.map(|surface| input(surface, role)).transpose()?);
+        }
+        self.instance.twice(|| self.run(&inputs))
+    }
 
-        let mut job = self.instance.start(JobSpec::untriggered(self.limit), inputs);
+    fn run(&self, inputs: &[InputFrame]) -> Result<Report, PluginError> {
+        let mut job = self.instance.run(self.instance.evaluation(self.limit), inputs)?;
         let (mut findings, mut fields) = (None, Vec::new());
         while let Some(frame) = job.next_frame() {
             if frame.is::<Findings>() && findings.is_none() {
                 let read = frame.decode::<Findings>();
-                findings = Some(read.map_err(|e| misbehaved(format!("findings that cannot be read: {e}")))?);
+                findings =
+                    Some(read.map_err(|e| job.misbehaved(format!("findings that cannot be read: {e}")))?);
             } else if frame.is::<Field>() {
                 let field = frame.decode().map_err(|e| match e {
                     DecodeError::Malformed(malformed) => {
-                        misbehaved(format!("a malformed field: {malformed}"))
+                        job.misbehaved(format!("a malformed field: {malformed}"))
                     }
-                    DecodeError::Invalid(_) => misbehaved("a field that does not fit its grid".into()),
+                    DecodeError::Invalid(_) => job.misbehaved("a field that does not fit its grid"),
                 });
                 fields.push(field?);
             } else {
-                return Err(misbehaved(format!("a frame {} out of turn", frame.format)));
+                return Err(job.misbehaved(format!("a frame {} out of turn", frame.format)));
             }
         }
         job.finish()?;
-        let findings = findings.ok_or_else(|| misbehaved("success without findings".into()))?;
+        let findings = findings.ok_or_else(|| job.misbehaved("success without findings"))?;
         Ok(Report { comparison: self.instance.name().to_owned(), findings, fields })
     }
 }

@@ -5,8 +5,7 @@ use std::time::Duration;
 use platen_plant::OptionValue;
 use platen_shape::{Chart, DiskMesh, Flatten, FlattenError};
 
-use super::instance::InputFrame;
-use super::{Instance, JobSpec, Kind, Library, PluginError};
+use super::{Instance, Kind, Library, PluginError};
 
 /// A configured flattening.
 #[derive(Debug)]
@@ -31,20 +30,25 @@ impl Flattening {
         self.instance.name()
     }
 
+    /// Returns the instance.
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
     fn run(&self, mesh: &DiskMesh) -> Result<Chart, PluginError> {
-        let mut job =
-            self.instance.start(JobSpec::untriggered(self.limit), vec![InputFrame::new(mesh, None)]);
-        let mut answer = None;
-        while let Some(frame) = job.next_frame() {
-            if !frame.is::<Chart>() || answer.is_some() {
-                return Err(self.instance.misbehaved(format!("a frame {} out of turn", frame.format)));
+        let inputs = [self.instance.input(mesh, None)?];
+        self.instance.twice(|| {
+            let mut job = self.instance.run(self.instance.evaluation(self.limit), &inputs)?;
+            let mut answer = None;
+            while let Some(frame) = job.next_frame() {
+                if !frame.is::<Chart>() || answer.is_some() {
+                    return Err(job.misbehaved(format!("a frame {} out of turn", frame.format)));
+                }
+                answer = Some(frame.decode().map_err(|e| job.misbehaved(format!("a malformed chart: {e}")))?);
             }
-            answer = Some(
-                frame.decode().map_err(|e| self.instance.misbehaved(format!("a malformed chart: {e}")))?,
-            );
-        }
-        job.finish()?;
-        answer.ok_or_else(|| self.instance.misbehaved("success without a chart"))
+            job.finish()?;
+            answer.ok_or_else(|| job.misbehaved("success without a chart"))
+        })
     }
 }
 

@@ -1,198 +1,444 @@
-//! One configured plugin, with a thread of its own for all its calls.
-#![allow(unsafe_code, reason = "calls through the plugin's table")]
+//! One configured plugin: its worker, started again after a fault, and given up after too many.
 
-use std::ffi::{CStr, CString};
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
-use std::thread::JoinHandle;
+use std::ffi::CStr;
+use std::fs;
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use platen_abi as abi;
-use platen_abi::payload;
+use platen_abi::status;
 use platen_plant::OptionValue;
 use platen_scan::Window;
-use platen_sdk::exchange::{AlignedBuffer, DecodeError, Payload, to_raw_window};
+use platen_sdk::Health;
+use platen_sdk::exchange::{AlignedBuffer, DecodeError, Payload};
 
-use super::job::{self, CancelToken, Event, JobSpec, Listed};
-use super::values::Values;
-use super::{Kind, Library, PluginError, host_table};
+use super::faults::Faults;
+use super::job::{CancelToken, JobSpec};
+use super::worker::{CallError, Confinement, Job, JobEvent, Link, LinkError, SharedMemory, new_job};
+use super::{Descriptor, Isolation, Kind, Library, PluginError, Quarantined, clock, library};
 
-/// Grace period: time for a plugin to return after its cancellation. A plugin that exceeds it ends the host, hence long
-/// enough for a busy computer.
-const GRACE: Duration = Duration::from_secs(2);
-
+/// Grace period: time for a plugin to return after its cancellation, before its process is ended.
+const GRACE: Duration = Duration::from_millis(500);
 /// Period at which a waiting job checks for cancellation.
 const CANCEL_POLL: Duration = Duration::from_millis(20);
+/// Time for an instrument's state, which must not ask for it.
+const HEALTH_LIMIT: Duration = Duration::from_secs(1);
 
-/// Capacity of the queue between a plugin and its consumer, frames: both stay busy, and memory is bounded.
-const FRAMES_UNDER_WAY: usize = 64;
-
-/// An input frame of a job.
+/// An input of a job, in memory that the plugin can only read.
 #[derive(Debug)]
 pub(super) struct InputFrame {
     pub(super) format: &'static CStr,
     pub(super) role: Option<&'static CStr>,
-    pub(super) buffer: AlignedBuffer,
+    pub(super) memory: SharedMemory,
 }
 
 impl InputFrame {
-    pub(super) fn new<T: Payload>(value: &T, role: Option<&'static CStr>) -> Self {
-        Self { format: T::FORMAT, role, buffer: value.to_buffer() }
+    pub(super) fn new<T: Payload>(value: &T, role: Option<&'static CStr>) -> io::Result<Self> {
+        let memory = value.encode(SharedMemory::new)?;
+        memory.seal()?;
+        Ok(Self { format: T::FORMAT, role, memory })
     }
 }
 
-type Reply<T> = SyncSender<T>;
-
-enum Command {
-    Open(Reply<Result<(), PluginError>>),
-    Estimate(Option<payload::Window>, Reply<Option<f64>>),
-    Arm(abi::Job, Reply<Result<(), PluginError>>),
-    Run(abi::Job, Vec<InputFrame>, SyncSender<Event>),
-}
-
-/// The C instance. Only `cancel` may be called through it from other threads.
-#[derive(Debug, Clone, Copy)]
-struct Raw(*mut abi::Instance);
-// SAFETY: the boundary allows `cancel` from any thread; all else is called by the instance's own thread.
-unsafe impl Send for Raw {}
-
-/// One configured plugin. Dropping it closes and destroys the plugin's instance.
+/// One configured plugin. Dropping it ends its worker.
 #[derive(Debug)]
 pub struct Instance {
-    name: String,
-    commands: Option<Sender<Command>>,
-    raw: Raw,
-    thread: Option<JoinHandle<()>>,
+    library: Library,
+    values: Vec<OptionValue>,
+    /// Stroke of the jobs that name none.
+    stroke: AtomicU64,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    link: Option<Link>,
+    /// The host has opened it: a job opens it again where its link was lost.
+    opened: bool,
+    /// SHA-256 of the library that the link runs.
+    sha256: String,
+    faults: Faults,
+    /// Content that failed too often, and its file at that time.
+    given_up: Option<(Quarantined, Option<Stamp>)>,
+    /// A job was repeated in a fresh process, since it was last asked.
+    retried: bool,
+}
+
+/// What changes with the content of a file, to be had without opening it.
+type Stamp = (u64, u64, i64, i64);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    fs::metadata(path).ok().map(|file| (file.ino(), file.size(), file.mtime(), file.mtime_nsec()))
+}
+
+/// State of a plugin's worker, for the people who look after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkerState {
+    /// Name of the plugin.
+    pub plugin: String,
+    /// Number of its process; `None` when there is none.
+    pub process: Option<u32>,
+    /// Private memory, bytes.
+    pub memory: Option<u64>,
+    /// What it is kept from.
+    pub confinement: Confinement,
+    /// Faults since the start of the host.
+    pub faults: u64,
+    /// Reason why it is not in use.
+    pub out_of_use: Option<String>,
+    /// Fraction and phase of its job as last reported.
+    pub progress: Option<(f64, String)>,
 }
 
 impl Instance {
-    /// Creates an instance of a plugin with checked option values. Accesses no hardware.
+    /// Creates a plugin with checked option values. Accesses no hardware.
     ///
     /// # Errors
     /// Wrong kind, or the plugin's reason to refuse the values.
     pub fn create(library: &Library, kind: Kind, values: &[OptionValue]) -> Result<Self, PluginError> {
         let descriptor = library.descriptor();
-        let name = descriptor.id.clone();
         if descriptor.kind != kind {
-            let found = descriptor.kind.name().to_owned();
+            let (name, found) = (descriptor.id.clone(), descriptor.kind.name().to_owned());
             return Err(PluginError::WrongKind { name, found, needed: kind.name() });
         }
-        let (commands, inbox) = channel();
-        let (made, created) = sync_channel(1);
-        let (entry, id, values) = (library.entry(), name.clone(), Values::new(values));
-        let thread = std::thread::Builder::new().name(name.clone()).spawn(move || {
-            let raw = create(entry, &id, &values);
-            if let Ok(raw) = raw {
-                // The instance's `[inst]` calls all come from this thread.
-                let _ = made.send(Ok(Raw(raw)));
-                serve(raw, &id, &inbox);
-            } else if let Err(error) = raw {
-                let _ = made.send(Err(error));
-            }
-        });
-        let failed = |message: String| PluginError::Failed { name: name.clone(), message, retryable: false };
-        let thread = thread.map_err(|e| failed(format!("no thread for it: {e}")))?;
-        let raw = created.recv().map_err(|_| failed("its thread ended".into()))??;
-        Ok(Self { name, commands: Some(commands), raw, thread: Some(thread) })
+        let instance = Self {
+            library: library.clone(),
+            values: values.to_vec(),
+            stroke: AtomicU64::new(0),
+            state: Mutex::default(),
+        };
+        instance.revive()?;
+        Ok(instance)
     }
 
     /// Returns the name in plant files.
+    #[expect(clippy::misnamed_getters, reason = "the name of a description is a title for people")]
     pub fn name(&self) -> &str {
-        &self.name
+        &self.library.descriptor().id
     }
 
-    fn ask<T>(&self, limit: Duration, command: impl FnOnce(Reply<T>) -> Command) -> Result<T, PluginError> {
-        let start = Instant::now();
-        let (reply, answer) = sync_channel(1);
-        if let Some(commands) = &self.commands {
-            // A thread that ended shows as a disconnected answer below.
-            let _ = commands.send(command(reply));
+    /// Returns the description of the plugin.
+    pub fn descriptor(&self) -> &Descriptor {
+        self.library.descriptor()
+    }
+
+    /// Returns the SHA-256 of the library that is in use, hexadecimal.
+    pub fn sha256(&self) -> String {
+        self.state().map(|state| state.sha256.clone()).unwrap_or_default()
+    }
+
+    /// Names the stroke of the jobs to come, 0 for none.
+    pub fn at_stroke(&self, stroke: u64) {
+        self.stroke.store(stroke, Ordering::Relaxed);
+    }
+
+    /// Returns the specification of an evaluation at this stroke.
+    pub(super) fn evaluation(&self, limit: Duration) -> JobSpec {
+        JobSpec { stroke: self.stroke.load(Ordering::Relaxed), ..JobSpec::untriggered(limit) }
+    }
+
+    /// Whether the plugin runs in a process of its own.
+    pub fn is_isolated(&self) -> bool {
+        self.library.settings.isolation == Isolation::Process
+    }
+
+    /// Returns the state; an error while a job runs, which has it until its end.
+    fn state(&self) -> Result<MutexGuard<'_, State>, PluginError> {
+        match self.state.try_lock() {
+            Ok(state) => Ok(state),
+            Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(PluginError::Failed {
+                name: self.name().to_owned(),
+                message: "its job before has not ended".into(),
+                retryable: true,
+            }),
         }
-        answer.recv_timeout(limit).map_err(|e| match e {
-            RecvTimeoutError::Timeout => self.hangs(start),
-            RecvTimeoutError::Disconnected => self.died(),
-        })
     }
 
-    fn hangs(&self, start: Instant) -> PluginError {
-        PluginError::Hangs { name: self.name.clone(), elapsed_ms: start.elapsed().as_millis() as u64 }
-    }
-
-    fn died(&self) -> PluginError {
-        self.misbehaved("its thread ended")
-    }
-
-    /// Returns the error of a plugin that violated the contract of the boundary.
-    pub(super) fn misbehaved(&self, what: impl Into<String>) -> PluginError {
-        PluginError::Misbehaved { name: self.name.clone(), what: what.into() }
-    }
-
-    /// Opens the instance: the plugin connects to its device.
+    /// Looks after a worker that idles.
     ///
     /// # Errors
-    /// The plugin's reason, or [`PluginError::Hangs`].
+    /// How it ended, once.
+    pub fn check(&self) -> Result<(), PluginError> {
+        let mut state = self.state()?;
+        let checked = state.link.as_mut().map_or(Ok(()), Link::check);
+        checked.map_err(|error| self.failed(&mut state, error, Instant::now()))
+    }
+
+    /// Makes sure that there is a worker, in which the plugin is created: looks after one that idles, starts one that is missing.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn revive(&self) -> Result<(), PluginError> {
+        if let Err(error) = self.check() {
+            tracing::error!("{error}");
+        }
+        let mut state = self.state()?;
+        let limit = self.library.settings.limits.memory / 2;
+        if let Some(held) = state.link.as_ref().and_then(Link::process_id).and_then(private_memory)
+            && held > limit
+        {
+            let (plugin, mib) = (self.name(), held >> 20);
+            tracing::warn!(plugin, "it holds {mib} MiB between two jobs: a fresh process takes its place");
+            state.link = None;
+        }
+        self.link(&mut state).map(drop)
+    }
+
+    /// Returns the worker, a fresh one where there is none.
+    fn link<'a>(&self, state: &'a mut State) -> Result<&'a mut Link, PluginError> {
+        let link = match state.link.take() {
+            Some(link) => link,
+            None => self.start(state)?,
+        };
+        Ok(state.link.insert(link))
+    }
+
+    fn start(&self, state: &mut State) -> Result<Link, PluginError> {
+        let name = || self.name().to_owned();
+        let path = self.library.path();
+        let quarantine = self.library.quarantine.as_ref();
+        if let Some((held, file)) = &state.given_up {
+            let released = quarantine.is_some_and(|quarantine| quarantine.find(&held.sha256).is_none());
+            if !released && stamp(path) == *file {
+                return Err(quarantined(held.clone()));
+            }
+            state.faults.forget();
+        }
+        let rest = state.faults.rest(Instant::now());
+        if !rest.is_zero() {
+            let wait_s = rest.as_secs() + 1;
+            return Err(PluginError::Resting { name: name(), wait_s, why: state.faults.why().to_owned() });
+        }
+        let file = stamp(path);
+        let (mut link, about) = library::start(path, self.library.settings)?;
+        if let Some(held) = quarantine.and_then(|quarantine| quarantine.find(&about.sha256)) {
+            state.given_up = Some((held.clone(), file));
+            return Err(quarantined(held));
+        }
+        if state.given_up.take().is_some() || (!state.sha256.is_empty() && about.sha256 != state.sha256) {
+            tracing::warn!(
+                plugin = self.name(),
+                sha256 = about.sha256,
+                "started from another content, or released"
+            );
+            state.faults.forget();
+        }
+        state.sha256 = about.sha256;
+        let ours = self.library.descriptor();
+        let same = about
+            .plugins
+            .iter()
+            .any(|plugin| plugin.id == ours.id && plugin.kind == ours.kind && plugin.options == ours.options);
+        if !same {
+            return Err(PluginError::Replaced { name: name(), path: path.to_owned() });
+        }
+        let confine = ours.kind != Kind::Scanner;
+        link.create(&ours.id, &self.values, confine).map_err(|error| match error {
+            LinkError::Call(CallError { message, .. }) => {
+                PluginError::RefusedOptions { name: name(), message }
+            }
+            other => self.failed(state, other, Instant::now()),
+        })?;
+        Ok(link)
+    }
+
+    /// Opens the plugin: it connects to its device, again when it was connected.
+    ///
+    /// # Errors
+    /// The plugin's reason, or why it has no worker.
     pub fn open(&self, limit: Duration) -> Result<(), PluginError> {
-        self.ask(limit, Command::Open)?
+        let mut state = self.state()?;
+        let start = Instant::now();
+        state.opened = true;
+        let opened = self.link(&mut state)?.open(limit);
+        opened.map_err(|error| self.failed(&mut state, error, start))
     }
 
     /// Returns the duration of a scan of the window, seconds, if the plugin can estimate it.
     ///
     /// # Errors
-    /// [`PluginError::Hangs`].
+    /// Why it has no worker, or does not answer.
     pub fn estimate_s(&self, window: Option<&Window>, limit: Duration) -> Result<Option<f64>, PluginError> {
-        let window = window.map(to_raw_window);
-        self.ask(limit, |reply| Command::Estimate(window, reply))
+        let mut state = self.state()?;
+        let start = Instant::now();
+        let raw = window.map(|w| [w.azimuth_start, w.azimuth_width, w.elevation_min, w.elevation_max]);
+        let seconds = self.link(&mut state)?.estimate_s(raw, limit);
+        seconds.map_err(|error| self.failed(&mut state, error, start))
     }
 
-    /// Prepares for the next trigger.
+    /// Returns the state of the plugin's instrument, if it tells.
     ///
     /// # Errors
-    /// The plugin's reason, or [`PluginError::Hangs`].
-    pub fn arm(&self, spec: JobSpec) -> Result<(), PluginError> {
-        let (reports, _receiver) = sync_channel(1);
-        let listed = job::begin(Instant::now() + spec.limit, reports);
-        let raw = raw_job(&listed, &spec);
-        self.ask(spec.limit + GRACE, |reply| Command::Arm(raw, reply))?
+    /// Why it has no worker, or does not answer.
+    pub fn health(&self) -> Result<Option<Health>, PluginError> {
+        let mut state = self.state()?;
+        let start = Instant::now();
+        let health = self.link(&mut state)?.health(HEALTH_LIMIT);
+        let health = health.map_err(|error| self.failed(&mut state, error, start))?;
+        Ok(health.map(|raw| {
+            Health::from_raw(&platen_abi::Health {
+                struct_size: 0,
+                flags: raw.flags,
+                temperature_c: raw.temperature_c,
+                battery: raw.battery,
+                tilt: raw.tilt,
+            })
+        }))
     }
 
-    pub(super) fn start(&self, spec: JobSpec, inputs: Vec<InputFrame>) -> RunningJob<'_> {
-        let (reports, inbox) = sync_channel(FRAMES_UNDER_WAY);
+    /// Returns whether a job was repeated in a fresh process since this was last asked.
+    pub fn take_retried(&self) -> bool {
+        self.state().is_ok_and(|mut state| std::mem::take(&mut state.retried))
+    }
+
+    /// Returns the state of the worker; `None` while a job runs.
+    pub fn worker_state(&self) -> Option<WorkerState> {
+        let state = self.state().ok()?;
+        let process = state.link.as_ref().and_then(Link::process_id);
+        let given_up = state.given_up.as_ref().map(|(held, _)| quarantined(held.clone()).to_string());
+        Some(WorkerState {
+            plugin: self.name().to_owned(),
+            process,
+            memory: process.and_then(private_memory),
+            confinement: state.link.as_ref().map(Link::confinement).unwrap_or_default(),
+            faults: state.faults.count(),
+            out_of_use: given_up.or_else(|| state.link.is_none().then(|| state.faults.why().to_owned())),
+            progress: state.link.as_ref().and_then(Link::progress).cloned(),
+        })
+    }
+
+    /// Puts a value where the plugin can read it.
+    pub(super) fn input<T: Payload>(
+        &self,
+        value: &T,
+        role: Option<&'static CStr>,
+    ) -> Result<InputFrame, PluginError> {
+        InputFrame::new(value, role).map_err(|why| PluginError::Failed {
+            name: self.name().to_owned(),
+            message: format!("the system has no memory for its input: {why}"),
+            retryable: true,
+        })
+    }
+
+    /// Starts a job.
+    pub(super) fn run(&self, spec: JobSpec, inputs: &[InputFrame]) -> Result<RunningJob<'_>, PluginError> {
+        let mut state = self.state()?;
         let started = Instant::now();
-        let listed = job::begin(started + spec.limit, reports.clone());
-        let raw = raw_job(&listed, &spec);
-        if let Some(commands) = &self.commands {
-            // A thread that ended shows as a disconnected inbox.
-            let _ = commands.send(Command::Run(raw, inputs, reports));
+        state.faults.job();
+        let opened = state.opened;
+        let link = self.link(&mut state)?;
+        if opened && !link.is_open() {
+            let opened = link.open(spec.limit);
+            opened.map_err(|error| self.failed(&mut state, error, started))?;
         }
-        RunningJob {
+        let job = job(&spec, started);
+        let sent = self.link(&mut state)?.run(job, inputs);
+        sent.map_err(|error| self.failed(&mut state, error, started))?;
+        Ok(RunningJob {
             instance: self,
-            listed,
-            inbox,
+            state: Some(state),
+            id: job.id,
+            deadline: started + spec.limit,
             started,
             token: spec.cancel,
             cancelled_at: None,
             result: None,
+        })
+    }
+
+    /// Runs a job, and once more in a fresh process when the plugin's process ended or its answer was none.
+    pub(super) fn twice<T>(&self, job: impl Fn() -> Result<T, PluginError>) -> Result<T, PluginError> {
+        match job() {
+            Err(error) if error.is_fault() && !matches!(error, PluginError::Hangs { .. }) => {
+                tracing::error!("{error}; once more in a fresh process");
+                let again = job();
+                self.state()?.retried = again.is_ok();
+                again.map_err(|second| if second.is_out_of_use() { error } else { second })
+            }
+            other => other,
         }
+    }
+
+    /// Takes account of an error of the worker, and returns it as one of the plugin.
+    fn failed(&self, state: &mut State, error: LinkError, since: Instant) -> PluginError {
+        let name = self.name().to_owned();
+        let failed = |message, retryable| PluginError::Failed { name: name.clone(), message, retryable };
+        match error {
+            LinkError::Load(fault) => PluginError::of_load(fault, self.library.path()),
+            LinkError::System(why) => failed(format!("the system refuses: {why}"), true),
+            LinkError::Died(how) => self.fault(state, PluginError::Died { name, how }),
+            LinkError::Hung(_) => {
+                let elapsed_ms = since.elapsed().as_millis() as u64;
+                self.fault(state, PluginError::Hangs { name, elapsed_ms })
+            }
+            LinkError::Call(CallError { status, retryable, message }) => match status {
+                status::MEMORY | status::STATE | status::INTERNAL | status::CANCELLED => {
+                    self.fault(state, failed(message, retryable))
+                }
+                _ => {
+                    let lost = matches!(status, status::TIMEOUT | status::DISCONNECTED | status::IO);
+                    if let Some(link) = state.link.as_mut().filter(|_| lost || status <= status::VENDOR) {
+                        link.reopen();
+                    }
+                    let again = matches!(status, status::TIMEOUT | status::DISCONNECTED | status::BUSY);
+                    failed(message, retryable || again)
+                }
+            },
+        }
+    }
+
+    /// Counts a fault: its process is not used again, and after too many nor is its library.
+    fn fault(&self, state: &mut State, error: PluginError) -> PluginError {
+        state.link = None;
+        let why = error.to_string();
+        if !state.faults.add(&why, Instant::now()) {
+            return error;
+        }
+        let (path, faults) = (self.library.path(), state.faults.count());
+        let held = Quarantined {
+            plugin: self.name().to_owned(),
+            library: path.to_owned(),
+            sha256: state.sha256.clone(),
+            why,
+            faults,
+            since: jiff::Timestamp::now(),
+        };
+        tracing::error!("{}", quarantined(held.clone()));
+        if let Some(quarantine) = &self.library.quarantine
+            && let Err(why) = quarantine.add(held.clone())
+        {
+            tracing::error!("the quarantine is not kept: {why}");
+        }
+        state.given_up = Some((held, stamp(path)));
+        error
     }
 }
 
-impl Drop for Instance {
-    fn drop(&mut self) {
-        drop(self.commands.take());
-        if let Some(thread) = self.thread.take() {
-            let end = Instant::now() + GRACE;
-            while !thread.is_finished() && Instant::now() < end {
-                std::thread::park_timeout(Duration::from_millis(2));
-            }
-            if thread.is_finished() {
-                let _ = thread.join();
-            } else {
-                tracing::warn!(
-                    plugin = self.name,
-                    "the plugin does not return from closing; its thread is abandoned"
-                );
-            }
-        }
+fn quarantined(Quarantined { plugin, library, why, faults, .. }: Quarantined) -> PluginError {
+    PluginError::Quarantined { name: plugin, path: library, faults, why }
+}
+
+/// Returns the private memory of a process, bytes.
+fn private_memory(process: u32) -> Option<u64> {
+    let text = fs::read_to_string(format!("/proc/{process}/statm")).ok()?;
+    let mut pages = text.split(' ').skip(1).map(|n| n.parse::<u64>().ok());
+    let (resident, shared) = (pages.next()??, pages.next()??);
+    Some(resident.saturating_sub(shared) * 4096)
+}
+
+fn job(spec: &JobSpec, now: Instant) -> Job {
+    let utc = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let utc = utc.saturating_sub(spec.trigger.elapsed());
+    Job {
+        id: new_job(),
+        stroke: spec.stroke,
+        trigger_ns: clock::ns_at(spec.trigger),
+        trigger_utc_ns: i64::try_from(utc.as_nanos()).unwrap_or(i64::MAX),
+        deadline_ns: clock::ns_at(now + spec.limit),
     }
 }
 
@@ -201,9 +447,7 @@ impl Drop for Instance {
 pub struct Emitted {
     /// Name of the format.
     pub format: String,
-    /// Bits of `platen_abi::frame_flag`.
-    pub flags: u32,
-    pub(super) buffer: AlignedBuffer,
+    buffer: AlignedBuffer,
 }
 
 impl Emitted {
@@ -230,8 +474,10 @@ impl Emitted {
 #[derive(Debug)]
 pub struct RunningJob<'a> {
     instance: &'a Instance,
-    listed: Listed,
-    inbox: Receiver<Event>,
+    /// Until the job has ended.
+    state: Option<MutexGuard<'a, State>>,
+    id: u64,
+    deadline: Instant,
     started: Instant,
     token: CancelToken,
     cancelled_at: Option<Instant>,
@@ -245,41 +491,72 @@ impl RunningJob<'_> {
             if self.token.is_cancelled() && self.cancelled_at.is_none() {
                 self.cancel();
             }
-            let until = self.cancelled_at.map_or(self.listed.0.deadline, |at| at + GRACE);
-            let left = until.saturating_duration_since(Instant::now());
-            match self.inbox.recv_timeout(left.min(CANCEL_POLL)) {
-                Ok(Event::Frame(frame)) if self.cancelled_at.is_none() => return Some(frame),
-                Ok(Event::Frame(_)) => {}
-                Ok(Event::Done(result)) => self.result = Some(self.judge(result)),
-                Err(RecvTimeoutError::Timeout) if left > CANCEL_POLL => {}
-                Err(RecvTimeoutError::Timeout) if self.cancelled_at.is_none() => self.cancel(),
-                Err(RecvTimeoutError::Timeout) => self.result = Some(Err(self.instance.hangs(self.started))),
-                Err(RecvTimeoutError::Disconnected) => self.result = Some(Err(self.instance.died())),
+            let now = Instant::now();
+            let until = self.cancelled_at.map_or(self.deadline, |at| at + GRACE);
+            let left = until.saturating_duration_since(now);
+            let id = self.id;
+            let next = match self.link() {
+                Some(link) => link.next_of_job(id, now + left.min(CANCEL_POLL)),
+                None => Err(LinkError::Died("it is gone".into())),
+            };
+            match next {
+                Ok(Some(JobEvent::Frame { format, buffer })) if self.cancelled_at.is_none() => {
+                    return Some(Emitted { format, buffer });
+                }
+                Ok(Some(JobEvent::Frame { .. })) => {}
+                Ok(Some(JobEvent::Done(result))) => self.end(result),
+                Ok(None) if left > CANCEL_POLL => {}
+                Ok(None) if self.cancelled_at.is_none() => self.cancel(),
+                Ok(None) => self.fail(LinkError::Hung(self.started.elapsed())),
+                Err(error) => self.fail(error),
             }
         }
         None
     }
 
-    /// Returns how the job ended: a job that was stopped is reported as stopped, whatever status the plugin returned.
-    fn judge(&self, result: Result<(), PluginError>) -> Result<(), PluginError> {
-        if self.cancelled_at.is_none() && !(result.is_err() && self.listed.0.is_stopped()) {
-            return result;
+    fn link(&mut self) -> Option<&mut Link> {
+        self.state.as_mut().and_then(|state| state.link.as_mut())
+    }
+
+    /// Takes the end of a job: one that was stopped is reported as stopped, whatever the plugin returned.
+    fn end(&mut self, result: Result<(), CallError>) {
+        let late = Instant::now() >= self.deadline;
+        let cancelled = matches!(&result, Err(error) if error.status == status::CANCELLED);
+        if self.cancelled_at.is_some() || (cancelled && late) {
+            self.state = None;
+            self.result = Some(Err(PluginError::Stopped {
+                name: self.instance.name().to_owned(),
+                elapsed_ms: self.started.elapsed().as_millis() as u64,
+                why: if late { "its deadline passed" } else { "it was cancelled" },
+            }));
+            return;
         }
-        let late = Instant::now() >= self.listed.0.deadline;
-        Err(PluginError::Stopped {
-            name: self.instance.name.clone(),
-            elapsed_ms: self.started.elapsed().as_millis() as u64,
-            why: if late { "its deadline passed" } else { "it was cancelled" },
-        })
+        match (result, self.state.take()) {
+            (Ok(()), Some(mut state)) => {
+                state.faults.success();
+                self.result = Some(Ok(()));
+            }
+            (Ok(()), None) => self.result = Some(Ok(())),
+            (Err(error), state) => {
+                self.state = state;
+                self.fail(LinkError::Call(error));
+            }
+        }
+    }
+
+    fn fail(&mut self, error: LinkError) {
+        if let Some(mut state) = self.state.take() {
+            self.result = Some(Err(self.instance.failed(&mut state, error, self.started)));
+        }
     }
 
     /// Cancels the job; later frames are dropped.
     pub fn cancel(&mut self) {
         self.cancelled_at = Some(Instant::now());
-        self.listed.0.cancelled.store(true, Ordering::Relaxed);
-        let raw = self.instance.raw.0;
-        // SAFETY: `cancel` may be called at any time while the instance lives, which `self.instance` ensures.
-        unsafe { ((*raw).cancel)(raw, self.listed.0.id) };
+        let id = self.id;
+        if let Some(link) = self.link() {
+            link.cancel(id);
+        }
     }
 
     /// Waits for the end; later frames are dropped.
@@ -291,8 +568,16 @@ impl RunningJob<'_> {
         self.result.clone().unwrap_or(Ok(()))
     }
 
-    pub(super) fn misbehaved(&self, what: impl Into<String>) -> PluginError {
-        self.instance.misbehaved(what)
+    /// Returns the error of a plugin that violated the contract of the boundary, and ends its process.
+    pub(super) fn misbehaved(&mut self, what: impl Into<String>) -> PluginError {
+        let name = self.instance.name().to_owned();
+        let mut error = PluginError::Misbehaved { name, what: what.into() };
+        let state = self.state.take();
+        if let Some(mut state) = state.or_else(|| self.instance.state().ok()) {
+            error = self.instance.fault(&mut state, error);
+        }
+        self.result = Some(Err(error.clone()));
+        error
     }
 }
 
@@ -304,135 +589,7 @@ impl Drop for RunningJob<'_> {
         if self.cancelled_at.is_none() {
             self.cancel();
         }
-        let hung = matches!(self.finish(), Err(PluginError::Hangs { .. }));
-        tracing::debug!(plugin = self.instance.name, hung, "cancelled before its end");
+        let ended = self.finish();
+        tracing::debug!(plugin = self.instance.name(), ?ended, "cancelled before its end");
     }
-}
-
-fn raw_job(listed: &Listed, spec: &JobSpec) -> abi::Job {
-    let since_trigger = spec.trigger.elapsed();
-    let utc = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(since_trigger);
-    abi::Job {
-        struct_size: size_of::<abi::Job>() as u32,
-        reserved: 0,
-        job_id: listed.0.id,
-        stroke_no: spec.stroke,
-        trigger_mono_ns: job::mono_ns(spec.trigger),
-        trigger_utc_ns: i64::try_from(utc.as_nanos()).unwrap_or(i64::MAX),
-        deadline_mono_ns: job::mono_ns(listed.0.deadline),
-    }
-}
-
-fn create(entry: &abi::Entry, name: &str, values: &Values) -> Result<*mut abi::Instance, PluginError> {
-    let id = CString::new(name).unwrap_or_default();
-    let (mut error, mut instance) = (host_table::empty_error(), std::ptr::null_mut());
-    let rows = values.as_slice();
-    // SAFETY: everything passed lives for the call.
-    let status = unsafe {
-        let host = host_table::get();
-        (entry.create)(host, id.as_ptr(), rows.as_ptr(), rows.len() as u32, &raw mut instance, &raw mut error)
-    };
-    if status != abi::status::OK {
-        return Err(PluginError::RefusedOptions {
-            name: name.to_owned(),
-            message: host_table::message(&error),
-        });
-    }
-    // SAFETY: null, or the instance that the plugin made.
-    match unsafe { instance.as_ref() } {
-        Some(made) if made.struct_size as usize >= size_of::<abi::Instance>() => Ok(instance),
-        _ => Err(PluginError::Misbehaved {
-            name: name.to_owned(),
-            what: "it created no valid instance".into(),
-        }),
-    }
-}
-
-/// The thread of one instance: executes commands until the host drops the instance, then closes and destroys it.
-fn serve(raw: *mut abi::Instance, name: &str, inbox: &Receiver<Command>) {
-    // SAFETY: of all calls here: `[inst]` calls of a live instance, all from this thread.
-    let table = unsafe { &*raw };
-    let mut opened = false;
-    while let Ok(command) = inbox.recv() {
-        match command {
-            Command::Open(reply) => {
-                // SAFETY: as above.
-                let result = call(name, |error| unsafe { (table.open)(raw, error) });
-                opened = result.is_ok();
-                let _ = reply.send(result);
-            }
-            // SAFETY: as above.
-            Command::Estimate(window, reply) => drop(reply.send(unsafe { estimate(raw, window.as_ref()) })),
-            Command::Arm(job, reply) => {
-                let result = table.arm.map_or(Ok(()), |arm| {
-                    // SAFETY: as above.
-                    call(name, |error| unsafe { arm(raw, &raw const job, error) })
-                });
-                let _ = reply.send(result);
-            }
-            Command::Run(job, inputs, reports) => {
-                let attrs: Vec<Option<abi::Attr>> = inputs.iter().map(role).collect();
-                let frames: Vec<abi::Frame> = inputs.iter().zip(&attrs).map(frame).collect();
-                // SAFETY: as above; frames and attributes live for the call.
-                let result = call(name, |error| unsafe {
-                    (table.run)(raw, &raw const job, frames.as_ptr(), frames.len() as u32, error)
-                });
-                let _ = reports.send(Event::Done(result));
-            }
-        }
-    }
-    // SAFETY: as above; nothing is called after `destroy`.
-    unsafe {
-        if opened {
-            (table.close)(raw);
-        }
-        (table.destroy)(raw);
-    }
-}
-
-fn role(input: &InputFrame) -> Option<abi::Attr> {
-    input.role.map(|role| abi::Attr { key: c"role".as_ptr(), value: role.as_ptr() })
-}
-
-fn frame((input, attr): (&InputFrame, &Option<abi::Attr>)) -> abi::Frame {
-    let bytes = input.buffer.as_ref();
-    abi::Frame {
-        struct_size: size_of::<abi::Frame>() as u32,
-        flags: 0,
-        format: input.format.as_ptr(),
-        frame_id: c"scanner".as_ptr(),
-        mono_ns: 0,
-        count: 0,
-        buffer: abi::Buffer { data: bytes.as_ptr().cast_mut().cast(), bytes: bytes.len() as u64, token: 0 },
-        attrs: attr.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
-        n_attrs: u32::from(attr.is_some()),
-        reserved: 0,
-    }
-}
-
-fn call(name: &str, call: impl FnOnce(*mut abi::Error) -> abi::Status) -> Result<(), PluginError> {
-    let mut error = host_table::empty_error();
-    match call(&raw mut error) {
-        abi::status::OK => Ok(()),
-        _ => Err(PluginError::Failed {
-            name: name.to_owned(),
-            message: host_table::message(&error),
-            retryable: error.flags & abi::error_flag::RETRYABLE != 0,
-        }),
-    }
-}
-
-/// # Safety
-/// `[inst]` call of a live instance.
-unsafe fn estimate(raw: *mut abi::Instance, window: Option<&payload::Window>) -> Option<f64> {
-    // SAFETY: as the caller promises; the table, when given, is as long as it says.
-    let seconds = unsafe {
-        let table =
-            ((*raw).get_extension)(raw, abi::EXT_ESTIMATE.as_ptr()).cast::<abi::Estimate>().as_ref()?;
-        if (table.struct_size as usize) < size_of::<abi::Estimate>() {
-            return None;
-        }
-        (table.scan_seconds)(raw, window.map_or(std::ptr::null(), std::ptr::from_ref))
-    };
-    (seconds >= 0.0).then_some(seconds)
 }

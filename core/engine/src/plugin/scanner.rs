@@ -6,7 +6,6 @@ use platen_plant::OptionValue;
 use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, Window};
 use platen_sdk::exchange::Payload;
 
-use super::instance::InputFrame;
 use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError, RunningJob};
 
 /// Largest lattice accepted: beyond the finest scanner's 17,351 x 40,960 cells.
@@ -26,7 +25,7 @@ impl Scanner {
         Instance::create(library, Kind::Scanner, values).map(Self)
     }
 
-    /// Returns the instance, to open and arm it.
+    /// Returns the instance, to open it.
     pub fn instance(&self) -> &Instance {
         &self.0
     }
@@ -49,8 +48,8 @@ impl Scanner {
     /// # Errors
     /// The driver's reason, the deadline, or the fault in what it sent.
     pub fn start(&self, spec: JobSpec, window: Option<&Window>) -> Result<RunningScan<'_>, PluginError> {
-        let window = window.map(|window| InputFrame::new(window, None));
-        let mut job = self.0.start(spec, window.into_iter().collect());
+        let window = window.map(|window| self.0.input(window, None)).transpose()?;
+        let mut job = self.0.run(spec, window.as_slice())?;
         let Some(frame) = job.next_frame() else {
             job.finish()?;
             return Err(job.misbehaved(NO_END));
@@ -58,7 +57,7 @@ impl Scanner {
         if !frame.is::<ScanHeader>() {
             return Err(job.misbehaved(out_of_turn(&frame)));
         }
-        let header: ScanHeader = decode(&job, &frame)?;
+        let header: ScanHeader = decode(&mut job, &frame)?;
         check(&header).map_err(|what| job.misbehaved(what))?;
         Ok(RunningScan { job, header, end: None })
     }
@@ -89,12 +88,15 @@ impl RunningScan<'_> {
     /// The driver's reason, the deadline, or the fault in what it sent.
     pub fn finish(&mut self) -> Result<ScanEnd, PluginError> {
         self.by_ref().try_for_each(|column| column.map(drop))?;
-        self.end.ok_or_else(|| self.job.misbehaved(NO_END))
+        match self.end {
+            Some(end) => Ok(end),
+            None => Err(self.job.misbehaved(NO_END)),
+        }
     }
 
     fn next_column(&mut self) -> Result<Option<Column>, PluginError> {
         while let Some(frame) = self.job.next_frame() {
-            let job = &self.job;
+            let job = &mut self.job;
             if self.end.is_some() {
                 return Err(job.misbehaved(format!("{} after the scan's end", frame.format)));
             }
@@ -132,7 +134,7 @@ fn out_of_turn(frame: &Emitted) -> String {
     format!("a frame {} out of turn", frame.format)
 }
 
-fn decode<T: Payload>(job: &RunningJob<'_>, frame: &Emitted) -> Result<T, PluginError> {
+fn decode<T: Payload>(job: &mut RunningJob<'_>, frame: &Emitted) -> Result<T, PluginError> {
     frame.decode().map_err(|e| job.misbehaved(format!("a malformed {}: {e}", frame.format)))
 }
 

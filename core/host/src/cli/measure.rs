@@ -20,7 +20,7 @@ use platen_shape::{Measured, Scanned};
 use super::scan_source::{self, READ_LIMIT};
 use super::setup::Setup;
 use super::{CliError, Common, output};
-use crate::progress;
+use crate::{plugin_records, progress};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
@@ -105,7 +105,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         reports: &reports,
         compare,
     };
-    let record = ResultRecord::new(&scanned, &now, context);
+    let mut record = ResultRecord::new(&scanned, &now, context);
+    record.name_plugins(plugin_records::records(rig.instances()));
     progress::done();
 
     let sound: Vec<_> = reports.iter().flatten().collect();

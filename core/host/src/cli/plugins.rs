@@ -1,10 +1,12 @@
 //! `platen plugins`: the installed plugins and their options.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use platen_engine::plugin::{Descriptor, Listed};
+use platen_engine::plugin::{Descriptor, Listed, Quarantine, Quarantined};
 use platen_plant::OptionDecl;
+use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
 
@@ -30,6 +32,30 @@ enum Verb {
         #[arg(long)]
         toml: bool,
     },
+    /// Show or release the plugins that a plant has given up after too many faults
+    #[command(after_help = "Examples:\n  platen plugins quarantine list config/plant-north.toml\n  \
+                            platen plugins quarantine clear config/plant-north.toml my-comparison\n\n\
+                            Another build of a plugin's library releases it as well. A running host sees both within seconds.")]
+    Quarantine {
+        #[command(subcommand)]
+        action: Action,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List them, with the reasons
+    List {
+        /// Plant file
+        plant: PathBuf,
+    },
+    /// Release one plugin, or all
+    Clear {
+        /// Plant file
+        plant: PathBuf,
+        /// Name of the plugin; all without
+        plugin: Option<String>,
+    },
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
@@ -38,7 +64,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         Verb::List => {
             let listed = catalogue.list();
             if common.json {
-                output::json(&listed.iter().map(listed_json).collect::<Vec<_>>())?;
+                output::json(&listed.iter().flat_map(listed_json).collect::<Vec<_>>())?;
             } else {
                 list(&listed)?;
                 let folders: Vec<String> =
@@ -55,27 +81,55 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 _ => describe(descriptor)?,
             }
         }
+        Verb::Quarantine { action } => quarantine(common, action)?,
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn list(listed: &[Listed]) -> Result<(), CliError> {
-    let row = |Listed { path, plugin }: &Listed| match plugin {
-        Ok(p) => vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()],
-        Err(error) => {
-            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            vec![file, "-".into(), "-".into(), format!("refused: {error}")]
+fn quarantine(common: &Common, action: &Action) -> Result<(), CliError> {
+    let of = |plant: &PathBuf| Ok::<_, CliError>(Quarantine::beside(&PlantFile::load(plant)?.output.history));
+    let failed = |why: std::io::Error| CliError::Failed(why.to_string());
+    let (entries, none) = match action {
+        Action::List { plant } => (of(plant)?.list().map_err(failed)?, "no plugin is in quarantine"),
+        Action::Clear { plant, plugin } => {
+            let released = of(plant)?.clear(plugin.as_deref()).map_err(failed)?;
+            (released, "none was in quarantine: nothing released")
         }
     };
-    output::titled("plugin | kind | version | state", listed.iter().map(row))
+    if common.json {
+        return output::json(&entries);
+    }
+    for Quarantined { plugin, library, sha256, why, faults, since } in &entries {
+        output::line(&format!("{plugin}: since {since:.0} after {faults} faults: {why}"))?;
+        output::line(&format!("  {} (sha256 {sha256})", library.display()))?;
+    }
+    match (action, entries.len()) {
+        (_, 0) => output::line(none),
+        (Action::List { .. }, _) => Ok(()),
+        (Action::Clear { .. }, n) => output::line(&format!("{n} released")),
+    }
 }
 
-fn listed_json(listed: &Listed) -> Json {
-    match &listed.plugin {
-        Ok(p) => {
-            json!({ "path": listed.path, "state": "ready", "id": p.id, "kind": p.kind.name(), "version": p.version })
+fn list(listed: &[Listed]) -> Result<(), CliError> {
+    let rows = |Listed { path, plugins }: &Listed| match plugins {
+        Ok(all) => all
+            .iter()
+            .map(|p| vec![p.id.clone(), p.kind.name().into(), p.version.clone(), "ready".into()])
+            .collect(),
+        Err(error) => {
+            let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            vec![vec![file, "-".into(), "-".into(), format!("refused: {error}")]]
         }
-        Err(error) => json!({ "path": listed.path, "state": "refused", "reason": error.to_string() }),
+    };
+    output::titled("plugin | kind | version | state", listed.iter().flat_map(rows))
+}
+
+fn listed_json(listed: &Listed) -> Vec<Json> {
+    let path = &listed.path;
+    let ready = |p: &Descriptor| json!({ "path": path, "state": "ready", "id": p.id, "kind": p.kind.name(), "version": p.version });
+    match &listed.plugins {
+        Ok(all) => all.iter().map(ready).collect(),
+        Err(error) => vec![json!({ "path": path, "state": "refused", "reason": error.to_string() })],
     }
 }
 

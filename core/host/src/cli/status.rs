@@ -72,6 +72,9 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             free.unwrap_or_default(),
             status.records_lost
         ))?;
+        for plugin in &status.plugins {
+            output::line(&format!("{} {}: {}", plugin.kind, plugin.plugin, plugin.line()))?;
+        }
         for (what, [median, worst]) in [
             ("trigger to busy", status.trigger_to_busy_ms),
             ("stroke to result", status.stroke_to_result_ms),

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use platen_engine::calibration::{self, Calibration};
-use platen_engine::pipeline::{self, Pipeline};
+use platen_engine::pipeline::{self, Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
 use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
@@ -26,10 +26,12 @@ use platen_shape::{PlateSpec, Scanned, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::figures;
+use super::plugin_status::{PluginStates, PluginStatus};
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
 use super::screen::{Event, MeasuredStroke, Teller};
+use crate::plugin_records;
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -82,7 +84,9 @@ pub(super) struct MeasurementWorker {
     plant: PlantFile,
     catalogue: Catalogue,
     pipeline: Pipeline,
+    /// The driver, once it could be created.
     scanner: Option<Scanner>,
+    connected: bool,
     region: Region,
     /// Duration of a scan of the base window; `None` for a driver without scan planning.
     estimate: Option<Duration>,
@@ -104,6 +108,7 @@ pub(super) struct Receivers {
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
     pub(super) screen: Teller,
+    pub(super) plugins: PluginStates,
 }
 
 impl MeasurementWorker {
@@ -122,6 +127,7 @@ impl MeasurementWorker {
             estimate: None,
             pipeline,
             scanner: None,
+            connected: false,
             in_reach: None,
             reported: None,
             scan_limit: press.timeouts.scan,
@@ -132,26 +138,22 @@ impl MeasurementWorker {
         }
     }
 
-    /// Executes commands until the dispatcher closes the channel, or a plugin hangs.
+    /// Executes commands until the dispatcher closes the channel.
     pub(super) fn serve(mut self, commands: &Receiver<(Command, CancelToken)>) {
         loop {
-            if self.scanner.is_none() {
-                self.connect();
-            }
+            self.look_after_scanner();
             self.report_readiness();
+            self.report_plugins();
             let (command, token) = match commands.recv_timeout(RETRY) {
                 Ok(command) => command,
                 Err(std::sync::mpsc::RecvTimeoutError::Timeout) => continue,
                 Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => return,
             };
-            let hung = match command {
+            match command {
                 Command::Scan { key, run_id, data } => self.scan(key, run_id, data, token),
                 Command::Evaluate(key) => self.evaluate(key),
                 // Executed by the dispatcher.
-                Command::Cancel(_) | Command::PartEnd => false,
-            };
-            if hung {
-                return;
+                Command::Cancel(_) | Command::PartEnd => {}
             }
         }
     }
@@ -165,28 +167,41 @@ impl MeasurementWorker {
         let _ = self.receivers.answers.send(answer);
     }
 
-    fn connect(&mut self) {
-        let scanner =
-            pipeline::scanner(&self.plant, &self.catalogue).map_err(|e| e.to_string()).and_then(|scanner| {
-                scanner.instance().open(OPEN_LIMIT).map_err(|e| e.to_string())?;
-                let estimate =
-                    scanner.estimate(self.region.base.as_ref(), OPEN_LIMIT).map_err(|e| e.to_string())?;
-                Ok((scanner, estimate))
-            });
-        match scanner {
-            Ok((scanner, estimate)) => {
-                tracing::info!(?estimate, window = ?self.region.base, "scanner in reach");
-                self.scanner = Some(scanner);
-                self.estimate = estimate;
+    /// Connects to the scanner where it is not, and sees whether its driver still lives where it is.
+    fn look_after_scanner(&mut self) {
+        if let Some(scanner) = self.scanner.as_ref().filter(|_| self.connected)
+            && let Err(why) = scanner.instance().check()
+        {
+            tracing::error!("scanner: {why}");
+            self.connected = false;
+        }
+        if self.connected {
+            return;
+        }
+        match self.connect() {
+            Ok(()) => {
+                tracing::info!(estimate = ?self.estimate, window = ?self.region.base, "scanner in reach");
+                self.connected = true;
                 self.in_reach.get_or_insert_with(Instant::now);
             }
             Err(why) => {
                 tracing::error!("scanner: {why}");
                 self.in_reach = None;
-                self.reported = Some(Err(Code::ScannerNotReady));
-                self.answer(Answer::Scanner { ready: Err(Code::ScannerNotReady), estimate: None });
+                let out_of_use = matches!(why, PipelineError::Plugin(PluginError::Quarantined { .. }));
+                self.tell_ready(Err(if out_of_use { Code::PluginOutOfUse } else { Code::ScannerNotReady }));
             }
         }
+    }
+
+    fn connect(&mut self) -> Result<(), PipelineError> {
+        let scanner = match self.scanner.take() {
+            Some(scanner) => scanner,
+            None => pipeline::scanner(&self.plant, &self.catalogue)?,
+        };
+        let scanner = self.scanner.insert(scanner);
+        scanner.instance().open(OPEN_LIMIT)?;
+        self.estimate = scanner.estimate(self.region.base.as_ref(), OPEN_LIMIT)?;
+        Ok(())
     }
 
     /// Returns the valid calibration; `None` where the plant file has none.
@@ -197,35 +212,49 @@ impl MeasurementWorker {
     }
 
     /// Reports to the press side whether strokes can be measured, when that has changed: without a valid calibration no
-    /// measurement could be judged.
+    /// measurement could be judged, without its plugins none made.
     fn report_readiness(&mut self) {
         if self.in_reach.is_none() {
             return;
         }
-        let found = self.calibration();
-        let ready = found.as_ref().map(|_| ()).map_err(|_| Code::CalibrationInvalid);
+        let plugins = self.pipeline.revive().map_err(|why| (Code::PluginOutOfUse, why.to_string()));
+        let found = plugins.and_then(|()| {
+            self.calibration().map(drop).map_err(|why| (Code::CalibrationInvalid, why.to_string()))
+        });
+        let ready = found.as_ref().copied().map_err(|(code, _)| *code);
         if self.reported == Some(ready) {
             return;
         }
-        match found {
-            Ok(_) => tracing::info!("scanner ready"),
-            Err(why) => tracing::error!("{why}"),
+        match &found {
+            Ok(()) => tracing::info!("scanner ready"),
+            Err((_, why)) => tracing::error!("{why}"),
         }
+        self.tell_ready(ready);
+    }
+
+    fn report_plugins(&self) {
+        let scanner = self.scanner.iter().map(Scanner::instance);
+        let states: Vec<PluginStatus> =
+            scanner.chain(self.pipeline.instances()).filter_map(PluginStatus::of).collect();
+        *self.receivers.plugins.lock().unwrap_or_else(PoisonError::into_inner) = states;
+    }
+
+    fn tell_ready(&mut self, ready: Result<(), Code>) {
         self.reported = Some(ready);
         // A plate that has moved out of its window is scanned twice.
         let estimate = self.estimate.map(|estimate| (2 * estimate).max(LEAST_ESTIMATE));
-        self.answer(Answer::Scanner { ready, estimate });
+        self.answer(Answer::Scanner { ready, estimate: estimate.filter(|_| self.connected) });
     }
 
-    /// Returns whether a plugin hangs.
-    fn scan(&mut self, key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken) -> bool {
+    fn scan(&mut self, key: StrokeKey, run_id: u32, data: Box<StrokeData>, token: CancelToken) {
         let started = Instant::now();
         self.active = None;
+        self.pipeline.instances().for_each(|plugin| plugin.at_stroke(u64::from(key.stroke)));
         let mut buffer = self.archive.buffer();
         let scanned = self.plate(&data).and_then(|plate| {
             let spec = self.pipeline.spec(&plate);
-            let scanner =
-                self.scanner.as_ref().ok_or((Code::ScannerNotReady, "not connected".to_owned(), false))?;
+            let scanner = self.scanner.as_ref().filter(|_| self.connected);
+            let scanner = scanner.ok_or((Code::ScannerNotReady, "not connected".to_owned()))?;
             let limit = self.scan_limit.unwrap_or(SCAN_LIMIT);
             let job = JobSpec { stroke: u64::from(key.stroke), trigger: started, limit, cancel: token };
             let window = self.quicker(scanner).filter(|_| !data.baseline);
@@ -238,16 +267,14 @@ impl MeasurementWorker {
                 self.active =
                     Some(ActiveStroke { key, run_id, data, plate, scanned, buffer, started, scanned_at });
                 self.answer(Answer::Acquired(key));
-                false
             }
-            Err((code, why, hung)) => {
-                if matches!(code, Code::ScanFailed | Code::ScannerNotReady) {
-                    self.scanner = None;
+            Err((code, why)) => {
+                if matches!(code, Code::ScanFailed | Code::ScannerNotReady | Code::ScanTimeout) {
+                    self.connected = false;
                 }
                 let found_no_plate = matches!(code, Code::PlateNotFound);
                 self.fail(key, data.baseline, code, why, started);
                 self.archive.keep(self.folder(run_id), buffer.filter(|_| found_no_plate));
-                hung
             }
         }
     }
@@ -305,22 +332,21 @@ impl MeasurementWorker {
     }
 
     /// Loads the plate file of the stroke's recipe.
-    fn plate(&self, data: &StrokeData) -> Result<PlateFile, (Code, String, bool)> {
-        let unknown = |why: String| (Code::RecipeUnknown, why, false);
+    fn plate(&self, data: &StrokeData) -> Result<PlateFile, (Code, String)> {
+        let unknown = |why: String| (Code::RecipeUnknown, why);
         let recipe = data.recipe_id.ok_or_else(|| unknown("the press names no recipe".into()))?;
         PlateFile::load(&self.plant.plate_path(recipe)).map_err(|e| unknown(format!("recipe {recipe}: {e}")))
     }
 
-    /// Returns whether a plugin hangs.
-    fn evaluate(&mut self, key: StrokeKey) -> bool {
+    fn evaluate(&mut self, key: StrokeKey) {
         let Some(mut stroke) = self.active.take().filter(|stroke| stroke.key == key) else {
             self.fail(key, false, Code::Interrupted, "its scan is gone".into(), Instant::now());
-            return false;
+            return;
         };
         let start = Instant::now();
         let (baseline, started) = (stroke.data.baseline, stroke.started);
         let (folder, buffer) = (self.folder(stroke.run_id), stroke.buffer.take());
-        let hung = match self.measure(&stroke, start) {
+        match self.measure(&stroke, start) {
             Ok(JudgedStroke { answer, record, surface, reports, folder }) => {
                 self.answer(Answer::Result(key, Box::new(answer)));
                 let elapsed = started.elapsed();
@@ -330,16 +356,13 @@ impl MeasurementWorker {
                     self.illustrate(&stroke, folder, &record, &surface, &reports);
                 }
                 self.report(StrokeReport { key, baseline, result: Ok(Box::new(record)), folder, elapsed });
-                false
             }
             Err(error) => {
-                let (code, why, hung) = refusal(&error);
+                let (code, why) = refusal(&error);
                 self.fail(key, baseline, code, why, started);
-                hung
             }
-        };
+        }
         self.archive.keep(folder, buffer);
-        hung
     }
 
     /// Passes a result on to the pages, if there are any.
@@ -404,7 +427,9 @@ impl MeasurementWorker {
             reports: &reports,
             compare,
         };
-        let record = ResultRecord::new(&stroke.scanned, &measured, context);
+        let mut record = ResultRecord::new(&stroke.scanned, &measured, context);
+        let scanner = self.scanner.iter().map(Scanner::instance);
+        record.name_plugins(plugin_records::records(scanner.chain(self.pipeline.instances())));
         let folder = self.keep(stroke, &record, &measured.measurement.surface);
         let times = [
             (Measure::ScanTime, stroke.scanned.acquire + stroke.scanned.extract),
@@ -414,7 +439,9 @@ impl MeasurementWorker {
         let mut answer =
             figures::measurement(&measured, &reports, verdict, &stroke.plate, times, stroke.scanned_at);
         // A result without files still goes to the press, with a warning.
-        answer.warning = folder.is_none().then_some(Code::StorageDegraded);
+        let retried = record.plugins.iter().any(|plugin| plugin.retried);
+        let warnings = [(folder.is_none(), Code::StorageDegraded), (retried, Code::PluginRestarted)];
+        answer.warning = warnings.into_iter().find_map(|(raised, code)| raised.then_some(code));
         Ok(JudgedStroke { answer, record, surface: measured.measurement.surface, reports, folder })
     }
 
@@ -466,15 +493,15 @@ impl MeasurementWorker {
     }
 }
 
-/// Returns the alarm code, the sentence for people, and whether a plugin hangs.
-fn refusal(error: &NotMeasured) -> (Code, String, bool) {
-    let hung = matches!(error, NotMeasured::Scanner(PluginError::Hangs { .. }));
+/// Returns the alarm code and the sentence for people.
+fn refusal(error: &NotMeasured) -> (Code, String) {
     let code = match error {
-        NotMeasured::Scanner(PluginError::Stopped { .. }) => Code::ScanTimeout,
+        NotMeasured::Scanner(PluginError::Stopped { .. } | PluginError::Hangs { .. }) => Code::ScanTimeout,
+        NotMeasured::Scanner(PluginError::Quarantined { .. }) => Code::PluginOutOfUse,
         NotMeasured::Scanner(_) | NotMeasured::Column(_) => Code::ScanFailed,
         NotMeasured::Plate(_) => Code::PlateNotFound,
         NotMeasured::Askew { .. } | NotMeasured::Turned(_) => Code::PlateTurned,
         NotMeasured::Outline(_) | NotMeasured::Blank(_) | NotMeasured::Shape(_) => Code::EvaluationFailed,
     };
-    (code, error.to_string(), hung)
+    (code, error.to_string())
 }

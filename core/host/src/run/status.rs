@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
 use super::disk;
+use super::plugin_status::{PluginStates, PluginStatus};
 
 /// The newest alarm, set by the dispatcher.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
@@ -26,6 +27,7 @@ pub(super) struct Beside {
     pub(super) lost: Arc<AtomicU64>,
     /// Address of the pages, where they are served.
     pub(super) pages: Option<String>,
+    pub(super) plugins: PluginStates,
 }
 
 /// Its name in the output folder.
@@ -97,6 +99,9 @@ pub struct StatusRecord {
     /// Address of the browser pages; null where none are served.
     #[serde(default)]
     pub pages: Option<String>,
+    /// Its plugins and their processes.
+    #[serde(default)]
+    pub plugins: Vec<PluginStatus>,
 }
 
 /// Counters of the link since the start.
@@ -171,6 +176,7 @@ impl StatusRecord {
             },
             reset_at,
             pages: beside.pages.clone(),
+            plugins: beside.plugins.lock().unwrap_or_else(PoisonError::into_inner).clone(),
         }
     }
 

@@ -50,9 +50,9 @@ pub(crate) fn page(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Mark
                 section { h2 { (text(words::REGISTERS_READ)) } (table(&[words::ADDRESS, words::CODE, words::WORDS, words::NAME, words::VALUE], registers(0))) }
                 section { h2 { (text(words::REGISTERS_WRITTEN)) } (table(&[words::ADDRESS, words::CODE, words::WORDS, words::NAME, words::VALUE], registers(1))) }
             }
-            section { h2 { (text(words::PLUGINS)) } (table(&[words::USE, words::NAME, words::VERSION, words::FILE], html! {
-                @for plugin in &engineer.plugins { tr {
-                    td { (plugin.role) } th scope="row" { (clean(&plugin.name)) } td { (clean(&plugin.version)) } td { (clean_path(&plugin.file)) }
+            section { h2 { (text(words::PLUGINS)) } (table(&[words::USE, words::NAME, words::VERSION, words::STATE, words::FILE], html! {
+                @for (k, plugin) in engineer.plugins.iter().enumerate() { tr {
+                    td { (plugin.role) } th scope="row" { (clean(&plugin.name)) } td { (clean(&plugin.version)) } td { (cells.span(&format!("plugin-{k}"))) } td { (clean_path(&plugin.file)) }
                 } }
             })) }
             section { h2 { (text(words::FILES_IN_FORCE)) } (table(&[words::FILE, words::CHECKSUM], pairs(&engineer.files, None))) }
@@ -73,6 +73,9 @@ pub(super) fn cells(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Cel
         for (k, row) in rows.iter().enumerate() {
             cells.text(format!("register-{block}-{k}"), clean(&row.value));
         }
+    }
+    for (k, plugin) in engineer.plugins.iter().enumerate() {
+        cells.text(format!("plugin-{k}"), clean(&plugin.state));
     }
     for (k, (_, value)) in engineer.figures.iter().enumerate() {
         cells.text(format!("figure-{k}"), value.clone());

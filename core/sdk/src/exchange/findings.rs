@@ -38,10 +38,6 @@ json! {
 impl Payload for Field {
     const FORMAT: &'static CStr = payload::Grid::FORMAT;
 
-    fn count(&self) -> u64 {
-        self.state.len() as u64
-    }
-
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let state: Vec<u8> = self.state.iter().map(|state| *state as u8).collect();
         let mut arrays = Arrays::behind::<payload::Grid>();

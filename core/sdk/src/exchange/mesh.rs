@@ -64,10 +64,6 @@ impl Payload for DiskMesh {
 impl Payload for Chart {
     const FORMAT: &'static CStr = payload::Chart::FORMAT;
 
-    fn count(&self) -> u64 {
-        self.uv.len() as u64
-    }
-
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let strain = self.strain.as_deref().unwrap_or_default();
         let sigma = self.sigma.as_deref().unwrap_or_default();

@@ -60,10 +60,6 @@ impl Payload for ScanHeader {
 impl Payload for Column {
     const FORMAT: &'static CStr = payload::Column::FORMAT;
 
-    fn count(&self) -> u64 {
-        self.len() as u64
-    }
-
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
         let state: Vec<u8> = self.state.iter().map(|s| *s as u8).collect();
         let mut arrays = Arrays::behind::<payload::Column>();

@@ -37,11 +37,24 @@ pub(super) fn figures(site: &Installation, board: &Board, archive: Option<&Archi
     Engineer {
         registers: registers(site, board),
         timeline: archive.map(timeline).unwrap_or_default(),
-        plugins: site.plugins.clone(),
+        plugins: plugins(site),
         alarms: alarms(board),
         figures: status(site, board),
         files: files(site),
     }
+}
+
+/// Returns the plugins with the state of their processes, in the order of the plant file.
+fn plugins(site: &Installation) -> Vec<PluginRow> {
+    let states = lock(&site.beside.plugins).clone();
+    let state = |row: &PluginRow| {
+        states
+            .iter()
+            .find(|state| state.kind == row.role && state.plugin == row.name)
+            .map(|state| state.line())
+    };
+    let rows = site.plugins.iter().cloned();
+    rows.map(|row| PluginRow { state: state(&row).unwrap_or_else(|| "not started".into()), ..row }).collect()
 }
 
 fn registers(site: &Installation, board: &Board) -> [Vec<RegisterRow>; 2] {
@@ -157,7 +170,7 @@ fn files(site: &Installation) -> Vec<(String, String)> {
 }
 
 /// Returns the checksum of a file, or why it cannot be read.
-pub(super) fn checksum(path: &Path) -> String {
+fn checksum(path: &Path) -> String {
     match std::fs::read(path) {
         Ok(bytes) => format!("crc32c {:08x}", crc32c::crc32c(&bytes)),
         Err(error) => error.to_string(),

@@ -228,9 +228,9 @@ fn plugins(plant: &PlantFile, catalogue: &Catalogue) -> Vec<PluginRow> {
         let library = catalogue.load(&used.plugin).ok();
         let version = library.as_ref().map_or(String::new(), |library| library.descriptor().version.clone());
         let file = library.map_or(String::new(), |library| {
-            format!("{} ({})", library.path().display(), engineer::checksum(library.path()))
+            format!("{} (sha256 {})", library.path().display(), library.sha256())
         });
-        PluginRow { role: role.to_owned(), name: used.plugin.clone(), version, file }
+        PluginRow { role: role.to_owned(), name: used.plugin.clone(), version, file, state: String::new() }
     };
     scanner.chain([("flattening", &plant.flattening)]).chain(comparisons).map(row).collect()
 }

@@ -1,0 +1,12 @@
+//! A plugin in this process, that of its worker: its library, the calls through its tables, and the host's table for it.
+
+mod descriptor;
+mod host_table;
+mod instance;
+mod job;
+mod library;
+mod values;
+
+pub(super) use instance::{Canceller, Input, Instance};
+pub(super) use job::{Listed, begin, find};
+pub(super) use library::Library;

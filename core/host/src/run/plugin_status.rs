@@ -1,0 +1,79 @@
+//! State of the plugins' processes, for `platen status` and the engineer's page.
+
+use std::sync::{Arc, Mutex};
+
+use platen_engine::plugin::{Instance, Kind};
+use serde::{Deserialize, Serialize};
+
+/// State of every plugin of the plant, set by the measurement worker between its jobs.
+pub(super) type PluginStates = Arc<Mutex<Vec<PluginStatus>>>;
+
+/// State of one plugin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PluginStatus {
+    /// `scanner`, `flattening` or `comparison`.
+    pub kind: String,
+    /// Name.
+    pub plugin: String,
+    /// Number of its process; null in the host's own process, and while it has none.
+    pub process: Option<u32>,
+    /// Private memory of its process, MiB.
+    pub memory_mib: Option<u64>,
+    /// What it is kept from.
+    pub confinement: String,
+    /// Faults since the start of the host; each cost it its process.
+    pub faults: u64,
+    /// Why it is not in use; null while it is.
+    pub out_of_use: Option<String>,
+}
+
+impl PluginStatus {
+    /// Returns the state of a plugin; `None` while its job runs.
+    pub(super) fn of(instance: &Instance) -> Option<Self> {
+        let state = instance.worker_state()?;
+        Some(Self {
+            kind: instance.descriptor().kind.name().to_owned(),
+            plugin: state.plugin,
+            process: state.process,
+            memory_mib: state.memory.map(|bytes| bytes >> 20),
+            confinement: confinement(instance, state.confinement),
+            faults: state.faults,
+            out_of_use: state.out_of_use,
+        })
+    }
+
+    /// Returns the state in one line.
+    pub fn line(&self) -> String {
+        if let Some(why) = &self.out_of_use {
+            return format!("out of use: {why}");
+        }
+        let process = self.process.map_or(String::new(), |process| format!("process {process}, "));
+        let memory = self.memory_mib.map_or(String::new(), |mib| format!(", {mib} MiB"));
+        let faults = match self.faults {
+            0 => String::new(),
+            1 => ", 1 fault".to_owned(),
+            n => format!(", {n} faults"),
+        };
+        format!("{process}{}{memory}{faults}", self.confinement)
+    }
+}
+
+fn confinement(instance: &Instance, holds: platen_engine::plugin::Confinement) -> String {
+    if !instance.is_isolated() {
+        return "in the host's process: it can end the host".to_owned();
+    }
+    if instance.descriptor().kind == Kind::Scanner {
+        return "free to use files, sockets and devices".to_owned();
+    }
+    let closed = [(holds.landlock, "files (landlock)"), (holds.seccomp, "sockets and programs (seccomp)")];
+    let list = |wanted: bool| {
+        let names: Vec<&str> =
+            closed.iter().filter(|(held, _)| *held == wanted).map(|(_, name)| *name).collect();
+        names.join(", ")
+    };
+    match (holds.landlock, holds.seccomp) {
+        (true, true) => format!("kept from {}", list(true)),
+        (false, false) => format!("NOT kept from {}: this kernel cannot", list(false)),
+        _ => format!("kept from {}, NOT from {}: this kernel cannot", list(true), list(false)),
+    }
+}

@@ -1,0 +1,146 @@
+/* A plugin that works as another one, but for one fault: loads TARGET and hands all calls on, and does FAULT at jobs of stroke STROKE
+ * (0: of every stroke), in the call WHERE. Compiled with -DTARGET='"..."' -DWHERE=run -DFAULT=... -DSTROKE=3. */
+#define _GNU_SOURCE
+#include "platen.h"
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#ifndef STROKE
+#define STROKE 0
+#endif
+
+enum { run = 1, create, open_, close_, cancel, init, constructor };
+
+static void nap(void) {
+  struct timespec second = {1, 0};
+  nanosleep(&second, NULL);
+}
+static void segv(void) { *(volatile int *)8 = 1; }
+static void leave(void) { exit(0); }
+static void leave_3(void) { _exit(3); }
+static void give_up(void) { abort(); }
+static void overflow(void) {
+  volatile char deep[1 << 16];
+  deep[0] = 1;
+  overflow();
+  deep[1] = 1;
+}
+static void spin(void) {
+  for (volatile int k = 0;; k++) {
+  }
+}
+static void hang(void) {
+  for (;;) nap();
+}
+static void ignore_term(void) { signal(SIGTERM, SIG_IGN), signal(SIGINT, SIG_IGN); }
+static void close_all(void) {
+  for (int fd = 0; fd < 64; fd++) close(fd);
+}
+static void print(void) { printf("a line for whoever reads the host's output\n"), fflush(stdout); }
+static void open_file(void) { (void)!open("/etc/hostname", O_RDONLY); }
+static void open_socket(void) { (void)!socket(AF_INET, SOCK_STREAM, 0); }
+static void shell(void) { (void)!system("true"); }
+static void fork_away(void) {
+  if (fork() == 0) hang();
+}
+static void eat_memory(void) {
+  for (;;) {
+    char *more = malloc(64 << 20);
+    if (!more) abort();
+    memset(more, 1, 64 << 20);
+  }
+}
+static void eat_files(void) {
+  for (int n = 0; n < 300; n++)
+    if (dup(2) < 0) abort();
+}
+static void shrink_pool(void) {
+  for (int fd = 3; fd < 64; fd++) (void)!ftruncate(fd, 0);
+}
+static void none(void) {}
+/* In every other job, at any moment within 100 ms. */
+static void *die_later(void *when) {
+  nanosleep(when, NULL);
+  __builtin_trap();
+}
+static void maybe_die(void) {
+  static struct timespec when;
+  pthread_t thread;
+  clock_gettime(CLOCK_MONOTONIC, &when);
+  unsigned long random = (unsigned long)when.tv_nsec / 1000 * 2654435761u >> 7;
+  when = (struct timespec){0, (long)(random % 100) * 1000000};
+  if (random / 100 % 2 == 0) pthread_create(&thread, NULL, die_later, &when);
+}
+
+static const platen_entry *target;
+static void fault(int where, uint64_t stroke) {
+  if (where == WHERE && (STROKE == 0 || stroke == STROKE)) FAULT();
+}
+
+__attribute__((constructor)) static void load(void) {
+  void *handle = dlopen(TARGET, RTLD_NOW | RTLD_LOCAL);
+  if (handle) target = dlsym(handle, "platen_entry_2");
+  if (WHERE == constructor) FAULT();
+}
+
+typedef struct proxy {
+  platen_instance raw;
+  platen_instance *real;
+} proxy;
+
+static platen_status on_open(platen_instance *self, platen_error *error) {
+  fault(open_, 0);
+  return ((proxy *)self)->real->open(((proxy *)self)->real, error);
+}
+static platen_status on_run(platen_instance *self, const platen_job *job, const platen_frame *in, uint32_t n, platen_error *error) {
+#ifdef WRITE_INPUT
+  if (n > 0) *(volatile char *)in[n - 1].buffer.data = 1;
+#endif
+  fault(run, job->stroke_no);
+  return ((proxy *)self)->real->run(((proxy *)self)->real, job, in, n, error);
+}
+static void on_cancel(platen_instance *self, uint64_t job) {
+  fault(cancel, 0);
+  if (((proxy *)self)->real->cancel) ((proxy *)self)->real->cancel(((proxy *)self)->real, job);
+}
+static void on_close(platen_instance *self) {
+  fault(close_, 0);
+  ((proxy *)self)->real->close(((proxy *)self)->real);
+}
+static void on_destroy(platen_instance *self) {
+  ((proxy *)self)->real->destroy(((proxy *)self)->real);
+  free(self);
+}
+static const void *on_extension(platen_instance *self, const char *id) {
+  /* A table's functions take the real instance: only what needs no instance could be handed on. */
+  return (void)self, (void)id, NULL;
+}
+
+static platen_status on_init(const platen_host *host, const char *folder, platen_error *error) {
+  fault(init, 0);
+  return target->init(host, folder, error);
+}
+static uint32_t count(void) { return target ? target->count() : 0; }
+static const platen_desc *desc(uint32_t index) { return target ? target->desc(index) : NULL; }
+static platen_status on_create(const platen_host *host, const char *id, const platen_value *values, uint32_t n, platen_instance **out,
+                               platen_error *error) {
+  fault(create, 0);
+  proxy *made = calloc(1, sizeof *made);
+  platen_status status = target->create(host, id, values, n, &made->real, error);
+  if (status != PLATEN_OK) return free(made), status;
+  made->raw = (platen_instance){sizeof made->raw, 0, NULL, on_open, on_run, on_cancel, on_close, on_destroy, on_extension};
+  *out = &made->raw;
+  return PLATEN_OK;
+}
+
+PLATEN_EXPORT const platen_entry platen_entry_2 = {sizeof(platen_entry), PLATEN_ABI_MINOR, on_init, NULL, count, desc, on_create};
