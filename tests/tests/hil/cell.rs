@@ -125,13 +125,25 @@ impl Host {
         Self::run(platen_tests::program("platen"), plant)
     }
 
-    /// A host that cannot write any file beyond so many blocks of 512 bytes.
-    pub(crate) fn starved(plant: &Path, blocks: u32) -> Self {
-        let platen = platen_tests::program("platen");
-        let mut shell = Command::new("sh");
-        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
-        shell.arg("-c").arg(script).arg(platen.get_program()).env_remove("PLATEN_LOG");
-        Self::run(shell, plant)
+    /// A host that finds its plugins in `plugins` first.
+    pub(crate) fn with_plugins(plant: &Path, plugins: &Path) -> Self {
+        let mut program = platen_tests::program("platen");
+        program.arg("--plugins").arg(plugins);
+        Self::run(program, plant)
+    }
+
+    /// Number of its process.
+    pub(crate) fn process(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// A host on a full disk: it cannot write any file beyond so many bytes.
+    pub(crate) fn on_full_disk(plant: &Path, file_bytes: u32) -> Self {
+        let library = plant.with_file_name("libfull_disk.so");
+        platen_tests::compile_c(&platen_tests::c_source("full_disk.c"), &library, &["-shared", "-fPIC"]);
+        let mut program = platen_tests::program("platen");
+        program.env("LD_PRELOAD", library).env("FILE_BYTES", file_bytes.to_string());
+        Self::run(program, plant)
     }
 
     fn run(mut program: Command, plant: &Path) -> Self {

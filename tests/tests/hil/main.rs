@@ -7,6 +7,7 @@ mod rig;
 mod stream;
 
 mod archive;
+mod isolation;
 mod kill;
 mod line;
 mod peer_run;

@@ -3,7 +3,7 @@
 use crate::cell::{Host, Press, assert_clean, plant, until};
 
 /// More than the journal of one stroke writes, less than its result files.
-const RESULT_BLOCKS: u32 = 400;
+const LESS_THAN_A_RESULT: u32 = 200 << 10;
 
 #[test]
 fn strokes_are_measured_recorded_and_answered() {
@@ -218,8 +218,7 @@ fn newest_words(stats: &serde_json::Value) -> Vec<u64> {
     words.iter().map(|word| word.as_u64().unwrap()).collect()
 }
 
-/// The largest file that this host may write, in blocks of 512 bytes, stands in for a full disk.
-fn starved_run(blocks: u32, wanted: &str) {
+fn run_on_full_disk(file_bytes: u32, wanted: &str) {
     let folder = tempfile::tempdir().unwrap();
     let mut press = Press::start(folder.path(), "strokes = 2\nautomatic = false");
     let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
@@ -228,7 +227,7 @@ fn starved_run(blocks: u32, wanted: &str) {
     until("ready", || (press.host_status() & 1 == 1).then_some(()));
     assert_eq!(first.stop(), Some(0), "{}", first.log());
 
-    let mut host = Host::starved(&plant, blocks);
+    let mut host = Host::on_full_disk(&plant, file_bytes);
     until("ready", || (press.host_status() & 1 == 1).then_some(()));
     assert_eq!(press.ask(r#"{"do":"stroke"}"#)["ok"], true);
     let stats = press.wait_taken(1);
@@ -247,10 +246,10 @@ fn starved_run(blocks: u32, wanted: &str) {
 
 #[test]
 fn a_full_journal_costs_the_record_and_not_the_result() {
-    starved_run(64, "the journal cannot be written");
+    run_on_full_disk(32 << 10, "the journal cannot be written");
 }
 
 #[test]
 fn a_lost_result_file_is_told_to_the_press() {
-    starved_run(RESULT_BLOCKS, "the record is lost");
+    run_on_full_disk(LESS_THAN_A_RESULT, "the record is lost");
 }

@@ -1,39 +1,21 @@
 //! The plugin boundary: header against Rust types, a scanner in C, and every way in which a library can be wrong.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
 use platen_engine::plugin::{Catalogue, JobSpec, Kind, PluginError, Scanner};
 use platen_plant::{OptionValue, Value};
 use platen_scan::Lattice;
+use platen_tests::{c_source, compile_c};
 
 const LIMIT: Duration = Duration::from_secs(20);
-
-fn cc(source: &Path, out: &Path, extra: &[&str]) {
-    let include = platen_tests::repository().join("core/abi/include");
-    let status = Command::new("cc")
-        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
-        .arg(include)
-        .args(extra)
-        .arg("-o")
-        .arg(out)
-        .arg(source)
-        .arg("-lm")
-        .status();
-    assert!(status.is_ok_and(|s| s.success()), "cc {}", source.display());
-}
-
-fn source(name: &str) -> PathBuf {
-    platen_tests::repository().join("tests/contract").join(name)
-}
 
 /// A library of C text in a folder of its own, found as `name`.
 fn c_plugin(folder: &Path, name: &str, text: &str) -> Catalogue {
     let file = folder.join("plugin.c");
     std::fs::write(&file, text).unwrap();
-    cc(&file, &folder.join(format!("lib{name}.so")), &["-shared", "-fPIC"]);
+    compile_c(&file, &folder.join(format!("lib{name}.so")), &["-shared", "-fPIC"]);
     Catalogue::new(Some(folder))
 }
 
@@ -43,7 +25,7 @@ fn the_header_and_the_rust_types_agree() {
     use std::mem::offset_of;
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("sizes");
-    cc(&source("sizes.c"), &program, &[]);
+    compile_c(&c_source("sizes.c"), &program, &[]);
     let printed = String::from_utf8(Command::new(program).output().unwrap().stdout).unwrap();
     let mut expected = String::new();
     macro_rules! layout {
@@ -56,7 +38,7 @@ fn the_header_and_the_rust_types_agree() {
         platen_error = platen_abi::Error { message, hint }
         platen_job = platen_abi::Job { deadline_mono_ns }
         platen_buffer = platen_abi::Buffer { token }
-        platen_frame = platen_abi::Frame { format, buffer, n_attrs }
+        platen_frame = platen_abi::Frame { format, buffer, role }
         platen_option = platen_abi::OptionDecl { name, min, choices }
         platen_value = platen_abi::Value { i, list, n }
         platen_desc = platen_abi::Desc { license, options, n_options }
@@ -72,6 +54,8 @@ fn the_header_and_the_rust_types_agree() {
         platen_surface = p::Surface { thickness, seen }
         platen_grid = p::Grid { components, state }
         platen_estimate = platen_abi::Estimate { scan_seconds }
+        platen_health = platen_abi::Health { tilt }
+        platen_health_source = platen_abi::HealthSource { health }
     }
     assert_eq!(printed, expected);
 }
@@ -82,7 +66,7 @@ fn a_scanner_in_c_scans() {
     let catalogue = c_plugin(
         folder.path(),
         "plane_scanner",
-        &std::fs::read_to_string(source("plane_scanner.c")).unwrap(),
+        &std::fs::read_to_string(c_source("plane_scanner.c")).unwrap(),
     );
     let library = catalogue.load("plane-scanner").unwrap();
     assert_eq!(library.descriptor().options[0].default.as_deref(), Some("2.0"));
@@ -134,13 +118,16 @@ fn every_wrong_library_gets_its_own_sentence() {
     );
     let other = refuse("other", "int x;");
     assert!(matches!(other, PluginError::NotAPlugin { .. }), "{other}");
-    let newer = refuse("newer", "const int platen_entry_2 = 0;");
-    assert!(matches!(&newer, PluginError::WrongAbi { found, .. } if found == "2"), "{newer}");
-    let older = refuse("older", "const int platen_entry_1[12] = {8, 0};");
-    assert!(matches!(&older, PluginError::WrongAbi { .. }), "{older}");
+    let newer = refuse("newer", "const int platen_entry_3 = 0;");
+    assert!(matches!(&newer, PluginError::WrongAbi { found, .. } if found == "3"), "{newer}");
+    let short = refuse("short", "const int platen_entry_2[12] = {8, 0};");
+    assert!(
+        matches!(&short, PluginError::NotAPlugin { why, .. } if why.contains("has 8 bytes, 48 are needed")),
+        "{short}"
+    );
     let unresolved = refuse(
         "unresolved",
-        "extern int acme_open2(void); const int platen_entry_1 = 0; int f(void) { return acme_open2(); }",
+        "extern int acme_open2(void); const int platen_entry_2 = 0; int f(void) { return acme_open2(); }",
     );
     assert!(
         matches!(&unresolved, PluginError::FailedToLoad { why, .. } if why.contains("acme_open2")),

@@ -1,0 +1,258 @@
+//! Faults of a plugin at one measurement: the program names the plugin and how it ended, prints nothing of it, and leaves no process.
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use platen_tests::faulty;
+use serde_json::Value as Json;
+
+/// A folder with a scan of a plate, its plate file, and a folder for faulty plugins.
+struct Bench(tempfile::TempDir);
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self(tempfile::tempdir().unwrap());
+        std::fs::write(
+            bench.file("plate.toml"),
+            "[plate]\nid = \"P\"\nwidth_mm = 2000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n",
+        )
+        .unwrap();
+        let plant = "[plant]\nname = \"test\"\n[flattening]\nplugin = \"harmonic\"\n[[comparison]]\nplugin = \"template\"\n\
+                     [[comparison]]\nplugin = \"curvature\"\n";
+        std::fs::write(bench.file("plant.toml"), plant).unwrap();
+        let simulated = bench.file("sim.toml");
+        let text = "strokes = 0\nshape = { shape = \"cylinder\", radius_mm = 6000.0, axis_deg = 90.0 }\n\
+                    [blank]\nwidth_mm = 2500.0\nheight_mm = 2000.0\nthickness_mm = 36.0\n[pose]\ncentre_mm = [6000.0, 0.0, -3600.0]\nyaw_deg = 0.0\n";
+        std::fs::write(&simulated, text).unwrap();
+        let mut sim = platen_tests::program("platen-sim");
+        sim.arg("scanner")
+            .arg(simulated)
+            .arg("--out")
+            .arg(bench.file("scan.e57"))
+            .args(["--step-deg", "0.1"]);
+        let made = sim.output().unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        bench
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Measures the scan with the plugins of this folder first.
+    fn measure(&self, plugins: &Path, more: &[&str]) -> Output {
+        let mut platen = platen_tests::program("platen");
+        platen
+            .arg("--plugins")
+            .arg(plugins)
+            .arg("--json")
+            .args(more)
+            .arg("measure")
+            .arg(self.file("scan.e57"));
+        platen.arg("--plate").arg(self.file("plate.toml")).arg("--plant").arg(self.file("plant.toml"));
+        platen.output().unwrap()
+    }
+
+    /// Measures with one faulty plugin; returns the output as texts.
+    fn with_fault(&self, name: &str, place: &str, fault: &str) -> Measured {
+        let plugins = self.file(&format!("{name}-{place}-{fault}"));
+        faulty(&plugins, name, place, fault, 0);
+        let output = self.measure(&plugins, &[]);
+        let left = left_behind(&plugins);
+        assert!(left.is_empty(), "{name} {place} {fault} left behind: {left:?}");
+        Measured {
+            code: output.status.code(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            error: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+}
+
+struct Measured {
+    code: Option<i32>,
+    out: String,
+    error: String,
+}
+
+/// The processes that have a library of this folder mapped.
+fn left_behind(folder: &Path) -> Vec<String> {
+    let maps = std::fs::read_dir("/proc").unwrap().flatten().filter_map(|process| {
+        let text = std::fs::read_to_string(process.path().join("maps")).ok()?;
+        text.contains(folder.to_str().unwrap()).then(|| process.path().display().to_string())
+    });
+    maps.collect()
+}
+
+/// A fault in `run` and the words that tell it.
+const ENDS: [(&str, &str); 5] = [
+    ("segv", "SIGSEGV"),
+    ("leave", "exit code 0"),
+    ("leave_3", "exit code 3"),
+    ("give_up", "SIGABRT"),
+    ("overflow", "SIGSEGV"),
+];
+
+#[test]
+fn a_flattening_or_driver_that_ends_is_named_with_how_it_ended() {
+    let bench = Bench::new();
+    for plugin in ["harmonic", "faro-file"] {
+        for (fault, how) in ENDS {
+            let measured = bench.with_fault(plugin, "run", fault);
+            let text = format!("{plugin} {fault}: {}", measured.error);
+            assert_eq!(measured.code, Some(1), "{text}");
+            assert!(measured.out.is_empty(), "{text}");
+            assert!(measured.error.contains(&format!("{plugin}: its process ended: {how}")), "{text}");
+        }
+    }
+}
+
+#[test]
+fn a_plugin_that_closes_every_descriptor_loses_its_process() {
+    let bench = Bench::new();
+    for plugin in ["harmonic", "faro-file"] {
+        let measured = bench.with_fault(plugin, "run", "close_all");
+        assert!(
+            measured.code == Some(1) && measured.error.contains("its process ended"),
+            "{}",
+            measured.error
+        );
+    }
+}
+
+#[test]
+fn a_comparison_that_ends_leaves_the_others_in_force() {
+    let bench = Bench::new();
+    for (fault, how) in ENDS {
+        let measured = bench.with_fault("curvature", "run", fault);
+        let result: Json = serde_json::from_str(&measured.out).unwrap();
+        let comparisons = result["comparisons"].as_array().unwrap();
+        let failed: Vec<&str> = comparisons.iter().filter_map(|report| report["error"].as_str()).collect();
+        assert!(comparisons.len() == 2 && failed.len() == 1, "{fault}: {failed:?}");
+        assert!(failed[0].starts_with("curvature: ") && failed[0].contains(how), "{fault}: {failed:?}");
+        assert_ne!(result["verdict"], "pass", "{fault}: {failed:?}");
+    }
+}
+
+/// Calls that a flattening or comparison has no use for.
+const CLOSED: [&str; 4] = ["open_file", "open_socket", "shell", "fork_away"];
+
+#[test]
+fn a_flattening_that_reaches_for_files_sockets_or_programs_is_ended() {
+    let bench = Bench::new();
+    for fault in CLOSED {
+        let measured = bench.with_fault("harmonic", "run", fault);
+        assert_eq!(measured.code, Some(1), "{fault}: {}", measured.error);
+        // system() blocks the signal that would name the call.
+        assert!(
+            fault == "shell" || measured.error.contains("is closed to flattenings and comparisons"),
+            "{fault}: {}",
+            measured.error
+        );
+        assert!(measured.error.contains("SIGSYS"), "{fault}: {}", measured.error);
+    }
+}
+
+#[test]
+fn limits_bite() {
+    let bench = Bench::new();
+    for plugin in ["harmonic", "faro-file"] {
+        for fault in ["eat_memory", "eat_files"] {
+            let measured = bench.with_fault(plugin, "run", fault);
+            // The plugin gives up when it gets no more: without a limit it would go on until the system's memory ends.
+            let ended = if plugin == "harmonic" && fault == "eat_files" { "SIGSYS" } else { "SIGABRT" };
+            assert!(measured.error.contains(ended), "{plugin} {fault}: {}", measured.error);
+            assert_eq!(measured.code, Some(1));
+        }
+    }
+}
+
+#[test]
+fn what_a_plugin_does_to_its_own_process_costs_nothing() {
+    let bench = Bench::new();
+    let sound = bench.measure(&bench.file("none"), &[]);
+    let comparable = |text: &str| {
+        let mut result: Json = serde_json::from_str(text).unwrap_or_else(|why| panic!("{why}: {text}"));
+        for key in ["timings_ms", "plugins"] {
+            result.as_object_mut().unwrap().remove(key).unwrap();
+        }
+        result
+    };
+    let wanted = comparable(&String::from_utf8(sound.stdout).unwrap());
+    for (plugin, place, fault) in [
+        ("harmonic", "run", "print"),
+        ("faro-file", "run", "print"),
+        ("faro-file", "create", "print"),
+        ("harmonic", "run", "ignore_term"),
+        ("faro-file", "run", "ignore_term"),
+        ("faro-file", "run", "fork_away"),
+        ("faro-file", "run", "shrink_pool"),
+        ("faro-file", "close_", "hang"),
+        ("harmonic", "close_", "segv"),
+    ] {
+        let measured = bench.with_fault(plugin, place, fault);
+        assert_eq!(measured.code, Some(0), "{plugin} {place} {fault}: {}", measured.error);
+        assert!(comparable(&measured.out) == wanted, "{plugin} {place} {fault}: {}", measured.error);
+    }
+}
+
+#[test]
+fn results_are_equal_in_both_isolations() {
+    let bench = Bench::new();
+    let none = bench.file("none");
+    let result = |more: &[&str]| {
+        let output = bench.measure(&none, more);
+        let mut result: Json = serde_json::from_slice(&output.stdout).unwrap();
+        result.as_object_mut().unwrap().remove("timings_ms").unwrap();
+        let isolated = |plugin: &mut Json| plugin.as_object_mut().unwrap().remove("isolated").unwrap();
+        let isolated: Vec<Json> =
+            result["plugins"].as_array_mut().unwrap().iter_mut().map(isolated).collect();
+        (result, isolated)
+    };
+    let (here, there) = (result(&["--in-process"]), result(&[]));
+    assert!(here.0 == there.0);
+    assert!(
+        here.1.iter().all(|isolated| isolated == false) && there.1.iter().all(|isolated| isolated == true)
+    );
+}
+
+#[test]
+fn a_library_that_ends_or_hangs_when_it_is_loaded_is_listed_as_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = |fault: &str| {
+        let plugins = folder.path().join(fault);
+        faulty(&plugins, "harmonic", "constructor", fault, 0);
+        let output =
+            platen_tests::program("platen").arg("--plugins").arg(&plugins).args(["plugins", "list"]).output();
+        let text = String::from_utf8(output.unwrap().stdout).unwrap();
+        assert!(left_behind(&plugins).is_empty(), "{fault}");
+        text
+    };
+    for (fault, how) in
+        [("give_up", "SIGABRT"), ("leave", "exit code 0"), ("segv", "SIGSEGV"), ("hang", "within 5 s")]
+    {
+        let text = list(fault);
+        let line = text
+            .lines()
+            .find(|line| line.contains("libharmonic"))
+            .unwrap_or_else(|| panic!("{fault}: {text}"));
+        assert!(line.contains("refused") && line.contains(how), "{fault}: {text}");
+        assert!(text.contains("template") && text.contains("faro-stream"), "{fault}: {text}");
+    }
+}
+
+#[test]
+fn a_plugin_that_writes_its_input_is_ended() {
+    let bench = Bench::new();
+    let plugins = bench.file("write-input");
+    std::fs::create_dir_all(&plugins).unwrap();
+    let target = platen_tests::library("harmonic");
+    let define = format!("-DTARGET=\"{}\"", target.display());
+    platen_tests::compile_c(
+        &platen_tests::c_source("faulty.c"),
+        &plugins.join(target.file_name().unwrap()),
+        &["-shared", "-fPIC", "-w", &define, "-DWHERE=run", "-DFAULT=none", "-DWRITE_INPUT"],
+    );
+    let output = bench.measure(&plugins, &[]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && error.contains("SIGSEGV"), "{error}");
+}
