@@ -1,10 +1,13 @@
 /* A plugin that works as another one, but for one fault: loads TARGET and hands all calls on, and does FAULT at jobs of stroke STROKE
- * (0: of every stroke), in the call WHERE. Compiled with -DTARGET='"..."' -DWHERE=run -DFAULT=... -DSTROKE=3. */
+ * (0: of every stroke), in the call WHERE. Compiled with -DTARGET='"..."' -DWHERE=run -DFAULT=... -DSTROKE=3.
+ *
+ * WHERE=word FAULT=none SPOIL=...: what it emits is spoiled, as a plugin that is wrong would say it. */
 #define _GNU_SOURCE
 #include "platen.h"
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
@@ -19,7 +22,7 @@
 #define STROKE 0
 #endif
 
-enum { run = 1, create, open_, close_, cancel, init, constructor };
+enum { run = 1, create, open_, close_, cancel, init, constructor, word };
 
 static void nap(void) {
   struct timespec second = {1, 0};
@@ -82,6 +85,112 @@ static void maybe_die(void) {
   if (random / 100 % 2 == 0) pthread_create(&thread, NULL, die_later, &when);
 }
 
+#ifndef SPOIL
+#define SPOIL as_it_is
+#endif
+#define AT(type, frame, member) ((type *)((char *)(frame)->buffer.data + (member).offset))
+
+static const platen_host *host;
+static uint64_t job_of_frame;
+static int is(const platen_frame *frame, const char *format) { return strcmp(frame->format, format) == 0; }
+static platen_column *column_of(const platen_frame *frame) {
+  return is(frame, PLATEN_FORMAT_COLUMN) ? frame->buffer.data : NULL;
+}
+static void as_it_is(platen_frame *frame) { (void)frame; }
+static void face_9(platen_frame *frame) {
+  if (column_of(frame)) column_of(frame)->face = 9;
+}
+static void state_9(platen_frame *frame) {
+  platen_column *column = column_of(frame);
+  if (column) *AT(uint8_t, frame, column->state) = 9;
+}
+static void azimuth_100(platen_frame *frame) {
+  platen_column *column = column_of(frame);
+  if (column) *AT(double, frame, column->azimuth) = 100;
+}
+static void range_nan(platen_frame *frame) {
+  platen_column *column = column_of(frame);
+  if (!column) return;
+  *AT(double, frame, column->range_m) = NAN;
+  *AT(uint8_t, frame, column->state) = 0;
+}
+static void same_index(platen_frame *frame) {
+  if (column_of(frame)) column_of(frame)->index = 5;
+}
+static void intensity_beyond(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN)) ((platen_scan *)frame->buffer.data)->intensity_max = 1;
+}
+static void intensity_turned(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN)) ((platen_scan *)frame->buffer.data)->intensity_min = 65535;
+}
+static void rows_4e9(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN)) ((platen_scan *)frame->buffer.data)->n_rows = 4000000000u;
+}
+static void end_of_7_columns(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN_END)) ((platen_scan_end *)frame->buffer.data)->columns = 7;
+}
+static void end_of_7_points(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN_END)) ((platen_scan_end *)frame->buffer.data)->points = 7;
+}
+static void outcome_9(platen_frame *frame) {
+  if (is(frame, PLATEN_FORMAT_SCAN_END)) ((platen_scan_end *)frame->buffer.data)->outcome = 9;
+}
+static void span_beyond(platen_frame *frame) {
+  if (column_of(frame)) column_of(frame)->range_m.count = (uint64_t)1 << 63;
+}
+
+/* A chart, to be spoiled by vertex. */
+static void chart(platen_frame *frame, void (*spoil)(double *uv, double *sigma, uint64_t vertex)) {
+  if (!is(frame, PLATEN_FORMAT_CHART)) return;
+  platen_chart *head = frame->buffer.data;
+  double *uv = AT(double, frame, head->uv), *sigma = head->sigma.count ? AT(double, frame, head->sigma) : NULL;
+  for (uint64_t k = 0; k < head->uv.count / 2; k++) spoil(uv + 2 * k, sigma ? sigma + 2 * k : NULL, k);
+}
+static void bump(double *uv, double *sigma, uint64_t k) {
+  (void)sigma, (void)k;
+  uv[0] += 0.03 * sin(M_PI * fmin(fmax(uv[0] / 2.0, 0), 1)) * sin(M_PI * fmin(fmax(uv[1] / 2.5, 0), 1));
+}
+static void wide(double *uv, double *sigma, uint64_t k) { (void)sigma, (void)k, uv[0] *= 1.01; }
+static void nan_sigma(double *uv, double *sigma, uint64_t k) {
+  (void)uv;
+  if (k == 9 && sigma) sigma[1] = NAN;
+}
+static void minus_sigma(double *uv, double *sigma, uint64_t k) {
+  (void)uv;
+  if (k == 9 && sigma) sigma[1] = -1;
+}
+static void chart_moved(platen_frame *frame) { chart(frame, bump); }
+static void chart_wide(platen_frame *frame) { chart(frame, wide); }
+static void sigma_nan(platen_frame *frame) { chart(frame, nan_sigma); }
+static void sigma_minus(platen_frame *frame) { chart(frame, minus_sigma); }
+
+/* Findings of one's own instead. */
+static void findings(platen_frame *frame, const char *json) {
+  if (!is(frame, PLATEN_FORMAT_FINDINGS)) return;
+  host->buffer_free(host, &frame->buffer);
+  if (host->buffer_alloc(host, job_of_frame, strlen(json), &frame->buffer) == PLATEN_OK) memcpy(frame->buffer.data, json, strlen(json));
+}
+#define FINDINGS(name, json) \
+  static void name(platen_frame *frame) { findings(frame, json); }
+FINDINGS(figure_null, "{\"figures\":[{\"name\":\"a\",\"value\":null,\"unit\":\"m\"}]}")
+FINDINGS(figure_twice, "{\"figures\":[{\"name\":\"a\",\"value\":1,\"unit\":\"m\"},{\"name\":\"a\",\"value\":2,\"unit\":\"m\"}]}")
+FINDINGS(figure_nameless, "{\"figures\":[{\"name\":\"\",\"value\":1,\"unit\":\"m\"}]}")
+FINDINGS(figure_unsure, "{\"figures\":[{\"name\":\"a\",\"value\":1,\"unit\":\"m\",\"uncertainty\":-1}]}")
+FINDINGS(figure_furlong, "{\"figures\":[{\"name\":\"a\",\"value\":1.5,\"unit\":\"furlong\"}]}")
+FINDINGS(says_escape, "{\"says\":[\"\\u001b[31mred\\u0007\"]}")
+FINDINGS(gap_0, "{\"verdict\":\"pass\",\"figures\":[{\"name\":\"gap.max\",\"value\":0,\"unit\":\"m\"}]}")
+
+static platen_host spoiled;
+static platen_status on_emit(const platen_host *self, uint64_t job, const platen_frame *frame) {
+  platen_frame spoilt = *frame;
+  (void)self, job_of_frame = job, SPOIL(&spoilt);
+  return host->emit(host, job, &spoilt);
+}
+static const platen_host *spoil(const platen_host *real) {
+  host = real, spoiled = *real, spoiled.emit = on_emit;
+  return WHERE == word ? &spoiled : real;
+}
+
 static const platen_entry *target;
 static void fault(int where, uint64_t stroke) {
   if (where == WHERE && (STROKE == 0 || stroke == STROKE)) FAULT();
@@ -128,7 +237,7 @@ static const void *on_extension(platen_instance *self, const char *id) {
 
 static platen_status on_init(const platen_host *host, const char *folder, platen_error *error) {
   fault(init, 0);
-  return target->init(host, folder, error);
+  return target->init(spoil(host), folder, error);
 }
 static uint32_t count(void) { return target ? target->count() : 0; }
 static const platen_desc *desc(uint32_t index) { return target ? target->desc(index) : NULL; }
@@ -136,7 +245,7 @@ static platen_status on_create(const platen_host *host, const char *id, const pl
                                platen_error *error) {
   fault(create, 0);
   proxy *made = calloc(1, sizeof *made);
-  platen_status status = target->create(host, id, values, n, &made->real, error);
+  platen_status status = target->create(spoil(host), id, values, n, &made->real, error);
   if (status != PLATEN_OK) return free(made), status;
   made->raw = (platen_instance){sizeof made->raw, 0, NULL, on_open, on_run, on_cancel, on_close, on_destroy, on_extension};
   *out = &made->raw;

@@ -65,8 +65,9 @@ pub fn c_source(name: &str) -> PathBuf {
 }
 
 /// Puts a faulty plugin into `folder`, in place of the project's `name`: it hands all calls on to that one, and does `fault` in the
-/// call `place` of jobs at `stroke`, at every one for 0 (`tests/contract/faulty.c`).
+/// call `place` of jobs at `stroke`, at every one for 0 (`tests/contract/faulty.c`). In the place `word`, `fault` spoils what it emits.
 pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) {
+    let (fault, spoil) = if place == "word" { ("none", fault) } else { (fault, "as_it_is") };
     let target = library(name);
     assert!(std::fs::create_dir_all(folder).is_ok());
     // Beside its final place, then renamed: a host may be loading it.
@@ -75,6 +76,7 @@ pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) 
         format!("-DTARGET=\"{}\"", target.display()),
         format!("-DWHERE={place}"),
         format!("-DFAULT={fault}"),
+        format!("-DSPOIL={spoil}"),
         format!("-DSTROKE={stroke}"),
     ];
     let arguments = ["-shared", "-fPIC", "-w"].into_iter().chain(defines.iter().map(String::as_str));

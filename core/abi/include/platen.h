@@ -235,7 +235,7 @@ typedef struct platen_mesh {
 
 typedef struct platen_chart {
   uint32_t struct_size, reserved;
-  platen_span uv, strain, sigma; /* f64: 2, 3 (e_uu, e_vv, e_uv), 2 each; strain and sigma may be absent */
+  platen_span uv, sigma; /* f64: 2 each; sigma may be absent. The host computes strain itself, and refuses what curvature does not explain */
 } platen_chart;
 
 /* Mid-surface S(u, v): bicubic B-spline over uniform knots, three beyond each end. Grids are v outer, u inner. */

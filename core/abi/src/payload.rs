@@ -191,8 +191,6 @@ header! {
         reserved: u32,
         /// f64, 2 a vertex.
         uv: Span,
-        /// f64, 3 a vertex: membrane strain e_uu, e_vv, e_uv (tensor component), positive when stretched. May be absent.
-        strain: Span,
         /// f64, 2 a vertex: standard deviation of u and v. May be absent.
         sigma: Span,
     }

@@ -22,6 +22,8 @@ pub struct Pipeline {
     pub flattening: Flattening,
     /// Comparisons, in the order of the plant file.
     pub comparisons: Vec<Comparison>,
+    /// The one whose figures fill the press's registers.
+    pub register_source: Option<usize>,
     /// Rough direction of growing u at a plate's first scan, scanner frame.
     pub u_axis: Option<Vec3>,
     /// Origin of the press, scanner frame, where the plant file has `press_from_scanner`.
@@ -105,6 +107,7 @@ impl Pipeline {
         Ok(Self {
             flattening,
             comparisons,
+            register_source: plant.register_source,
             u_axis: plant.frame.u_axis.map(Vec3::from),
             press: press_origin(&plant.frame.press_from_scanner),
             // The rotation's last row is the press frame's z axis in the scanner frame.

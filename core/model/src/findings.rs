@@ -6,6 +6,7 @@ use crate::{Field, Seat, Verdict};
 
 /// Figures, judgement and sentences of one comparison.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Findings {
     /// Judgement; `None` for a comparison that does not judge.
     pub verdict: Option<Verdict>,
@@ -17,7 +18,8 @@ pub struct Findings {
     pub templates: Vec<TemplateFinding>,
 }
 
-/// A named figure. Names are dotted, e.g. `deviation.max`, `gap.max`, `station.S1`.
+/// A named figure of one comparison: names are its own, dotted. Those of the press's registers (`deviation.max`, `gap.max`, `station.S1`) reach
+/// the press only from the comparison that the plant file makes their source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// Name.

@@ -135,6 +135,12 @@ impl Document {
         Reported(())
     }
 
+    /// Records a fault that has its place.
+    pub(crate) fn report(&self, fault: Fault) -> Reported {
+        self.faults.borrow_mut().push(fault);
+        Reported(())
+    }
+
     /// Records that something is missing, unless an error of syntax may have hidden it.
     pub(crate) fn absent(&self, place: &Place, message: impl Into<String>) -> Reported {
         if self.source.syntax_errors.is_empty() {

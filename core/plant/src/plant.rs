@@ -28,6 +28,9 @@ const FLATTENING: &str = "elastic";
 /// Used where the plant file lists no comparison; `comparison = []` asks for none.
 const COMPARISONS: [&str; 2] = ["displacement", "template"];
 
+/// The comparison whose figures fill the press's registers, unless another has `fills_registers = true`.
+const REGISTER_SOURCE: &str = "template";
+
 /// Words of `window` in `[scanner]`.
 const WINDOWS: [(&str, ScanWindow); 3] =
     [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
@@ -75,6 +78,8 @@ pub struct PlantFile {
     pub flattening: PluginUse,
     /// Comparisons after each stroke, in this order.
     pub comparisons: Vec<PluginUse>,
+    /// The comparison whose figures fill the press's registers: its place among `comparisons`.
+    pub register_source: Option<usize>,
     /// Destination of results.
     pub output: Output,
     /// Browser pages; without the table none are served.
@@ -121,6 +126,7 @@ impl Default for PlantFile {
             plates: PathBuf::from("plates"),
             flattening: PluginUse::by_default(FLATTENING),
             comparisons: COMPARISONS.map(PluginUse::by_default).to_vec(),
+            register_source: COMPARISONS.iter().position(|name| *name == REGISTER_SOURCE),
             output: Output::in_folder(Path::new("")),
             screen: None,
         }
@@ -167,14 +173,14 @@ impl PlantFile {
             table.finish();
             Ok((name?, seed?))
         });
-        let mut plugin = |role, table: &mut TomlTable<'_>| {
+        let mut named = |role, table: &mut TomlTable<'_>| {
             let plugin = PluginUse::read(table);
             survey.plugins.extend(plugin.iter().map(|plugin| (role, plugin.clone())));
             plugin
         };
         let scanner = root.table("scanner").optional().and_then(|table| {
             let Some(mut table) = table else { return Ok((None, default.scan_window, None)) };
-            let scanner = plugin(PluginRole::Scanner, &mut table);
+            let scanner = named(PluginRole::Scanner, &mut table);
             let window = table.choice("window", &WINDOWS).or(default.scan_window);
             let range_error =
                 table.number("range_error_mm").in_range(0.0..=LARGEST_RANGE_ERROR_MM).map(metres);
@@ -182,17 +188,21 @@ impl PlantFile {
             table.finish();
             Ok((Some(scanner?), window?, range_error?))
         });
-        let mut plugin = |role, mut table: TomlTable<'_>| {
-            let plugin = plugin(role, &mut table);
+        let flattening = root.table("flattening").optional().and_then(|table| {
+            let Some(mut table) = table else { return Ok(None) };
+            let flattening = named(PluginRole::Flattening, &mut table);
             table.finish();
-            plugin
-        };
-        let flattening = root
-            .table("flattening")
-            .optional()
-            .and_then(|table| table.map(|table| plugin(PluginRole::Flattening, table)).transpose());
+            flattening.map(Some)
+        });
         let comparisons = root.tables("comparison").and_then(|tables| {
-            let uses = tables.into_iter().map(|table| plugin(PluginRole::Comparison, table));
+            let uses = tables.into_iter().map(|mut table| {
+                let used = named(PluginRole::Comparison, &mut table);
+                let fills_registers = table.bool("fills_registers").or(false);
+                table.finish();
+                let mut used = used?;
+                used.fills_registers = fills_registers?;
+                Ok(used)
+            });
             uses.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()
         });
         let listed = root.has("comparison");
@@ -205,6 +215,10 @@ impl PlantFile {
             survey.plugins.extend(uses.map(|used| (PluginRole::Comparison, used)));
         }
         survey.has_press = root.has("press");
+        let register_source = match &comparisons {
+            Ok(uses) if listed => register_source(uses, document),
+            _ => Ok(default.register_source),
+        };
         let press = root.table("press").optional();
         let press = press.and_then(|table| table.map(Press::read).transpose());
         let frame = root.section("frame").and_then(Frame::read);
@@ -240,9 +254,24 @@ impl PlantFile {
             plates: plates?,
             flattening: flattening?.unwrap_or(default.flattening),
             comparisons: if listed { comparisons? } else { default.comparisons },
+            register_source: register_source?,
             output: output?,
             screen: screen?,
         })
+    }
+}
+
+/// Returns the comparison whose figures go to the press: the one with `fills_registers`, else the one named [`REGISTER_SOURCE`].
+fn register_source(uses: &[PluginUse], document: &Document) -> Result<Option<usize>, Reported> {
+    let asked = uses.iter().any(|used| used.fills_registers);
+    let claims = |used: &PluginUse| if asked { used.fills_registers } else { used.plugin == REGISTER_SOURCE };
+    let mut claims = uses.iter().enumerate().filter(|(_, used)| claims(used));
+    let source = claims.next().map(|(place, _)| place);
+    match claims.next() {
+        None => Ok(source),
+        Some((_, second)) => Err(document.report(second.fault(
+            "a second comparison for the figures of the press's registers; set fills_registers = true on one",
+        ))),
     }
 }
 

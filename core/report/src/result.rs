@@ -6,6 +6,7 @@
 //! radians.
 
 mod checks;
+mod fields;
 mod grid;
 mod lines;
 mod next;
@@ -169,6 +170,12 @@ pub struct QualityRecord {
     pub noise_mm: f64,
     /// Mean distance of neighbouring samples.
     pub lattice_step_mm: f64,
+    /// Root mean square membrane strain that the plate's double curvature explains.
+    #[serde(default)]
+    pub membrane_strain: Option<f64>,
+    /// Largest distance of the chart's material points from an elastic membrane's; counted in the uncertainty of markers.
+    #[serde(default)]
+    pub chart_misplaced_mm: Option<f64>,
 }
 
 /// Time of each stage, milliseconds.
@@ -266,6 +273,8 @@ impl ResultRecord {
                 coverage: measurement.quality.coverage,
                 noise_mm: mm(measurement.quality.noise),
                 lattice_step_mm: mm(measurement.quality.lattice_step),
+                membrane_strain: Some(measurement.misplacement.explained),
+                chart_misplaced_mm: Some(mm(measurement.misplacement.largest())),
             },
             plugins: Vec::new(),
             timings_ms: timings(scanned, measured, context.compare),
@@ -386,6 +395,9 @@ pub fn figure(figure: &Figure) -> Json {
     let mut record = Map::new();
     record.insert("name".into(), json!(figure.name));
     record.insert(format!("value{suffix}"), json!(figure.value * factor));
+    if suffix.is_empty() && figure.unit != "1" {
+        record.insert("unit".into(), json!(figure.unit));
+    }
     if let Some(uncertainty) = figure.uncertainty {
         record.insert(format!("uncertainty{suffix}"), json!(uncertainty * factor));
     }

@@ -22,7 +22,7 @@ pub trait Flattening: Send + Sized + 'static {
     /// When the options contradict each other.
     fn new(options: Self::Options) -> Result<Self>;
 
-    /// Returns the chart of `mesh`: (u, v) per vertex in metres, optionally strain and uncertainty. The mesh contains the
+    /// Returns the chart of `mesh`: (u, v) per vertex in metres, optionally their uncertainty. The mesh contains the
     /// places of its boundary. Deterministic: equal meshes give equal charts, to the last bit.
     ///
     /// # Errors

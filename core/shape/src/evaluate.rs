@@ -4,6 +4,7 @@
 //!
 //! (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
 
+use crate::flatten::Misplacement;
 use crate::surface::{Curvature, Surface};
 use crate::{Chart, DiskMesh, Vec3};
 
@@ -66,11 +67,14 @@ pub struct Grid {
 const CELLS: usize = 16;
 
 impl Location {
-    /// Collects the uncertainties of the mesh's edges and of the chart.
+    /// Collects the uncertainties of the mesh's edges, of the chart by its own word, and its misplacement, which counts as a standard deviation.
     #[must_use]
-    pub fn new(mesh: &DiskMesh, chart: &Chart) -> Self {
+    pub fn new(mesh: &DiskMesh, chart: &Chart, misplacement: &Misplacement) -> Self {
         let mut cells = vec![[0.0_f64; 2]; CELLS * CELLS];
-        for ([u, v], sigma) in chart.uv.iter().zip(chart.sigma.iter().flatten()) {
+        let own = |vertex: usize| chart.sigma.as_ref().map_or([0.0; 2], |sigma| sigma[vertex]);
+        for (vertex, ([u, v], by)) in chart.uv.iter().zip(&misplacement.by).enumerate() {
+            let own = own(vertex);
+            let sigma = [0, 1].map(|c| own[c].hypot(by[c]));
             let cell = &mut cells[cell(*u, mesh.width) + CELLS * cell(*v, mesh.height)];
             *cell = [cell[0].max(sigma[0]), cell[1].max(sigma[1])];
         }

@@ -17,6 +17,7 @@ use std::time::Duration;
 use platen_numerics::spline_fit::Undetermined;
 
 use crate::evaluate::Location;
+use crate::flatten::Misplacement;
 use crate::mesh::{MeshError, SmoothFace};
 use crate::surface::{FitToSamples, Quality, Surface, fit_surface};
 use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
@@ -33,6 +34,8 @@ pub struct Measurement {
     pub mesh: DiskMesh,
     /// Its flattening.
     pub chart: Chart,
+    /// Its distance from an elastic membrane.
+    pub misplacement: Misplacement,
     /// Uncertainty of material points.
     pub location: Location,
     /// The blank's corners (0,0), (W,0), (W,H), (0,H) on the scanned face, metres, scanner frame.
@@ -48,7 +51,7 @@ pub struct Measurement {
 pub struct Timings {
     /// Smooth face, mid-surface and mesh.
     pub mesh: Duration,
-    /// Flattening.
+    /// Flattening, and the check of its chart.
     pub flatten: Duration,
     /// S(u, v) with its covariance.
     pub surface: Duration,
@@ -86,15 +89,17 @@ pub fn measure(
     let meshed = clock();
     let chart = flatten.flatten(&mesh)?;
     chart.check(&mesh)?;
+    let misplacement = Misplacement::of(&mesh, &chart)?;
     let flattened = clock();
     let FitToSamples { surface, quality } = fit_surface(patch, &face, &places, &chart, spec)?;
     let fitted = clock();
     Ok(Measurement {
         corners: blank.corners.map(|[u, v]| surface.face(u, v)),
-        location: Location::new(&mesh, &chart),
+        location: Location::new(&mesh, &chart, &misplacement),
         surface,
         mesh,
         chart,
+        misplacement,
         quality,
         timings: Timings {
             mesh: meshed.saturating_sub(start),

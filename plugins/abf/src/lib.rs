@@ -37,7 +37,7 @@
 //! For comparison with Masuda et al.; it has no advantage over `harmonic`. ABF is for charts whose boundary is free; a plate's is known,
 //! and with that fixed both give the same chart, within 0.0001 mm on the sample plates. It is exact where a plate is bent
 //! without stretching, and wrong by about a millimetre on double curvature, because it preserves angles where the plate
-//! preserves lengths; use `elastic` there. The chart contains neither strain nor uncertainty.
+//! preserves lengths; use `elastic` there. The chart contains no uncertainty of its own; the host counts its distance from an elastic membrane.
 //!
 //! # Example
 //!

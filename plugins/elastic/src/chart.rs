@@ -1,4 +1,4 @@
-//! Chart of a mesh: start, minimum of the energy, strain, uncertainty.
+//! Chart of a mesh: start, minimum of the energy, uncertainty.
 
 use platen_sdk::Result;
 use platen_shape::flatten::{cotangents, first_turned, fixed_boundary};
@@ -19,8 +19,7 @@ pub(crate) fn elastic(mesh: &DiskMesh, poisson: f64, check: impl Fn() -> Result<
     let strains = membrane.strains(&uv);
     let sigma =
         material_law_bound(&strains, &uv, [mesh.width, mesh.height], poisson).map_err(|e| unsolved(&e))?;
-    let strain = strain_of_vertices(mesh, &strains);
-    Ok(Chart { uv, strain: Some(strain), sigma: Some(sigma) })
+    Ok(Chart { uv, sigma: Some(sigma) })
 }
 
 /// Returns the harmonic map, or Tutte's (uniform weights) where obtuse angles fold it.
@@ -44,17 +43,4 @@ fn scatter(strains: &[Strained]) -> f64 {
         s.area * (a * a + b * b + 2.0 * c * c)
     };
     (strains.iter().map(square).sum::<f64>() / area).sqrt()
-}
-
-/// Returns the area-weighted mean strain of the triangles at each vertex: uu, vv, uv.
-fn strain_of_vertices(mesh: &DiskMesh, strains: &[Strained]) -> Vec<[f64; 3]> {
-    let mut sums = vec![(0.0, [0.0; 3]); mesh.vertices.len()];
-    for (t, s) in mesh.triangles.iter().zip(strains) {
-        for &v in t {
-            let (area, sum) = &mut sums[v as usize];
-            *area += s.area;
-            (0..3).for_each(|k| sum[k] += s.area * s.strain[k]);
-        }
-    }
-    sums.into_iter().map(|(area, sum)| sum.map(|s| s / area)).collect()
 }

@@ -31,7 +31,6 @@
 //! - (u, v) per vertex: exact on flat, rolled and conical plates. On a sphere of R 10 m, 5 x 2.5 m: 0.01 mm from the material
 //!   when the material follows least energy; 0.24 mm in the mean and 0.39 mm at most when its fibres along one side keep
 //!   their length.
-//! - Membrane strain per vertex: Green's strain, area-weighted mean of the triangles around the vertex.
 //! - Uncertainty per vertex: the distance between these two material laws. The contribution of the edges' own uncertainty is
 //!   not part of it; the host adds that for every flattening.
 //!
@@ -86,7 +85,7 @@ impl Flattening for Elastic {
     const INFO: Info = Info::new(
         c"elastic",
         c"Least membrane energy",
-        c"Least membrane energy onto the known outline: right on double curvature, with strain and uncertainty.",
+        c"Least membrane energy onto the known outline: right on double curvature, with uncertainty.",
         c"1.0.0",
     );
     type Options = Options;

@@ -3,11 +3,12 @@ mod least_energy;
 mod membrane;
 
 use crate::chart::elastic;
+use crate::membrane::{Membrane, Strained};
 use least_energy::sphere_of_least_energy;
 use platen_numerics::random::Random;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, cotangents, first_turned, fixed_boundary};
-use platen_shape::{Chart, Vec3};
+use platen_shape::{Chart, DiskMesh, Vec3};
 
 fn chart(plate: &ClosedForm) -> Chart {
     let chart = elastic(&plate.mesh().unwrap(), 0.3, || Ok(())).unwrap();
@@ -63,7 +64,7 @@ fn a_flat_plate_keeps_its_places() {
     let plate = ClosedForm::new(|[u, v]| [1.0, u, v], [5.0, 2.0], [50, 20], 0.3, 3);
     let chart = chart(&plate);
     assert!(plate.errors(&chart.uv)[1] < 1e-12);
-    assert!(chart.strain.unwrap().iter().flatten().all(|e| e.abs() < 1e-12));
+    assert!(strain(&plate, &chart).iter().flatten().all(|e| e.abs() < 1e-12));
 }
 
 #[test]
@@ -118,7 +119,7 @@ fn on_a_sphere_of_least_energy_it_is_right() {
 fn the_strain_is_compatible_with_the_curvature_of_the_sphere() {
     let (radius, size, n) = (10.0, [2.5, 2.5], 40);
     let plate = ClosedForm::new(sphere_of_least_energy(radius, size, 0.3), size, [n; 2], 0.0, 0);
-    let strain = chart(&plate).strain.unwrap();
+    let strain = strain(&plate, &chart(&plate));
     let at = |i: u32, j: u32| {
         let near = |p: &[f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9;
         let place = [size[0] * f64::from(i) / f64::from(n), size[1] * f64::from(j) / f64::from(n)];
@@ -198,10 +199,8 @@ fn random_small_meshes_give_charts_or_are_refused() {
         }
         match elastic(&mesh, 0.3, || Ok(())) {
             Ok(chart) => {
-                chart.check(&mesh).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
-                let numbers =
-                    chart.strain.iter().flatten().flatten().chain(chart.sigma.iter().flatten().flatten());
-                assert!(numbers.into_iter().all(|x| x.is_finite()), "seed {seed}");
+                assert_eq!(first_turned(&mesh.triangles, &chart.uv), None, "seed {seed}");
+                assert!(chart.sigma.iter().flatten().flatten().all(|x| x.is_finite()), "seed {seed}");
             }
             Err(e) => {
                 assert!(!smooth, "seed {seed}: {e}");
@@ -211,4 +210,23 @@ fn random_small_meshes_give_charts_or_are_refused() {
     }
     // Found: 184 of 2000.
     assert!(refused < 370, "{refused} refused");
+}
+
+/// Green's strain at every vertex.
+fn strain(plate: &ClosedForm, chart: &Chart) -> Vec<[f64; 3]> {
+    let mesh = plate.mesh().unwrap();
+    strain_of_vertices(&mesh, &Membrane::new(&mesh, 0.3).strains(&chart.uv))
+}
+
+/// Returns the area-weighted mean strain of the triangles at each vertex: uu, vv, uv.
+fn strain_of_vertices(mesh: &DiskMesh, strains: &[Strained]) -> Vec<[f64; 3]> {
+    let mut sums = vec![(0.0, [0.0; 3]); mesh.vertices.len()];
+    for (t, s) in mesh.triangles.iter().zip(strains) {
+        for &v in t {
+            let (area, sum) = &mut sums[v as usize];
+            *area += s.area;
+            (0..3).for_each(|k| sum[k] += s.area * s.strain[k]);
+        }
+    }
+    sums.into_iter().map(|(area, sum)| sum.map(|s| s / area)).collect()
 }

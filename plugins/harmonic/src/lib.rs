@@ -26,7 +26,7 @@
 //! | double curvature in general | systematic, 0.4 to 2 mm: the map preserves angles, the plate preserves lengths; use `elastic` |
 //!
 //! An error in the place of an edge, or in the arc length along it, enters the interior undamped. The chart contains
-//! neither strain nor uncertainty.
+//! no uncertainty of its own; the host counts its distance from an elastic membrane.
 //!
 //! # Example
 //!

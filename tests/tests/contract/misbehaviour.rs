@@ -256,3 +256,60 @@ fn a_plugin_that_writes_its_input_is_ended() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(1) && error.contains("SIGSEGV"), "{error}");
 }
+
+/// What a plugin says, and the sentence that refuses it.
+const WRONG_WORDS: [(&str, &str, &str); 16] = [
+    ("faro-file", "face_9", ", must be 0 or 1"),
+    ("faro-file", "state_9", "state 9 in column"),
+    ("faro-file", "azimuth_100", "azimuth 100 rad"),
+    ("faro-file", "range_nan", "NaN"),
+    ("faro-file", "same_index", "column 5 twice"),
+    ("faro-file", "intensity_beyond", "at most 1 by its header"),
+    ("faro-file", "intensity_turned", "intensities from 65535 to"),
+    ("faro-file", "rows_4e9", "a lattice of 4000000000 x"),
+    ("faro-file", "end_of_7_columns", "of which its end says 7 and"),
+    ("faro-file", "end_of_7_points", "and 7"),
+    ("faro-file", "outcome_9", "outcome 9"),
+    ("faro-file", "span_beyond", "a malformed platen.column/2"),
+    ("harmonic", "chart_moved", "it strains the plate by"),
+    ("harmonic", "chart_wide", "mm off, "),
+    ("elastic", "sigma_nan", "vertex 9 has a standard deviation that is negative or no number"),
+    ("elastic", "sigma_minus", "vertex 9 has a standard deviation that is negative or no number"),
+];
+
+#[test]
+fn a_wrong_word_is_refused_with_a_sentence() {
+    let bench = Bench::new();
+    let plant = std::fs::read_to_string(bench.file("plant.toml")).unwrap();
+    for (plugin, spoil, sentence) in WRONG_WORDS {
+        let flattening = if plugin == "elastic" { plugin } else { "harmonic" };
+        std::fs::write(bench.file("plant.toml"), plant.replace("harmonic", flattening)).unwrap();
+        let measured = bench.with_fault(plugin, "word", spoil);
+        assert_eq!(measured.code, Some(1), "{plugin} {spoil}: {}", measured.error);
+        assert!(measured.error.contains(sentence), "{plugin} {spoil}: {}", measured.error);
+    }
+}
+
+#[test]
+fn a_wrong_finding_fails_its_comparison_alone() {
+    let bench = Bench::new();
+    for (spoil, sentence) in [
+        ("figure_null", "a number that is none"),
+        ("figure_twice", "two figures named a"),
+        ("figure_nameless", "a figure named \"\""),
+        ("figure_unsure", "figure a with the uncertainty -1"),
+    ] {
+        let measured = bench.with_fault("curvature", "word", spoil);
+        let result: Json = serde_json::from_str(&measured.out).unwrap();
+        let failed = result["comparisons"][1]["error"].as_str().unwrap_or_default();
+        assert!(failed.contains(sentence), "{spoil}: {result:#}");
+        assert!(result["comparisons"][0]["error"].is_null(), "{spoil}");
+    }
+    let measured = bench.with_fault("curvature", "word", "figure_furlong");
+    let result: Json = serde_json::from_str(&measured.out).unwrap();
+    let figure = &result["comparisons"][1]["figures"][0];
+    assert_eq!((figure["value"].as_f64(), figure["unit"].as_str()), (Some(1.5), Some("furlong")), "{figure}");
+    let measured = bench.with_fault("curvature", "word", "says_escape");
+    let result: Json = serde_json::from_str(&measured.out).unwrap();
+    assert!(result["says"].to_string().contains("\u{fffd}[31mred\u{fffd}"), "{}", result["says"]);
+}

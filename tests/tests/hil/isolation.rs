@@ -197,3 +197,20 @@ fn strokes_whose_driver_dies_at_any_moment_are_measured_or_reported() {
     assert_eq!(verdicts(&plant).len(), 5 * parts);
     assert!(deaths > 0 || parts < 4, "the driver died");
 }
+
+#[test]
+fn the_figures_of_another_comparison_reach_no_register() {
+    let folder = tempfile::tempdir().unwrap();
+    let plugins = folder.path().join("plugins");
+    // It says "pass" and a largest gap of 0.
+    faulty(&plugins, "curvature", "word", "gap_0", 0);
+    let (mut press, plant) = start(folder.path(), "strokes = 1", "[[comparison]]\nplugin = \"curvature\"\n");
+    let mut host = Host::with_plugins(&plant, &plugins);
+    let stats = press.wait_done();
+    let log = host.log();
+    assert_eq!(host.stop(), Some(0), "{log}");
+    let taken = stats["taken"].as_array().unwrap();
+    let gap = taken.last().unwrap()["words"][55].as_u64().unwrap();
+    assert!(gap > 100 && gap != 0xFFFF, "the template's gap, 0.01 mm: {gap}");
+    assert!(verdicts(&plant).iter().all(|(_, verdict, _)| verdict != "pass"));
+}

@@ -1,4 +1,4 @@
-//! What it costs to have a plugin in a process of its own: its start, a call, against a thread of the host.
+//! Cost of a plugin in a process of its own: its start, a call, against a thread of the host.
 
 use std::time::{Duration, Instant};
 

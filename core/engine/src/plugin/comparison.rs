@@ -1,5 +1,6 @@
 //! Comparison plugins: from a task and surfaces to a report.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use platen_model::{Field, Findings, Report, Task};
@@ -7,6 +8,7 @@ use platen_plant::OptionValue;
 use platen_sdk::exchange::DecodeError;
 use platen_shape::Surface;
 
+use super::worker::printable;
 use super::{InputFrame, Instance, Kind, Library, PluginError};
 
 /// A configured comparison.
@@ -14,6 +16,42 @@ use super::{InputFrame, Instance, Kind, Library, PluginError};
 pub struct Comparison {
     instance: Instance,
     limit: Duration,
+}
+
+/// Longest name of a figure, characters.
+const NAME: usize = 100;
+/// Longest unit, characters.
+const UNIT: usize = 20;
+/// Longest sentence, characters; longer ones are cut.
+const SENTENCE: usize = 500;
+/// Most sentences; the first are the most important.
+const SENTENCES: usize = 50;
+
+/// Checks findings as far as they go to people and registers: names that tell figures apart, numbers, sentences that leave a screen alone.
+fn checked(mut findings: Findings) -> Result<Findings, String> {
+    let mut names = BTreeSet::new();
+    for figure in &findings.figures {
+        let name = figure.name.as_str();
+        if name.is_empty() || name.chars().count() > NAME || name.chars().any(char::is_control) {
+            return Err(format!("a figure named {name:?}"));
+        }
+        if !names.insert(name) {
+            return Err(format!("two figures named {name}"));
+        }
+        if figure.unit.chars().count() > UNIT || figure.unit.chars().any(char::is_control) {
+            return Err(format!("figure {name} in the unit {:?}", figure.unit));
+        }
+        if let Some(uncertainty) = figure.uncertainty.filter(|it| !(it.is_finite() && *it >= 0.0)) {
+            return Err(format!("figure {name} with the uncertainty {uncertainty}"));
+        }
+    }
+    findings.says.truncate(SENTENCES);
+    let templates =
+        findings.templates.iter_mut().flat_map(|found| [&mut found.says, &mut found.name, &mut found.line]);
+    for text in findings.says.iter_mut().chain(templates) {
+        *text = printable(text).chars().take(SENTENCE).collect();
+    }
+    Ok(findings)
 }
 
 /// Surfaces of one plate, the inputs of a comparison.
@@ -83,6 +121,7 @@ impl Comparison {
         }
         job.finish()?;
         let findings = findings.ok_or_else(|| job.misbehaved("success without findings"))?;
+        let findings = checked(findings).map_err(|what| job.misbehaved(what))?;
         Ok(Report { comparison: self.instance.name().to_owned(), findings, fields })
     }
 }

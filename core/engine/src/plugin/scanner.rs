@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use platen_plant::OptionValue;
-use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, Window};
+use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::exchange::Payload;
 
 use super::{Emitted, Instance, JobSpec, Kind, Library, PluginError, RunningJob};
@@ -59,7 +59,7 @@ impl Scanner {
         }
         let header: ScanHeader = decode(&mut job, &frame)?;
         check(&header).map_err(|what| job.misbehaved(what))?;
-        Ok(RunningScan { job, header, end: None })
+        Ok(RunningScan { job, seen: Vec::new(), columns: 0, points: 0, header, end: None })
     }
 }
 
@@ -71,6 +71,10 @@ impl Scanner {
 pub struct RunningScan<'a> {
     job: RunningJob<'a>,
     header: ScanHeader,
+    /// Which columns have come.
+    seen: Vec<bool>,
+    columns: u32,
+    points: u64,
     end: Option<ScanEnd>,
 }
 
@@ -94,6 +98,28 @@ impl RunningScan<'_> {
         }
     }
 
+    /// Counts a column; each comes once, within what the header says.
+    fn count(&mut self, column: &Column) -> Result<(), String> {
+        let index = column.index;
+        if index >= MAX_COLUMNS {
+            return Err(format!("column {index} of at most {MAX_COLUMNS}"));
+        }
+        let place = index as usize;
+        if self.seen.len() <= place {
+            self.seen.resize((place + 1).next_power_of_two(), false);
+        }
+        if std::mem::replace(&mut self.seen[place], true) {
+            return Err(format!("column {index} twice"));
+        }
+        let (_, most) = self.header.intensity_range;
+        if let Some(intensity) = column.intensity.iter().max().filter(|found| **found > most) {
+            return Err(format!("intensity {intensity} in column {index}, at most {most} by its header"));
+        }
+        self.columns += 1;
+        self.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
+        Ok(())
+    }
+
     fn next_column(&mut self) -> Result<Option<Column>, PluginError> {
         while let Some(frame) = self.job.next_frame() {
             let job = &mut self.job;
@@ -103,9 +129,7 @@ impl RunningScan<'_> {
             if frame.is::<Column>() {
                 let column: Column = decode(job, &frame)?;
                 column.check(self.header.n_rows).map_err(|e| job.misbehaved(e.to_string()))?;
-                if column.index >= MAX_COLUMNS {
-                    return Err(job.misbehaved(format!("column {} of at most {MAX_COLUMNS}", column.index)));
-                }
+                self.count(&column).map_err(|what| self.job.misbehaved(what))?;
                 return Ok(Some(column));
             }
             if !frame.is::<ScanEnd>() {
@@ -114,6 +138,12 @@ impl RunningScan<'_> {
             let end: ScanEnd = decode(job, &frame)?;
             if end.outcome != Outcome::Complete {
                 return Err(job.misbehaved("success without a complete scan"));
+            }
+            if (end.columns, end.points) != (self.columns, self.points) {
+                return Err(job.misbehaved(format!(
+                    "{} columns with {} valid cells, of which its end says {} and {}",
+                    self.columns, self.points, end.columns, end.points
+                )));
             }
             self.end = Some(end);
         }
@@ -141,6 +171,9 @@ fn decode<T: Payload>(job: &mut RunningJob<'_>, frame: &Emitted) -> Result<T, Pl
 fn check(header: &ScanHeader) -> Result<(), String> {
     if !(1..=MAX_ROWS).contains(&header.n_rows) || header.n_columns > MAX_COLUMNS {
         return Err(format!("a lattice of {} x {} cells", header.n_rows, header.n_columns));
+    }
+    if header.intensity_range.0 > header.intensity_range.1 {
+        return Err(format!("intensities from {} to {}", header.intensity_range.0, header.intensity_range.1));
     }
     let steps = [header.azimuth_step, header.elevation_step];
     let starts = [header.azimuth_start, header.elevation_start];

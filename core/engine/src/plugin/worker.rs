@@ -31,6 +31,7 @@ pub(super) use link::{JobEvent, Link, LinkError, Place, new_job};
 pub(super) use memory::SharedMemory;
 pub(super) use outbox::{Outbox, outbox};
 pub(super) use pool::{Extent, Pool};
+pub(super) use process::printable;
 pub use serve::serve_stdin;
 pub(super) use wire::{CallError, Health, Job, LoadFault, LoadedLibrary, ToHost};
 

@@ -1,14 +1,14 @@
 //! Mapping of the comparisons' findings to the figures in the press's registers.
 
-use platen_engine::plugin::PluginError;
 use platen_model::{Figures, Measure, Measurement, Report, Timestamp, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::Measured;
 
-/// Returns the result for the press. A figure that no comparison gave is absent, and its register holds the invalid value.
+/// Returns the result for the press. `source` is the report of the one comparison whose figures fill the registers; a figure that it did
+/// not give is absent, and its register holds the invalid value.
 pub(super) fn measurement(
     measured: &Measured,
-    reports: &[Result<Report, PluginError>],
+    source: Option<&Report>,
     verdict: Verdict,
     plate: &PlateFile,
     times: [(Measure, std::time::Duration); 3],
@@ -20,7 +20,7 @@ pub(super) fn measurement(
             figures.values.insert(measure, value);
         }
     };
-    let found = || reports.iter().flatten().flat_map(|report| &report.findings.figures);
+    let found = || source.into_iter().flat_map(|report| &report.findings.figures);
     for figure in found() {
         if let Some(measure) = Measure::from_name(&figure.name) {
             put(measure, figure.value);

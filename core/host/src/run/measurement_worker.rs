@@ -436,8 +436,9 @@ impl MeasurementWorker {
             (Measure::EvaluateTime, start.elapsed()),
             (Measure::StrokeToResultTime, stroke.started.elapsed()),
         ];
+        let source = self.pipeline.register_source.and_then(|place| reports[place].as_ref().ok());
         let mut answer =
-            figures::measurement(&measured, &reports, verdict, &stroke.plate, times, stroke.scanned_at);
+            figures::measurement(&measured, source, verdict, &stroke.plate, times, stroke.scanned_at);
         // A result without files still goes to the press, with a warning.
         let retried = record.plugins.iter().any(|plugin| plugin.retried);
         let warnings = [(folder.is_none(), Code::StorageDegraded), (retried, Code::PluginRestarted)];

@@ -45,6 +45,8 @@ pub struct PluginUse {
     pub options: RawOptions,
     /// The process in which it runs.
     pub worker: Worker,
+    /// `fills_registers`: a comparison whose figures go to the press.
+    pub fills_registers: bool,
     /// Fault at the place of the name, without its message.
     template: Option<Fault>,
 }
@@ -53,7 +55,8 @@ impl PluginUse {
     /// Makes the use of a plugin that no file names, with the default of every option.
     pub fn by_default(plugin: &str) -> Self {
         let options = RawOptions::none(plugin);
-        Self { plugin: plugin.to_owned(), options, worker: Worker::default(), template: None }
+        let worker = Worker::default();
+        Self { plugin: plugin.to_owned(), options, worker, fills_registers: false, template: None }
     }
 
     /// Makes the use of a plugin that the file implies by leaving its table out; its faults are reported at `place`.
@@ -68,7 +71,7 @@ impl PluginUse {
         let worker = Worker::read(table);
         let Located { value: plugin, place } = plugin?;
         let template = Some(table.document().source().fault(&place, String::new()));
-        Ok(Self { plugin, options, worker: worker?, template })
+        Ok(Self { plugin, options, worker: worker?, fills_registers: false, template })
     }
 
     /// Makes a fault of this choice of plugin, at its place in the plant file.

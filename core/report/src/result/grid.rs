@@ -1,5 +1,6 @@
 //! Grid of the result document: curvature of S(u, v), positions and fields of the comparisons at 21 x 21 nodes.
 
+use super::fields::find_field;
 use serde::{Deserialize, Serialize};
 
 use platen_model::units::mm;
@@ -40,10 +41,8 @@ impl GridRecord {
         let curvature = |kappa: fn(&platen_shape::surface::Curvature) -> f64| {
             grid.nodes.iter().map(|n| n.place.seen.then(|| kappa(&n.curvature))).collect()
         };
-        let find =
-            |name: &str| reports.iter().flat_map(|report| &report.fields).find(|field| field.name == name);
-        let displacement = find("displacement").filter(|field| field.components == 3);
-        let deviation = find("deviation").filter(|field| field.components == 1);
+        let displacement = find_field(reports, "displacement", "displacement", 3);
+        let deviation = find_field(reports, "template", "deviation", 1);
         Self {
             nu,
             nv,

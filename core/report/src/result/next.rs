@@ -14,6 +14,7 @@
 //!
 //! The figure is a place: neither the force nor the depth of a stroke follows from it.
 
+use super::fields::find_field;
 use serde::{Deserialize, Serialize};
 
 use platen_model::units::{mm, mm_pair};
@@ -126,8 +127,7 @@ impl NextPlace {
 }
 
 fn find(reports: &[&Report], plate: &PlateFile) -> Result<NextPlace, NoNext> {
-    let is_map = |field: &&Field| field.name == CURVATURE_DEFICIT && field.components == 1;
-    let field = reports.iter().flat_map(|report| &report.fields).find(is_map).ok_or(NoNext::NoTarget)?;
+    let field = find_field(reports, "curvature", CURVATURE_DEFICIT, 1).ok_or(NoNext::NoTarget)?;
     let shortest = plate.templates.iter().min_by(|a, b| a.chord.total_cmp(&b.chord));
     let template = shortest.ok_or(NoNext::NoTarget)?;
     let target = plate.target.as_ref().ok_or(NoNext::NoTarget)?;

@@ -24,7 +24,10 @@ macro_rules! json {
             }
 
             fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-                serde_json::from_slice(bytes).map_err(|error| DecodeError::Invalid(error.to_string()))
+                serde_json::from_slice(bytes).map_err(|error| {
+                    let text = error.to_string().replace("invalid type: null, expected f64", "a number that is none (NaN or infinite)");
+                    DecodeError::Invalid(text)
+                })
             }
         }
     )* };

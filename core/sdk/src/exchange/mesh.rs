@@ -65,14 +65,12 @@ impl Payload for Chart {
     const FORMAT: &'static CStr = payload::Chart::FORMAT;
 
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E> {
-        let strain = self.strain.as_deref().unwrap_or_default();
         let sigma = self.sigma.as_deref().unwrap_or_default();
         let mut arrays = Arrays::behind::<payload::Chart>();
         let head = payload::Chart {
             struct_size: size_of::<payload::Chart>() as u32,
             reserved: 0,
             uv: arrays.add(&self.uv),
-            strain: arrays.add(strain),
             sigma: arrays.add(sigma),
         };
         arrays.encode(&head, allocate)
@@ -80,11 +78,9 @@ impl Payload for Chart {
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Chart = payload::read(bytes)?;
-        let strain = payload::slice::<[f64; 3]>(bytes, head.strain)?;
         let sigma = payload::slice::<[f64; 2]>(bytes, head.sigma)?;
         Ok(Self {
             uv: payload::slice::<[f64; 2]>(bytes, head.uv)?.to_vec(),
-            strain: (!strain.is_empty()).then(|| strain.to_vec()),
             sigma: (!sigma.is_empty()).then(|| sigma.to_vec()),
         })
     }

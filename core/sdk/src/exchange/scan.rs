@@ -7,6 +7,9 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window, wra
 
 use super::{Arrays, DecodeError, Payload};
 
+/// Azimuths may be counted over two turns, not more, radians.
+const MOST_AZIMUTH: f64 = 4.0 * std::f64::consts::PI;
+
 impl Payload for ScanHeader {
     const FORMAT: &'static CStr = payload::Scan::FORMAT;
 
@@ -79,20 +82,39 @@ impl Payload for Column {
 
     fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let head: payload::Column = payload::read(bytes)?;
+        let states = payload::slice::<u8>(bytes, head.state)?;
+        if let Some(code) = states.iter().find(|code| **code > 2) {
+            return Err(DecodeError::Invalid(format!(
+                "state {code} in column {}, must be 0, 1 or 2",
+                head.index
+            )));
+        }
         let state = |code: &u8| match code {
             0 => State::Valid,
             1 => State::DirectionOnly,
             _ => State::NoReturn,
         };
+        let face = match head.face {
+            0 => Face::Front,
+            1 => Face::Back,
+            other => {
+                let index = head.index;
+                return Err(DecodeError::Invalid(format!("face {other} of column {index}, must be 0 or 1")));
+            }
+        };
+        let azimuth = payload::slice::<f64>(bytes, head.azimuth)?;
+        if let Some(beyond) = azimuth.iter().find(|azimuth| azimuth.abs() > MOST_AZIMUTH) {
+            return Err(DecodeError::Invalid(format!("azimuth {beyond} rad in column {}", head.index)));
+        }
         Ok(Self {
             index: head.index,
-            face: if head.face == 0 { Face::Front } else { Face::Back },
+            face,
             first_row: head.first_row,
             range_m: payload::slice::<f64>(bytes, head.range_m)?.to_vec(),
-            azimuth: payload::slice(bytes, head.azimuth)?.iter().map(|a: &f64| wrap_azimuth(*a)).collect(),
+            azimuth: azimuth.iter().map(|a| wrap_azimuth(*a)).collect(),
             elevation: payload::slice::<f64>(bytes, head.elevation)?.to_vec(),
             intensity: payload::slice::<u16>(bytes, head.intensity)?.to_vec(),
-            state: payload::slice::<u8>(bytes, head.state)?.iter().map(state).collect(),
+            state: states.iter().map(state).collect(),
         })
     }
 }
@@ -124,7 +146,8 @@ impl Payload for ScanEnd {
             outcome: match head.outcome {
                 0 => Outcome::Complete,
                 1 => Outcome::Aborted,
-                _ => Outcome::Failed,
+                2 => Outcome::Failed,
+                other => return Err(DecodeError::Invalid(format!("outcome {other}, must be 0, 1 or 2"))),
             },
         })
     }

@@ -19,7 +19,7 @@ use super::fixed_boundary::{cotangents, fixed_boundary};
 use crate::mesh::DiskMesh;
 
 /// Poisson's ratio of steel.
-const POISSON: f64 = 0.3;
+pub(super) const POISSON: f64 = 0.3;
 /// The last step is shorter than this, metres.
 const TOLERANCE: f64 = 1e-7;
 /// Steps allowed; three or four are usual, each shorter by the strain or the turn that is left.
@@ -54,15 +54,8 @@ pub fn lay_flat(mesh: &DiskMesh) -> Result<Option<LaidFlat>, SparseError> {
         let mut load = vec![[0.0; 2]; uv.len()];
         for (t, metric) in mesh.triangles.iter().zip(&metrics) {
             let (area, hats) = hats(t.map(|v| uv[v as usize]));
-            let [e11, e22, e12] = strain(&hats, metric);
-            let lateral = POISSON * (e11 + e22);
-            let stress =
-                [(1.0 - POISSON) * e11 + lateral, (1.0 - POISSON) * e22 + lateral, (1.0 - POISSON) * e12]
-                    .map(|s| area * s / (1.0 - POISSON * POISSON));
-            for (v, hat) in t.iter().zip(hats) {
-                let slot = &mut load[*v as usize];
-                slot[0] += stress[0] * hat[0] + stress[2] * hat[1];
-                slot[1] += stress[2] * hat[0] + stress[1] * hat[1];
+            for (v, force) in t.iter().zip(forces(area, &hats, strain(&hats, metric))) {
+                (0..2).for_each(|c| load[*v as usize][c] += force[c]);
             }
         }
         (0..2).for_each(|c| load[origin as usize][c] -= HELD * uv[origin as usize][c]);
@@ -115,24 +108,33 @@ pub fn plane_stress(a: [f64; 2], b: [f64; 2], poisson: f64) -> [[f64; 2]; 2] {
 }
 
 /// Metric of a triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
-fn metric(mesh: &DiskMesh, t: &[u32; 3]) -> [f64; 3] {
+pub(super) fn metric(mesh: &DiskMesh, t: &[u32; 3]) -> [f64; 3] {
     let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
     let (e1, e2) = (b - a, c - a);
     [e1.dot(&e1), e1.dot(&e2), e2.dot(&e2)]
 }
 
 /// Area of a plane triangle and the gradients of its three hat functions.
-fn hats([a, b, c]: [[f64; 2]; 3]) -> (f64, [[f64; 2]; 3]) {
+pub(super) fn hats([a, b, c]: [[f64; 2]; 3]) -> (f64, [[f64; 2]; 3]) {
     let area = signed_area([a, b, c]);
     let hat = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / (2.0 * area), (q[0] - p[0]) / (2.0 * area)];
     (area, [hat(b, c), hat(c, a), hat(a, b)])
 }
 
 /// Green's strain 11, 22, 12: the rows of M^-1 are the gradients of the second and third hat function.
-fn strain([_, p, q]: &[[f64; 2]; 3], [g11, g12, g22]: &[f64; 3]) -> [f64; 3] {
+pub(super) fn strain([_, p, q]: &[[f64; 2]; 3], [g11, g12, g22]: &[f64; 3]) -> [f64; 3] {
     let stretch =
         |i: usize, j: usize| g11 * p[i] * p[j] + g12 * (p[i] * q[j] + q[i] * p[j]) + g22 * q[i] * q[j];
     [0.5 * (stretch(0, 0) - 1.0), 0.5 * (stretch(1, 1) - 1.0), 0.5 * stretch(0, 1)]
+}
+
+/// Forces of a triangle's strain on its corners, plane stress, Young's modulus 1.
+pub(super) fn forces(area: f64, hats: &[[f64; 2]; 3], [e11, e22, e12]: [f64; 3]) -> [[f64; 2]; 3] {
+    let lateral = POISSON * (e11 + e22);
+    let [s11, s22, s12] =
+        [(1.0 - POISSON) * e11 + lateral, (1.0 - POISSON) * e22 + lateral, (1.0 - POISSON) * e12]
+            .map(|s| area * s / (1.0 - POISSON * POISSON));
+    hats.map(|hat| [s11 * hat[0] + s12 * hat[1], s12 * hat[0] + s22 * hat[1]])
 }
 
 fn rms_strain(mesh: &DiskMesh, metrics: &[[f64; 3]], uv: &[[f64; 2]]) -> f64 {

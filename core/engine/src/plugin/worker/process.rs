@@ -150,7 +150,7 @@ fn pump(plugin: &str, output: PipeReader, kept: &Mutex<VecDeque<String>>) {
 }
 
 /// Returns a text that leaves a terminal alone.
-pub(super) fn printable(text: &str) -> String {
+pub(in crate::plugin) fn printable(text: &str) -> String {
     let shown = |c: char| if c.is_control() && c != '\t' { '\u{fffd}' } else { c };
     text.chars().map(shown).collect()
 }
