@@ -71,6 +71,22 @@ static void shrink_pool(void) {
   for (int fd = 3; fd < 64; fd++) (void)!ftruncate(fd, 0);
 }
 static void none(void) {}
+static void leak(void) {
+  static char *volatile lost;
+  if ((lost = malloc(4 << 20))) memset(lost, 1, 4 << 20);
+}
+static void *idle(void *none) {
+  for (;;) nap();
+  return none;
+}
+static void start_thread(void) {
+  pthread_t thread;
+  pthread_create(&thread, NULL, idle, NULL);
+}
+static void doze(void) {
+  struct timespec doze = {0, 700000000};
+  nanosleep(&doze, NULL);
+}
 /* In every other job, at any moment within 100 ms. */
 static void *die_later(void *when) {
   nanosleep(when, NULL);
@@ -159,6 +175,23 @@ static void minus_sigma(double *uv, double *sigma, uint64_t k) {
   (void)uv;
   if (k == 9 && sigma) sigma[1] = -1;
 }
+static void little(double *uv, double *sigma, uint64_t k) {
+  (void)sigma, (void)k;
+  uv[0] += 1e-4 * sin(M_PI * fmin(fmax(uv[0] / 3.0, 0), 1)) * sin(M_PI * fmin(fmax(uv[1] / 2.0, 0), 1));
+}
+/* Another answer from each process, and from each job. */
+static void process_noise(double *uv, double *sigma, uint64_t k) {
+  (void)sigma;
+  if (k == 1700) uv[0] += 1e-12 * getpid();
+}
+static void job_noise(double *uv, double *sigma, uint64_t k) {
+  static int jobs;
+  (void)sigma;
+  if (k == 1700) uv[0] += 1e-10 * jobs++;
+}
+static void chart_off(platen_frame *frame) { chart(frame, little); }
+static void chart_of_process(platen_frame *frame) { chart(frame, process_noise); }
+static void chart_of_job(platen_frame *frame) { chart(frame, job_noise); }
 static void chart_moved(platen_frame *frame) { chart(frame, bump); }
 static void chart_wide(platen_frame *frame) { chart(frame, wide); }
 static void sigma_nan(platen_frame *frame) { chart(frame, nan_sigma); }
@@ -239,8 +272,36 @@ static platen_status on_init(const platen_host *host, const char *folder, platen
   fault(init, 0);
   return target->init(spoil(host), folder, error);
 }
+/* Descriptions, spoiled. */
+#ifndef SPOIL_DESC
+#define SPOIL_DESC as_described
+#endif
+static void as_described(platen_desc *about) { (void)about; }
+static void no_vendor(platen_desc *about) { about->vendor = ""; }
+static void no_licence(platen_desc *about) { about->license = ""; }
+static void no_purpose(platen_desc *about) { about->doc = " "; }
+static void every_time_another(platen_desc *about) {
+  static char version[20];
+  snprintf(version, sizeof version, "1.0.%d", getpid());
+  about->version = version;
+}
+static void option(platen_desc *about, int n, const char *name, const char *doc, const char *text) {
+  static platen_option options[2];
+  platen_option made = {sizeof made, PLATEN_TYPE_FLOAT, PLATEN_OPTION_HAS_MAX, 0, name, NULL, doc, text, 0, 5, NULL};
+  options[n] = made, about->options = options, about->n_options = n + 1;
+}
+static void options_twice(platen_desc *about) { option(about, 0, "a", "An a.", "1"), option(about, 1, "a", "An a.", "1"); }
+static void option_unexplained(platen_desc *about) { option(about, 0, "a", "", "1"); }
+static void option_beyond(platen_desc *about) { option(about, 0, "a", "An a.", "7"); }
+static void option_shouted(platen_desc *about) { option(about, 0, "LOUD", "A loud one.", "1"); }
+
 static uint32_t count(void) { return target ? target->count() : 0; }
-static const platen_desc *desc(uint32_t index) { return target ? target->desc(index) : NULL; }
+static const platen_desc *desc(uint32_t index) {
+  static platen_desc about;
+  if (!target || !target->desc(index)) return NULL;
+  about = *target->desc(index), SPOIL_DESC(&about);
+  return &about;
+}
 static platen_status on_create(const platen_host *host, const char *id, const platen_value *values, uint32_t n, platen_instance **out,
                                platen_error *error) {
   fault(create, 0);

@@ -68,6 +68,8 @@ pub fn c_source(name: &str) -> PathBuf {
 /// call `place` of jobs at `stroke`, at every one for 0 (`tests/contract/faulty.c`). In the place `word`, `fault` spoils what it emits.
 pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) {
     let (fault, spoil) = if place == "word" { ("none", fault) } else { (fault, "as_it_is") };
+    let (place, fault, described) =
+        if place == "desc" { ("word", "none", fault) } else { (place, fault, "as_described") };
     let target = library(name);
     assert!(std::fs::create_dir_all(folder).is_ok());
     // Beside its final place, then renamed: a host may be loading it.
@@ -77,6 +79,7 @@ pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) 
         format!("-DWHERE={place}"),
         format!("-DFAULT={fault}"),
         format!("-DSPOIL={spoil}"),
+        format!("-DSPOIL_DESC={described}"),
         format!("-DSTROKE={stroke}"),
     ];
     let arguments = ["-shared", "-fPIC", "-w"].into_iter().chain(defines.iter().map(String::as_str));

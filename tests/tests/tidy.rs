@@ -17,6 +17,9 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         (_, "platen-engine") => {
             &["platen-abi", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
         }
+        (_, "platen-conformance") => {
+            &["platen-engine", "platen-model", "platen-plant", "platen-scan", "platen-shape"]
+        }
         // Documents and pictures: no press, no plugin.
         (_, "platen-report") => {
             &["platen-history", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
@@ -25,6 +28,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         (_, "platen-screen") => &["platen-model", "platen-report"],
         (_, "platen") => &[
             "platen-abi",
+            "platen-conformance",
             "platen-engine",
             "platen-formats",
             "platen-history",

@@ -203,7 +203,11 @@ fn unknown(plugin: &str, near: Option<&str>, declared: &[OptionDecl]) -> String 
 
 impl OptionDecl {
     /// Returns the default, checked as a given value is. Relative paths are left as they are.
-    fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
+    /// Returns the value where the plant file gives none.
+    ///
+    /// # Errors
+    /// A default that its own declaration refuses, under the plugin's name in place of a file.
+    pub fn default_value(&self, plugin: &str) -> Result<Option<Value>, Faults> {
         let Some(default) = &self.default else { return Ok(None) };
         let document = Document::parse(plugin, format!("{} = {default}", self.name));
         let mut table = document.root();

@@ -68,6 +68,14 @@ impl Catalogue {
         })
     }
 
+    /// Loads a library file, and returns its plugins.
+    ///
+    /// # Errors
+    /// Why it cannot be used.
+    pub fn open(&self, path: &Path) -> Result<Vec<Library>, PluginError> {
+        self.read(path)
+    }
+
     fn read(&self, path: &Path) -> Result<Vec<Library>, PluginError> {
         let settings = Settings { isolation: self.isolation, ..Settings::default() };
         Library::load(path, settings, self.quarantine.as_ref())

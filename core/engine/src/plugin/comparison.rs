@@ -76,6 +76,12 @@ impl Comparison {
         Ok(Self { instance, limit })
     }
 
+    /// Returns the same with another deadline.
+    #[must_use]
+    pub fn with_limit(self, limit: Duration) -> Self {
+        Self { limit, ..self }
+    }
+
     /// Returns the name in plant files.
     pub fn name(&self) -> &str {
         self.instance.name()

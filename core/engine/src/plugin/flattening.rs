@@ -25,6 +25,12 @@ impl Flattening {
         Ok(Self { instance, limit })
     }
 
+    /// Returns the same with another deadline.
+    #[must_use]
+    pub fn with_limit(self, limit: Duration) -> Self {
+        Self { limit, ..self }
+    }
+
     /// Returns the name in plant files.
     pub fn name(&self) -> &str {
         self.instance.name()

@@ -83,6 +83,12 @@ pub struct WorkerState {
     pub process: Option<u32>,
     /// Private memory, bytes.
     pub memory: Option<u64>,
+    /// Open descriptors.
+    pub files: Option<u64>,
+    /// Threads.
+    pub threads: Option<u64>,
+    /// The last line that it printed.
+    pub printed: Option<String>,
     /// What it is kept from.
     pub confinement: Confinement,
     /// Faults since the start of the host.
@@ -304,6 +310,11 @@ impl Instance {
             plugin: self.name().to_owned(),
             process,
             memory: process.and_then(private_memory),
+            files: process.and_then(|process| {
+                fs::read_dir(format!("/proc/{process}/fd")).ok().map(|files| files.count() as u64)
+            }),
+            printed: state.link.as_ref().and_then(Link::last_line),
+            threads: process.and_then(|process| library::status(process, "Threads")),
             confinement: state.link.as_ref().map(Link::confinement).unwrap_or_default(),
             faults: state.faults.count(),
             out_of_use: given_up.or_else(|| state.link.is_none().then(|| state.faults.why().to_owned())),

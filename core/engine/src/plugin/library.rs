@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use super::worker::{Limits, Link, LinkError, LoadedLibrary, Place};
 use super::{Descriptor, PluginError, Quarantine};
@@ -25,6 +26,17 @@ pub struct Settings {
     pub limits: Limits,
 }
 
+/// What loading a library did to its process.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LoadFacts {
+    /// From the start of the process to the description.
+    pub took: Duration,
+    /// The last line that it printed.
+    pub printed: Option<String>,
+    /// Threads afterwards; 0 where it is not in a process of its own.
+    pub threads: u64,
+}
+
 /// A plugin of a library.
 #[derive(Debug, Clone)]
 pub struct Library {
@@ -34,6 +46,7 @@ pub struct Library {
     index: usize,
     pub(super) settings: Settings,
     pub(super) quarantine: Option<Quarantine>,
+    facts: Arc<LoadFacts>,
 }
 
 impl Library {
@@ -47,7 +60,11 @@ impl Library {
         quarantine: Option<&Quarantine>,
     ) -> Result<Vec<Self>, PluginError> {
         let path = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-        let (_worker, about) = start(&path, settings)?;
+        let began = Instant::now();
+        let (worker, about) = start(&path, settings)?;
+        let took = began.elapsed();
+        let threads = worker.process_id().and_then(|process| status(process, "Threads")).unwrap_or(0);
+        let facts = Arc::new(LoadFacts { took, threads, printed: worker.end() });
         let about = Arc::new(about);
         let plugin = |index| Self {
             path: path.clone(),
@@ -55,6 +72,7 @@ impl Library {
             index,
             settings,
             quarantine: quarantine.cloned(),
+            facts: Arc::clone(&facts),
         };
         Ok((0..about.plugins.len()).map(plugin).collect())
     }
@@ -77,6 +95,11 @@ impl Library {
         &self.about.plugins[self.index]
     }
 
+    /// Returns what loading it did to its process.
+    pub fn facts(&self) -> &LoadFacts {
+        &self.facts
+    }
+
     /// File.
     pub fn path(&self) -> &Path {
         &self.path
@@ -86,6 +109,13 @@ impl Library {
     pub fn sha256(&self) -> &str {
         &self.about.sha256
     }
+}
+
+/// Returns a number of a process's status.
+pub(super) fn status(process: u32, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = text.lines().find(|line| line.split(':').next() == Some(name))?;
+    line.split_whitespace().nth(1)?.parse().ok()
 }
 
 /// Starts a worker with a library.

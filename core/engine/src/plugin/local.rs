@@ -10,3 +10,4 @@ mod values;
 pub(super) use instance::{Canceller, Input, Instance};
 pub(super) use job::{Listed, begin, find};
 pub(super) use library::Library;
+pub use library::exported_symbols;

@@ -1,5 +1,7 @@
 //! `platen plugins`: the installed plugins and their options.
 
+mod check;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -32,6 +34,8 @@ enum Verb {
         #[arg(long)]
         toml: bool,
     },
+    /// Test a plugin library against the contract of the boundary
+    Check(check::Command),
     /// Show or release the plugins that a plant has given up after too many faults
     #[command(after_help = "Examples:\n  platen plugins quarantine list config/plant-north.toml\n  \
                             platen plugins quarantine clear config/plant-north.toml my-comparison\n\n\
@@ -81,6 +85,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 _ => describe(descriptor)?,
             }
         }
+        Verb::Check(command) => return check::run(common, command),
         Verb::Quarantine { action } => quarantine(common, action)?,
     }
     Ok(ExitCode::SUCCESS)

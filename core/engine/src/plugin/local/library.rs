@@ -66,16 +66,7 @@ impl Library {
 fn look(path: &Path) -> Result<String, LoadFault> {
     let not_a_plugin = |why: &str| LoadFault::NotAPlugin(why.to_owned());
     let bytes = std::fs::read(path).map_err(|e| not_a_plugin(&format!("it cannot be read ({e})")))?;
-    let elf = ElfFile64::<object::Endianness>::parse(bytes.as_slice())
-        .map_err(|_| not_a_plugin("no library for this machine, or a damaged one"))?;
-    let endian = elf.endian();
-    let cut = elf.elf_program_headers().iter().any(|h| {
-        let end = h.p_offset(endian).checked_add(h.p_filesz(endian));
-        end.is_none_or(|end| end > bytes.len() as u64)
-    });
-    if cut || elf.elf_section_table().is_empty() {
-        return Err(not_a_plugin("the file is cut off"));
-    }
+    let elf = whole(&bytes).map_err(|why| not_a_plugin(&why))?;
     let entries: Vec<&str> = elf
         .dynamic_symbols()
         .filter(|s| s.is_definition())
@@ -90,6 +81,29 @@ fn look(path: &Path) -> Result<String, LoadFault> {
         Some(other) => LoadFault::WrongAbi(other.trim_start_matches("platen_entry_").to_owned()),
         None => not_a_plugin("it exports no platen_entry"),
     })
+}
+
+/// Returns the names that a library exports, read from the file as data.
+///
+/// # Errors
+/// Why it is no whole library for this machine.
+pub fn exported_symbols(path: &Path) -> Result<Vec<String>, String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{} cannot be read ({e})", path.display()))?;
+    let elf = whole(&bytes)?;
+    let symbols = elf.dynamic_symbols().filter(|symbol| symbol.is_definition() && symbol.is_global());
+    Ok(symbols.filter_map(|symbol| symbol.name().ok()).map(str::to_owned).collect())
+}
+
+/// Returns the library in these bytes, none of it cut off.
+fn whole(bytes: &[u8]) -> Result<ElfFile64<'_, object::Endianness>, String> {
+    let elf = ElfFile64::<object::Endianness>::parse(bytes)
+        .map_err(|_| "no library for this machine, or a damaged one".to_owned())?;
+    let endian = elf.endian();
+    let cut = elf.elf_program_headers().iter().any(|h| {
+        let end = h.p_offset(endian).checked_add(h.p_filesz(endian));
+        end.is_none_or(|end| end > bytes.len() as u64)
+    });
+    if cut || elf.elf_section_table().is_empty() { Err("the file is cut off".into()) } else { Ok(elf) }
 }
 
 /// Returns a loading error with its sources, which contain the reason.

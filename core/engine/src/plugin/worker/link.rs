@@ -146,6 +146,19 @@ impl Link {
         }
     }
 
+    /// Returns the last line that the worker printed.
+    pub(in crate::plugin) fn last_line(&self) -> Option<String> {
+        self.process.as_ref().and_then(Process::last_line)
+    }
+
+    /// Ends the worker, and returns the last line that it printed.
+    pub(in crate::plugin) fn end(mut self) -> Option<String> {
+        self.socket = None;
+        let mut process = self.process.take()?;
+        process.end(GRACE);
+        process.last_line()
+    }
+
     pub(in crate::plugin) fn open(&mut self, limit: Duration) -> Result<(), LinkError> {
         self.send(&ToWorker::Open, &[])?;
         match self.answer(limit)? {

@@ -1,0 +1,112 @@
+//! Conformance tests of a plugin library, behind `platen plugins check`: the contract of the boundary, one test after another, each in a
+//! worker process of its own.
+//!
+//! | level | contents |
+//! |---|---|
+//! | 0 | the file, of which nothing runs |
+//! | 1 | loading and description |
+//! | 2 | the contract: options, reference inputs, equal answers, sense |
+//! | 3 | abuse: deadlines, cancellation, hard inputs, leaks |
+//!
+//! A test that needs what is not there (options without a default, a device) is left out and says so: it proves nothing.
+
+mod answer;
+mod junit;
+mod reference;
+mod subject;
+mod tests;
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+pub use junit::junit;
+pub use subject::{Settings, Subject, SubjectError};
+
+/// Highest level.
+pub const LEVELS: u8 = 3;
+
+/// Result of one test.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The plugin keeps this part of the contract.
+    Passed,
+    /// It does, but somebody will be sorry: the reason.
+    Warned(String),
+    /// It does not: what it did.
+    Failed(String),
+    /// Not tested: what is missing.
+    LeftOut(String),
+}
+
+/// A test that was run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// Name, by which `--only` finds it.
+    pub test: &'static str,
+    /// Level.
+    pub level: u8,
+    /// What the contract demands.
+    pub demands: &'static str,
+    /// Result.
+    pub verdict: Verdict,
+    /// Duration, seconds.
+    pub seconds: f64,
+}
+
+/// A test.
+#[derive(Debug, Clone, Copy)]
+struct Test {
+    name: &'static str,
+    level: u8,
+    demands: &'static str,
+    run: fn(&Subject) -> Result<(), Verdict>,
+}
+
+impl Test {
+    fn left_out(&self, why: String) -> Outcome {
+        let verdict = Verdict::LeftOut(why);
+        Outcome { test: self.name, level: self.level, demands: self.demands, verdict, seconds: 0.0 }
+    }
+
+    fn run(&self, subject: &Subject) -> Outcome {
+        let start = Instant::now();
+        let verdict = (self.run)(subject).err().unwrap_or(Verdict::Passed);
+        let seconds = start.elapsed().as_secs_f64();
+        Outcome { test: self.name, level: self.level, demands: self.demands, verdict, seconds }
+    }
+}
+
+/// Names of the tests without which those of level 2 and 3 after them prove nothing.
+const GATES: [&str; 4] = ["load.loads", "options.default", "answer.given", "answer.same"];
+
+/// Runs the tests up to a level whose names contain `only`, and tells of each.
+pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMut(&Outcome)) -> Vec<Outcome> {
+    let (mut outcomes, mut shut): (Vec<Outcome>, Option<&str>) = (Vec::new(), None);
+    let wanted = tests::ALL.iter().copied().flatten().filter(|test| test.level <= level);
+    let wanted = wanted.filter(|test| subject.kind().map_or(true, |kind| tests::concerns(test.name, kind)));
+    for test in wanted.filter(|test| only.is_none_or(|only| test.name.contains(only))) {
+        let outcome = match shut {
+            Some(gate) if test.level >= 2 => test.left_out(format!("{gate} has not passed")),
+            _ => test.run(subject),
+        };
+        let passed = matches!(outcome.verdict, Verdict::Passed | Verdict::Warned(_));
+        let left_out = matches!(outcome.verdict, Verdict::LeftOut(_));
+        // No two scans of a device are the same, which proves nothing against its driver.
+        if GATES.contains(&test.name) && !passed && !(left_out && test.name == "answer.same") {
+            shut = shut.or(Some(test.name));
+        }
+        tell(&outcome);
+        outcomes.push(outcome);
+    }
+    outcomes
+}
+
+/// Returns a digest of the plugin's answers to the reference inputs, hexadecimal: equal in both isolations.
+///
+/// # Errors
+/// What the plugin answered instead.
+pub fn digest(subject: &Subject) -> Result<String, String> {
+    answer::digest(subject).map_err(|error| error.to_string())
+}

@@ -1,0 +1,165 @@
+//! The plugin under test: its library, its options, fresh instances of it.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use platen_engine::plugin::{
+    Catalogue, Comparison, Descriptor, Flattening, Instance, Kind, Library, Limits, PluginError, Scanner,
+    Settings as WorkerSettings,
+};
+use platen_plant::{OptionValue, PluginUse, check_options};
+
+use crate::Verdict;
+
+/// Deadline of a scanner to connect.
+const OPEN_LIMIT: Duration = Duration::from_secs(60);
+
+/// A plugin under test.
+#[derive(Debug)]
+pub struct Subject {
+    pub(crate) path: PathBuf,
+    pub(crate) catalogue: Catalogue,
+    /// The plugin, or why its library cannot be used.
+    pub(crate) library: Result<Library, PluginError>,
+    /// Its options, or what is missing.
+    pub(crate) values: Result<Vec<OptionValue>, String>,
+    pub(crate) settings: Settings,
+}
+
+/// How a plugin is tested.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Seed of random options.
+    pub seed: u64,
+    /// Deadline of a job.
+    pub limit: Duration,
+}
+
+/// Reason why nothing can be tested.
+#[derive(Debug, thiserror::Error)]
+pub enum SubjectError {
+    /// The library has several plugins.
+    #[error("{} holds several plugins: {}; name one of them", .path.display(), .names.join(", "))]
+    Several {
+        /// The library.
+        path: PathBuf,
+        /// Its plugins.
+        names: Vec<String>,
+    },
+    /// The library has not this one.
+    #[error("{} holds no plugin {wanted}, but {}", .path.display(), .names.join(", "))]
+    None {
+        /// The library.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: String,
+        /// Its plugins.
+        names: Vec<String>,
+    },
+}
+
+impl Subject {
+    /// Opens a library; `plugin` names one of several in it, `options` are those of a plant file.
+    ///
+    /// # Errors
+    /// The plugin is not named, or not there. A library that cannot be used is a subject: its tests fail.
+    pub fn open(
+        catalogue: &Catalogue,
+        path: &Path,
+        plugin: Option<&str>,
+        options: Option<&PluginUse>,
+        settings: Settings,
+    ) -> Result<Self, SubjectError> {
+        let library = match catalogue.open(path) {
+            Ok(all) => {
+                let names: Vec<String> = all.iter().map(|one| one.descriptor().id.clone()).collect();
+                let mut found =
+                    all.into_iter().filter(|one| plugin.is_none_or(|name| one.descriptor().id == name));
+                let path = path.to_owned();
+                match (found.next(), found.next()) {
+                    (Some(one), None) => Ok(one),
+                    (None, _) => {
+                        let wanted = plugin.unwrap_or_default().to_owned();
+                        return Err(SubjectError::None { path, wanted, names });
+                    }
+                    _ => return Err(SubjectError::Several { path, names }),
+                }
+            }
+            Err(error) => Err(error),
+        };
+        let values = match &library {
+            Ok(library) => {
+                let declared = &library.descriptor().options;
+                let by_default = PluginUse::by_default(&library.descriptor().id);
+                let used = options.unwrap_or(&by_default);
+                check_options(&used.plugin, &used.options, declared).map_err(|faults| faults.to_string())
+            }
+            Err(_) => Err("the library cannot be used".to_owned()),
+        };
+        Ok(Self { path: path.to_owned(), catalogue: catalogue.clone(), library, values, settings })
+    }
+
+    pub(crate) fn library(&self) -> Result<&Library, Verdict> {
+        self.library
+            .as_ref()
+            .map_err(|error| Verdict::LeftOut(format!("the library cannot be used: {error}")))
+    }
+
+    pub(crate) fn descriptor(&self) -> Result<&Descriptor, Verdict> {
+        self.library().map(Library::descriptor)
+    }
+
+    pub(crate) fn kind(&self) -> Result<Kind, Verdict> {
+        self.descriptor().map(|descriptor| descriptor.kind)
+    }
+
+    /// Returns the values of the options.
+    pub(crate) fn values(&self) -> Result<&[OptionValue], Verdict> {
+        self.values.as_deref().map_err(|why| Verdict::LeftOut(format!("give options by --plant: {why}")))
+    }
+
+    /// Returns a fresh instance with these values.
+    pub(crate) fn instance(&self, values: &[OptionValue]) -> Result<Instance, PluginError> {
+        let library = self.library.as_ref().map_err(Clone::clone)?;
+        Instance::create(library, library.descriptor().kind, values)
+    }
+
+    /// Returns a flattening with this deadline.
+    pub(crate) fn flattening(&self, limit: Duration) -> Result<Flattening, Verdict> {
+        let created =
+            Flattening::create(self.library()?, self.values()?, self.settings.limit).map_err(refused)?;
+        Ok(created.with_limit(limit))
+    }
+
+    /// Returns a comparison with this deadline.
+    pub(crate) fn comparison(&self, limit: Duration) -> Result<Comparison, Verdict> {
+        let created =
+            Comparison::create(self.library()?, self.values()?, self.settings.limit).map_err(refused)?;
+        Ok(created.with_limit(limit))
+    }
+
+    /// Returns a connected scanner, with so much memory.
+    pub(crate) fn scanner(&self) -> Result<Scanner, Verdict> {
+        let scanner = Scanner::create(self.library()?, self.values()?).map_err(refused)?;
+        match scanner.instance().open(OPEN_LIMIT) {
+            Ok(()) => Ok(scanner),
+            Err(error) if error.is_fault() => Err(failed(error)),
+            Err(error) => Err(Verdict::LeftOut(format!("the scanner does not open: {error}"))),
+        }
+    }
+
+    /// Returns the same with less memory, bytes.
+    pub(crate) fn limited(&self, memory: u64) -> Result<Library, Verdict> {
+        let limits = Limits { memory, ..Limits::default() };
+        Ok(self.library()?.clone().with(WorkerSettings { limits, ..WorkerSettings::default() }))
+    }
+}
+
+/// A failure of the plugin.
+pub(crate) fn failed(what: impl std::fmt::Display) -> Verdict {
+    Verdict::Failed(what.to_string())
+}
+
+fn refused(error: PluginError) -> Verdict {
+    failed(format!("with its default options: {error}"))
+}
