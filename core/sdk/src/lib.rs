@@ -97,7 +97,14 @@ pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};
 pub use platen_abi as abi;
 #[cfg(feature = "comparison")]
-pub use platen_model::{Field, NodeState, Report};
+pub use platen_model::{Field, Figure, Findings, NodeState, Report, Task, TemplateFinding, Verdict};
+pub use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
+#[cfg(feature = "comparison")]
+pub use platen_shape::Surface;
+#[cfg(feature = "flattening")]
+pub use platen_shape::flatten::{cotangents, fixed_boundary};
+#[cfg(feature = "flattening")]
+pub use platen_shape::{Chart, DiskMesh};
 pub use scanner::{ScanReceiver, ScanSink, Scanner};
 
 /// Compiles the example of `plugins/README.md` as a test.

@@ -65,16 +65,16 @@ fn a_scanner_in_c_scans() {
     let folder = tempfile::tempdir().unwrap();
     let catalogue = c_plugin(
         folder.path(),
-        "plane_scanner",
-        &std::fs::read_to_string(c_source("plane_scanner.c")).unwrap(),
+        "my_plugin",
+        &std::fs::read_to_string(platen_tests::repository().join("drivers/examples/scanner.c")).unwrap(),
     );
-    let library = catalogue.load("plane-scanner").unwrap();
+    let library = catalogue.load("my-plugin").unwrap();
     assert_eq!(library.descriptor().options[0].default.as_deref(), Some("2.0"));
     let height = |f| [OptionValue { name: "height".into(), value: Value::Float(f), given: true }];
     let refused = Scanner::create(&library, &height(1000.0)).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "plugin plane-scanner: refused its options: height is above any hall; give metres"
+        "plugin my-plugin: refused its options: height is above any hall; give metres"
     );
 
     let scanner = Scanner::create(&library, &height(2.5)).unwrap();
@@ -146,4 +146,20 @@ fn every_wrong_library_gets_its_own_sentence() {
     assert_eq!(library.descriptor().kind, Kind::Flattening);
     let wrong_kind = Scanner::create(&library, &[]).unwrap_err();
     assert!(matches!(&wrong_kind, PluginError::WrongKind { needed: "scanner", .. }), "{wrong_kind}");
+}
+
+/// Built from each released header, and never again.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn a_library_of_each_released_boundary_loads_for_ever() {
+    let folder = platen_tests::repository().join("tests/data/boundary");
+    for library in std::fs::read_dir(folder).unwrap() {
+        let path = library.unwrap().path();
+        let library = Catalogue::new(None).open(&path).unwrap().remove(0);
+        let height = OptionValue { name: "height".into(), value: Value::Float(2.0), given: true };
+        let scanner = Scanner::create(&library, &[height]).unwrap();
+        scanner.instance().open(LIMIT).unwrap();
+        let mut scan = scanner.start(JobSpec::untriggered(LIMIT), None).unwrap();
+        assert_eq!(scan.finish().unwrap().columns, 80, "{}", path.display());
+    }
 }

@@ -4,3 +4,4 @@
 mod boundary;
 mod check;
 mod misbehaviour;
+mod new_plugin;

@@ -7,10 +7,15 @@ use platen_tests::faulty;
 use serde_json::Value as Json;
 
 /// A folder with a scan of a plate, its plate file, and a folder for faulty plugins.
-struct Bench(tempfile::TempDir);
+pub(crate) struct Bench(tempfile::TempDir);
 
 impl Bench {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
+        Self::rolled(90.0)
+    }
+
+    /// The plate rolled to 6 m about an axis at so many degrees to its u.
+    pub(crate) fn rolled(axis_deg: f64) -> Self {
         let bench = Self(tempfile::tempdir().unwrap());
         std::fs::write(
             bench.file("plate.toml"),
@@ -21,8 +26,11 @@ impl Bench {
                      [[comparison]]\nplugin = \"curvature\"\n";
         std::fs::write(bench.file("plant.toml"), plant).unwrap();
         let simulated = bench.file("sim.toml");
-        let text = "strokes = 0\nshape = { shape = \"cylinder\", radius_mm = 6000.0, axis_deg = 90.0 }\n\
-                    [blank]\nwidth_mm = 2500.0\nheight_mm = 2000.0\nthickness_mm = 36.0\n[pose]\ncentre_mm = [6000.0, 0.0, -3600.0]\nyaw_deg = 0.0\n";
+        let text = format!(
+            "strokes = 0\nshape = {{ shape = \"cylinder\", radius_mm = 6000.0, axis_deg = {axis_deg:?} }}\n\
+             [blank]\nwidth_mm = 2500.0\nheight_mm = 2000.0\nthickness_mm = 36.0\n\
+             [pose]\ncentre_mm = [6000.0, 0.0, -3600.0]\nyaw_deg = 0.0\n"
+        );
         std::fs::write(&simulated, text).unwrap();
         let mut sim = platen_tests::program("platen-sim");
         sim.arg("scanner")
@@ -35,12 +43,12 @@ impl Bench {
         bench
     }
 
-    fn file(&self, name: &str) -> PathBuf {
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
     /// Measures the scan with the plugins of this folder first.
-    fn measure(&self, plugins: &Path, more: &[&str]) -> Output {
+    pub(crate) fn measure(&self, plugins: &Path, more: &[&str]) -> Output {
         let mut platen = platen_tests::program("platen");
         platen
             .arg("--plugins")

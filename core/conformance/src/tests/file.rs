@@ -36,8 +36,19 @@ fn entry(subject: &Subject) -> Result<(), Verdict> {
 }
 
 /// Symbols that compilers and linkers add on their own.
-const USUAL: [&str; 7] =
-    ["platen_entry_", "_init", "_fini", "_edata", "_end", "__bss_start", "rust_eh_personality"];
+const USUAL: [&str; 11] = [
+    "_ZNSt",
+    "_ZNKSt",
+    "_ZSt",
+    "_ZT",
+    "platen_entry_",
+    "_init",
+    "_fini",
+    "_edata",
+    "_end",
+    "__bss_start",
+    "rust_eh_personality",
+];
 
 fn exports(subject: &Subject) -> Result<(), Verdict> {
     let usual = |name: &String| USUAL.iter().any(|usual| name.starts_with(usual));

@@ -1,6 +1,7 @@
 //! `platen plugins`: the installed plugins and their options.
 
 mod check;
+mod new;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -34,6 +35,8 @@ enum Verb {
         #[arg(long)]
         toml: bool,
     },
+    /// Make a plugin of one's own that builds and works, in Rust, C or C++
+    New(new::Command),
     /// Test a plugin library against the contract of the boundary
     Check(check::Command),
     /// Show or release the plugins that a plant has given up after too many faults
@@ -85,6 +88,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 _ => describe(descriptor)?,
             }
         }
+        Verb::New(command) => return new::run(common, command),
         Verb::Check(command) => return check::run(common, command),
         Verb::Quarantine { action } => quarantine(common, action)?,
     }

@@ -1,4 +1,6 @@
-/* A scanner in C against platen.h: sees a level floor `height` metres below. */
+/* A scanner: sees a level floor `height` metres below.
+ *
+ * cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so scanner.c -lm */
 #include "platen.h"
 
 #include <math.h>
@@ -13,7 +15,7 @@ static const platen_host *host;
 static const platen_option options[] = {{sizeof(platen_option), PLATEN_TYPE_FLOAT, PLATEN_OPTION_HAS_MIN, 0, "height", "m",
                                          "Height of the scanner over the floor.", "2.0", 0.1, 0.0, NULL}};
 static const char *const outputs[] = {PLATEN_FORMAT_SCAN, PLATEN_FORMAT_COLUMN, PLATEN_FORMAT_SCAN_END, NULL};
-static const platen_desc description = {sizeof(platen_desc), 0, "plane-scanner", "scanner", "Plane scanner", "an integrator",
+static const platen_desc description = {sizeof(platen_desc), 0, "my-plugin", "scanner", "Plane scanner", "an integrator",
                                         "1.0.0", "Sees a level floor.", NULL, "MIT", NULL, outputs, options, 1, 0};
 
 static platen_status emit(const platen_job *job, const char *format, platen_buffer buffer) {
