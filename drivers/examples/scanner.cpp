@@ -15,6 +15,7 @@ class my_plugin {
 
   explicit my_plugin(const platen::values &values) : height_(values.number("height")) {}
   void open() {}
+  void close() {}
 
   void run(const platen::job &job, const platen::inputs &) {
     const platen_scan scan{sizeof scan, 0, rows, columns, 0, step, top, step, UINT32_MAX, 0, 2047, 0, {0, 0}, {0, 0}, 0};

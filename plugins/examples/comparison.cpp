@@ -15,6 +15,7 @@ class my_plugin {
 
   explicit my_plugin(const platen::values &values) : least_seen_(values.number("least_seen")) {}
   void open() {}
+  void close() {}
 
   void run(const platen::job &job, const platen::inputs &in) {
     platen_plate plate;

@@ -30,7 +30,11 @@ static platen_status run(platen_instance *self, const platen_job *job, const pla
   int failed = harmonic_map(mesh, (double *)((char *)frame.buffer.data + sizeof head), stopped, (void *)job);
   if (!failed) return host->emit(host, job->job_id, &frame);
   host->buffer_free(host, &frame.buffer);
-  return failed == 2 ? PLATEN_E_CANCELLED : PLATEN_E_MEMORY;
+  if (failed == 1) return PLATEN_E_MEMORY;
+  if (failed == 2) return PLATEN_E_CANCELLED;
+  snprintf(error->message, sizeof error->message, "the mesh has no harmonic map");
+  snprintf(error->hint, sizeof error->hint, "scan again with the whole plate in view");
+  return PLATEN_E_BAD_DATA;
 }
 
 static platen_status open_(platen_instance *self, platen_error *error) { return (void)self, (void)error, PLATEN_OK; }

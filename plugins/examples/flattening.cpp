@@ -14,6 +14,7 @@ class my_plugin {
 
   explicit my_plugin(const platen::values &) {}
   void open() {}
+  void close() {}
 
   void run(const platen::job &job, const platen::inputs &in) {
     const auto &mesh = in.get<platen_mesh>(PLATEN_FORMAT_MESH);
@@ -22,7 +23,8 @@ class my_plugin {
     const auto stopped = [](void *asked) { return static_cast<const platen::job *>(asked)->cancelled() ? 1 : 0; };
     switch (harmonic_map(&mesh, uv.data(), stopped, const_cast<platen::job *>(&job))) {
       case 1: throw std::bad_alloc();
-      case 2: job.check();
+      case 2: job.check(); break;
+      case 3: throw platen::failure("the mesh has no harmonic map", "scan again with the whole plate in view");
     }
     const platen_chart head{sizeof head, 0, {sizeof head, n}, {0, 0}};
     job.emit(PLATEN_FORMAT_CHART, sizeof head + n * sizeof(double), [&](char *out) {

@@ -24,7 +24,7 @@ static inline void harmonic_apply(uint64_t n, const uint32_t *triangles, uint64_
     if (held[k]) out[k] = 0;
 }
 
-/* Fills uv, 2 numbers a vertex. `stopped` is asked once a step. Returns 0, or 1 without memory, 2 when stopped. */
+/* Fills uv, 2 numbers a vertex. `stopped` is asked once a step. Returns 0, or 1 without memory, 2 when stopped, 3 when there is none. */
 static inline int harmonic_map(const platen_mesh *mesh, double *uv, int (*stopped)(void *), void *asked) {
   const char *base = (const char *)mesh;
   uint64_t n = mesh->vertices.count / 3, n_triangles = mesh->triangles.count / 3;
@@ -51,12 +51,17 @@ static inline int harmonic_map(const platen_mesh *mesh, double *uv, int (*stoppe
     harmonic_apply(n, triangles, n_triangles, cot, held, x, ld);
     double rr = 0;
     for (uint64_t k = 0; k < n; k++) r[k] = d[k] = -ld[k], rr += r[k] * r[k];
-    for (double first = rr; rr > 1e-26 * first && result == 0;) {
+    /* In exact arithmetic n steps are enough. */
+    uint64_t steps = 0;
+    for (double first = rr; rr > 1e-26 * first && result == 0; steps++) {
       if (stopped(asked)) result = 2;
       harmonic_apply(n, triangles, n_triangles, cot, held, d, ld);
       double dld = 0, next = 0;
       for (uint64_t k = 0; k < n; k++) dld += d[k] * ld[k];
-      if (!(dld > 0)) break;
+      if (!(dld > 0) || steps > n) {
+        result = 3;
+        break;
+      }
       for (uint64_t k = 0; k < n; k++) x[k] += rr / dld * d[k], r[k] -= rr / dld * ld[k], next += r[k] * r[k];
       for (uint64_t k = 0; k < n; k++) d[k] = r[k] + next / rr * d[k];
       rr = next;

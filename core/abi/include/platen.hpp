@@ -5,7 +5,8 @@
 //     static constexpr platen::about description{"my-plugin", platen::kind::flattening, "My plugin", "an integrator", "0.1.0", "What it does.", "MIT"};
 //     static std::vector<platen::option> options() { return {}; }
 //     explicit my_plugin(const platen::values &) {}
-//     void open() {}                                          // a scanner connects here
+//     void open() {}                                          // a scanner connects here, again after a failure
+//     void close() {}                                         // and disconnects here
 //     void run(const platen::job &job, const platen::inputs &in) { ... }
 //   };
 //   PLATEN_PLUGIN(my_plugin)
@@ -16,12 +17,16 @@
 
 #include "platen.h"
 
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace platen {
@@ -68,23 +73,30 @@ struct about {
   const char *name, *vendor, *version, *doc, *license;
 };
 
-// An option: a number between two others.
+// An option: a number between two others, or a text (the address of a device), with its default as TOML text; nullptr: required.
 struct option {
   const char *name, *unit, *doc, *default_text;
-  double min, max;
+  double min = 0, max = 0;
+  platen_option raw() const {
+    const bool number = min < max;
+    const std::uint32_t flags = (number ? PLATEN_OPTION_HAS_MIN | PLATEN_OPTION_HAS_MAX : 0) | (default_text ? 0 : PLATEN_OPTION_REQUIRED);
+    return {sizeof(platen_option), number ? PLATEN_TYPE_FLOAT : PLATEN_TYPE_STRING, flags, 0, name, unit, doc, default_text, min, max, nullptr};
+  }
 };
 
 // The values of the options, checked by the host.
 class values {
  public:
   values(const platen_value *data, std::uint32_t n) : all_(data, n) {}
-  double number(const char *name) const {
-    for (const platen_value &value : all_)
-      if (std::strcmp(value.name, name) == 0) return value.f;
-    throw failure(std::string("option ") + name + " is missing", "report this to the plugin's author", PLATEN_E_CONFIG);
-  }
+  double number(const char *name) const { return find(name).f; }
+  std::string text(const char *name) const { return find(name).s; }
 
  private:
+  const platen_value &find(const char *name) const {
+    for (const platen_value &value : all_)
+      if (std::strcmp(value.name, name) == 0) return value;
+    throw failure(std::string("option ") + name + " is missing", "report this to the plugin's author", PLATEN_E_CONFIG);
+  }
   span<const platen_value> all_;
 };
 
@@ -92,10 +104,11 @@ class values {
 class inputs {
  public:
   inputs(const platen_frame *data, std::uint32_t n) : all_(data, n) {}
-  // The header of the first frame of a format.
-  template <class Head> const Head &get(const char *format) const {
+  // The header of the frame of a format, and of a role where several have it: now, before, baseline.
+  template <class Head> const Head &get(const char *format, const char *role = nullptr) const {
     for (const platen_frame &frame : all_)
-      if (std::strcmp(frame.format, format) == 0) return *static_cast<const Head *>(frame.buffer.data);
+      if (std::strcmp(frame.format, format) == 0 && (!role || (frame.role && std::strcmp(frame.role, role) == 0)))
+        return *static_cast<const Head *>(frame.buffer.data);
     throw failure(std::string("no ") + format + " came", "report this to platen", PLATEN_E_NO_DATA);
   }
   const platen_frame *data() const { return all_.data(); }
@@ -170,36 +183,40 @@ template <class Call> platen_status guarded(platen_error *error, Call &&call) no
 }
 
 template <class Plugin> struct tables {
-  struct instance {
-    platen_instance raw;
-    Plugin plugin;
-  };
-  static Plugin &of(platen_instance *self) { return reinterpret_cast<instance *>(self)->plugin; }
+  static Plugin &of(platen_instance *self) { return *static_cast<Plugin *>(self->data); }
 
-  static platen_status open(platen_instance *self, platen_error *error) {
+  static platen_status open(platen_instance *self, platen_error *error) noexcept {
     return guarded(error, [&] { of(self).open(); });
   }
-  static platen_status run(platen_instance *self, const platen_job *raw, const platen_frame *in, std::uint32_t n, platen_error *error) {
+  static platen_status run(platen_instance *self, const platen_job *raw, const platen_frame *in, std::uint32_t n,
+                           platen_error *error) noexcept {
     return guarded(error, [&] { of(self).run(job(host, raw), inputs(in, n)); });
   }
-  static void close(platen_instance *) {}
-  static void destroy(platen_instance *self) {
+  static void close(platen_instance *self) noexcept {
     platen_error ignored{};
-    guarded(&ignored, [&] { delete reinterpret_cast<instance *>(self); });
+    guarded(&ignored, [&] { of(self).close(); });
+  }
+  static void destroy(platen_instance *self) noexcept {
+    platen_error ignored{};
+    guarded(&ignored, [&] { delete &of(self); });
+    delete self;
   }
 
-  static platen_status init(const platen_host *given, const char *, platen_error *) {
+  static platen_status init(const platen_host *given, const char *, platen_error *) noexcept {
     host = given;
     return PLATEN_OK;
   }
-  static std::uint32_t count() { return 1; }
-  static const platen_desc *desc(std::uint32_t index) {
-    if (index != 0) return nullptr;
+  static std::uint32_t count() noexcept { return 1; }
+  static const platen_desc *desc(std::uint32_t index) noexcept {
+    platen_error ignored{};
+    const platen_desc *made = nullptr;
+    guarded(&ignored, [&] { made = index == 0 ? describe() : nullptr; });
+    return made;
+  }
+  static const platen_desc *describe() {
     static const std::vector<platen_option> options = [] {
       std::vector<platen_option> made;
-      for (const option &it : Plugin::options())
-        made.push_back({sizeof(platen_option), PLATEN_TYPE_FLOAT, PLATEN_OPTION_HAS_MIN | PLATEN_OPTION_HAS_MAX, 0, it.name, it.unit,
-                        it.doc, it.default_text, it.min, it.max, nullptr});
+      for (const option &it : Plugin::options()) made.push_back(it.raw());
       return made;
     }();
     static const char *const formats[3][2][4] = {
@@ -215,10 +232,11 @@ template <class Plugin> struct tables {
     return &made;
   }
   static platen_status create(const platen_host *, const char *, const platen_value *given, std::uint32_t n, platen_instance **out,
-                              platen_error *error) {
+                              platen_error *error) noexcept {
     return guarded(error, [&] {
-      const platen_instance raw{sizeof raw, 0, nullptr, open, run, nullptr, close, destroy, nullptr};
-      *out = &(new instance{raw, Plugin(values(given, n))})->raw;
+      auto plugin = std::make_unique<Plugin>(values(given, n));
+      *out = new platen_instance{sizeof(platen_instance), 0, plugin.get(), open, run, nullptr, close, destroy, nullptr};
+      plugin.release();
     });
   }
 };

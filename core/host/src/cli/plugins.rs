@@ -26,8 +26,14 @@ pub(super) struct Command {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// List every library file in the plugin folders
+    #[command(
+        after_help = "Examples:\n  platen plugins list\n  platen --plugins target/release plugins list --json"
+    )]
     List,
     /// Describe a plugin and its options
+    #[command(
+        after_help = "Examples:\n  platen plugins describe elastic\n  platen plugins describe faro-stream --toml >> plant.toml"
+    )]
     Describe {
         /// Name as in plant files
         name: String,

@@ -179,20 +179,20 @@ fn files(command: &Command, platen: &Path) -> Vec<File> {
         let platen = platen.display().to_string();
         let using = using.replace("FOLDER", folder);
         [
+            ("libmy_plugin", file.trim_end_matches(".so")),
+            ("@USE@", &using),
+            ("my-plugin", &command.name),
             ("@KIND@", kind),
             ("@LANGUAGE@", language),
             ("@BUILD@", build),
             ("@LIBRARY@", library.trim_start_matches("./")),
             ("@FILE@", &file),
             ("@FOLDER@", folder),
-            ("@USE@", &using),
             ("@SOURCE@", name),
             ("@COMPILE@", compile),
             ("@LIBRARIES@", libraries),
             ("@PLATEN@", &platen),
             ("@FEATURES@", &features),
-            ("my-plugin", &command.name),
-            ("libmy_plugin", file.trim_end_matches(".so")),
         ]
         .iter()
         .fold(text.to_owned(), |text, (mark, value)| text.replace(mark, value))
