@@ -5,3 +5,4 @@ mod boundary;
 mod check;
 mod misbehaviour;
 mod new_plugin;
+mod surface_header;
