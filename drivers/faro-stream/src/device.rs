@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
-use platen_sdk::ScanReceiver;
+use platen_sdk::{Health, ScanReceiver};
 
 use crate::error::{Error, Result};
 use crate::message::{self, Settings};
@@ -94,13 +94,24 @@ impl Link {
     }
 }
 
-/// Scans through the bridge at `address`; delivers columns to the host as they arrive.
-pub(crate) fn scan(address: &str, request: Request, host: &mut impl ScanReceiver) -> Result<()> {
+/// Scans through the bridge at `address`; delivers columns to the host as they arrive. Returns the state of the instrument as last told
+/// beside the outcome.
+pub(crate) fn scan(
+    address: &str,
+    request: Request,
+    host: &mut impl ScanReceiver,
+) -> (Option<Health>, Result<()>) {
     let mut session = Session::new(request);
+    let ended = attempts(address, &mut session, host);
+    (session.health(), ended)
+}
+
+/// Connects again and again until the scan is complete or cannot be.
+fn attempts(address: &str, session: &mut Session, host: &mut impl ScanReceiver) -> Result<()> {
     let mut wait = BACK_OFF.0;
     loop {
         let started = Instant::now();
-        let error = match connection(address, &mut session, host) {
+        let error = match connection(address, session, host) {
             Ok(()) => return Ok(()),
             Err(error @ (Error::Broken(_) | Error::Busy { .. })) => error,
             Err(error) => return Err(error),
@@ -158,8 +169,14 @@ fn pause_for(pause: Duration, host: &impl ScanReceiver, error: &Error) -> Result
     Ok(())
 }
 
-/// Asks a bridge whether the settings are possible; returns the duration of the scan, seconds.
-pub(crate) fn ask(address: &str, request: &Request, settings: &Settings) -> Result<Option<f64>> {
+/// Asks a bridge whether the settings are possible; returns the duration of the scan, seconds. `health` receives the state of the
+/// instrument where the bridge tells it meanwhile.
+pub(crate) fn ask(
+    address: &str,
+    request: &Request,
+    settings: &Settings,
+    health: &mut Option<Health>,
+) -> Result<Option<f64>> {
     let mut link = Link::connect(address)?;
     let hello = message::Hello { versions: [VERSION; 2], client: &request.client, role: "controller" };
     link.send(kind::HELLO, 0, &json(&hello))?;
@@ -176,6 +193,7 @@ pub(crate) fn ask(address: &str, request: &Request, settings: &Settings) -> Resu
             }
             kind::CONFIGURED => return Ok(parse::<message::Configured>(&frame)?.duration_s),
             kind::ERROR => return Err(refused(parse(&frame)?)),
+            kind::STATUS => *health = Some(parse::<message::Status>(&frame)?.health()),
             _ => {}
         }
     }

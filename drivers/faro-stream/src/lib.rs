@@ -37,7 +37,7 @@ mod wire;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use platen_scan::Window;
-use platen_sdk::{Info, Job, Result, ScanSink, Scanner, options};
+use platen_sdk::{Health, Info, Job, Result, ScanSink, Scanner, options};
 
 use message::Settings;
 use session::Request;
@@ -66,6 +66,8 @@ pub struct FaroStream {
     options: Options,
     /// Start time, part of the job names of this run.
     run: u64,
+    /// State of the instrument as last told.
+    health: Option<Health>,
 }
 
 impl Scanner for FaroStream {
@@ -80,7 +82,7 @@ impl Scanner for FaroStream {
 
     fn new(options: Options) -> Result<Self> {
         let run = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as u64);
-        Ok(Self { options, run })
+        Ok(Self { options, run, health: None })
     }
 
     fn open(&mut self) -> Result<()> {
@@ -93,7 +95,13 @@ impl Scanner for FaroStream {
 
     fn capture(&mut self, job: &Job<'_>, out: &mut ScanSink<'_>) -> Result<()> {
         let request = self.request(job.id(), out.window());
-        device::scan(&self.options.address, request, out).map_err(|error| error.at(&self.options.address))
+        let (health, ended) = device::scan(&self.options.address, request, out);
+        self.health = health;
+        ended.map_err(|error| error.at(&self.options.address))
+    }
+
+    fn health(&mut self) -> Option<Health> {
+        self.health
     }
 }
 
@@ -113,9 +121,10 @@ impl FaroStream {
         }
     }
 
-    fn ask(&self, window: Option<&Window>) -> Result<Option<f64>> {
+    fn ask(&mut self, window: Option<&Window>) -> Result<Option<f64>> {
         let request = self.request(0, window);
-        let answer = device::ask(&self.options.address, &request, &request.settings);
+        self.health = None;
+        let answer = device::ask(&self.options.address, &request, &request.settings, &mut self.health);
         answer.map_err(|error| error.at(&self.options.address))
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use platen_scan::Window;
+use platen_sdk::Health;
 
 #[derive(Debug, Serialize)]
 pub(crate) struct Hello<'a> {
@@ -79,8 +80,31 @@ pub(crate) struct Status {
     pub(crate) state: String,
     #[serde(default)]
     pub(crate) progress: f64,
+    pub(crate) temperature_c: Option<f64>,
+    pub(crate) battery: Option<f64>,
+    pub(crate) tilt_deg: Option<f64>,
+    #[serde(default)]
+    pub(crate) dirty: bool,
+    #[serde(default)]
+    pub(crate) on_battery: bool,
+    #[serde(default)]
+    pub(crate) warming_up: bool,
     #[serde(default)]
     pub(crate) exceptions: Vec<Exception>,
+}
+
+impl Status {
+    /// Returns the instrument's state; what the bridge does not know stays unknown.
+    pub(crate) fn health(&self) -> Health {
+        Health {
+            temperature_c: self.temperature_c,
+            battery: self.battery,
+            tilt: self.tilt_deg.map(f64::to_radians),
+            dirty: self.dirty,
+            on_battery: self.on_battery,
+            warming_up: self.warming_up,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -10,6 +10,7 @@
 use std::collections::VecDeque;
 
 use platen_scan::{Column, Outcome, ScanEnd, ScanHeader, State};
+use platen_sdk::Health;
 
 use crate::column::Layout;
 use crate::error::{Error, Result};
@@ -67,13 +68,21 @@ pub(crate) struct Session {
     greeted: bool,
     scanner: String,
     scan: Option<Scan>,
+    /// Of the newest Status.
+    health: Option<Health>,
     actions: VecDeque<Action>,
 }
 
 impl Session {
     /// Creates a session before its first connection.
     pub(crate) fn new(request: Request) -> Self {
-        Self { request, greeted: false, scanner: String::new(), scan: None, actions: VecDeque::new() }
+        let (scanner, actions) = (String::new(), VecDeque::new());
+        Self { request, greeted: false, scanner, scan: None, health: None, actions }
+    }
+
+    /// Returns the state of the instrument as last told.
+    pub(crate) fn health(&self) -> Option<Health> {
+        self.health
     }
 
     /// Returns the next action.
@@ -150,6 +159,7 @@ impl Session {
     }
 
     fn status(&mut self, status: message::Status) {
+        self.health = Some(status.health());
         let worst = status.exceptions.into_iter().filter(|e| e.level <= 3).min_by_key(|e| e.level);
         let text = worst.map_or(status.state.clone(), |e| format!("{}: {}", status.state, e.text));
         self.actions.push_back(Action::Progress(status.progress.clamp(0.0, 1.0), text));

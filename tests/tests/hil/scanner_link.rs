@@ -311,6 +311,17 @@ fn a_scanner_moved_during_the_scan_is_reported() {
 fn battery_temperature_and_contamination_are_warnings() {
     for fault in ["battery-low", "temperature", "contamination"] {
         survives(&[fault]);
+        // The host learns it as a state of the instrument too.
+        // A bridge tells it once a second: the scan takes longer.
+        let bridge = start(&[fault], BridgeConfig { time_scale: 0.1, ..BridgeConfig::default() }, head());
+        let scanner = driver(bridge.address(), COARSE);
+        scan(&scanner, Some(&WINDOW), LIMIT).unwrap();
+        let health = scanner.instance().health().unwrap().unwrap();
+        let temperature_c = if fault == "temperature" { 46.0 } else { 31.5 };
+        let battery = if fault == "battery-low" { 0.04 } else { 0.8 };
+        assert_eq!((health.temperature_c, health.battery), (Some(temperature_c), Some(battery)), "{fault}");
+        assert!((health.tilt.unwrap().to_degrees() - 0.02).abs() < 1e-9, "{health:?}");
+        assert_eq!(health.dirty, fault == "contamination", "{health:?}");
     }
 }
 

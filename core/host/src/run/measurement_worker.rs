@@ -234,8 +234,14 @@ impl MeasurementWorker {
 
     fn report_plugins(&self) {
         let scanner = self.scanner.iter().map(Scanner::instance);
-        let states: Vec<PluginStatus> =
+        let mut states: Vec<PluginStatus> =
             scanner.chain(self.pipeline.instances()).filter_map(PluginStatus::of).collect();
+        // A driver that cannot tell is no fault; one that does not answer is found by the next look after it.
+        let scanner = self.scanner.as_ref().filter(|_| self.connected);
+        let health = scanner.and_then(|scanner| scanner.instance().health().ok().flatten());
+        if let (Some(state), Some(health)) = (states.first_mut(), health) {
+            state.instrument = Some(health.into());
+        }
         *self.receivers.plugins.lock().unwrap_or_else(PoisonError::into_inner) = states;
     }
 

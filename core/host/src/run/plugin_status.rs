@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use platen_engine::plugin::{Instance, Kind};
+use platen_engine::plugin::{Health, Instance, Kind};
 use serde::{Deserialize, Serialize};
 
 /// State of every plugin of the plant, set by the measurement worker between its jobs.
@@ -25,6 +25,54 @@ pub struct PluginStatus {
     pub faults: u64,
     /// Why it is not in use; null while it is.
     pub out_of_use: Option<String>,
+    /// State of the instrument, where its driver tells it.
+    #[serde(default)]
+    pub instrument: Option<InstrumentStatus>,
+}
+
+/// State of a scanner; null is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct InstrumentStatus {
+    /// Temperature inside, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// Charge of the battery, 0 to 1.
+    pub battery: Option<f64>,
+    /// Angle between the vertical axis and the plumb line, degrees.
+    pub tilt_deg: Option<f64>,
+    /// Mirror or window must be cleaned.
+    pub dirty: bool,
+    /// It runs on its battery.
+    pub on_battery: bool,
+    /// It has not reached its working temperature.
+    pub warming_up: bool,
+}
+
+impl From<Health> for InstrumentStatus {
+    fn from(health: Health) -> Self {
+        Self {
+            temperature_c: health.temperature_c,
+            battery: health.battery,
+            tilt_deg: health.tilt.map(f64::to_degrees),
+            dirty: health.dirty,
+            on_battery: health.on_battery,
+            warming_up: health.warming_up,
+        }
+    }
+}
+
+impl InstrumentStatus {
+    /// Returns what is known, in one line.
+    fn line(self) -> String {
+        let parts = [
+            self.temperature_c.map(|it| format!("{it:.1} \u{b0}C")),
+            self.battery.map(|it| format!("battery {:.0} %", 100.0 * it)),
+            self.tilt_deg.map(|it| format!("tilt {it:.3}\u{b0}")),
+            self.on_battery.then(|| "on its battery".to_owned()),
+            self.warming_up.then(|| "warming up".to_owned()),
+            self.dirty.then(|| "DIRTY: clean mirror or window".to_owned()),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
 }
 
 impl PluginStatus {
@@ -39,6 +87,7 @@ impl PluginStatus {
             confinement: confinement(instance, state.confinement),
             faults: state.faults,
             out_of_use: state.out_of_use,
+            instrument: None,
         })
     }
 
@@ -54,7 +103,8 @@ impl PluginStatus {
             1 => ", 1 fault".to_owned(),
             n => format!(", {n} faults"),
         };
-        format!("{process}{}{memory}{faults}", self.confinement)
+        let instrument = self.instrument.map_or(String::new(), |it| format!("; instrument: {}", it.line()));
+        format!("{process}{}{memory}{faults}{instrument}", self.confinement)
     }
 }
 

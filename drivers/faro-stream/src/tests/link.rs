@@ -48,18 +48,18 @@ fn a_bridge_says_how_long_a_scan_takes() {
         }
         other => panic!("{other:#06x}"),
     });
-    assert_eq!(ask(&address, &request(), &request().settings), Ok(Some(97.5)));
+    assert_eq!(ask(&address, &request(), &request().settings, &mut None), Ok(Some(97.5)));
 }
 
 #[test]
 fn a_bridge_that_refuses_or_hangs_up_is_told_apart() {
     let refusing = serve(|_, _| Some((kind::ERROR, json!({"code": "busy", "text": "held by press-4"}))));
-    let refused = ask(&refusing, &request(), &request().settings).unwrap_err();
+    let refused = ask(&refusing, &request(), &request().settings, &mut None).unwrap_err();
     assert_eq!(refused.to_string(), "the bridge is busy: held by press-4");
     let silent = serve(|_, _| None);
-    assert!(matches!(ask(&silent, &request(), &request().settings), Err(Error::Broken(_))));
+    assert!(matches!(ask(&silent, &request(), &request().settings, &mut None), Err(Error::Broken(_))));
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    assert!(matches!(ask(&nobody, &request(), &request().settings), Err(Error::Broken(_))));
+    assert!(matches!(ask(&nobody, &request(), &request().settings, &mut None), Err(Error::Broken(_))));
 }
 
 /// Host with a deadline, which may cancel after some columns.
@@ -144,7 +144,7 @@ fn serve_scan(mut stream: TcpStream, mut left: usize, heard: &std::sync::mpsc::S
 fn a_scan_over_a_socket_goes_on_after_every_break() {
     let (address, asked) = bridge(vec![0, 1, 4, 9]);
     let mut taker = Taker::new(Duration::from_secs(60));
-    scan(&address, request(), &mut taker).unwrap();
+    scan(&address, request(), &mut taker).1.unwrap();
     let mut lattice = Lattice::new(taker.header.unwrap());
     taker.columns.iter().for_each(|column| lattice.push(column).unwrap());
     check(&BRIDGE, &Got { lattice, columns: taker.columns, end: taker.end.unwrap(), connections: 5 });
@@ -157,7 +157,7 @@ fn a_scan_over_a_socket_goes_on_after_every_break() {
 fn a_cancelled_scan_is_aborted_at_the_bridge() {
     let (address, asked) = bridge(Vec::new());
     let mut taker = Taker { cancel_after: 3, ..Taker::new(Duration::from_secs(60)) };
-    let cancelled = scan(&address, request(), &mut taker).unwrap_err();
+    let cancelled = scan(&address, request(), &mut taker).1.unwrap_err();
     assert!(matches!(&cancelled, Error::Host(error) if error.kind() == platen_sdk::ErrorKind::Cancelled));
     let heard = asked.iter().find(|kind| *kind == kind::ABORT);
     assert_eq!(heard, Some(kind::ABORT));
@@ -168,7 +168,7 @@ fn a_cancelled_scan_is_aborted_at_the_bridge() {
 fn nobody_there_ends_at_the_deadline_with_the_reason() {
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let mut taker = Taker::new(Duration::from_millis(400));
-    let late = scan(&nobody, request(), &mut taker).unwrap_err();
+    let late = scan(&nobody, request(), &mut taker).1.unwrap_err();
     assert!(late.to_string().starts_with("no scan in time: the connection broke: "), "{late}");
     assert!(taker.header.is_none());
 }

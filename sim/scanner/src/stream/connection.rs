@@ -447,6 +447,8 @@ fn status(shared: &Shared) -> Status {
         progress,
         temperature_c: Some(if is_active(FaultKind::Temperature) { 46.0 } else { 31.5 }),
         battery: Some(if is_active(FaultKind::BatteryLow) { 0.04 } else { 0.8 }),
+        tilt_deg: 0.02,
+        dirty: is_active(FaultKind::Contamination),
         exceptions,
         time_ns: shared.begun.elapsed().as_nanos() as u64,
         synced: false,

@@ -173,6 +173,8 @@ pub(super) struct Status {
     pub(super) temperature_c: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) battery: Option<f64>,
+    pub(super) tilt_deg: f64,
+    pub(super) dirty: bool,
     pub(super) exceptions: Vec<Exception>,
     pub(super) time_ns: u64,
     pub(super) synced: bool,
