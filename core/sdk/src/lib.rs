@@ -106,8 +106,3 @@ pub use platen_shape::flatten::{cotangents, fixed_boundary};
 #[cfg(feature = "flattening")]
 pub use platen_shape::{Chart, DiskMesh};
 pub use scanner::{ScanReceiver, ScanSink, Scanner};
-
-/// Compiles the example of `plugins/README.md` as a test.
-#[cfg(all(doctest, feature = "comparison"))]
-#[doc = include_str!("../../../plugins/README.md")]
-mod plugins_readme {}

@@ -15,6 +15,10 @@ fn made(folder: &Path, kind: &str, language: &str) -> PathBuf {
     let place = folder.join(&name);
     let mut new = platen_tests::program("platen");
     new.args(["plugins", "new", &name, "--kind", kind, "--lang", language]).arg(&place);
+    if language == "rust" {
+        // The target folder may lie outside the sources.
+        new.arg("--platen").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
+    }
     let output = new.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let file = format!("lib{}.so", name.replace('-', "_"));
@@ -118,6 +122,24 @@ fn scanners_scan_in_each_language() {
 }
 
 #[test]
+fn the_lines_of_its_readme_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = std::env::var("PATH").unwrap_or_default();
+    for kind in ["comparison", "flattening", "scanner"] {
+        made(folder.path(), kind, "c");
+        let place = folder.path().join(format!("my-{kind}-c"));
+        let readme = std::fs::read_to_string(place.join("README.md")).unwrap();
+        let lines = readme.split("```").nth(1).and_then(|block| block.strip_prefix("sh\n")).unwrap();
+        let mut shell = Command::new("sh");
+        shell.args(["-ec", lines]).current_dir(&place);
+        shell.env("PATH", format!("{}:{path}", platen_tests::built().display()));
+        let output = shell.output().unwrap();
+        assert!(output.status.success(), "{kind}: {}", String::from_utf8_lossy(&output.stderr));
+        println!("{kind}: {} lines", lines.lines().count());
+    }
+}
+
+#[test]
 fn a_name_or_folder_that_will_not_do_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |name: &str, place: &Path, sentence: &str| {
@@ -128,4 +150,5 @@ fn a_name_or_folder_that_will_not_do_is_refused() {
     };
     refused("My Plugin", &folder.path().join("new"), "lower case letters, digits and hyphens");
     refused("my-plugin", folder.path(), "exists already");
+    refused("faro-stream", &folder.path().join("new"), "the name of a plugin that is here already");
 }

@@ -23,7 +23,7 @@ pub(super) struct Command {
     lang: Language,
     /// Folder to make; the plugin's name in this one without
     folder: Option<PathBuf>,
-    /// Sources of platen, on which a plugin in Rust depends; those that this program was built from without
+    /// Sources of platen, on which a plugin in Rust depends; those around this program without
     #[arg(long, value_name = "DIR")]
     platen: Option<PathBuf>,
 }
@@ -52,6 +52,10 @@ const HEADER: &str = include_str!("../../../../abi/include/platen.h");
 const HEADER_CPP: &str = include_str!("../../../../abi/include/platen.hpp");
 const SURFACE: &str = include_str!("../../../../abi/include/platen_surface.h");
 const HARMONIC_MAP: &str = include_str!("../../../../../plugins/examples/harmonic_map.h");
+
+/// How a flattening or comparison is tried: on a simulated plate.
+const MEASURE: &str = "platen-sim scanner simulated.toml --out scan.e57\n\
+                       platen --plugins FOLDER measure scan.e57 --plate plate.toml --plant plant.toml";
 
 /// Returns the source: its name and text.
 fn source(kind: Kind, language: Language) -> (&'static str, &'static str) {
@@ -88,6 +92,14 @@ fn source(kind: Kind, language: Language) -> (&'static str, &'static str) {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     check_name(&command.name)?;
+    let catalogue = common.catalogue();
+    if let Ok(taken) = catalogue.load(&command.name) {
+        return Err(CliError::Usage(format!(
+            "{}: the name of a plugin that is here already, {}; choose another",
+            command.name,
+            taken.path().display()
+        )));
+    }
     let folder = command.folder.clone().unwrap_or_else(|| PathBuf::from(&command.name));
     if folder.exists() {
         return Err(CliError::Usage(format!("{}: exists already; give another folder", folder.display())));
@@ -123,18 +135,24 @@ fn check_name(name: &str) -> Result<(), CliError> {
 
 /// Returns the folder of platen's sources, for a plugin in Rust.
 fn sources(command: &Command) -> Result<PathBuf, CliError> {
-    let built_from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = command.platen.clone().unwrap_or(built_from);
     if command.lang != Language::Rust {
-        return Ok(folder);
+        return Ok(PathBuf::new());
     }
-    match folder.canonicalize() {
-        Ok(found) if found.join("core/sdk/Cargo.toml").is_file() => Ok(found),
-        _ => Err(CliError::Usage(format!(
-            "{}: no sources of platen; name them by --platen DIR",
-            folder.display()
-        ))),
-    }
+    let holds = |folder: &Path| folder.join("core/sdk/Cargo.toml").is_file();
+    let program = std::env::current_exe().and_then(|file| file.canonicalize()).unwrap_or_default();
+    // Built from its sources, or installed: /usr/bin/platen and /usr/share/platen/sources.
+    let installed = program.ancestors().nth(2).map(|top| top.join("share/platen/sources"));
+    let around = program.ancestors().map(Path::to_path_buf).chain(installed);
+    let found = match &command.platen {
+        Some(given) if holds(given) => given.canonicalize().ok(),
+        Some(given) => return Err(CliError::Usage(format!("{}: no sources of platen", given.display()))),
+        None => around.into_iter().find(|folder| holds(folder)),
+    };
+    found.ok_or_else(|| {
+        CliError::Usage(
+            "no sources of platen near this program; name them by --platen DIR, or take --lang c".to_owned(),
+        )
+    })
 }
 
 /// Returns the command that builds the plugin, its library, and the folder of that.
@@ -150,19 +168,10 @@ fn files(command: &Command, platen: &Path) -> Vec<File> {
     let (name, text) = source(command.kind, command.lang);
     let (build, library, folder) = commands(command);
     let file = library.rsplit('/').next().unwrap_or_default().to_owned();
-    let (kind, using) = match command.kind {
-        Kind::Scanner => (
-            "scanner",
-            "platen --plugins FOLDER scan plant.toml first.e57   # [scanner] plugin = \"my-plugin\"",
-        ),
-        Kind::Flattening => (
-            "flattening",
-            "platen --plugins FOLDER measure scan.e57 --plate plate.toml --plant plant.toml   # [flattening] plugin = \"my-plugin\"",
-        ),
-        Kind::Comparison => (
-            "comparison",
-            "platen --plugins FOLDER measure scan.e57 --plate plate.toml --plant plant.toml   # [[comparison]] plugin = \"my-plugin\"",
-        ),
+    let (kind, table, using) = match command.kind {
+        Kind::Scanner => ("scanner", "[scanner]", "platen --plugins FOLDER scan plant.toml first.e57"),
+        Kind::Flattening => ("flattening", "[flattening]", MEASURE),
+        Kind::Comparison => ("comparison", "[[comparison]]", MEASURE),
     };
     let (language, compile, libraries) = match command.lang {
         Language::Rust => ("Rust", "", ""),
@@ -176,13 +185,15 @@ fn files(command: &Command, platen: &Path) -> Vec<File> {
         Kind::Flattening | Kind::Comparison => format!(", features = [\"{kind}\"]"),
     };
     let filled = |text: &str| {
-        let platen = platen.display().to_string();
+        // A string of JSON is one of TOML.
+        let platen = serde_json::Value::from(platen.join("core/sdk").to_string_lossy()).to_string();
         let using = using.replace("FOLDER", folder);
         [
             ("libmy_plugin", file.trim_end_matches(".so")),
             ("@USE@", &using),
             ("my-plugin", &command.name),
             ("@KIND@", kind),
+            ("@TABLE@", table),
             ("@LANGUAGE@", language),
             ("@BUILD@", build),
             ("@LIBRARY@", library.trim_start_matches("./")),
@@ -191,14 +202,22 @@ fn files(command: &Command, platen: &Path) -> Vec<File> {
             ("@SOURCE@", name),
             ("@COMPILE@", compile),
             ("@LIBRARIES@", libraries),
-            ("@PLATEN@", &platen),
+            ("@SDK@", &platen),
             ("@FEATURES@", &features),
         ]
         .iter()
         .fold(text.to_owned(), |text, (mark, value)| text.replace(mark, value))
     };
     let file = |name, text: &str| File { name, text: filled(text) };
-    let mut files = vec![file(name, text), file("README.md", include_str!("new/README.md"))];
+    let mut files = vec![
+        file(name, text),
+        file("README.md", include_str!("new/README.md")),
+        file("plant.toml", include_str!("new/plant.toml")),
+    ];
+    if command.kind != Kind::Scanner {
+        files.push(file("plate.toml", include_str!("new/plate.toml")));
+        files.push(file("simulated.toml", include_str!("new/simulated.toml")));
+    }
     if command.lang == Language::Rust {
         files.push(file("Cargo.toml", include_str!("new/Cargo.toml.in")));
         files.push(file("tests/check.rs", include_str!("new/check.rs.in")));
