@@ -6,6 +6,7 @@ use crate::{Field, Seat, Verdict};
 
 /// Figures, judgement and sentences of one comparison.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default)]
 pub struct Findings {
     /// Judgement; `None` for a comparison that does not judge.
@@ -21,6 +22,7 @@ pub struct Findings {
 /// A named figure of one comparison: names are its own, dotted. Those of the press's registers (`deviation.max`, `gap.max`, `station.S1`) reach
 /// the press only from the comparison that the plant file makes their source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Figure {
     /// Name.
     pub name: String,
@@ -56,6 +58,7 @@ impl Figure {
 
 /// Contact of one template with the plate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct TemplateFinding {
     /// Name of the template.
     pub name: String,
@@ -89,6 +92,7 @@ pub struct TemplateFinding {
 
 /// A place where a template touches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Contact {
     /// Place on the plate.
     pub at: [f64; 2],

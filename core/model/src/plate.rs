@@ -30,6 +30,7 @@ pub struct Marker {
 
 /// A straight line on the original rectangle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ReferenceLine {
     /// Name.
     pub name: String,
@@ -49,6 +50,7 @@ impl ReferenceLine {
 
 /// A place that rests on a support of the press while the plate is scanned. A pair of numbers in documents.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(transparent)]
 pub struct Support {
     /// Place, metres.
@@ -57,6 +59,7 @@ pub struct Support {
 
 /// A place with one figure for the press.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Station {
     /// Name.
     pub name: String,
@@ -68,6 +71,7 @@ pub struct Station {
 
 /// Figures of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// Measured minus target along the target's normal.

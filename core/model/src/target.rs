@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The shape that the plate is bent toward.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Target {
     /// Shape.
     pub shape: TargetShape,
@@ -15,44 +16,46 @@ pub struct Target {
 
 /// Target shapes. Radii in metres, positive; directions are those of the generators, from u towards v, radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum TargetShape {
     /// A plane.
     Flat,
     /// Cylinder with straight generators along `axis`.
     Cylinder {
-        /// Radius.
+        /// Radius, metres.
         radius: f64,
-        /// Direction of the straight lines.
+        /// Direction of the straight lines, from u towards v, radians.
         axis: f64,
     },
     /// Cone: the middle generator runs along `axis`, and the radius varies linearly along it.
     Cone {
-        /// Direction of the middle straight line.
+        /// Direction of the middle straight line, from u towards v, radians.
         axis: f64,
-        /// Radius at its first end.
+        /// Radius at its first end, metres.
         radius_start: f64,
-        /// Radius at its last end.
+        /// Radius at its last end, metres.
         radius_end: f64,
     },
     /// Sphere.
     Sphere {
-        /// Radius.
+        /// Radius, metres.
         radius: f64,
     },
     /// Torus: two radii; a negative cross radius curves to the other side.
     Torus {
-        /// Direction in which `radius` is measured.
+        /// Direction in which `radius` is measured, from u towards v, radians.
         axis: f64,
-        /// Radius along the axis direction.
+        /// Radius along the axis direction, metres.
         radius: f64,
-        /// Radius across it.
+        /// Radius across it, metres; negative curves to the other side.
         cross_radius: f64,
     },
 }
 
 /// Surface that a radius refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum RadiusOf {
     /// The concave face.
@@ -65,6 +68,7 @@ pub enum RadiusOf {
 
 /// A face of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Facing {
     /// The concave one: the centre of curvature lies on the scanner's side.

@@ -6,14 +6,15 @@ use crate::{ReferenceLine, Station, Support, Target, Template};
 
 /// Input of a comparison beside the surfaces.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Task {
     /// Name of the plate.
     pub plate: String,
-    /// Extent along u.
+    /// Extent along u, metres.
     pub width: f64,
-    /// Extent along v.
+    /// Extent along v, metres.
     pub height: f64,
-    /// Thickness.
+    /// Thickness, metres.
     pub thickness: f64,
     /// Target shape, where the plate file has one.
     pub target: Option<Target>,
@@ -24,9 +25,9 @@ pub struct Task {
     /// Places with one figure each.
     pub stations: Vec<Station>,
     /// Correlated part of the level of detection of a position between two scans, one sigma: from null pairs, else from the
-    /// range error of the scanner's data sheet.
+    /// range error of the scanner's data sheet; metres.
     pub sigma_correlated: f64,
-    /// The scanner's systematic uncertainty against a known artefact, one sigma; `None` when never calibrated.
+    /// The scanner's systematic uncertainty against a known artefact, one sigma, metres; `None` when never calibrated.
     pub sigma_true: Option<f64>,
     /// Places that rest on the press's supports while the plate is scanned.
     pub supports: Vec<Support>,

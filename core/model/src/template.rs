@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// A gauge whose edge is the target's section along a reference line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Template {
     /// Name; `T1`, `T2` by its place in the plate file where none is given.
     pub name: String,
@@ -24,6 +25,7 @@ pub struct Template {
 
 /// Place of a template's middle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Centre {
     /// Along the line from its first point, metres.
@@ -34,6 +36,7 @@ pub enum Centre {
 
 /// Seat of a template on the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Seat {
     /// At rest under its weight; judged balanced when it rocks.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Ordered from good to bad, so that the verdict of several comparisons is their maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Within every limit by more than the uncertainty.

@@ -5,4 +5,5 @@ mod boundary;
 mod check;
 mod misbehaviour;
 mod new_plugin;
+mod schemas;
 mod surface_header;
