@@ -35,7 +35,7 @@ pub use error::PluginError;
 pub use flattening::Flattening;
 use instance::InputFrame;
 pub use instance::{Emitted, Instance, RunningJob, WorkerState};
-pub use job::{CancelToken, JobSpec};
+pub use job::{CancelToken, JobSpec, ProgressSink};
 pub use library::{Isolation, Library, LoadFacts, Settings};
 pub use local::exported_symbols;
 pub use platen_sdk::Health;

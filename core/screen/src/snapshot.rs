@@ -127,6 +127,8 @@ pub struct StrokePart {
     pub stage: Stage,
     /// Start of its scan, milliseconds since 1970.
     pub since_ms: Option<i64>,
+    /// Share of its scan that is done, percent, while it is scanned and where the driver says.
+    pub scanned_percent: Option<u8>,
 }
 
 /// Stage of a stroke.

@@ -49,6 +49,7 @@ fn snapshot(result: Option<ResultPart>) -> Snapshot {
             baseline: false,
             stage: Stage::Done,
             since_ms: Some(0),
+            scanned_percent: None,
         }),
         result,
         strip: Vec::new(),

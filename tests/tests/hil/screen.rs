@@ -78,6 +78,31 @@ fn a_result_is_on_the_page_until_the_next_trigger_and_the_end_of_the_part() {
 }
 
 #[test]
+fn the_operator_sees_how_far_a_scan_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false");
+    let path = plant_with_pages(folder.path(), &press);
+    let text = std::fs::read_to_string(&path).unwrap();
+    // A scan of some seconds.
+    std::fs::write(&path, text.replace("cell = ", "time_scale = 0.1\ncell = ")).unwrap();
+    let mut host = Host::start(&path);
+    let at = address(&host);
+    until("ready", || (state(&at)["press"]["ready"] == true).then_some(()));
+    press.ask(r#"{"do":"baseline"}"#);
+    let share = || {
+        let state = state(&at);
+        assert!(state["stroke"]["scanned_percent"].is_null() || state["stroke"]["stage"] == "scanning");
+        state["stroke"]["scanned_percent"].as_u64()
+    };
+    let first = until("a share of the scan", || share().filter(|percent| *percent > 0));
+    assert!(get(&at, "/").contains(" %"), "beside the word for scanning");
+    until("more of it", || share().filter(|percent| *percent > first));
+    press.wait_taken(1);
+    assert_eq!(share(), None);
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
+
+#[test]
 fn after_a_restart_no_result_is_shown_without_its_stroke() {
     let folder = tempfile::tempdir().unwrap();
     let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false");

@@ -95,8 +95,6 @@ pub struct WorkerState {
     pub faults: u64,
     /// Reason why it is not in use.
     pub out_of_use: Option<String>,
-    /// Fraction and phase of its job as last reported.
-    pub progress: Option<(f64, String)>,
 }
 
 impl Instance {
@@ -318,7 +316,6 @@ impl Instance {
             confinement: state.link.as_ref().map(Link::confinement).unwrap_or_default(),
             faults: state.faults.count(),
             out_of_use: given_up.or_else(|| state.link.is_none().then(|| state.faults.why().to_owned())),
-            progress: state.link.as_ref().and_then(Link::progress).cloned(),
         })
     }
 
@@ -347,7 +344,7 @@ impl Instance {
             opened.map_err(|error| self.failed(&mut state, error, started))?;
         }
         let job = job(&spec, started);
-        let sent = self.link(&mut state)?.run(job, inputs);
+        let sent = self.link(&mut state)?.run(job, inputs, spec.progress);
         sent.map_err(|error| self.failed(&mut state, error, started))?;
         Ok(RunningJob {
             instance: self,

@@ -1,5 +1,6 @@
 //! A job as it is asked for.
 
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -20,6 +21,30 @@ impl CancelToken {
     }
 }
 
+/// Receiver of what a job says on its way: the share done, 0 to 1, and its phase in words.
+#[derive(Clone, Default)]
+pub struct ProgressSink(Option<Arc<dyn Fn(f64, &str) + Send + Sync>>);
+
+impl ProgressSink {
+    /// Makes a receiver; it is called from the thread that waits for the job.
+    pub fn new(receive: impl Fn(f64, &str) + Send + Sync + 'static) -> Self {
+        Self(Some(Arc::new(receive)))
+    }
+
+    /// Hands on what a plugin said; a share that is no number is dropped.
+    pub(super) fn tell(&self, share: f64, phase: &str) {
+        if let Some(receive) = self.0.as_ref().filter(|_| share.is_finite()) {
+            receive(share.clamp(0.0, 1.0), phase);
+        }
+    }
+}
+
+impl fmt::Debug for ProgressSink {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("ProgressSink").field(&self.0.is_some()).finish()
+    }
+}
+
 /// Stroke and deadline of a job.
 #[derive(Debug, Clone)]
 pub struct JobSpec {
@@ -31,11 +56,14 @@ pub struct JobSpec {
     pub limit: Duration,
     /// Token that cancels it.
     pub cancel: CancelToken,
+    /// Receives its progress.
+    pub progress: ProgressSink,
 }
 
 impl JobSpec {
     /// Returns the specification of a job outside a stroke.
     pub fn untriggered(limit: Duration) -> Self {
-        Self { stroke: 0, trigger: Instant::now(), limit, cancel: CancelToken::default() }
+        let (cancel, progress) = (CancelToken::default(), ProgressSink::default());
+        Self { stroke: 0, trigger: Instant::now(), limit, cancel, progress }
     }
 }

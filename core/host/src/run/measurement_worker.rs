@@ -4,14 +4,14 @@
 //! press; then pictures and report. Between strokes it connects to the scanner and reports readiness to the press side.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use platen_engine::calibration::{self, Calibration};
 use platen_engine::pipeline::{self, Pipeline, PipelineError};
-use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Scanner, Surfaces};
+use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ProgressSink, Scanner, Surfaces};
 use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
 use platen_history::History;
@@ -262,7 +262,9 @@ impl MeasurementWorker {
             let scanner = self.scanner.as_ref().filter(|_| self.connected);
             let scanner = scanner.ok_or((Code::ScannerNotReady, "not connected".to_owned()))?;
             let limit = self.scan_limit.unwrap_or(SCAN_LIMIT);
-            let job = JobSpec { stroke: u64::from(key.stroke), trigger: started, limit, cancel: token };
+            let progress = self.shown_progress(key);
+            let job =
+                JobSpec { stroke: u64::from(key.stroke), trigger: started, limit, cancel: token, progress };
             let window = self.quicker(scanner).filter(|_| !data.baseline);
             let scanned = self.acquire(scanner, job, window, &spec, &mut buffer).map_err(|e| refusal(&e))?;
             Ok((plate, scanned))
@@ -283,6 +285,20 @@ impl MeasurementWorker {
                 self.archive.keep(self.folder(run_id), buffer.filter(|_| found_no_plate));
             }
         }
+    }
+
+    /// Returns the way of a scan's progress to the pages, percent by percent.
+    fn shown_progress(&self, key: StrokeKey) -> ProgressSink {
+        if !self.receivers.screen.is_heard() {
+            return ProgressSink::default();
+        }
+        let (screen, shown) = (self.receivers.screen.clone(), AtomicU8::new(u8::MAX));
+        ProgressSink::new(move |share, _| {
+            let percent = (100.0 * share) as u8;
+            if shown.swap(percent, Ordering::Relaxed) != percent {
+                screen.tell(Event::Scanned { key, percent });
+            }
+        })
     }
 
     /// Scans in the window of the last stroke's plate, if there is one, else in the base window. A plate that has moved out of

@@ -47,6 +47,8 @@ pub enum ScreenError {
 pub(super) enum Event {
     /// A stroke is being scanned.
     Accepted { key: StrokeKey, run_id: u32, data: Box<StrokeData> },
+    /// So much of a stroke is scanned, as the driver says.
+    Scanned { key: StrokeKey, percent: u8 },
     /// The plate is finished.
     PartEnded,
     /// The press side raised an alarm.

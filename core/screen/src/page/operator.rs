@@ -87,7 +87,9 @@ fn band(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         (None, None) => (words::NOT_READY, None, "unknown"),
     };
     cells.text("verdict", text(verdict));
-    cells.text("why", why.map_or("", text));
+    let scanned = snapshot.stroke.as_ref().and_then(|stroke| stroke.scanned_percent);
+    let scanned = scanned.filter(|_| look == "busy").map(|percent| format!("{percent} %"));
+    cells.text("why", scanned.as_deref().unwrap_or(why.map_or("", text)));
     cells.class("band", format!("band {look}"));
     let mode = match snapshot.host.mode {
         _ if snapshot.host.simulated => text(words::SIMULATED),

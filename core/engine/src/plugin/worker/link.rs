@@ -18,7 +18,7 @@ use super::wire::{
     CallError, Health, Input, Job, LoadFault, LoadedLibrary, PROTOCOL, Received, Socket, ToHost, ToWorker,
 };
 use super::{Confinement, Limits, pool, serve};
-use crate::plugin::InputFrame;
+use crate::plugin::{InputFrame, ProgressSink};
 
 pub(in crate::plugin) use super::serve::Place;
 
@@ -61,8 +61,8 @@ pub(in crate::plugin) struct Link {
     process: Option<Process>,
     confinement: Confinement,
     opened: bool,
-    /// Fraction and phase as last reported.
-    progress: Option<(f64, String)>,
+    /// Receives the progress of the job.
+    progress: ProgressSink,
 }
 
 impl fmt::Debug for Link {
@@ -110,7 +110,7 @@ impl Link {
             process,
             confinement: Confinement::default(),
             opened: false,
-            progress: None,
+            progress: ProgressSink::default(),
         };
         let request = ToWorker::Load {
             protocol: PROTOCOL,
@@ -209,10 +209,6 @@ impl Link {
         self.process.as_ref().map(Process::id)
     }
 
-    pub(in crate::plugin) fn progress(&self) -> Option<&(f64, String)> {
-        self.progress.as_ref()
-    }
-
     /// Reads what an idle worker has sent; an error when it has ended.
     pub(in crate::plugin) fn check(&mut self) -> Result<(), LinkError> {
         match self.next(Instant::now()) {
@@ -223,8 +219,13 @@ impl Link {
     }
 
     /// Starts a job.
-    pub(in crate::plugin) fn run(&mut self, job: Job, inputs: &[InputFrame]) -> Result<(), LinkError> {
-        self.progress = None;
+    pub(in crate::plugin) fn run(
+        &mut self,
+        job: Job,
+        inputs: &[InputFrame],
+        progress: ProgressSink,
+    ) -> Result<(), LinkError> {
+        self.progress = progress;
         let named = inputs.iter().map(|input| Input {
             format: input.format.to_string_lossy().into_owned(),
             role: input.role.map(|role| role.to_string_lossy().into_owned()),
@@ -294,7 +295,7 @@ impl Link {
             match socket.receive(Some(until), &mut self.buffer) {
                 Received::Message(ToHost::Log { job, level, text }, _) => log(&self.name, job, level, &text),
                 Received::Message(ToHost::Progress { fraction, phase, .. }, _) => {
-                    self.progress = Some((fraction.clamp(0.0, 1.0), printable(&phase)));
+                    self.progress.tell(fraction, &printable(&phase));
                 }
                 Received::Message(message, _) => return Next::Message(message),
                 Received::Late => return Next::Late,

@@ -51,6 +51,7 @@ struct Hand {
     run_id: u32,
     data: Box<StrokeData>,
     since_ms: i64,
+    scanned_percent: Option<u8>,
 }
 
 fn now_ms() -> i64 {
@@ -77,7 +78,12 @@ impl Facts {
     pub(super) fn take(&mut self, event: Event) {
         match event {
             Event::Accepted { key, run_id, data } => {
-                self.hand = Some(Hand { key, run_id, data, since_ms: now_ms() });
+                self.hand = Some(Hand { key, run_id, data, since_ms: now_ms(), scanned_percent: None });
+            }
+            Event::Scanned { key, percent } => {
+                if let Some(hand) = self.hand.as_mut().filter(|hand| hand.key == key) {
+                    hand.scanned_percent = Some(percent);
+                }
             }
             Event::PartEnded => self.ended = self.hand.as_ref().map(|hand| hand.run_id).or(self.recalled),
             Event::Alarm(code) => *self.raised.entry(code).or_default() += 1,
@@ -213,6 +219,7 @@ impl Facts {
             baseline: hand.is_some_and(|hand| hand.data.baseline),
             stage,
             since_ms: hand.map(|hand| hand.since_ms),
+            scanned_percent: hand.and_then(|hand| hand.scanned_percent).filter(|_| stage == Stage::Scanning),
         })
     }
 
