@@ -1,5 +1,5 @@
 //! Conformance tests of a plugin library, behind `platen plugins check`: the contract of the boundary, one test after another, each in a
-//! worker process of its own.
+//! worker process of its own. [`run_bridge`] has those of a scan bridge over TCP, behind `platen bridge check`.
 //!
 //! | level | contents |
 //! |---|---|
@@ -11,6 +11,7 @@
 //! A test that needs what is not there (options without a default, a device) is left out and says so: it proves nothing.
 
 mod answer;
+mod bridge;
 mod junit;
 mod reference;
 mod subject;
@@ -20,6 +21,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+pub use bridge::{BridgeSubject, run_bridge};
 pub use junit::junit;
 pub use subject::{Settings, Subject, SubjectError};
 

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON document.
 
 pub mod bench;
+mod bridge;
 mod calibrate;
 pub mod cell;
 mod check;
@@ -12,6 +13,7 @@ mod generate;
 mod history;
 mod inspect;
 mod measure;
+mod outcomes;
 pub mod output;
 mod plugins;
 pub mod press;
@@ -102,8 +104,10 @@ enum Verb {
     Screen(screen::Command),
     /// Query the record
     History(history::Command),
-    /// List the installed plugins and their options
+    /// List, test and make plugins
     Plugins(plugins::Command),
+    /// Test a scan bridge over TCP
+    Bridge(bridge::Command),
     /// Print the tables of Masuda et al. beside this machine's figures, on simulated scans
     Bench(bench::BenchArguments),
     /// Generate man pages or shell completions
@@ -185,6 +189,7 @@ pub fn main() -> ExitCode {
         Verb::Verify(command) => verify::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
+        Verb::Bridge(command) => bridge::run(&cli.common, command),
         Verb::Bench(_) => bench::start(),
         Verb::Generate(command) => generate::run(&cli.common, command, Cli::command()),
         Verb::Worker(_) => worker::run(),

@@ -7,6 +7,7 @@ mod rig;
 mod stream;
 
 mod archive;
+mod bridge_check;
 mod isolation;
 mod kill;
 mod line;

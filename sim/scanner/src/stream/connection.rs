@@ -149,8 +149,12 @@ impl Connection<'_> {
             (frame::CONFIGURE, Some(_)) => self.configure(frame),
             (frame::START, Some(_)) => self.start(frame),
             (frame::RESUME, Some(_)) => self.resume(frame),
-            // Executed by the reader already.
-            (frame::ABORT, Some(_)) => Ok(()),
+            // Executed by the reader already, unless it came before its Start was.
+            (frame::ABORT, Some(_)) => {
+                let abort: Abort = self.parse(frame)?;
+                self.shared.abort(&abort.job);
+                Ok(())
+            }
             (kind, _) => {
                 self.refuse(0, &Refusal::new("unknown_type", format!("{kind:#06x} is not allowed here")))?;
                 Err(Hangup)

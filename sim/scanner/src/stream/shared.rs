@@ -225,8 +225,9 @@ impl Shared {
 
     /// Aborts the scan of a job.
     pub(super) fn abort(&self, job: &str) {
-        if let Some(scan) = self.scan_of(job).filter(|scan| !scan.spool.is_over()) {
-            scan.aborted.store(true, Ordering::Relaxed);
+        if let Some(scan) = self.scan_of(job).filter(|scan| !scan.spool.is_over())
+            && !scan.aborted.swap(true, Ordering::Relaxed)
+        {
             increment(&self.counts.aborts);
         }
     }

@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use platen_conformance::{LEVELS, Outcome, Settings, Subject, Verdict, digest, junit};
+use platen_conformance::{LEVELS, Outcome, Settings, Subject, Verdict, digest};
 use platen_plant::{Document, PluginUse, Survey};
 
-use super::super::{CliError, Common, output};
+use super::super::{CliError, Common, outcomes, output};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen plugins check target/release/libmy_comparison.so\n  \
@@ -69,26 +69,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         tell(common, command, &outcome)?;
         outcomes.push(outcome);
     }
-    if outcomes.is_empty() {
-        return Err(CliError::Usage("no test has such a name; without --only all are run".into()));
-    }
     let name = command.library.display().to_string();
-    if let Some(file) = &command.junit {
-        std::fs::write(file, junit(&name, &outcomes))
-            .map_err(|why| CliError::Failed(format!("{}: {why}; choose another file", file.display())))?;
-    }
-    let count = |wanted: fn(&Verdict) -> bool| outcomes.iter().filter(|it| wanted(&it.verdict)).count();
-    let failed = count(|verdict| matches!(verdict, Verdict::Failed(_)));
-    if common.json {
-        output::json(&serde_json::json!({ "library": name, "failed": failed, "tests": outcomes }))?;
-    } else {
-        let passed = count(|verdict| matches!(verdict, Verdict::Passed));
-        let warned = count(|verdict| matches!(verdict, Verdict::Warned(_)));
-        let left_out = count(|verdict| matches!(verdict, Verdict::LeftOut(_)));
-        let text = format!("{passed} passed, {failed} failed, {warned} warnings, {left_out} left out");
-        output::line(&format!("{name}: {text}, platen {}, boundary 2", env!("CARGO_PKG_VERSION")))?;
-    }
-    Ok(ExitCode::from(u8::from(failed > 0)))
+    outcomes::sum(common, ("library", &name, "boundary 2"), &outcomes, command.junit.as_deref())
 }
 
 fn subject(common: &Common, command: &Command) -> Result<Subject, CliError> {
@@ -124,27 +106,9 @@ fn plugins_of(plant: &Path) -> Result<Vec<PluginUse>, CliError> {
 }
 
 fn tell(common: &Common, command: &Command, outcome: &Outcome) -> Result<(), CliError> {
-    if common.json {
-        return Ok(());
-    }
-    let (word, why) = match &outcome.verdict {
-        Verdict::Passed => ("ok", None),
-        Verdict::Warned(why) => ("warning", Some(why)),
-        Verdict::Failed(why) => ("FAILED", Some(why)),
-        Verdict::LeftOut(why) => ("left out", Some(why)),
-    };
-    output::line(&format!("{:8} {:16} {}", word, outcome.test, outcome.demands))?;
-    if let Some(why) = why {
-        output::line(&format!("         {why}"))?;
-    }
-    if matches!(outcome.verdict, Verdict::Failed(_)) {
-        let (library, seed) = (command.library.display(), command.seed);
-        output::line(&format!(
-            "         again: platen plugins check {library} --only {} --seed {seed}",
-            outcome.test
-        ))?;
-    }
-    Ok(())
+    let (library, seed) = (command.library.display(), command.seed);
+    let again = format!("platen plugins check {library} --only {} --seed {seed}", outcome.test);
+    outcomes::tell(common, outcome, &again)
 }
 
 /// Name and level of the test that needs a second process of this program.

@@ -1,0 +1,86 @@
+//! Conformance tests of a scan bridge over TCP, behind `platen bridge check`: the scan bridge protocol 1.0
+//! (`drivers/faro-stream/PROTOCOL.md`), written from that document alone.
+//!
+//! The kit is a driver of its own. Each test opens its connections anew; those that scan use the settings given, and the scanner
+//! turns. A test that the bridge's answers leave no room for (no scan was under way any more) is left out and says so.
+
+mod client;
+mod hello;
+mod hostile;
+mod scans;
+
+use std::cell::OnceCell;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use serde_json::Value as Json;
+
+use crate::{Outcome, Verdict};
+use scans::Recorded;
+
+/// What the tests of a bridge need.
+#[derive(Debug)]
+pub struct BridgeSubject {
+    address: SocketAddr,
+    /// Members of Start beside the job: `divisor`, `rate_kpts`, `compression`, `window`.
+    settings: Json,
+    /// Longest time of a scan.
+    limit: Duration,
+    /// Makes names of jobs that no earlier run has used.
+    run: String,
+    /// The scan that several tests look at, made once.
+    scan: OnceCell<Result<Recorded, String>>,
+}
+
+impl BridgeSubject {
+    /// Prepares the tests of the bridge at an address.
+    #[must_use]
+    pub fn new(address: SocketAddr, settings: Json, limit: Duration) -> Self {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        let run = format!("check-{}-{}", std::process::id(), now.as_millis());
+        Self { address, settings, limit, run, scan: OnceCell::new() }
+    }
+}
+
+/// A test of a bridge.
+struct Test {
+    name: &'static str,
+    demands: &'static str,
+    run: fn(&BridgeSubject) -> Result<(), Verdict>,
+}
+
+impl Test {
+    const fn new(
+        name: &'static str,
+        demands: &'static str,
+        run: fn(&BridgeSubject) -> Result<(), Verdict>,
+    ) -> Self {
+        Self { name, demands, run }
+    }
+}
+
+/// Runs the tests whose names contain `only`, and tells of each. Without an answer to Hello the others are left out.
+pub fn run_bridge(
+    subject: &BridgeSubject,
+    only: Option<&str>,
+    mut tell: impl FnMut(&Outcome),
+) -> Vec<Outcome> {
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    let mut dumb = None;
+    let all = hello::TESTS.iter().chain(scans::TESTS).chain(hostile::TESTS);
+    for test in all.filter(|test| only.is_none_or(|only| test.name.contains(only))) {
+        let start = Instant::now();
+        let verdict = match &dumb {
+            Some(why) => Verdict::LeftOut(String::clone(why)),
+            None => (test.run)(subject).err().unwrap_or(Verdict::Passed),
+        };
+        if test.name == hello::TESTS[0].name && matches!(verdict, Verdict::Failed(_)) {
+            dumb = Some(format!("{} has not passed", test.name));
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let outcome = Outcome { test: test.name, level: 2, demands: test.demands, verdict, seconds };
+        tell(&outcome);
+        outcomes.push(outcome);
+    }
+    outcomes
+}
