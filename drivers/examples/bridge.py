@@ -89,6 +89,24 @@ def measure(settings, job, progress, aborted):
     return begin, columns, "complete"
 
 
+def encode(kind, scan, number, payload):
+    """A frame (section 1)."""
+    head = struct.pack("<4sBBHI", b"PSB1", 1, 0, kind, len(payload)) + bytes(4) + struct.pack("<QII", number, scan, 0)
+    head = head[:12] + struct.pack("<I", crc32c(head[:12] + head[16:])) + head[16:]
+    return head + payload + struct.pack("<I", crc32c(payload))
+
+
+def answer_datagrams(server):
+    """Lets itself be found (section 8)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(server.getsockname())
+        while True:
+            asked, sender = found.recvfrom(2048)
+            hello = asked[32:-4]
+            if asked == encode(HELLO, 0, 0, hello) and b'"monitor"' in hello:
+                found.sendto(encode(CAPABILITIES, 0, 0, json.dumps(CAPABLE).encode()), sender)
+
+
 class Scan:
     """A scan, kept on disk so that it can be resumed (section 6)."""
 
@@ -175,6 +193,11 @@ class Bridge:
 
 
 KEPT = 5
+CAPABLE = {
+    "version": [1, 0], "model": "example floor", "serial": "1", "firmware": "1", "live": False,
+    "modes": [{"divisor": it, "rate_kpts": 122} for it in DIVISORS], "max_rows": 160, "max_columns": 160, "faces": 1,
+    "kept_scans": KEPT, "clock": "monotonic", "clock_synced": False,
+}
 
 
 class Connection:
@@ -227,10 +250,8 @@ class Connection:
 
     def send(self, kind, scan, message):
         payload = message if isinstance(message, bytes) else json.dumps(message).encode()
-        head = struct.pack("<4sBBHI", b"PSB1", 1, 0, kind, len(payload)) + bytes(4) + struct.pack("<QII", self.sent, scan, 0)
-        head = head[:12] + struct.pack("<I", crc32c(head[:12] + head[16:])) + head[16:]
+        self.stream.sendall(encode(kind, scan, self.sent, payload))
         self.sent += 1
-        self.stream.sendall(head + payload + struct.pack("<I", crc32c(payload)))
 
     def command(self, kind, scan, payload):
         if kind == HEARTBEAT or self.role and not kind & CRITICAL:
@@ -264,10 +285,7 @@ class Connection:
             self.bridge.take_lease(str(message.get("client")), self)
         self.role = role
         self.status_due = time.monotonic() + 0.9
-        self.send(CAPABILITIES, 0, {
-            "version": [1, 0], "model": "example floor", "serial": "1", "firmware": "1", "live": False,
-            "modes": [{"divisor": it, "rate_kpts": 122} for it in DIVISORS], "max_rows": 160, "max_columns": 160, "faces": 1,
-            "kept_scans": KEPT, "clock": "monotonic", "clock_synced": False})
+        self.send(CAPABILITIES, 0, CAPABLE)
 
     def configure(self, _, message):
         self.send(CONFIGURED, 0, plan(message))
@@ -316,6 +334,7 @@ def main():
         spool.mkdir(parents=True, exist_ok=True)
         bridge = Bridge(spool)
         with socket.create_server((host, int(port))) as server:
+            threading.Thread(target=answer_datagrams, args=(server,), daemon=True).start()
             print(json.dumps({"bridge": "%s:%d" % server.getsockname()[:2]}), flush=True)
             while True:
                 stream, _ = server.accept()

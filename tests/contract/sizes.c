@@ -30,5 +30,7 @@ int main(void) {
   SIZE(platen_estimate), FIELD(platen_estimate, scan_seconds);
   SIZE(platen_health), FIELD(platen_health, tilt);
   SIZE(platen_health_source), FIELD(platen_health_source, health);
+  SIZE(platen_device), FIELD(platen_device, option), FIELD(platen_device, value), FIELD(platen_device, about);
+  SIZE(platen_discovery), FIELD(platen_discovery, discover);
   return 0;
 }

@@ -277,6 +277,18 @@ typedef struct platen_health_source {
   platen_status (*health)(platen_instance *, platen_health *); /* [inst] after open or a job, within 100 ms */
 } platen_health_source;
 
+#define PLATEN_EXT_DISCOVERY "platen.ext.discovery/1"
+typedef struct platen_device { /* UTF-8 with NUL */
+  uint32_t struct_size, reserved;
+  char option[32], value[128]; /* what a plant file says to use it */
+  char about[128];             /* model and serial number */
+} platen_device;
+typedef struct platen_discovery {
+  uint32_t struct_size, reserved;
+  /* [inst] without open: looks for devices for at most 3 s and writes up to n; *found is their number, more than n when some had no place */
+  platen_status (*discover)(platen_instance *, platen_device *devices, uint32_t n, uint32_t *found, platen_error *);
+} platen_discovery;
+
 #ifdef __cplusplus
 }
 #endif

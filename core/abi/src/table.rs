@@ -377,6 +377,7 @@ tables! {
     Frame = "platen_frame" up to buffer of 24 bytes;
     Estimate = "platen_estimate" up to scan_seconds of 8 bytes;
     HealthSource = "platen_health_source" up to health of 8 bytes;
+    Discovery = "platen_discovery" up to discover of 8 bytes;
 }
 
 /// Extension of a scanner instance: duration of a scan.
@@ -433,6 +434,38 @@ pub struct HealthSource {
     pub reserved: u32,
     /// `[inst]` Writes what is known after `open` or a job, without asking for more than 100 ms.
     pub health: Option<unsafe extern "C" fn(*mut Instance, *mut Health) -> Status>,
+}
+
+/// Extension of a scanner instance: devices in reach.
+pub const EXT_DISCOVERY: &std::ffi::CStr = c"platen.ext.discovery/1";
+
+/// A device in reach: texts of UTF-8 with NUL.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Device {
+    /// Size of this struct.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Option by which a plant file names it.
+    pub option: [c_char; 32],
+    /// Value of that option.
+    pub value: [c_char; 128],
+    /// Model and serial number.
+    pub about: [c_char; 128],
+}
+
+/// Table of [`EXT_DISCOVERY`].
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Discovery {
+    /// Size of this struct.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// `[inst]` Looks for devices for at most 3 s, without `open`; writes up to n of them, and how many there are.
+    pub discover:
+        Option<unsafe extern "C" fn(*mut Instance, *mut Device, u32, *mut u32, *mut Error) -> Status>,
 }
 
 // Sizes on a 64-bit machine; the C header asserts the same.

@@ -38,7 +38,7 @@ pub use instance::{Emitted, Instance, RunningJob, WorkerState};
 pub use job::{CancelToken, JobSpec, ProgressSink};
 pub use library::{Isolation, Library, LoadFacts, Settings};
 pub use local::exported_symbols;
-pub use platen_sdk::Health;
+pub use platen_sdk::{Device, Health};
 pub use quarantine::{Quarantine, Quarantined};
 pub use scanner::{RunningScan, Scanner};
 pub use worker::{Confinement, Limits, serve_stdin};

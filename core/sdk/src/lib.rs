@@ -66,6 +66,7 @@
 //! call.
 #![allow(unsafe_code, reason = "this crate is the plugin's side of the boundary")]
 
+mod device;
 mod error;
 pub mod exchange;
 mod health;
@@ -86,6 +87,7 @@ mod grid;
 
 #[cfg(feature = "comparison")]
 pub use comparison::{Comparison, Inputs};
+pub use device::Device;
 pub use error::{Error, ErrorKind, Result};
 #[cfg(feature = "flattening")]
 pub use flattening::Flattening;

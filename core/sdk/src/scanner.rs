@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use platen_scan::{Column, ScanEnd, ScanHeader, Window};
 
-use crate::{Error, ErrorKind, Health, Info, Job, Options, Result};
+use crate::{Device, Error, ErrorKind, Health, Info, Job, Options, Result};
 
 /// Plugin that turns a trigger into a lattice, column by column.
 pub trait Scanner: Send + Sized + 'static {
@@ -36,6 +36,14 @@ pub trait Scanner: Send + Sized + 'static {
     /// Returns what is known of the instrument after `open` or a scan, without asking it for longer than 100 ms.
     fn health(&mut self) -> Option<Health> {
         None
+    }
+
+    /// Looks for devices for at most 3 s, without `open`; the options tell where.
+    ///
+    /// # Errors
+    /// When the driver cannot look for any, or nothing can be asked.
+    fn discover(&mut self) -> Result<Vec<Device>> {
+        Err(Error::new(ErrorKind::Unsupported, "this driver cannot look for devices"))
     }
 
     /// Scans: calls [`ScanSink::begin`] once, [`ScanSink::column`] for the columns in any order, [`ScanSink::end`] once.

@@ -10,7 +10,7 @@ use platen_abi as abi;
 
 use crate::exchange::{DecodeError, Payload, from_raw_window};
 pub use crate::option::{Declared, declare};
-use crate::{Error, ErrorKind, Health, Info, Job, Options, Result, Scanner, Values, job, logging};
+use crate::{Device, Error, ErrorKind, Health, Info, Job, Options, Result, Scanner, Values, job, logging};
 
 /// Input frame from the host.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +38,9 @@ pub trait Plugin: Send + Sized + 'static {
     }
     fn health(&mut self) -> Option<Health> {
         None
+    }
+    fn discover(&mut self) -> Result<Vec<Device>> {
+        Err(Error::new(ErrorKind::Unsupported, "no driver"))
     }
     fn close(&mut self) {}
 }
@@ -96,6 +99,9 @@ impl<S: Scanner> Plugin for ScannerPlugin<S> {
     fn health(&mut self) -> Option<Health> {
         self.0.health()
     }
+    fn discover(&mut self) -> Result<Vec<Device>> {
+        self.0.discover()
+    }
     fn run(&mut self, job: &Job<'_>, inputs: &[Input<'_>]) -> Result<()> {
         let window = inputs.iter().find(|input| input.format == platen_scan::Window::FORMAT);
         let window = window
@@ -129,6 +135,7 @@ struct State<P> {
     raw: abi::Instance,
     estimate: abi::Estimate,
     health: abi::HealthSource,
+    discovery: abi::Discovery,
     host: &'static abi::Host,
     waker: job::Waker,
     plugin: P,
@@ -172,7 +179,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
 }
 
 /// Copies as much of `text` as fits, whole characters only, NUL at the end.
-fn copy_text(out: &mut [c_char], text: &str) {
+pub(crate) fn copy_text(out: &mut [c_char], text: &str) {
     let mut end = text.len().min(out.len() - 1);
     while !text.is_char_boundary(end) {
         end -= 1;
@@ -312,6 +319,11 @@ unsafe fn create<P: Plugin>(host: &'static abi::Host, values: &[abi::Value]) -> 
             reserved: 0,
             health: Some(health::<P>),
         },
+        discovery: abi::Discovery {
+            struct_size: size_of::<abi::Discovery>() as u32,
+            reserved: 0,
+            discover: Some(discover::<P>),
+        },
         host,
         waker: Mutex::new(None),
         plugin: P::create(&Values(values))?,
@@ -413,8 +425,36 @@ unsafe extern "C" fn get_extension<P: Plugin>(
             _ if id.is_null() => std::ptr::null(),
             _ if CStr::from_ptr(id) == abi::EXT_ESTIMATE => (&raw const (*state).estimate).cast(),
             _ if CStr::from_ptr(id) == abi::EXT_HEALTH => (&raw const (*state).health).cast(),
+            _ if CStr::from_ptr(id) == abi::EXT_DISCOVERY => (&raw const (*state).discovery).cast(),
             _ => std::ptr::null(),
         }
+    }
+}
+
+unsafe extern "C" fn discover<P: Plugin>(
+    instance: *mut abi::Instance,
+    devices: *mut abi::Device,
+    n: u32,
+    found: *mut u32,
+    error: *mut abi::Error,
+) -> abi::Status {
+    // SAFETY: `[inst]` call on an instance from `create`; the host's array has n structs as long as the first one says.
+    unsafe {
+        guard(error, || {
+            let all = parts::<P>(instance).0.discover()?;
+            let stride = devices.as_ref().map_or(0, |first| first.struct_size as usize);
+            if stride >= size_of::<abi::Device>() {
+                for (place, device) in all.iter().enumerate().take(n as usize) {
+                    if let Some(out) = devices.byte_add(place * stride).as_mut() {
+                        device.write(out);
+                    }
+                }
+            }
+            if let Some(found) = found.as_mut() {
+                *found = all.len() as u32;
+            }
+            Ok(())
+        })
     }
 }
 

@@ -18,6 +18,8 @@
 //! rate_kpts = 244
 //! ```
 //!
+//! `platen plugins find faro-stream --option address=192.168.43.255:7040` lists the bridges of a network that answer.
+//!
 //! | key | meaning |
 //! |---|---|
 //! | `address` | host and port of the bridge |
@@ -29,6 +31,7 @@
 
 mod column;
 mod device;
+mod discovery;
 mod error;
 mod message;
 mod session;
@@ -37,7 +40,7 @@ mod wire;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use platen_scan::Window;
-use platen_sdk::{Health, Info, Job, Result, ScanSink, Scanner, options};
+use platen_sdk::{Device, Health, Info, Job, Result, ScanSink, Scanner, options};
 
 use message::Settings;
 use session::Request;
@@ -98,6 +101,11 @@ impl Scanner for FaroStream {
         let (health, ended) = device::scan(&self.options.address, request, out);
         self.health = health;
         ended.map_err(|error| error.at(&self.options.address))
+    }
+
+    fn discover(&mut self) -> Result<Vec<Device>> {
+        discovery::bridges(&self.options.address, &self.options.client)
+            .map_err(|error| error.at(&self.options.address))
     }
 
     fn health(&mut self) -> Option<Health> {

@@ -56,6 +56,8 @@ fn the_header_and_the_rust_types_agree() {
         platen_estimate = platen_abi::Estimate { scan_seconds }
         platen_health = platen_abi::Health { tilt }
         platen_health_source = platen_abi::HealthSource { health }
+        platen_device = platen_abi::Device { option, value, about }
+        platen_discovery = platen_abi::Discovery { discover }
     }
     assert_eq!(printed, expected);
 }

@@ -26,7 +26,7 @@ fn the_bridge_of_the_simulator_passes() {
     let config = BridgeConfig { time_scale: 0.2, ..BridgeConfig::default() };
     let bridge = stream::start(&[], config, stream::head());
     let passed = tests(bridge.address(), "", "passed");
-    assert_eq!(passed.len(), 33, "only these: {passed:?}");
+    assert_eq!(passed.len(), 34, "only these: {passed:?}");
 }
 
 #[test]
@@ -62,4 +62,24 @@ fn without_a_bridge_one_test_fails_and_the_others_are_left_out() {
     let start = std::time::Instant::now();
     assert_eq!(tests(free, "", "failed"), ["hello.answered"]);
     assert!(start.elapsed() < Duration::from_secs(60), "it does not try each again");
+}
+
+#[test]
+fn a_bridge_is_found_by_datagram() {
+    let bridge = stream::bridge(&[]);
+    let find = |address: &str| {
+        let mut platen = platen_tests::program("platen");
+        platen.args(["plugins", "find", "faro-stream", "--option", &format!("address={address}"), "--json"]);
+        let output = platen.output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (code, text) = find(&bridge.address().to_string());
+    let found: Json = serde_json::from_str(&text).unwrap();
+    assert_eq!(code, Some(0), "{text}");
+    let expected = serde_json::json!([{
+        "option": "address", "value": bridge.address().to_string(), "about": "platen simulated scanner SIM0001",
+    }]);
+    assert_eq!(found, expected);
+    let free = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    assert_eq!(find(&free.to_string()), (Some(1), "[]\n".to_owned()));
 }

@@ -1,11 +1,13 @@
 //! Sections 1 to 4 of the protocol, without a scan: Hello, lease, Configure, Status.
 
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value as Json, json};
 
 use super::client::{
-    ANSWER, CAPABILITIES, CLIENT, CONFIGURE, CONFIGURED, Client, ERROR, HEARTBEAT, HELLO, START, fault,
+    ANSWER, CAPABILITIES, CLIENT, CONFIGURE, CONFIGURED, Client, ERROR, HEARTBEAT, HELLO, START, encode,
+    fault,
 };
 use super::{BridgeSubject, Test};
 use crate::Verdict;
@@ -21,6 +23,7 @@ pub(super) const TESTS: &[Test] = &[
     Test::new("lease.same", "the same client again gets the lease, its first connection ends", same_client),
     Test::new("lease.monitor", "a monitor: Status, and Error `denied` for Configure and Start", monitor),
     Test::new("status.rate", "Status at least once a second", rate),
+    Test::new("discovery.answered", "a Hello of a monitor by UDP is answered with Capabilities", discovered),
     Test::new("configure.answered", "Configure is answered with the settings and the duration", configured),
     Test::new("configure.impossible", "impossible settings: Error `config` that names others", impossible),
 ];
@@ -32,7 +35,8 @@ fn answered(subject: &BridgeSubject) -> Result<(), Verdict> {
     if capabilities["version"] != json!([1, 0]) {
         return fault(format!("Capabilities name version {}", capabilities["version"]));
     }
-    let kinds: [(&str, fn(&Json) -> bool); 8] = [
+    type Is = fn(&Json) -> bool;
+    let kinds: [(&str, Is); 8] = [
         ("model", Json::is_string),
         ("serial", Json::is_string),
         ("live", Json::is_boolean),
@@ -94,7 +98,7 @@ fn busy(subject: &BridgeSubject) -> Result<(), Verdict> {
     let mut other = Client::connect(subject)?;
     other.say_hello("another client", "controller")?;
     let error = other.expect_error("busy")?;
-    if !error["retry_ms"].as_u64().is_some_and(|ms| ms <= 5000) {
+    if error["retry_ms"].as_u64().is_none_or(|ms| ms > 5000) {
         return fault(format!("Error `busy` names retry_ms {}, the lease has 5 s", error["retry_ms"]));
     }
     other.expect_close()?;
@@ -140,6 +144,35 @@ fn silence(client: &mut Client) -> Result<(), Verdict> {
             fault(format!("{} ms without a Status", longest.as_millis()))
         }
         _ => Ok(()),
+    }
+}
+
+fn discovered(subject: &BridgeSubject) -> Result<(), Verdict> {
+    let here: SocketAddr = if subject.address.is_ipv4() {
+        (Ipv4Addr::UNSPECIFIED, 0).into()
+    } else {
+        (Ipv6Addr::UNSPECIFIED, 0).into()
+    };
+    let hello = json!({"versions": [[1, 0], [1, 0]], "client": CLIENT, "role": "monitor"});
+    let mut answer = [0; 65536];
+    let ask = |answer: &mut [u8]| {
+        let socket = UdpSocket::bind(here)?;
+        socket.set_read_timeout(Some(Duration::from_secs(1)))?;
+        // Not one of the protocol: to be ignored.
+        socket.send_to(b"hello?", subject.address)?;
+        socket.send_to(&encode(HELLO, 0, 0, hello.to_string().as_bytes()), subject.address)?;
+        socket.recv_from(answer)
+    };
+    let Ok((length, _)) = ask(&mut answer) else {
+        return Err(Verdict::LeftOut("no answer within 1 s: it cannot be found, which is allowed".into()));
+    };
+    let payload = answer[..length].get(32..length.saturating_sub(4)).unwrap_or_default();
+    if encode(CAPABILITIES, 0, 0, payload) != answer[..length] {
+        return fault("the answer is not one Capabilities frame of number 0");
+    }
+    match serde_json::from_slice::<Json>(payload) {
+        Ok(capabilities) if capabilities["serial"].is_string() => Ok(()),
+        _ => fault("its Capabilities are no JSON object with a serial number"),
     }
 }
 

@@ -135,7 +135,7 @@ fn made(subject: &BridgeSubject) -> Result<&Recorded, &String> {
 }
 
 fn complete(subject: &BridgeSubject) -> Result<(), Verdict> {
-    let scan = made(subject).or_else(|why| fault(why))?;
+    let scan = made(subject).or_else(fault)?;
     let due = scan.begin["columns"].as_u64().unwrap_or_default();
     if scan.end["outcome"] != "complete" {
         fault(format!("ScanEnd is {}", scan.end))

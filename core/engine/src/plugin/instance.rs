@@ -12,18 +12,22 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use platen_abi::status;
 use platen_plant::OptionValue;
 use platen_scan::Window;
-use platen_sdk::Health;
 use platen_sdk::exchange::{AlignedBuffer, DecodeError, Payload};
+use platen_sdk::{Device, Health};
 
 use super::faults::Faults;
 use super::job::{CancelToken, JobSpec};
-use super::worker::{CallError, Confinement, Job, JobEvent, Link, LinkError, SharedMemory, new_job};
+use super::worker::{
+    CallError, Confinement, Job, JobEvent, Link, LinkError, SharedMemory, new_job, printable,
+};
 use super::{Descriptor, Isolation, Kind, Library, PluginError, Quarantined, clock, library};
 
 /// Grace period: time for a plugin to return after its cancellation, before its process is ended.
 const GRACE: Duration = Duration::from_millis(500);
 /// Period at which a waiting job checks for cancellation.
 const CANCEL_POLL: Duration = Duration::from_millis(20);
+/// Time for a driver to look for devices: 3 s, and some for itself.
+const DISCOVERY_LIMIT: Duration = Duration::from_secs(5);
 /// Time for an instrument's state, which must not ask for it.
 const HEALTH_LIMIT: Duration = Duration::from_secs(1);
 
@@ -292,6 +296,23 @@ impl Instance {
                 tilt: raw.tilt,
             })
         }))
+    }
+
+    /// Returns the devices that a driver finds in reach, without opening any.
+    ///
+    /// # Errors
+    /// When it cannot look for them, or why it has no worker or does not answer.
+    pub fn discover(&self) -> Result<Vec<Device>, PluginError> {
+        let mut state = self.state()?;
+        let start = Instant::now();
+        let found = self.link(&mut state)?.discover(DISCOVERY_LIMIT);
+        let found = found.map_err(|error| self.failed(&mut state, error, start))?;
+        let device = |it: super::worker::Device| Device {
+            option: printable(&it.option),
+            value: printable(&it.value),
+            about: printable(&it.about),
+        };
+        Ok(found.into_iter().map(device).collect())
     }
 
     /// Returns whether a job was repeated in a fresh process since this was last asked.

@@ -23,7 +23,9 @@ impl CancelToken {
 
 /// Receiver of what a job says on its way: the share done, 0 to 1, and its phase in words.
 #[derive(Clone, Default)]
-pub struct ProgressSink(Option<Arc<dyn Fn(f64, &str) + Send + Sync>>);
+pub struct ProgressSink(Option<Arc<Receive>>);
+
+type Receive = dyn Fn(f64, &str) + Send + Sync;
 
 impl ProgressSink {
     /// Makes a receiver; it is called from the thread that waits for the job.

@@ -33,7 +33,7 @@ pub(super) use outbox::{Outbox, outbox};
 pub(super) use pool::{Extent, Pool};
 pub(super) use process::printable;
 pub use serve::serve_stdin;
-pub(super) use wire::{CallError, Health, Job, LoadFault, LoadedLibrary, ToHost};
+pub(super) use wire::{CallError, Device, Health, Job, LoadFault, LoadedLibrary, ToHost};
 
 /// What a worker may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use platen_engine::plugin::{Descriptor, Listed, Quarantine, Quarantined};
+use platen_engine::plugin::{Descriptor, Device, Listed, Quarantine, Quarantined};
 use platen_plant::OptionDecl;
 use platen_plant::PlantFile;
 
@@ -40,6 +40,18 @@ enum Verb {
         /// Print its options as TOML, commented out, to paste into a plant file
         #[arg(long)]
         toml: bool,
+    },
+    /// List the devices that a scanner driver finds in reach
+    #[command(
+        after_help = "Examples:\n  platen plugins find faro-stream --option address=192.168.43.255:7040\n\n\
+                            Exit code 1 when none is found."
+    )]
+    Find {
+        /// Name of the driver
+        name: String,
+        /// Option of the driver that it needs to look: a text
+        #[arg(long = "option", value_name = "NAME=TEXT", value_parser = pair)]
+        options: Vec<(String, String)>,
     },
     /// Make a plugin of one's own that builds and works, in Rust, C or C++
     New(new::Command),
@@ -94,11 +106,43 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 _ => describe(descriptor)?,
             }
         }
+        Verb::Find { name, options } => return find(common, name, options),
         Verb::New(command) => return new::run(common, command),
         Verb::Check(command) => return check::run(common, command),
         Verb::Quarantine { action } => quarantine(common, action)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Splits an option of the command line.
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (name, value) =
+        text.split_once('=').ok_or("an option is NAME=TEXT, such as address=192.168.43.255:7040")?;
+    Ok((name.trim().to_owned(), value.trim().to_owned()))
+}
+
+fn find(common: &Common, name: &str, options: &[(String, String)]) -> Result<ExitCode, CliError> {
+    let values = options.iter().map(|(name, value)| format!("{name} = {}\n", Json::from(value.as_str())));
+    let options: String = values.collect();
+    // As a plant file would name it, so that its options are checked.
+    let text = format!(
+        "[plant]\nname = \"find\"\n[scanner]\nplugin = {}\n[scanner.options]\n{options}",
+        Json::from(name)
+    );
+    let plant = PlantFile::parse("--option", &text).map_err(|faults| CliError::Usage(faults.to_string()))?;
+    let scanner = platen_engine::pipeline::scanner(&plant, &common.catalogue())?;
+    let found = scanner.instance().discover()?;
+    if common.json {
+        let json = |it: &Device| json!({"option": it.option, "value": it.value, "about": it.about});
+        output::json(&found.iter().map(json).collect::<Vec<_>>())?;
+    } else if found.is_empty() {
+        output::line("none found: is it switched on, and on this network? is a firewall in the way?")?;
+    } else {
+        for Device { option, value, about } in &found {
+            output::line(&format!("{option} = {:<24} # {about}", Json::from(value.as_str()).to_string()))?;
+        }
+    }
+    Ok(ExitCode::from(u8::from(found.is_empty())))
 }
 
 fn quarantine(common: &Common, action: &Action) -> Result<(), CliError> {

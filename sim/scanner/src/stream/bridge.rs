@@ -1,13 +1,17 @@
 //! Bridge: a listening port, and a thread for each connection.
 
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use super::config::BridgeConfig;
 use super::connection;
 use super::counters::BridgeCounters;
+use super::frame::{self, Frame};
 use super::head::Head;
+use super::message::{Hello, Role};
 use super::shared::Shared;
 
 /// Running bridge; dropping it stops it.
@@ -16,6 +20,7 @@ pub struct Bridge {
     address: SocketAddr,
     shared: Arc<Shared>,
     port: Option<JoinHandle<()>>,
+    discovery: Option<JoinHandle<()>>,
 }
 
 impl Bridge {
@@ -34,7 +39,12 @@ impl Bridge {
             let shared = Arc::clone(&shared);
             std::thread::spawn(move || accept(&listener, &shared))
         };
-        Ok(Self { address, shared, port: Some(port) })
+        // Where the port number is taken for datagrams, the bridge cannot be found, which is allowed.
+        let discovery = datagrams(address).ok().map(|socket| {
+            let shared = Arc::clone(&shared);
+            std::thread::spawn(move || answer(&socket, &shared))
+        });
+        Ok(Self { address, shared, port: Some(port), discovery })
     }
 
     /// Returns the address of the port.
@@ -56,6 +66,38 @@ impl Drop for Bridge {
         if let Some(port) = self.port.take() {
             let _ = port.join();
         }
+        if let Some(discovery) = self.discovery.take() {
+            let _ = discovery.join();
+        }
+    }
+}
+
+/// Time between two looks whether the bridge ends.
+const NAP: Duration = Duration::from_millis(100);
+
+/// Opens the port for discovery (section 8 of the protocol). Broadcasts reach a socket of every address alone.
+fn datagrams(address: SocketAddr) -> io::Result<UdpSocket> {
+    let everywhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, address.port()));
+    let local = address.ip().is_loopback() || address.is_ipv6();
+    let socket = UdpSocket::bind(if local { address } else { everywhere })?;
+    socket.set_read_timeout(Some(NAP))?;
+    Ok(socket)
+}
+
+/// Answers to those who look for bridges.
+fn answer(socket: &UdpSocket, shared: &Shared) {
+    let mut datagram = [0; 2048];
+    while !shared.is_ending() {
+        let Ok((length, from)) = socket.recv_from(&mut datagram) else { continue };
+        let Ok(asked) = frame::read(&mut &datagram[..length], 0) else { continue };
+        let hello = serde_json::from_slice::<Hello>(&asked.payload);
+        if asked.kind != frame::HELLO || !hello.is_ok_and(|hello| hello.role == Role::Monitor) {
+            continue;
+        }
+        let payload = connection::capabilities(shared).to_string().into_bytes();
+        let answer = Frame { kind: frame::CAPABILITIES, scan: 0, payload };
+        // Who asked may have gone.
+        let _ = socket.send_to(&frame::bytes(&answer, 0), from);
     }
 }
 

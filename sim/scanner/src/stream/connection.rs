@@ -82,6 +82,24 @@ pub(super) fn serve(stream: TcpStream, number: u32, shared: &Arc<Shared>) {
     let _ = reader.join();
 }
 
+/// Returns the Capabilities of a bridge.
+pub(super) fn capabilities(shared: &Shared) -> serde_json::Value {
+    let modes: Vec<_> = [1, 2, 4, 5, 8, 10, 16, 20, 32]
+        .into_iter()
+        .flat_map(|divisor| [122, 244, 488, 976].map(|rate_kpts| (divisor, rate_kpts)))
+        .filter(|(divisor, rate_kpts)| crate::Device::new(*divisor, *rate_kpts, 1).is_ok())
+        .map(|(divisor, rate_kpts)| json!({"divisor": divisor, "rate_kpts": rate_kpts}))
+        .collect();
+    let config = &shared.config;
+    let serial = if shared.is_active(FaultKind::WrongScanner) { "SIM9999" } else { config.serial.as_str() };
+    json!({
+        "version": frame::VERSION, "model": "platen simulated scanner", "serial": serial,
+        "firmware": env!("CARGO_PKG_VERSION"), "live": config.live, "modes": modes, "max_rows": 17351,
+        "max_columns": 40960, "faces": 2, "kept_scans": config.kept_scans, "clock": "monotonic",
+        "clock_synced": false,
+    })
+}
+
 /// Reads frames until the connection ends. Renews the lease and executes Abort at once.
 fn read(mut stream: TcpStream, connection: u32, shared: &Shared, events: &Sender<Event>) {
     for due in 0.. {
@@ -191,21 +209,7 @@ impl Connection<'_> {
             std::thread::sleep(Duration::from_millis(ms.into()));
         }
         self.client = Some((hello.client, hello.role));
-        let modes: Vec<_> = [1, 2, 4, 5, 8, 10, 16, 20, 32]
-            .into_iter()
-            .flat_map(|divisor| [122, 244, 488, 976].map(|rate_kpts| (divisor, rate_kpts)))
-            .filter(|(divisor, rate_kpts)| crate::Device::new(*divisor, *rate_kpts, 1).is_ok())
-            .map(|(divisor, rate_kpts)| json!({"divisor": divisor, "rate_kpts": rate_kpts}))
-            .collect();
-        let config = &self.shared.config;
-        let serial =
-            if self.shared.is_active(FaultKind::WrongScanner) { "SIM9999" } else { config.serial.as_str() };
-        let capabilities = json!({
-            "version": frame::VERSION, "model": "platen simulated scanner", "serial": serial,
-            "firmware": env!("CARGO_PKG_VERSION"), "live": config.live, "modes": modes, "max_rows": 17351,
-            "max_columns": 40960, "faces": 2, "kept_scans": config.kept_scans, "clock": "monotonic",
-            "clock_synced": false,
-        });
+        let capabilities = capabilities(self.shared);
         self.send_message(frame::CAPABILITIES, 0, &capabilities)
     }
 

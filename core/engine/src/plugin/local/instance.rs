@@ -6,9 +6,12 @@ use std::ffi::CString;
 use platen_abi::{self as abi, Table as _};
 use platen_plant::OptionValue;
 
-use super::super::worker::{CallError, Health, Job, SharedMemory};
+use super::super::worker::{CallError, Device, Health, Job, SharedMemory};
 use super::values::Values;
 use super::{Library, host_table};
+
+/// Most devices that a driver may find.
+const DEVICES: u32 = 64;
 
 /// Functions that every instance has.
 #[derive(Debug, Clone, Copy)]
@@ -157,6 +160,26 @@ impl Instance {
         let status = unsafe { health(self.raw, &raw mut found) };
         let abi::Health { flags, temperature_c, battery, tilt, .. } = found;
         (status == abi::status::OK).then_some(Health { flags, temperature_c, battery, tilt })
+    }
+
+    pub(in crate::plugin) fn discover(&self) -> Result<Vec<Device>, CallError> {
+        let table = self.extension::<abi::Discovery>(abi::EXT_DISCOVERY);
+        let Some(discover) = table.and_then(|table| table.discover) else {
+            let message = "this driver cannot look for devices".to_owned();
+            return Err(CallError { status: abi::status::UNSUPPORTED, retryable: false, message });
+        };
+        let empty = abi::Device {
+            struct_size: size_of::<abi::Device>() as u32,
+            reserved: 0,
+            option: [0; 32],
+            value: [0; 128],
+            about: [0; 128],
+        };
+        let (mut devices, mut found) = (vec![empty; DEVICES as usize], 0);
+        // SAFETY: `[inst]` call of a live instance; array and number live for the call.
+        call(|error| unsafe { discover(self.raw, devices.as_mut_ptr(), DEVICES, &raw mut found, error) })?;
+        let written = devices.iter().take(found.min(DEVICES) as usize).map(platen_sdk::Device::from_raw);
+        Ok(written.map(|it| Device { option: it.option, value: it.value, about: it.about }).collect())
     }
 
     pub(in crate::plugin) fn run(&mut self, job: &Job, inputs: &[Input]) -> Result<(), CallError> {

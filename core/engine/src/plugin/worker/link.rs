@@ -15,7 +15,8 @@ use platen_sdk::exchange::AlignedBuffer;
 use super::memory::SharedMemory;
 use super::process::{Process, printable};
 use super::wire::{
-    CallError, Health, Input, Job, LoadFault, LoadedLibrary, PROTOCOL, Received, Socket, ToHost, ToWorker,
+    CallError, Device, Health, Input, Job, LoadFault, LoadedLibrary, PROTOCOL, Received, Socket, ToHost,
+    ToWorker,
 };
 use super::{Confinement, Limits, pool, serve};
 use crate::plugin::{InputFrame, ProgressSink};
@@ -187,6 +188,14 @@ impl Link {
         self.send(&ToWorker::Health, &[])?;
         match self.answer(limit)? {
             ToHost::Health(health) => Ok(health),
+            _ => Err(self.out_of_turn()),
+        }
+    }
+
+    pub(in crate::plugin) fn discover(&mut self, limit: Duration) -> Result<Vec<Device>, LinkError> {
+        self.send(&ToWorker::Discover, &[])?;
+        match self.answer(limit)? {
+            ToHost::Discovered(found) => found.map_err(LinkError::Call),
             _ => Err(self.out_of_turn()),
         }
     }

@@ -100,6 +100,7 @@ enum Request {
     Open,
     Estimate(Option<[f64; 4]>),
     Health,
+    Discover,
     Run(Job, Vec<Input>, local::Listed),
 }
 
@@ -141,6 +142,7 @@ impl Worker {
                     ToHost::Estimated(instance.estimate_s(window.map(raw_window).as_ref()))
                 }
                 Request::Health => ToHost::Health(instance.health()),
+                Request::Discover => ToHost::Discovered(instance.discover()),
                 Request::Run(job, inputs, listed) => {
                     let result = instance.run(&job, &inputs);
                     drop(listed);
@@ -175,6 +177,7 @@ impl Worker {
                 ToWorker::Open => Request::Open,
                 ToWorker::Estimate(window) => Request::Estimate(window),
                 ToWorker::Health => Request::Health,
+                ToWorker::Discover => Request::Discover,
                 ToWorker::Run { job, inputs } => {
                     newest = job.id;
                     let listed = local::begin(

@@ -49,6 +49,7 @@ pub(super) enum ToWorker {
     /// Azimuth start and width, elevation least and most, radians.
     Estimate(Option<[f64; 4]>),
     Health,
+    Discover,
     /// Inputs come beside it, in order.
     Run {
         job: Job,
@@ -82,6 +83,7 @@ pub(in crate::plugin) enum ToHost {
     Opened(Result<(), CallError>),
     Estimated(Option<f64>),
     Health(Option<Health>),
+    Discovered(Result<Vec<Device>, CallError>),
     /// Place in the pool.
     Frame {
         job: u64,
@@ -136,6 +138,14 @@ pub(in crate::plugin) struct Health {
     pub(in crate::plugin) temperature_c: f64,
     pub(in crate::plugin) battery: f64,
     pub(in crate::plugin) tilt: f64,
+}
+
+/// A device in reach of a driver.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::plugin) struct Device {
+    pub(in crate::plugin) option: String,
+    pub(in crate::plugin) value: String,
+    pub(in crate::plugin) about: String,
 }
 
 /// One end of the connection. Any thread may send; one thread receives.
