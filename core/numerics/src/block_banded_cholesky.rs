@@ -13,88 +13,12 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
+use crate::block_banded::{BlockBandedFactor, Layout, REACH};
 use crate::vector_registers::ClearVectorRegisters;
-
-/// Rows of the net that one B-spline reaches back to.
-const REACH: usize = 3;
-
-/// Layout of the coefficients of a net in blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
-    n_u: usize,
-    n_v: usize,
-}
-
-impl Layout {
-    /// Blocks run along v when it is the longer axis.
-    fn v_is_outer(self) -> bool {
-        self.n_v >= self.n_u
-    }
-
-    fn n_rows(self) -> usize {
-        self.n_u.max(self.n_v)
-    }
-
-    fn block(self) -> usize {
-        self.n_u.min(self.n_v)
-    }
-
-    /// (outer, inner) place of the coefficient (i along u, k along v).
-    fn place(self, i: usize, k: usize) -> (usize, usize) {
-        if self.v_is_outer() { (k, i) } else { (i, k) }
-    }
-
-    /// Index in the net's order of the coefficient at an (outer, inner) place.
-    fn coefficient(self, outer: usize, inner: usize) -> usize {
-        let (i, k) = if self.v_is_outer() { (inner, outer) } else { (outer, inner) };
-        k * self.n_u + i
-    }
-
-    /// Index in block order of the coefficient with index `c` in the net's order (v outer).
-    fn index(self, c: usize) -> usize {
-        let (row, inner) = self.place(c % self.n_u, c / self.n_u);
-        row * self.block() + inner
-    }
-
-    /// Copies what lies inside the band along both axes, of the block that couples row `row + ahead`, down, to row `row`,
-    /// across, into the 49 slots of each coefficient, from both sides.
-    fn spread(self, row: usize, ahead: usize, block: MatRef<'_, f64>, local: &mut [[f64; 49]]) {
-        let slot = |by_row: usize, by_inner: usize| {
-            if self.v_is_outer() { by_row * 7 + by_inner } else { by_inner * 7 + by_row }
-        };
-        for across in 0..self.block() {
-            let around = across.saturating_sub(REACH)..(across + REACH + 1).min(self.block());
-            for down in around {
-                let value = block[(down, across)];
-                local[self.coefficient(row + ahead, down)][slot(REACH - ahead, across + REACH - down)] =
-                    value;
-                local[self.coefficient(row, across)][slot(REACH + ahead, down + REACH - across)] = value;
-            }
-        }
-    }
-
-    fn len(self) -> usize {
-        self.n_rows() * (REACH + 1) * self.block() * self.block()
-    }
-
-    /// Range of the block that couples row `row` to row `row - back`.
-    fn range(self, row: usize, back: usize) -> std::ops::Range<usize> {
-        let size = self.block() * self.block();
-        let start = (row * (REACH + 1) + back) * size;
-        start..start + size
-    }
-}
 
 /// A symmetric matrix over the coefficients of a net: blocks (row, row - 0..=3), column-major, lower triangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockBandedMatrix {
-    layout: Layout,
-    blocks: Vec<f64>,
-}
-
-/// The lower Cholesky factor of a [`BlockBandedMatrix`], in the same layout.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BlockBandedFactor {
     layout: Layout,
     blocks: Vec<f64>,
 }
@@ -226,24 +150,12 @@ impl BlockBandedMatrix {
 }
 
 impl BlockBandedFactor {
-    /// Builds a factor from its blocks; `None` when their number does not fit the coefficients.
-    #[must_use]
-    pub fn from_blocks(n_u: usize, n_v: usize, blocks: Vec<f64>) -> Option<Self> {
-        let layout = Layout { n_u, n_v };
-        (blocks.len() == layout.len()).then_some(Self { layout, blocks })
-    }
-
-    /// Returns the blocks, to be stored or sent.
-    #[must_use]
-    pub fn blocks(&self) -> &[f64] {
-        &self.blocks
-    }
-
     /// Solves A X = B in place; rows of `x` in the net's order, one column per component.
     pub fn solve<const D: usize>(&self, x: &mut [[f64; D]]) {
         let _clear = ClearVectorRegisters;
-        let mut work = self.forward(x);
         let (layout, m) = (self.layout, self.layout.block());
+        let forward = self.forward(x);
+        let mut work = Mat::from_fn(x.len(), D, |place, d| forward[place][d]);
         for row in (0..layout.n_rows()).rev() {
             let (done, rest) = work.as_mut().split_at_row_mut((row + 1) * m);
             let mut target = done.subrows_mut(row * m, m);
@@ -258,34 +170,6 @@ impl BlockBandedFactor {
         for (c, row) in x.iter_mut().enumerate() {
             *row = std::array::from_fn(|d| work[(layout.index(c), d)]);
         }
-    }
-
-    /// Returns the variance `f' A^-1 f` of a linear functional with coefficients `f` in the net's order.
-    #[must_use]
-    pub fn variance(&self, f: &[f64]) -> f64 {
-        let columns: Vec<[f64; 1]> = f.iter().map(|x| [*x]).collect();
-        let _clear = ClearVectorRegisters;
-        self.forward(&columns).as_ref().squared_norm_l2()
-    }
-
-    /// L^-1 B in block order.
-    fn forward<const D: usize>(&self, b: &[[f64; D]]) -> Mat<f64> {
-        let (layout, m) = (self.layout, self.layout.block());
-        let mut work = Mat::<f64>::zeros(b.len(), D);
-        for (c, row) in b.iter().enumerate() {
-            (0..D).for_each(|d| work[(layout.index(c), d)] = row[d]);
-        }
-        for row in 0..layout.n_rows() {
-            let (done, rest) = work.as_mut().split_at_row_mut(row * m);
-            let mut target = rest.subrows_mut(0, m);
-            for back in 1..=REACH.min(row) {
-                let block = view(&self.blocks[layout.range(row, back)], m);
-                let known = done.as_ref().subrows((row - back) * m, m);
-                matmul(target.as_mut(), Accum::Add, block, known, -1.0, Par::Seq);
-            }
-            solve_lower_triangular_in_place(view(&self.blocks[layout.range(row, 0)], m), target, Par::Seq);
-        }
-        work
     }
 
     /// Returns the inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
@@ -336,7 +220,7 @@ impl BlockBandedFactor {
                 }
             }
             recent.put(row, 0, &work);
-            (0..=reach).for_each(|ahead| layout.spread(row, ahead, recent.block(row, ahead), &mut local));
+            (0..=reach).for_each(|ahead| spread(layout, row, ahead, recent.block(row, ahead), &mut local));
         }
         local
     }
@@ -363,6 +247,26 @@ impl Recent {
 
     fn put(&mut self, row: usize, ahead: usize, block: &Mat<f64>) {
         self.blocks[Self::place(row, ahead)].copy_from(block);
+    }
+}
+
+/// Copies what lies inside the band along both axes, of the block that couples row `row + ahead`, down, to row `row`,
+/// across, into the 49 slots of each coefficient, from both sides.
+fn spread(layout: Layout, row: usize, ahead: usize, block: MatRef<'_, f64>, local: &mut [[f64; 49]]) {
+    let slot = |by_row: usize, by_inner: usize| {
+        if layout.v_is_outer() { by_row * 7 + by_inner } else { by_inner * 7 + by_row }
+    };
+    let coefficient = |outer: usize, inner: usize| {
+        let (i, k) = if layout.v_is_outer() { (inner, outer) } else { (outer, inner) };
+        k * layout.n_u + i
+    };
+    for across in 0..layout.block() {
+        let around = across.saturating_sub(REACH)..(across + REACH + 1).min(layout.block());
+        for down in around {
+            let value = block[(down, across)];
+            local[coefficient(row + ahead, down)][slot(REACH - ahead, across + REACH - down)] = value;
+            local[coefficient(row, across)][slot(REACH + ahead, down + REACH - across)] = value;
+        }
     }
 }
 

@@ -9,6 +9,7 @@
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
 //! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
 //! | [`uniform_knots`], [`penalised_curve`], [`tensor_spline`] | uniform cubic B-splines: basis, smoothing curve, surface |
+//! | [`block_banded`] | a tensor spline's Cholesky factor: variances |
 //! | [`block_banded_cholesky`] | Cholesky factor of a tensor spline's normal matrix, and the band of its inverse |
 //! | [`reml`], `normal_equations`, [`spline_fit`] | penalised least squares on scattered points, smoothing by restricted maximum likelihood |
 //!
@@ -16,16 +17,24 @@
 //! machine. Lengths have no unit here. No clock, no files, no randomness but from a given seed.
 
 pub mod adaptive_metropolis;
+pub mod block_banded;
+#[cfg(feature = "solvers")]
 pub mod block_banded_cholesky;
 pub mod normal_distribution;
+#[cfg(feature = "solvers")]
 mod normal_equations;
 pub mod penalised_curve;
 pub mod random;
+#[cfg(feature = "solvers")]
 pub mod reml;
+#[cfg(feature = "solvers")]
 pub mod simd;
+#[cfg(feature = "solvers")]
 pub mod sparse;
+#[cfg(feature = "solvers")]
 pub mod spline_fit;
 pub mod tensor_spline;
 pub mod uniform_knots;
 pub mod union_find;
+#[cfg(feature = "solvers")]
 mod vector_registers;

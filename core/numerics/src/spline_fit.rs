@@ -1,6 +1,6 @@
 //! Penalised weighted least squares of a bicubic spline on scattered points: sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2.
 
-use crate::block_banded_cholesky::BlockBandedFactor;
+use crate::block_banded::BlockBandedFactor;
 use crate::normal_equations::CellMoments;
 use crate::reml::{Penalty, SelectedPenalty};
 use crate::tensor_spline::TensorSpline;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, SVector};
 
-use crate::uniform_knots::{BASIS, UniformKnots};
+use crate::uniform_knots::UniformKnots;
 
 /// A bicubic tensor-product spline from (u, v) to `D` components.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,12 +129,13 @@ impl<const D: usize> TensorSpline<D> {
 
     /// Returns the polynomial of the span (i, k) in its middle-centred coordinates s (along u) and t (along v): `[q][p]` is
     /// the coefficient of s^p t^q.
+    #[cfg(feature = "solvers")]
     pub(crate) fn polynomial(&self, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
         let mut bicubic = [[[0.0; D]; 4]; 4];
-        for (b, along_v) in BASIS.iter().enumerate() {
+        for (b, along_v) in crate::uniform_knots::BASIS.iter().enumerate() {
             // Row k + b of the spline as a polynomial in s.
             let mut row = [[0.0; D]; 4];
-            for (control, along_u) in self.row(i, k + b).iter().zip(&BASIS) {
+            for (control, along_u) in self.row(i, k + b).iter().zip(&crate::uniform_knots::BASIS) {
                 for (slot, f) in row.iter_mut().zip(along_u) {
                     (0..D).for_each(|d| slot[d] += f * control[d]);
                 }

@@ -18,27 +18,44 @@
 //! | [`correspondence`] | two scans of a plate | outline of the blank by a baseline scan; test for a plate put back turned |
 //! | [`inspection`] | outline, surface -> figures | dimension checks, bending energy, marker detection, calibration |
 //!
+//! Without the feature `measure` there are `plate`, `surface` and `target_surface` alone: what a comparison evaluates.
+//!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket, and works on one
 //! thread at a time: the same columns give the same result to the last bit.
 
+#[cfg(feature = "measure")]
 pub mod correspondence;
+#[cfg(feature = "measure")]
 pub mod evaluate;
+#[cfg(feature = "measure")]
 pub mod extract;
+#[cfg(feature = "measure")]
 pub mod flatten;
+#[cfg(feature = "measure")]
 pub mod inspection;
+#[cfg(feature = "measure")]
 pub mod measure;
+#[cfg(feature = "measure")]
 pub mod mesh;
+#[cfg(feature = "measure")]
 pub mod outline;
 pub mod plate;
 pub mod surface;
 pub mod target_surface;
 
+#[cfg(feature = "measure")]
 pub use correspondence::{BlankError, Reorientation, reorientation};
+#[cfg(feature = "measure")]
 pub use extract::{Beyond, Crossing, Patch, Sample};
+#[cfg(feature = "measure")]
 pub use flatten::{Chart, Flatten, FlattenError};
+#[cfg(feature = "measure")]
 pub use inspection::{BendingEnergy, Check, EdgeCheck, EdgeDoubt, ShapeChecks, corners_seen, edge_doubts};
+#[cfg(feature = "measure")]
 pub use measure::{MeasureError, Measured, Measurement, Scanned, measure};
+#[cfg(feature = "measure")]
 pub use mesh::{DiskMesh, DiskParts, MeshError};
+#[cfg(feature = "measure")]
 pub use outline::{Corner, EdgeCurve, HeightField, Outline, OutlineError};
 pub use plate::{Blank, PlateSpec, RegionOfInterest};
 

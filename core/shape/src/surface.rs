@@ -5,20 +5,24 @@
 //! deviations at one place. The samples' noise acts along the normal, so every standard deviation is that of the normal
 //! direction; the uncertainty of material points within the surface comes from the flattening.
 
+#[cfg(feature = "measure")]
 mod fit_surface;
 mod mask;
 mod parts;
 
+#[cfg(feature = "measure")]
 pub use fit_surface::Quality;
+#[cfg(feature = "measure")]
 pub(crate) use fit_surface::{FitToSamples, fit_surface};
 pub use mask::Mask;
 pub use parts::{SurfaceError, SurfaceParts};
+#[cfg(feature = "measure")]
 pub use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
 pub use platen_numerics::tensor_spline::TensorSpline;
 pub use platen_numerics::uniform_knots::UniformKnots;
 
 use crate::Vec3;
-use platen_numerics::block_banded_cholesky::BlockBandedFactor;
+use platen_numerics::block_banded::BlockBandedFactor;
 use platen_numerics::uniform_knots::LocalBasis;
 
 /// The mid-surface S(u, v), (u, v) in `[0, W] x [0, H]`, metres, scanner frame.
@@ -70,6 +74,7 @@ pub struct Curvature {
 
 impl Surface {
     /// Builds the surface of a fit over the original rectangle, which starts in (0, 0).
+    #[cfg(feature = "measure")]
     #[must_use]
     pub fn new(fitted: FittedSpline<3>, thickness: f64, mask: Mask) -> Self {
         let covariance = fitted.precision.local_inverse();

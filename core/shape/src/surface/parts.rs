@@ -1,6 +1,6 @@
 //! A surface as plain numbers, to be stored or sent across a library boundary.
 
-use platen_numerics::block_banded_cholesky::BlockBandedFactor;
+use platen_numerics::block_banded::BlockBandedFactor;
 use platen_numerics::tensor_spline::TensorSpline;
 use platen_numerics::uniform_knots::UniformKnots;
 

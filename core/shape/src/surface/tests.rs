@@ -1,3 +1,5 @@
+#![cfg(feature = "measure")]
+
 use super::*;
 
 /// A surface without noise over 3 x 2 m, with points `f(u, v)` of the mid-surface.
