@@ -185,9 +185,11 @@ typedef struct platen_span {
 #define PLATEN_FORMAT_WINDOW "platen.window/1"     /* host -> driver, optional */
 #define PLATEN_FORMAT_MESH "platen.mesh/2"         /* host -> flattening */
 #define PLATEN_FORMAT_CHART "platen.chart/1"       /* flattening -> host */
-#define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison; role: now, before, baseline */
+#define PLATEN_FORMAT_SURFACE "platen.surface/1"   /* host -> comparison, advisor; role: now, before, baseline */
 #define PLATEN_FORMAT_TASK "platen.task/1"         /* host -> comparison, JSON: platen.task-1.json */
 #define PLATEN_FORMAT_FINDINGS "platen.findings/1" /* comparison -> host, JSON: platen.findings-1.json */
+#define PLATEN_FORMAT_RECORD "platen.record/1"     /* host -> advisor, JSON: platen.record-1.json */
+#define PLATEN_FORMAT_ADVICE "platen.advice/1"     /* advisor -> host, JSON: platen.advice-1.json */
 #define PLATEN_FORMAT_GRID "platen.grid/1"         /* comparison -> host */
 
 /* Rows run down from the top, columns by increasing azimuth, counter-clockwise seen from above; z is up. */

@@ -258,6 +258,10 @@ header! {
 pub const TASK: &CStr = c"platen.task/1";
 /// Format of a comparison's findings: UTF-8 JSON, no header.
 pub const FINDINGS: &CStr = c"platen.findings/1";
+/// Format of the history of a plate, an advisor's input: UTF-8 JSON, no header.
+pub const RECORD: &CStr = c"platen.record/1";
+/// Format of an advisor's advice: UTF-8 JSON, no header.
+pub const ADVICE: &CStr = c"platen.advice/1";
 
 /// Fault of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -23,6 +23,8 @@ const FOOT_STEPS: usize = 3;
 pub struct Truth {
     /// Corners (0,0), (W,0), (W,H), (0,H) of the scanned face.
     pub corners_m: [[f64; 3]; 4],
+    /// Edges v = 0, u = W, v = H, u = 0 of the scanned face, counter-clockwise; on a bevelled plate inside of the rectangle.
+    pub edges: [Vec<[f64; 3]>; 4],
     /// Markers on the scanned face.
     pub markers: Vec<TrueMarker>,
     /// Positions and curvatures at a few hundred places.

@@ -6,7 +6,7 @@ use platen_host::cli::bench::{BenchArguments, Part};
 use platen_host::cli::{CliError, Common, output};
 
 use crate::machine::Machine;
-use crate::{random, scale, seeds, tables};
+use crate::{advice, random, scale, seeds, tables};
 
 use serde_json::json;
 
@@ -27,6 +27,9 @@ pub(crate) fn run(common: &Common, arguments: &BenchArguments) -> Result<ExitCod
             Some(n) => random::random(&catalogue, &arguments.out, arguments, n, common.json)?,
             None => seeds::accuracy(&catalogue, &arguments.out, arguments, common.json)?,
         };
+    }
+    if wanted(Part::Advice) {
+        document["advice"] = advice::study(arguments, common.json)?;
     }
     if wanted(Part::Scale) {
         document["scale"] = scale::scale(common, arguments)?;

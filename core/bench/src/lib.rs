@@ -6,12 +6,14 @@
 //! | `tables` | tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", beside this machine's figures |
 //! | `seeds`, `strokes` | accuracy over many seeds: plates of every shape, strokes, templates |
 //! | `random` | accuracy over random scenes, coverage of the stated intervals |
+//! | `advice` | plates of a hidden steel bent by the advice and by shop strategies |
 //! | `scale` | time and memory from 1.6 to 44 million cells |
 //! | `soak` | strokes against a simulated press on a faulty line |
 //! | `accuracy` | the difference of a measurement from the known truth |
 //! | `scene`, `stages`, `figures`, `machine` | simulated scans, timed stages, statistics, the computer |
 
 pub mod accuracy;
+mod advice;
 mod bench;
 mod figures;
 mod machine;

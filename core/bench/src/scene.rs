@@ -41,6 +41,9 @@ pub(super) struct Scene {
     pub(super) shape: String,
     /// Centre of the mid-surface in the scanner frame, millimetres.
     pub(super) centre_mm: [f64; 3],
+    /// Distance of the face's edge inside the mid-surface's edge, and height of the root face between the flanks of the bevel,
+    /// millimetres; 0 for square edges.
+    pub(super) bevel_mm: [f64; 2],
     /// Direction of u, counter-clockwise from the line of sight, degrees.
     pub(super) yaw_deg: f64,
 }
@@ -95,7 +98,8 @@ impl Scene {
             width,
             height,
             thickness,
-            face_inset: 0.0,
+            face_inset: metres(self.bevel_mm[0]),
+            root_face: metres(self.bevel_mm[1]),
             u_axis: Some(Vec3::new(cos, sin, 0.0)),
             region: None,
         }
@@ -107,9 +111,10 @@ impl Scene {
         let mut swing = |reach: f64| reach * (2.0 * random.f64() - 1.0);
         let centre = self.centre_mm.map(|mm| mm + 1000.0 * swing(SHIFT));
         let yaw = self.yaw_deg + swing(TURN_DEG);
-        let [width, height, thickness] = self.size_mm;
+        let ([width, height, thickness], [inset, root]) = (self.size_mm, self.bevel_mm);
         format!(
-            "[blank]\nwidth_mm = {width:?}\nheight_mm = {height:?}\nthickness_mm = {thickness:?}\nmarkers_mm = {:?}\n\
+            "[blank]\nwidth_mm = {width:?}\nheight_mm = {height:?}\nthickness_mm = {thickness:?}\n\
+             face_inset_mm = {inset:?}\nroot_face_mm = {root:?}\nmarkers_mm = {:?}\n\
              [shape]\n{}\n[pose]\ncentre_mm = {centre:?}\nyaw_deg = {yaw:?}\n",
             self.markers_mm(),
             self.shape,

@@ -26,6 +26,7 @@ pub(super) fn scenes() -> Vec<Scene> {
         size_mm,
         shape: shape.into(),
         centre_mm: [6000.0, 0.0, -3600.0],
+        bevel_mm: [0.0; 2],
         yaw_deg,
     };
     let usual = [3000.0, 2500.0, 36.0];

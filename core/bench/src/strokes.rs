@@ -109,6 +109,7 @@ pub(super) fn errors(
             size_mm: SIZE_MM,
             shape,
             centre_mm: [6000.0, 0.0, -3600.0],
+            bevel_mm: [0.0; 2],
             yaw_deg: 10.0,
         };
         // Four scans a seed, none with the errors of another.

@@ -55,6 +55,7 @@ pub(super) fn scene() -> Scene {
         size_mm: [4000.0, 2755.0, 36.0],
         shape: "shape = \"cylinder\"\nradius_mm = 12000.0\naxis_deg = 110.0".into(),
         centre_mm: [6770.0, 0.0, -3600.0],
+        bevel_mm: [0.0; 2],
         yaw_deg: 30.0,
     }
 }

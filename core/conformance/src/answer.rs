@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use platen_engine::plugin::{Comparison, Flattening, Instance, JobSpec, Kind, Scanner, Surfaces};
+use platen_engine::plugin::{
+    Advisor, CancelToken, Comparison, Flattening, Instance, JobSpec, Kind, Scanner, Surfaces,
+};
 use platen_model::Report;
 use platen_shape::{Chart, Flatten};
 use sha2::{Digest as _, Sha256};
@@ -20,6 +22,7 @@ pub(crate) struct NoAnswer(pub(crate) Verdict);
 pub(crate) enum Any {
     Flattening(Flattening),
     Comparison(Comparison),
+    Advisor(Advisor),
     Scanner(Scanner),
 }
 
@@ -29,6 +32,7 @@ impl Any {
         Ok(match subject.kind()? {
             Kind::Flattening => Self::Flattening(subject.flattening(limit)?),
             Kind::Comparison => Self::Comparison(subject.comparison(limit)?),
+            Kind::Advisor => Self::Advisor(subject.advisor(limit)?),
             Kind::Scanner => Self::Scanner(subject.scanner()?),
         })
     }
@@ -37,6 +41,7 @@ impl Any {
         match self {
             Self::Flattening(one) => one.instance(),
             Self::Comparison(one) => one.instance(),
+            Self::Advisor(one) => one.instance(),
             Self::Scanner(one) => one.instance(),
         }
     }
@@ -46,6 +51,7 @@ impl Any {
         match self {
             Self::Flattening(one) => of_flattening(one),
             Self::Comparison(one) => of_comparison(one),
+            Self::Advisor(one) => of_advisor(one),
             Self::Scanner(one) => of_scanner(one, limit),
         }
     }
@@ -121,6 +127,29 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Result<String, Verdict> 
             sha.update(&field.name);
             field.values.iter().for_each(|x| sha.update(x.to_bits().to_le_bytes()));
         }
+    }
+    Ok(hex(sha))
+}
+
+/// Situations of an advisor, by name: radius of the plate, metres; how much is seen; strokes so far.
+const ADVISED: [(&str, f64, f64, usize); 4] = [
+    ("a flat plate", 1e4, 1.0, 0),
+    ("a plate half way, after three strokes", 9.0, 1.0, 3),
+    ("a plate bent too far", 5.0, 1.0, 3),
+    ("a third of the plate unseen", 9.0, 0.67, 3),
+];
+
+/// Returns a digest of the advice in the reference situations.
+pub(crate) fn of_advisor(advisor: &Advisor) -> Result<String, Verdict> {
+    let mut sha = Sha256::new();
+    for (name, radius, seen, strokes) in ADVISED {
+        let surface = |radius, seen| {
+            reference::surface(radius, seen).ok_or_else(|| failed("the kit has no reference surface"))
+        };
+        let (now, blank) = (surface(radius, seen)?, surface(1e4, 1.0)?);
+        let history = reference::history(strokes);
+        let advice = advisor.advise(&history, &now, Some(&blank), CancelToken::default());
+        sha.update(format!("{:?}", advice.map_err(|error| failed(format!("{name}: {error}")))?));
     }
     Ok(hex(sha))
 }

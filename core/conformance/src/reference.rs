@@ -1,6 +1,9 @@
 //! Reference inputs of closed form: meshes with known charts, surfaces, the task of a plate.
 
-use platen_model::{Facing, RadiusOf, Target, TargetShape, Task};
+use platen_model::{
+    Bend, Centre, Die, Facing, PlateHistory, PressedStroke, RadiusOf, ReferenceLine, Seat, Steel, Target,
+    TargetShape, Task, Template,
+};
 use platen_shape::flatten::closed_form::{ClosedForm, cylinder};
 use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 use platen_shape::{Surface, Vec3};
@@ -71,5 +74,39 @@ pub(crate) fn task(target: bool) -> Task {
         sigma_true: None,
         supports: Vec::new(),
         supports_changed: false,
+    }
+}
+
+/// The history of that plate after so many strokes from its left edge, with one template along u.
+pub(crate) fn history(strokes: usize) -> PlateHistory {
+    let line = ReferenceLine { name: "L".into(), from: [0.0, 1.0], to: [SIZE[0], 1.0] };
+    let template = Template {
+        name: "T".into(),
+        line: "L".into(),
+        chord: 2.0,
+        centre: Centre::Worst,
+        limit: 3e-3,
+        seat: Seat::Gravity,
+        source: None,
+    };
+    let stroke = |k: usize| PressedStroke {
+        stroke: k as u16 + 1,
+        depth: Some(4.5e-3),
+        bends: vec![Bend {
+            at: [0.3 + 0.3 * k as f64, 1.0],
+            direction: std::f64::consts::FRAC_PI_2,
+            angle: 0.03,
+            sigma: 3e-4,
+        }],
+        ..PressedStroke::default()
+    };
+    PlateHistory {
+        task: Task { reference_lines: vec![line], templates: vec![template], ..task(true) },
+        templates: Vec::new(),
+        die: Some(Die { id: 1, opening: 0.36, edge: 0.2 }),
+        steel: Some(Steel { grade: None, yield_strength: 440e6, heat: None }),
+        strokes: (0..strokes).map(stroke).collect(),
+        like: None,
+        may_turn_over: true,
     }
 }

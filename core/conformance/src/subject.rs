@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use platen_engine::plugin::{
-    Catalogue, Comparison, Descriptor, Flattening, Instance, Kind, Library, Limits, PluginError, Scanner,
-    Settings as WorkerSettings,
+    Advisor, Catalogue, Comparison, Descriptor, Flattening, Instance, Kind, Library, Limits, PluginError,
+    Scanner, Settings as WorkerSettings,
 };
 use platen_plant::{OptionValue, PluginUse, check_options};
 
@@ -136,6 +136,11 @@ impl Subject {
         let created =
             Comparison::create(self.library()?, self.values()?, self.settings.limit).map_err(refused)?;
         Ok(created.with_limit(limit))
+    }
+
+    /// Returns an advisor with this deadline.
+    pub(crate) fn advisor(&self, limit: Duration) -> Result<Advisor, Verdict> {
+        Advisor::create(self.library()?, self.values()?, limit).map_err(refused)
     }
 
     /// Returns a connected scanner, with so much memory.

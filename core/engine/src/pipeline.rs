@@ -132,13 +132,14 @@ impl Pipeline {
         self.instances().try_for_each(Instance::revive)
     }
 
-    /// Returns the plate for the geometry: size, inset, direction of u, region of interest.
+    /// Returns the plate for the geometry: size, edges, direction of u, region of interest.
     pub fn spec(&self, plate: &PlateFile) -> PlateSpec {
         PlateSpec {
             width: plate.plate.width,
             height: plate.plate.height,
             thickness: plate.plate.thickness,
             face_inset: plate.plate.face_inset,
+            root_face: plate.plate.root_face,
             u_axis: self.u_axis,
             region: self.region,
         }

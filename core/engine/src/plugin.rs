@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `catalogue` | the plugin folders, and the libraries in them |
 //! | `library`, `descriptor` | a plugin of a library, and its description |
-//! | `scanner`, `flattening`, `comparison` | the three kinds behind safe types |
+//! | `scanner`, `flattening`, `comparison`, `advisor` | the four kinds behind safe types |
 //! | `instance`, `job` | one configured plugin, and what it is asked for |
 //! | `faults`, `quarantine` | when a plugin rests, and when it is given up |
 //! | `worker` | its process: messages, shared memory, limits; both ends |
@@ -13,6 +13,7 @@
 //!
 //! All `unsafe` of the host is in this module, nearly all of it runs in workers.
 
+mod advisor;
 mod catalogue;
 mod clock;
 mod comparison;
@@ -28,6 +29,7 @@ mod quarantine;
 mod scanner;
 mod worker;
 
+pub use advisor::Advisor;
 pub use catalogue::{Catalogue, Listed};
 pub use comparison::{Comparison, Surfaces};
 pub use descriptor::{Descriptor, Kind};

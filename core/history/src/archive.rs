@@ -169,7 +169,7 @@ impl Archive {
         rows.into_iter().map(|(run_id, stroke)| stroke.map_err(|error| damaged(run_id, error))).collect()
     }
 
-    fn rows<T>(
+    pub(crate) fn rows<T>(
         &self,
         sql: &str,
         values: impl Params,
@@ -232,7 +232,7 @@ pub(crate) fn text(time: Timestamp) -> String {
     format!("{time:.3}")
 }
 
-fn time(row: &Row<'_>, column: usize) -> rusqlite::Result<Timestamp> {
+pub(crate) fn time(row: &Row<'_>, column: usize) -> rusqlite::Result<Timestamp> {
     let text: String = row.get(column)?;
     text.parse().map_err(|error: jiff::Error| wrong(column, error.to_string()))
 }

@@ -12,8 +12,11 @@
 //! as CSV and Parquet. This crate does not depend on Modbus, plugins or geometry, and reads no clock: callers pass the time.
 
 mod archive;
+mod backup;
+mod change;
 mod compare;
 mod error;
+mod event;
 mod export;
 mod history;
 mod journal;
@@ -22,8 +25,11 @@ mod schema;
 mod stroke;
 
 pub use archive::{Archive, Filter};
+pub use backup::adopt;
+pub use change::{Change, ChangeKind, Owner};
 pub use compare::{Difference, compare};
 pub use error::Error;
+pub use event::Event;
 pub use export::StrokeTable;
 pub use history::{Accepted, Finished, History};
 pub use stroke::{PlateRecord, Stroke};

@@ -1,6 +1,6 @@
 //! Opening of the database: created when new, refused when it is anything else.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::{Connection, OpenFlags};
@@ -9,8 +9,13 @@ use crate::Error;
 
 /// Marks a SQLite file as a history of platen: "pltn".
 const APPLICATION_ID: i32 = 0x706c_746e;
-/// Version of the tables in `schema.sql`.
-const VERSION: i32 = 1;
+/// Format of the first release, which counted otherwise.
+const FIRST: i32 = 1;
+/// Format that this program writes: 100 x major + minor.
+const VERSION: i32 = 101;
+/// Steps from one minor format to the next; an empty database gets all of them.
+const STEPS: [&str; 2] = [include_str!("schema.sql"), include_str!("schema-1.1.sql")];
+
 /// Longest wait for a reader's checkpoint; in write-ahead mode the writer itself never waits.
 const BUSY: Duration = Duration::from_secs(5);
 
@@ -22,7 +27,10 @@ pub(crate) fn open_writer(path: &Path) -> Result<Connection, Error> {
     if is_empty(&connection, path)? {
         create(&mut connection).map_err(&storage)?;
     }
-    check(&connection, path)?;
+    let format = check(&connection, path)?;
+    if format < VERSION {
+        extend(&mut connection, path, format)?;
+    }
     connection
         .execute_batch("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;")
         .map_err(&storage)?;
@@ -43,10 +51,66 @@ pub(crate) fn open_reader(path: &Path) -> Result<Connection, Error> {
 /// fills.
 fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
-    transaction.execute_batch(include_str!("schema.sql"))?;
+    for step in STEPS {
+        transaction.execute_batch(step)?;
+    }
     transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()
+}
+
+/// Extends an older minor format: a checked copy beside the database first, then one transaction. A process that dies here leaves the
+/// older format, and the next one begins anew. Rows and columns that are there stay as they are.
+fn extend(connection: &mut Connection, path: &Path, from: i32) -> Result<(), Error> {
+    let storage = Error::storage(path);
+    let copy = copy_path(path, from);
+    copy_checked(connection, path, &copy)?;
+    let transaction = connection.transaction().map_err(&storage)?;
+    for step in &STEPS[usize::try_from(from % 100 + 1).unwrap_or(STEPS.len()).min(STEPS.len())..] {
+        transaction.execute_batch(step).map_err(&storage)?;
+    }
+    transaction.pragma_update(None, "user_version", VERSION).map_err(&storage)?;
+    transaction.commit().map_err(&storage)
+}
+
+/// Returns the path of the copy that is made before a format is extended: `history.sqlite.1.0`.
+fn copy_path(path: &Path, format: i32) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(format!(".{}", words(format)));
+    PathBuf::from(name)
+}
+
+/// Copies a database by one read transaction, beside a writer or not, and checks the copy. A half copy never has the name.
+pub(crate) fn copy_checked(connection: &Connection, path: &Path, copy: &Path) -> Result<(), Error> {
+    let storage = Error::storage(copy);
+    let mut part = copy.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let unreachable = |source| Error::Unreachable { path: part.clone(), source };
+    if part.exists() {
+        std::fs::remove_file(&part).map_err(unreachable)?;
+    }
+    connection.execute("VACUUM INTO ?1", [part.to_string_lossy()]).map_err(&storage)?;
+    let found = damage(&Connection::open(&part).map_err(&storage)?).map_err(&storage)?;
+    if let Some(found) = found {
+        return Err(Error::Foreign {
+            path: path.to_owned(),
+            why: format!("is damaged: {found}; restore it from a backup (`platen history restore`)"),
+        });
+    }
+    std::fs::File::open(&part).and_then(|file| file.sync_all()).map_err(unreachable)?;
+    std::fs::rename(&part, copy).map_err(unreachable)
+}
+
+/// Returns the first damage that SQLite finds in a database.
+pub(crate) fn damage(connection: &Connection) -> rusqlite::Result<Option<String>> {
+    let found: String = connection.query_row("PRAGMA integrity_check(1)", [], |row| row.get(0))?;
+    Ok((found != "ok").then_some(found))
+}
+
+/// Returns a format in words: 1.1.
+pub(crate) fn words(format: i32) -> String {
+    format!("{}.{}", format / 100, format % 100)
 }
 
 fn is_empty(connection: &Connection, path: &Path) -> Result<bool, Error> {
@@ -54,7 +118,8 @@ fn is_empty(connection: &Connection, path: &Path) -> Result<bool, Error> {
     connection.query_row(tables, [], |row| row.get(0)).map_err(|source| refuse(path, source))
 }
 
-fn check(connection: &Connection, path: &Path) -> Result<(), Error> {
+/// Returns the format of a history. One of the same major number can be read and written: later minor ones only add.
+fn check(connection: &Connection, path: &Path) -> Result<i32, Error> {
     let pragma = |name: &str| -> Result<i32, Error> {
         connection.pragma_query_value(None, name, |row| row.get(0)).map_err(|source| refuse(path, source))
     };
@@ -63,9 +128,12 @@ fn check(connection: &Connection, path: &Path) -> Result<(), Error> {
         return foreign("is a database, but not a history of platen; name another file".to_owned());
     }
     match pragma("user_version")? {
-        VERSION => Ok(()),
+        FIRST => Ok(100),
+        format if format / 100 == VERSION / 100 => Ok(format),
         other => foreign(format!(
-            "has format {other}, this program reads format {VERSION}; use the program that wrote it"
+            "has format {}, this program reads format {}; use the program that wrote it",
+            words(other),
+            words(VERSION)
         )),
     }
 }

@@ -7,7 +7,9 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use jiff::{SignedDuration, Timestamp};
-use platen_history::{Accepted, Archive, Difference, Error, Filter, Finished, History, StrokeTable, compare};
+use platen_history::{
+    Accepted, Archive, ChangeKind, Difference, Error, Filter, Finished, History, Stroke, StrokeTable, compare,
+};
 use platen_model::{Stage, StrokeKey, Verdict};
 
 const PRESS: u16 = 3;
@@ -474,9 +476,9 @@ fn files_that_are_not_a_history_are_left_alone() {
     check("other.sqlite", "is a database, but not a history of platen; name another file");
     database(
         "newer.sqlite",
-        "CREATE TABLE t (x); PRAGMA application_id = 0x706c746e; PRAGMA user_version = 2",
+        "CREATE TABLE t (x); PRAGMA application_id = 0x706c746e; PRAGMA user_version = 200",
     );
-    check("newer.sqlite", "has format 2, this program reads format 1; use the program that wrote it");
+    check("newer.sqlite", "has format 2.0, this program reads format 1.1; use the program that wrote it");
     let absent = folder.path().join("absent.sqlite");
     let error = Archive::open(&absent).unwrap_err().to_string();
     assert_eq!(error, format!("{}: No such file or directory (os error 2)", absent.display()));
@@ -491,4 +493,95 @@ fn a_row_changed_by_hand_is_named() {
     other.execute("UPDATE stroke SET verdict = 'good'", []).unwrap();
     let error = fixture.archive().stroke(1).unwrap_err().to_string();
     assert!(error.contains("run 1: ") && error.contains("unknown verdict \"good\""), "{error}");
+}
+
+/// A record of the first release: it is read as it is, a host extends it with a copy before, and no stroke is passed over.
+#[test]
+fn a_record_of_format_1_0_is_read_and_extended() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("history.sqlite");
+    let old = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/records/1.0.sqlite");
+    std::fs::copy(&old, &path).unwrap();
+    let strokes = Archive::open(&path).unwrap().strokes(&Filter::default()).unwrap();
+    assert_eq!(strokes.len(), 3);
+    assert!(Archive::open(&path).unwrap().changes(0, 100).unwrap().is_empty());
+
+    let history = History::open(&path, PRESS, Timestamp::UNIX_EPOCH).unwrap();
+    assert_eq!(history.archive().strokes(&Filter::default()).unwrap(), strokes);
+    let changes = history.archive().changes(0, 100).unwrap();
+    let kinds: Vec<_> = changes.iter().map(|change| (change.run_id.unwrap(), change.kind)).collect();
+    let of = |run| [(run, ChangeKind::Accepted), (run, ChangeKind::Finished), (run, ChangeKind::Acked)];
+    assert_eq!(kinds, [of(1), of(2), of(3)].concat());
+    assert_eq!(history.archive().changes(changes[4].n, 2).unwrap(), changes[5..7]);
+    drop(history);
+    assert_eq!(
+        std::fs::read(folder.path().join("history.sqlite.1.0")).map(|copy| copy.len() > 4096).ok(),
+        Some(true)
+    );
+    History::open(&path, PRESS, Timestamp::UNIX_EPOCH).unwrap();
+    assert_eq!(Archive::open(&path).unwrap().changes(0, 100).unwrap(), changes, "extended once");
+}
+
+#[test]
+fn each_step_is_a_change_and_a_repeated_one_none() {
+    let mut fixture = Fixture::new();
+    let run_id = fixture.accept(1, 1, None);
+    let key = StrokeKey { press: PRESS, session: 1, stroke: 1, attempt: 0 };
+    let now = fixture.tick();
+    for _ in 0..2 {
+        fixture.history().acked(key, "acknowledged", now).unwrap();
+        fixture.history().part_end(now).unwrap();
+    }
+    fixture.history().note("alarm", Some(run_id), "410 a sink is behind", now).unwrap();
+    fixture.history().note("clock", Some(99), "set back by 2.0 s", now).unwrap();
+    let changes = fixture.history().archive().changes(0, 10).unwrap();
+    let kinds: Vec<_> = changes.iter().map(|change| (change.run_id, change.kind)).collect();
+    assert_eq!(
+        kinds,
+        [
+            (Some(run_id), ChangeKind::Accepted),
+            (Some(run_id), ChangeKind::Acked),
+            (None, ChangeKind::Plate),
+            (Some(run_id), ChangeKind::Event),
+            (None, ChangeKind::Event),
+        ]
+    );
+    assert_eq!(changes[2].plate, Some(1));
+    let events = fixture.history().archive().events(0, 10).unwrap();
+    assert_eq!(
+        events.iter().map(|it| Some(it.event)).collect::<Vec<_>>(),
+        [changes[3].event, changes[4].event]
+    );
+    // A stroke that is not on record is not named.
+    assert_eq!((events[0].run_id, events[1].run_id), (Some(run_id), None));
+    assert_eq!(
+        (events[1].kind.as_str(), events[1].text.as_str(), events[1].at),
+        ("clock", "set back by 2.0 s", now)
+    );
+}
+
+#[test]
+fn a_restored_copy_has_the_same_strokes_and_another_owner() {
+    let mut fixture = Fixture::new();
+    let run_id = fixture.accept(1, 1, None);
+    fixture.history().attach_document(run_id, std::path::Path::new("old/run-000001/result.json")).unwrap();
+    let copy = fixture.folder.path().join("copy.sqlite");
+    fixture.history().archive().copy_to(&copy).unwrap();
+    let before = fixture.history().archive().strokes(&Filter::default()).unwrap();
+    let owners = platen_history::adopt(&copy, |run| format!("new/{run}")).unwrap();
+    let [[old, new]] = owners[..] else { panic!("{owners:?}") };
+    assert!(old != new && new > 0, "{owners:?}");
+    let mut after = Archive::open(&copy).unwrap().strokes(&Filter::default()).unwrap();
+    assert_eq!(after[0].document.take().unwrap(), PathBuf::from(format!("new/{run_id}")));
+    assert_eq!(after[0], Stroke { document: None, ..before[0].clone() });
+    let restored = Archive::open(&copy).unwrap();
+    assert_eq!(restored.damage().unwrap(), None);
+    // Changes from before the copy keep the number under which they were made; those after it get the new one.
+    drop(restored);
+    let mut goes_on = History::open(&copy, PRESS, Timestamp::UNIX_EPOCH).unwrap();
+    goes_on.note("alarm", None, "after", Timestamp::UNIX_EPOCH).unwrap();
+    let changes = goes_on.archive().changes(0, 10).unwrap();
+    assert_eq!(changes.iter().map(|it| it.owner).collect::<Vec<_>>(), [old, new]);
+    let owners = goes_on.archive().owners().unwrap();
+    assert_eq!(owners.iter().map(|it| (it.owner, it.after_change)).collect::<Vec<_>>(), [(old, 0), (new, 1)]);
 }

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON document.
 
+mod advise;
 pub mod bench;
 mod bridge;
 mod calibrate;
@@ -15,6 +16,7 @@ mod inspect;
 mod measure;
 mod outcomes;
 pub mod output;
+mod plate;
 mod plugins;
 pub mod press;
 pub mod run;
@@ -23,6 +25,7 @@ mod scan_source;
 mod screen;
 mod setup;
 mod status;
+mod systemd;
 mod verify;
 mod worker;
 
@@ -96,12 +99,18 @@ enum Verb {
     Inspect(inspect::Command),
     /// Check plant and plate files and list all faults
     Check(check::Command),
+    /// Make plate files from the zones of a tank
+    Plate(plate::Command),
     /// Print the register map, read registers, test link and handshake
     Press(press::Command),
     /// Show the state of a running host
     Status(status::Command),
+    /// Print the drop-in of the unit platen@ for a plant: its addresses, devices, folders
+    Systemd(systemd::Command),
     /// Make the token of the browser pages
     Screen(screen::Command),
+    /// Advise the next stroke of a plate on record
+    Advise(advise::Command),
     /// Query the record
     History(history::Command),
     /// List, test and make plugins
@@ -181,9 +190,12 @@ pub fn main() -> ExitCode {
         Verb::Convert(command) => convert::run(&cli.common, command),
         Verb::Inspect(command) => inspect::run(&cli.common, command),
         Verb::Check(command) => check::run(&cli.common, command),
+        Verb::Plate(command) => plate::run(&cli.common, command),
         Verb::Press(command) => press::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
+        Verb::Systemd(command) => systemd::run(&cli.common, command),
         Verb::Screen(command) => screen::run(&cli.common, command),
+        Verb::Advise(command) => advise::run(&cli.common, command),
         Verb::History(command) => history::run(&cli.common, command),
         Verb::Calibrate(command) => calibrate::run(&cli.common, command),
         Verb::Verify(command) => verify::run(&cli.common, command),

@@ -1,6 +1,7 @@
 //! The program `platen`: command line, and `run`, which serves a press.
 
 pub mod cli;
+mod plate_history;
 mod plugin_records;
 pub mod progress;
 pub mod run;

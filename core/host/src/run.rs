@@ -9,9 +9,11 @@
 //! | `previous_scans`, `region` | the stroke before and the baseline, from the history; the window of the next scan |
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
 //! | `screen` | the browser pages, where the plant file has `[screen]` |
+//! | `advice` | the next stroke, after the result, where the plant file has `[advice]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
 //! | `figures` | findings to figures of the press's registers |
 
+mod advice;
 mod disk;
 mod measurement_worker;
 
@@ -23,6 +25,7 @@ mod prometheus;
 mod region;
 mod scan_retention;
 mod screen;
+mod service;
 mod status;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,6 +44,7 @@ pub use plugin_status::PluginStatus;
 pub use screen::{Pages, ScreenError};
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
+use advice::AdviceDesk;
 use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, Quarantine};
@@ -101,12 +105,15 @@ pub async fn run(
         teller = started.1;
         screen = Some(tokio::spawn(started.0.keep(host.status.clone())));
     }
+    let desk = AdviceDesk::start(plant, catalogue, teller.clone(), host.answers.clone())
+        .map_err(HostError::Thread)?;
     let receivers = measurement_worker::Receivers {
         answers: host.answers.clone(),
         strokes,
         lost: Arc::clone(&beside.lost),
         screen: teller.clone(),
         plugins: Arc::clone(&beside.plugins),
+        advice: desk.clone(),
     };
     let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
@@ -120,6 +127,7 @@ pub async fn run(
         beside.clone(),
         host.answers.clone(),
     ));
+    let service = tokio::spawn(service::keep(press.mode, host.status.clone()));
     let mut press_side =
         tokio::spawn(run_press(press, link, journal::HistoryJournal(Arc::clone(&history)), side));
     let mut scanning: Option<(StrokeKey, CancelToken)> = None;
@@ -128,6 +136,7 @@ pub async fn run(
         tokio::select! {
             ended = &mut press_side => break ended,
             changed = stop.changed() => {
+                service::stopping();
                 if changed.is_err() || *stop.borrow() {
                     // The press side answers by making the registers safe; then it ends.
                     let _ = host.answers.send(platen_press::Answer::Stop);
@@ -141,10 +150,14 @@ pub async fn run(
                     hung = Some(HostError::Worker("a plugin hangs or the measurement failed".into()));
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
+                if matches!(order, Order::Command(Command::Scan { .. } | Command::PartEnd)) {
+                    desk.cancel();
+                }
                 dispatch(order, &commands, &mut scanning, &history, &beside.alarm, &teller);
             }
         }
     };
+    service.abort();
     drop(commands);
     if let Some((_, token)) = scanning {
         token.cancel();

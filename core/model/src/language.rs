@@ -32,6 +32,14 @@ impl Texts {
     }
 }
 
+/// Fills the places `{}` of a text in their order.
+#[must_use]
+pub fn fill(text: &str, values: &[&str]) -> String {
+    let mut parts = text.split("{}");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.zip(values).fold(first, |filled, (part, value)| filled + value + part)
+}
+
 /// Makes a table of texts, one constant each: name, English, Japanese.
 #[macro_export]
 macro_rules! texts {

@@ -8,6 +8,7 @@
 //! | `stroke` | [`StrokeKey`], [`StrokeData`]: identity of a stroke, and the press's data about it |
 //! | `task` | [`Task`]: the input of a comparison |
 //! | `findings`, `field` | [`Findings`], [`Field`], [`Report`]: the output of a comparison |
+//! | `plate_history`, `advice` | [`PlateHistory`], [`Advice`]: the input and the output of an advisor |
 //! | `verdict`, `figures`, `publication` | [`Verdict`], [`Figures`], [`Publication`]: the result as the press receives it |
 //! | `journal` | [`Record`], [`Recalled`]: the steps of a stroke that survive a power cut |
 //! | `alarm` | [`Code`]: numbers, texts and remedies of the alarms |
@@ -16,6 +17,7 @@
 //! Lengths in metres, angles in radians, places as (u, v) on the original rectangle. [`units`] converts to the units of
 //! people. Plain data with serde: no I/O, no clock.
 
+mod advice;
 mod alarm;
 mod field;
 mod figures;
@@ -23,6 +25,7 @@ mod findings;
 mod journal;
 mod language;
 mod plate;
+mod plate_history;
 mod publication;
 mod stroke;
 mod target;
@@ -31,16 +34,18 @@ mod template;
 pub mod units;
 mod verdict;
 
+pub use advice::{Advice, CannotAdvise, NextBend, PlannedBend, PressModel, Step};
 pub use alarm::{Alarm, Audience, Code, Severity};
 pub use field::{Field, NodeState};
 pub use figures::{Figures, Measure};
 pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
 pub use journal::{Acknowledgement, Entry, Recalled, Record, Stage};
-pub use language::{Language, Texts};
-pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support};
+pub use language::{Language, Texts, fill};
+pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support, TrimLine};
+pub use plate_history::{Bend, Die, LikePlates, PlateHistory, PressedStroke, Steel, WantedBend};
 pub use publication::{Judgement, Measurement, Publication};
 pub use stroke::{StrokeData, StrokeKey, Timestamp};
-pub use target::{Facing, RadiusOf, Target, TargetShape};
+pub use target::{FLATTEST_CONE, Facing, RadiusOf, Target, TargetShape};
 pub use task::Task;
 pub use template::{Centre, Seat, Template};
 pub use verdict::Verdict;

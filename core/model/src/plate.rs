@@ -17,6 +17,8 @@ pub struct Plate {
     pub supports: Option<String>,
     /// Distance of the scanned face's edge inside the mid-surface's edge (bevelled edges), metres.
     pub face_inset: f64,
+    /// Height of the square root face in the middle of a bevelled edge, metres.
+    pub root_face: f64,
 }
 
 /// A place whose position is reported.
@@ -26,6 +28,15 @@ pub struct Marker {
     pub name: String,
     /// Place, metres.
     pub at: [f64; 2],
+}
+
+/// A line along which the formed plate is cut, on the original rectangle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrimLine {
+    /// Name.
+    pub name: String,
+    /// Points, metres; straight on the rectangle between them.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// A straight line on the original rectangle.

@@ -59,6 +59,9 @@ pub struct StrokeData {
     pub plc_time: Option<Timestamp>,
     /// Die set in use.
     pub die_id: Option<u16>,
+    /// Code of the crew, where the plant file has `[crews]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crew: Option<u16>,
     /// A scan of the plate before its first stroke.
     pub baseline: bool,
     /// A trial: measured and recorded as one.

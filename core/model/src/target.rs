@@ -53,6 +53,10 @@ pub enum TargetShape {
     },
 }
 
+/// Largest change of a cone's radius of normal curvature along its straight line, relative to its length: the tangent of the angle between
+/// line and axis. A roof of slope 1 : 20 is no longer told from flat.
+pub const FLATTEST_CONE: f64 = 20.0;
+
 /// Surface that a radius refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

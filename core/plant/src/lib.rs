@@ -29,7 +29,7 @@ pub use fault::{Fault, Faults};
 pub use key::{Located, TomlKey};
 pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options};
-pub use plant::{PlantFile, PluginRole, PluginUse, ScanWindow, Screen, Survey, Worker};
+pub use plant::{AdviceUse, PlantFile, PluginRole, PluginUse, ScanWindow, Screen, Show, Survey, Worker};
 pub use plate::PlateFile;
 pub use source::Place;
 pub use table::TomlTable;

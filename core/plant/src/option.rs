@@ -128,6 +128,15 @@ impl RawOptions {
     }
 
     /// Makes a fault of the options as a whole.
+    /// Returns every text among the values.
+    pub fn texts(&self) -> impl Iterator<Item = &str> {
+        let entries = self.entries.as_ref().map_or(&[][..], Vec::as_slice);
+        entries.iter().filter_map(|entry| match &entry.value.kind {
+            NodeKind::String(text) => Some(text.as_str()),
+            _ => None,
+        })
+    }
+
     pub(crate) fn fault(&self, message: String) -> Fault {
         self.source.fault(&self.place, message)
     }

@@ -3,12 +3,14 @@
 //! Everything but `[scanner]` and `[press]` has a default, so that a scan can be measured without a plant file.
 //! Relative paths start at the folder of the plant file.
 
+mod advice;
 mod calibration;
 mod frame;
 mod output;
 mod plugin_use;
 mod screen;
 
+pub use advice::{AdviceUse, Show};
 pub use calibration::CalibrationUse;
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
@@ -17,10 +19,11 @@ pub use screen::Screen;
 
 use std::path::{Path, PathBuf};
 
+use platen_model::Die;
 use platen_model::units::metres;
 
 use crate::document::{Document, Reported};
-use crate::press::Press;
+use crate::press::{Input, Press};
 use crate::{Error, Fault, Faults, Located, TomlTable};
 
 /// Used where the plant file names no flattening.
@@ -80,6 +83,12 @@ pub struct PlantFile {
     pub comparisons: Vec<PluginUse>,
     /// The comparison whose figures fill the press's registers: its place among `comparisons`.
     pub register_source: Option<usize>,
+    /// Advice for the next stroke; without the table none is given.
+    pub advice: Option<AdviceUse>,
+    /// Dies of the press.
+    pub dies: Vec<Die>,
+    /// Purpose for which the codes of crews are recorded; without it none is.
+    pub crews: Option<String>,
     /// Destination of results.
     pub output: Output,
     /// Browser pages; without the table none are served.
@@ -95,6 +104,8 @@ pub enum PluginRole {
     Flattening,
     /// `[[comparison]]`.
     Comparison,
+    /// `[advice]`.
+    Advisor,
 }
 
 /// Parts of a plant file that further checks start from, whether or not other parts are faulty.
@@ -127,6 +138,9 @@ impl Default for PlantFile {
             flattening: PluginUse::by_default(FLATTENING),
             comparisons: COMPARISONS.map(PluginUse::by_default).to_vec(),
             register_source: COMPARISONS.iter().position(|name| *name == REGISTER_SOURCE),
+            advice: None,
+            dies: Vec::new(),
+            crews: None,
             output: Output::in_folder(Path::new("")),
             screen: None,
         }
@@ -205,6 +219,21 @@ impl PlantFile {
             });
             uses.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()
         });
+        let advice = root.table("advice").optional().and_then(|table| {
+            let Some(mut table) = table else { return Ok(None) };
+            let plugin = named(PluginRole::Advisor, &mut table);
+            AdviceUse::read(table, plugin).map(Some)
+        });
+        let dies = root.tables("die").and_then(|tables| {
+            let dies: Vec<_> = tables.into_iter().map(advice::read_die).collect();
+            dies.into_iter().collect::<Result<Vec<_>, _>>()
+        });
+        let crews = root.table("crews").optional().and_then(|table| {
+            let Some(mut table) = table else { return Ok(None) };
+            let purpose = table.name("purpose").required();
+            table.finish();
+            purpose.map(Some)
+        });
         let listed = root.has("comparison");
         if !root.has("flattening") {
             let flattening = PluginUse::implied(FLATTENING, document, root.place());
@@ -237,15 +266,28 @@ impl PlantFile {
         let output = root.section("output").and_then(|table| Output::read(table, folder));
         let screen = root.table("screen").optional();
         let screen = screen.and_then(|table| table.map(|table| Screen::read(table, folder)).transpose());
+        let root_place = &root.place().clone();
         root.finish();
 
         let (name, seed) = plant?;
+        let (mut press, advice, crews) = (press?, advice?, crews?);
+        if crews.is_none() && press.as_ref().is_some_and(|press| press.map.inputs.contains_key(&Input::Crew))
+        {
+            let message = "press.map.inputs.crew needs [crews] with its purpose: figures of crews are agreed on before they are recorded";
+            return Err(document.fault(root_place, message));
+        }
+        if let Some(advice) = &advice {
+            let registers = advice.registers(document, press.as_ref())?;
+            if let Some(press) = &mut press {
+                press.advice = registers;
+            }
+        }
         let (scanner, scan_window, range_error) = scanner?;
         Ok(Self {
             file: PathBuf::new(),
             name,
             seed,
-            press: press?,
+            press,
             scanner,
             scan_window,
             frame: frame?,
@@ -255,6 +297,9 @@ impl PlantFile {
             flattening: flattening?.unwrap_or(default.flattening),
             comparisons: if listed { comparisons? } else { default.comparisons },
             register_source: register_source?,
+            advice: advice.map(|read| read.advice),
+            dies: dies?,
+            crews,
             output: output?,
             screen: screen?,
         })

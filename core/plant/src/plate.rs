@@ -1,20 +1,26 @@
 //! Plate file: a plate, its target, and the places, lines and templates to be evaluated.
 
+mod edges;
 mod place;
 mod target;
 mod template;
 
 use std::path::Path;
 
-use platen_model::{Marker, Plate, Quantity, ReferenceLine, Station, Support, Target, Task, Template};
+use platen_model::{
+    Marker, Plate, Quantity, ReferenceLine, Station, Steel, Support, Target, Task, Template, TrimLine,
+};
 
 use crate::document::{Document, Reported};
 use crate::unit::metres;
 use crate::{Error, Faults, TomlTable};
+use edges::EdgeKeys;
 use place::{Names, Rectangle};
 
 /// Range of a plate's sides, millimetres: wide enough for the 2-5 m of the trade, narrow enough to refuse metres.
 const SIDE_MM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
+/// Range of the yield strength of steel, MPa.
+const YIELD_MPA: std::ops::RangeInclusive<f64> = 100.0..=2000.0;
 /// Range of thickness, millimetres.
 const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1.0..=300.0;
 
@@ -23,6 +29,8 @@ const THICKNESS_MM: std::ops::RangeInclusive<f64> = 1.0..=300.0;
 pub struct PlateFile {
     /// Plate as ordered.
     pub plate: Plate,
+    /// Steel, for the advice of the next stroke.
+    pub steel: Option<Steel>,
     /// Target shape; without it nothing can be judged.
     pub target: Option<Target>,
     /// Markers to be reported.
@@ -35,6 +43,8 @@ pub struct PlateFile {
     pub templates: Vec<Template>,
     /// Stations, in the order of the press's station registers.
     pub stations: Vec<Station>,
+    /// Lines along which the formed plate is cut.
+    pub trim_lines: Vec<TrimLine>,
 }
 
 /// Reference line and its name, which is kept where the line is faulty: a template on it is then no second fault.
@@ -97,6 +107,8 @@ impl PlateFile {
     fn read(mut root: TomlTable<'_>) -> Result<Self, Reported> {
         let mut rectangle = None;
         let plate = root.table("plate").required().and_then(|table| read_plate(table, &mut rectangle));
+        let steel = root.table("steel").optional();
+        let steel = steel.and_then(|table| table.map(read_steel).transpose());
         let target = root.table("target").optional();
         let target = target.and_then(|table| table.map(|table| target::read(table, rectangle)).transpose());
         let markers = read_all(&mut root, "marker", |table, names| read_marker(table, names, rectangle));
@@ -105,15 +117,19 @@ impl PlateFile {
         let templates = read_all(&mut root, "template", |table, names| template::read(table, names, known));
         let supports = read_all(&mut root, "support", |table, _| read_support(table, rectangle));
         let stations = read_all(&mut root, "station", |table, names| read_station(table, names, rectangle));
+        let trim_lines =
+            read_all(&mut root, "trim_line", |table, names| read_trim_line(table, names, rectangle));
         root.finish();
         Ok(Self {
             plate: plate?,
+            steel: steel?,
             target: target?,
             markers: markers?.into_iter().collect::<Result<_, _>>()?,
             reference_lines: lines?.into_iter().map(|line| line.line).collect::<Result<_, _>>()?,
             supports: supports?.into_iter().collect::<Result<_, _>>()?,
             templates: templates?.into_iter().collect::<Result<_, _>>()?,
             stations: stations?.into_iter().collect::<Result<_, _>>()?,
+            trim_lines: trim_lines?.into_iter().collect::<Result<_, _>>()?,
         })
     }
 }
@@ -133,6 +149,15 @@ fn read_all<'d, T>(
     Ok(all)
 }
 
+/// Reads `[steel]`.
+fn read_steel(mut table: TomlTable<'_>) -> Result<Steel, Reported> {
+    let grade = table.name("grade").optional();
+    let yield_mpa = table.number("yield_mpa").in_range(YIELD_MPA).required();
+    let heat = table.name("heat").optional();
+    table.finish();
+    Ok(Steel { grade: grade?, yield_strength: 1e6 * yield_mpa?, heat: heat? })
+}
+
 /// Reads `[plate]`; sets `rectangle` if both sides are sound.
 fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
     let id = table.name("id").required();
@@ -140,33 +165,28 @@ fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Re
     let height = table.number("height_mm").in_range(SIDE_MM).required();
     let thickness = table.number("thickness_mm").in_range(THICKNESS_MM).located().required();
     let supports = table.name("supports").optional();
-    let face_inset = table.number("face_inset_mm").at_least(0.0).located().optional();
+    let edges = EdgeKeys::read(&mut table);
     let document = table.document();
     table.finish();
 
     if let (Ok(width), Ok(height)) = (width, height) {
         *rectangle = Some(Rectangle { width: metres(width), height: metres(height) });
     }
-    let inset = match (face_inset, &thickness) {
-        (Ok(Some(inset)), Ok(thickness)) if inset.value > thickness.value => {
-            let message =
-                format!("found {}, must not be above the thickness of {} mm", inset.value, thickness.value);
-            Err(document.fault(&inset.place, message))
-        }
-        (inset, _) => inset.map(|inset| inset.map_or(0.0, |inset| inset.value)),
-    };
+    let edges = edges.check(document, thickness.as_ref().ok().map(|thickness| thickness.value));
     let (width, height, thickness) = (width?, height?, thickness?);
     if thickness.value > width.min(height) / 4.0 {
         let message = format!("found {}, no plate of {width} x {height} mm is that thick", thickness.value);
         return Err(document.fault(&thickness.place, message));
     }
+    let edges = edges?;
     Ok(Plate {
         id: id?,
         width: metres(width),
         height: metres(height),
         thickness: metres(thickness.value),
         supports: supports?,
-        face_inset: metres(inset?),
+        face_inset: metres(edges.face_inset),
+        root_face: metres(edges.root_face),
     })
 }
 
@@ -185,6 +205,17 @@ fn read_support(mut table: TomlTable<'_>, plate: Option<Rectangle>) -> Result<Su
     let at = place::point(&mut table, "at_mm", plate);
     table.finish();
     Ok(Support { at: at? })
+}
+
+fn read_trim_line(
+    mut table: TomlTable<'_>,
+    names: &mut Names,
+    plate: Option<Rectangle>,
+) -> Result<TrimLine, Reported> {
+    let name = names.take(&mut table);
+    let points = place::points(&mut table, "points_mm", plate);
+    table.finish();
+    Ok(TrimLine { name: name?, points: points? })
 }
 
 fn read_line(mut table: TomlTable<'_>, names: &mut Names, plate: Option<Rectangle>) -> NamedLine {

@@ -38,6 +38,28 @@ pub struct Press {
     pub timeouts: Timeouts,
     /// Reaction to faults.
     pub policy: Policy,
+    /// Registers for the advice, if it is written there.
+    pub advice: Option<AdviceBlock>,
+}
+
+/// Registers for the advice of the next stroke: for a display, apart from those of the handshake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AdviceBlock {
+    /// Address of the first, as on the wire.
+    pub start: u16,
+    /// The depth of the ram is written, too.
+    pub depth: bool,
+}
+
+impl AdviceBlock {
+    /// Number of registers.
+    pub const COUNT: u16 = 24;
+
+    /// Returns the registers as a block.
+    #[must_use]
+    pub fn block(&self) -> Block {
+        Block { table: RegisterTable::Holding, start: self.start, count: Self::COUNT }
+    }
 }
 
 impl Press {
@@ -54,6 +76,7 @@ impl Press {
             map,
             timeouts: Timeouts::default(),
             policy: Policy::default(),
+            advice: None,
         }
     }
 }

@@ -96,6 +96,14 @@ impl<'d> TomlTable<'d> {
         self.value(key, &format!("a list of {N} numbers"), vector)
     }
 
+    /// Reads any number of lists of exactly `N` finite numbers: the points of a line.
+    pub fn vectors<const N: usize>(&mut self, key: &str) -> TomlKey<'d, Vec<[f64; N]>> {
+        self.value(key, &format!("lists of {N} numbers"), |node| match &node.kind {
+            NodeKind::Array(points) => points.iter().map(vector).collect(),
+            _ => None,
+        })
+    }
+
     /// Reads `R` lists of exactly `N` finite numbers: the rows of a matrix.
     pub fn matrix<const R: usize, const N: usize>(&mut self, key: &str) -> TomlKey<'d, [[f64; N]; R]> {
         self.value(key, &format!("{R} lists of {N} numbers"), |node| match &node.kind {

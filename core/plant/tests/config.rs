@@ -58,7 +58,20 @@ fn directions_become_radians_and_a_template_lies_in_the_middle_unless_said() {
     let expected = TargetShape::Cone { axis, radius_start: 6.0, radius_end: 6.6 };
     assert_eq!(file.target.unwrap().shape, expected);
     assert_eq!(file.templates[0].centre, Centre::At(1.5));
-    assert_eq!(file.plate.face_inset, 0.0104);
+    assert_eq!((file.plate.face_inset, file.plate.root_face), (0.0104, 0.0));
+}
+
+#[test]
+fn a_bevel_is_an_inset_and_a_root_face() {
+    let plate = |edges: &str| {
+        let text =
+            format!("[plate]\nid = 'A'\nwidth_mm = 4000\nheight_mm = 4000\nthickness_mm = 36\n{edges}");
+        PlateFile::parse("plate.toml", &text).unwrap().plate
+    };
+    let edges = |plate: platen_model::Plate| (plate.face_inset, plate.root_face);
+    assert_eq!(edges(plate("face_inset_mm = 9.0\nroot_face_mm = 4.0\n")), (0.009, 0.004));
+    assert_eq!(edges(plate("root_face_mm = 0.0\n")), (0.0, 0.0));
+    assert_eq!(edges(plate("face_inset_mm = 36.0\n")), (0.036, 0.0));
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! state machine [`Handshake`], passes its [`Command`]s to the host and writes the wanted registers ([`HostImage`]) until
 //! they are echoed. Invariants, table of transitions, timing parameters and register map are in the README of this crate.
 
+mod advice_block;
 mod codec;
 mod handshake;
 mod journal;
@@ -15,7 +16,10 @@ mod register_page;
 mod replay;
 mod runner;
 
-pub use codec::{HostImage, PressImage, Torn, Wrong, describe_inputs, describe_outputs, saturates};
+pub use codec::{
+    ADVICE_REGISTERS, AdviceImage, HostImage, PressImage, Torn, Wrong, describe_inputs, describe_outputs,
+    saturates,
+};
 pub use handshake::{Command, Config, Effect, Event, Handshake, LinkState, State, Transition, Work};
 pub use journal::{Journal, MemoryJournal};
 pub use link::{

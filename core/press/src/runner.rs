@@ -16,10 +16,12 @@ use tokio::sync::{mpsc, watch};
 
 pub use metrics::{Durations, Metrics};
 
+use crate::advice_block::AdviceWriter;
 use crate::handshake::{Config, Handshake};
 use crate::reconcile::Reconciler;
 use crate::{
-    Client, Code, Command, Counts, HostImage, Journal, Link, Measurement, PressImage, State, StrokeKey,
+    AdviceImage, Client, Code, Command, Counts, HostImage, Journal, Link, Measurement, PressImage, State,
+    StrokeKey,
 };
 
 /// Order of the press side to the host.
@@ -56,6 +58,8 @@ pub enum Answer {
         /// Its estimate of one scan.
         estimate: Option<Duration>,
     },
+    /// Advice after a stroke, for a display at the press.
+    Advice(StrokeKey, Box<AdviceImage>),
     /// The operator resets faults.
     Reset,
     /// Stop; the registers are made safe first.
@@ -159,6 +163,7 @@ pub async fn run_press<L: Link, J: Journal>(
             let runner = cycle::Runner {
                 handshake: Handshake::new(Config::new(&press), recalled),
                 registers: Reconciler::new(&press),
+                advice: AdviceWriter::new(&press),
                 client: Client::new(link, &press),
                 metrics: Metrics::default(),
                 journal,

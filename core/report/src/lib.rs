@@ -12,6 +12,7 @@
 //!
 //! This crate has no access to press, plugins or network.
 
+pub mod advice;
 pub mod field_export;
 pub mod history_view;
 pub mod output_folder;
@@ -19,3 +20,4 @@ pub mod picture;
 pub mod plate_report;
 pub mod result;
 pub mod sequence;
+pub mod skill;

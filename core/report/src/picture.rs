@@ -16,7 +16,7 @@ mod strip;
 mod view;
 mod words;
 
-pub use map::map;
+pub use map::{Mark, map};
 pub use scale::PictureScale;
 pub use screen_map::{ScreenMap, screen_map, texture};
 pub use section::section;

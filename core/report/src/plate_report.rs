@@ -11,6 +11,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use platen_history::{Archive, Error as HistoryError, Filter, PlateRecord, Stroke};
 use platen_model::Verdict;
 
+use crate::advice::{self, AdviceRecord};
 use crate::history_view;
 use crate::output_folder::{self, FilesError};
 use crate::picture::{self, Caption, StripPoint, View};
@@ -109,6 +110,14 @@ impl<'a> Entry<'a> {
         Self { stroke, document, point }
     }
 
+    /// Returns the advice that followed the stroke, where it was shown, in words.
+    fn advice(&self) -> Option<Vec<String>> {
+        let record = AdviceRecord::beside(self.stroke.document.as_deref()?).ok()??;
+        // The host writes the report before the advice: what is there may stem from an earlier host.
+        let shown = record.show != "shadow" && record.run_id == self.stroke.run_id;
+        record.advice.filter(|_| shown).map(|advice| advice::words(&advice))
+    }
+
     /// Returns a picture drawn beside the document.
     fn picture(&self, name: &str) -> Option<Markup> {
         let path = self
@@ -184,6 +193,7 @@ fn summary(entries: &[Entry<'_>], entry: &Entry<'_>, record: &ResultRecord) -> M
                 (format!(", a sample every {:.1} mm, noise {:.2} mm", record.quality.lattice_step_mm, record.quality.noise_mm))
             }
             dt { "Calibration" } dd { (calibration(&record.calibration)) }
+            @if let Some(advice) = entry.advice() { dt { "Advice for the next stroke" } dd { @for words in &advice { div { (words) } } } }
             dt { "Software" } dd { (record.software) ", " (record.schema) }
         }
         div.pictures {

@@ -13,6 +13,7 @@ mod next;
 mod outline;
 mod plate;
 mod plugins;
+mod trim;
 
 pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
 pub use grid::GridRecord;
@@ -21,6 +22,7 @@ pub use next::{CURVATURE_DEFICIT, Next, NextPlace, NoNext};
 pub use outline::{OutlineRecord, OutlineSource};
 pub use plate::PlateRecord;
 pub use plugins::PluginRecord;
+pub use trim::{TrimLineRecord, TrimPointRecord};
 
 use std::fmt::Display;
 
@@ -73,6 +75,9 @@ pub struct ResultRecord {
     pub corners_seen: [bool; 4],
     /// Markers.
     pub markers: Vec<MarkerRecord>,
+    /// Lines along which the formed plate is cut; none in documents older than it.
+    #[serde(default)]
+    pub trim_lines: Vec<TrimLineRecord>,
     /// Dimension checks, as by tape, square and sight line.
     pub shape_checks: ShapeChecksRecord,
     /// Reference lines and the templates on them.
@@ -264,6 +269,7 @@ impl ResultRecord {
             corners_seen: corners_seen(outline, &doubts),
             shape_checks: ShapeChecksRecord::new(&checks),
             markers: markers(measured, context.plate),
+            trim_lines: trim::record(measurement, context.plate),
             reference_lines: lines::record(measurement, context.plate, &sound),
             grid: GridRecord::new(measurement, &sound),
             surface: surface(measured),

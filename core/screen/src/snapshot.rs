@@ -3,9 +3,13 @@
 //! A snapshot is whole: a page that has missed ten shows the truth with the eleventh. What is not known is null. `result` is the
 //! result of the plate and stroke in hand or null: it never is one of an earlier stroke.
 
+mod advice;
+
 use platen_model::{Audience, Code, Severity, Texts, Verdict};
 use platen_report::result::Next;
 use serde::Serialize;
+
+pub use advice::{AdvicePart, AdvisedBend, AdvisedStep};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.screen/1";
@@ -164,6 +168,8 @@ pub struct ResultPart {
     pub next: Option<Next>,
     /// An earlier stroke bent the plate at this place; false while that is not known.
     pub again: bool,
+    /// Advice for the next stroke; null where the plant file shows none, and until it is there.
+    pub advice: Option<AdvicePart>,
     /// Names of the fields that can be shown as maps.
     pub fields: Vec<String>,
 }

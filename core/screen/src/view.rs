@@ -94,6 +94,14 @@ impl View {
         format!("{} {}", self.units.with_uncertainty(mm, uncertainty), self.units.symbol())
     }
 
+    /// Formats a place on the plate for a ruler: whole millimetres, tenths of an inch.
+    pub(crate) fn place(self, mm: f64) -> String {
+        match self.units {
+            Units::Millimetre => format!("{mm:.0} mm"),
+            Units::Inch => format!("{:.1} in", mm / 25.4),
+        }
+    }
+
     /// Formats a distance along the plate: metres with one decimal, inches with none.
     pub(crate) fn distance(self, mm: f64) -> String {
         match self.units {

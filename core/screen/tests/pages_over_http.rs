@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use platen_model::{Code, Field, Verdict};
+use platen_model::{CannotAdvise, Code, Field, Verdict};
 use platen_report::result::ResultRecord;
 use platen_report::sequence::Sequence;
 use platen_screen::{
-    Access, Engineer, HostPart, Listener, PlatePart, PlateRow, PressPart, RecordPart, ResultPart, SCHEMA,
-    ScannerPart, ScannerState, Server, ShownAlarm, Snapshot, Source, SourceError, Stage, StrokePart,
-    StrokeRow, Token, Worst,
+    Access, AdvicePart, AdvisedBend, AdvisedStep, Engineer, HostPart, Listener, PlatePart, PlateRow,
+    PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState, Server, ShownAlarm, Snapshot,
+    Source, SourceError, Stage, StrokePart, StrokeRow, Token, Worst,
 };
 use tokio::sync::watch;
 
@@ -72,6 +72,7 @@ fn result(verdict: Verdict, sense: i8) -> ResultPart {
         }),
         next: None,
         again: false,
+        advice: None,
         fields: vec!["curvature_deficit".into()],
     }
 }
@@ -430,4 +431,63 @@ fn assets_are_kept_for_a_year_under_the_address_of_their_content() {
     let (status, head, _) = site.ask("GET", &path, "Accept-Encoding: gzip\r\n");
     assert!(status == 200 && head.contains("immutable") && head.contains("content-encoding: gzip"), "{head}");
     assert_eq!(site.get("/assets/00000000/style.css").0, 404);
+}
+
+fn advised(advice: AdvicePart) -> Snapshot {
+    snapshot(Some(ResultPart { advice: Some(advice), ..result(Verdict::Fail, -1) }))
+}
+
+fn bend(line_mm: [[f64; 2]; 2]) -> AdvicePart {
+    let bend = AdvisedBend {
+        line_mm,
+        angle_deg: 1.5,
+        depth_mm: Some(4.81),
+        depth_not_beyond_mm: Some(5.34),
+        gap_after_mm: [9.0, 12.0, 15.2],
+    };
+    AdvicePart {
+        step: AdvisedStep::Bend,
+        bend: Some(bend),
+        why: None,
+        strokes_left: Some([5, 7]),
+        says: vec![EVIL.into()],
+    }
+}
+
+#[test]
+fn advice_is_a_line_a_depth_and_what_comes_of_it() {
+    let site = site();
+    let show = |advice: AdvicePart| site.stand.snapshots.send_replace(Arc::new(advised(advice)));
+    assert!(!site.get("/").2.contains("PRESS ALONG"), "no advice, no line");
+    show(bend([[1650.4, 0.0], [1650.4, 2000.0]]));
+    let (_, _, page) = site.get("/");
+    for text in [
+        "PRESS ALONG THE LINE",
+        ">1650 mm<",
+        ">from the left<",
+        ">4.8 mm<",
+        ">deep<",
+        "not beyond 5.3 mm; then 12.0 mm open (9.0 to 15.2); 5 to 7 strokes left",
+    ] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+    assert!(!page.contains("<script>alert"), "sentences of a plugin are text");
+    let (_, _, page) = site.get("/?lang=ja&units=in");
+    for text in ["線に沿って押す", ">65.0 in<", "左から", ">0.19 in<", "残り 5 ~ 7 回"] {
+        assert!(page.contains(text), "{text}");
+    }
+    // Across, and oblique: from the press, with both ends.
+    show(bend([[0.0, 700.0], [3000.0, 820.0]]));
+    let (_, _, page) = site.get("/");
+    assert!(page.contains(">700 mm<") && page.contains("from the press, far end 820 mm"), "{page}");
+    let cannot = AdvicePart {
+        step: AdvisedStep::Cannot,
+        bend: None,
+        why: Some(CannotAdvise::EdgeOutOfReach.texts()),
+        strokes_left: None,
+        says: Vec::new(),
+    };
+    show(cannot);
+    assert!(site.get("/").2.contains("No advice: what is missing lies nearer to an edge"));
+    assert!(site.get("/?lang=ja").2.contains("助言なし: 端部"));
 }

@@ -8,7 +8,7 @@
 //! | `scan` | scan header, column, end of a scan, window | `platen.scan/1`, `.column/1`, `.scan_end/1`, `.window/1` |
 //! | `mesh` | mid-surface mesh, chart | `platen.mesh/1`, `.chart/1` |
 //! | `surface` | S(u, v) with covariance and mask | `platen.surface/1` |
-//! | `findings` | task, findings (JSON), field | `platen.task/1`, `.findings/1`, `.grid/1` |
+//! | `findings` | task, findings, history, advice (JSON), field | `platen.task/1`, `.findings/1`, `.record/1`, `.advice/1`, `.grid/1` |
 
 #[cfg(feature = "comparison")]
 mod findings;

@@ -79,12 +79,16 @@ mod scanner;
 pub mod shim;
 
 #[cfg(feature = "comparison")]
+mod advisor;
+#[cfg(feature = "comparison")]
 mod comparison;
 #[cfg(feature = "flattening")]
 mod flattening;
 #[cfg(feature = "comparison")]
 mod grid;
 
+#[cfg(feature = "comparison")]
+pub use advisor::{Advisor, AdvisorInputs};
 #[cfg(feature = "comparison")]
 pub use comparison::{Comparison, Inputs};
 pub use device::Device;
@@ -99,7 +103,9 @@ pub use job::{CancelGuard, Job};
 pub use option::{OptionType, Options, Values};
 pub use platen_abi as abi;
 #[cfg(feature = "comparison")]
-pub use platen_model::{Field, Figure, Findings, NodeState, Report, Task, TemplateFinding, Verdict};
+pub use platen_model::{
+    Advice, Field, Figure, Findings, NodeState, PlateHistory, Report, Task, TemplateFinding, Verdict,
+};
 pub use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 #[cfg(feature = "comparison")]
 pub use platen_shape::Surface;

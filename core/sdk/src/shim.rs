@@ -528,8 +528,11 @@ macro_rules! export {
     (@adapter scanner $plugin:ty) => { $crate::shim::ScannerPlugin<$plugin> };
     (@adapter flattening $plugin:ty) => { $crate::shim::FlatteningPlugin<$plugin> };
     (@adapter comparison $plugin:ty) => { $crate::shim::ComparisonPlugin<$plugin> };
+    (@adapter advisor $plugin:ty) => { $crate::shim::AdvisorPlugin<$plugin> };
 }
 
+#[cfg(feature = "comparison")]
+pub use crate::advisor::AdvisorPlugin;
 #[cfg(feature = "comparison")]
 pub use crate::comparison::ComparisonPlugin;
 #[cfg(feature = "flattening")]

@@ -309,7 +309,8 @@ impl Extractor {
                 });
             }
         }
-        let (crossings, cut) = crossings::find(window, noise, &face, pixels, |cell| number[cell]);
+        let (crossings, cut) =
+            crossings::find(window, noise, &face, pixels, self.spec.flank_depth(), |cell| number[cell]);
         if cut > CUT_TOLERANCE {
             return Err(Refusal::CutByRegion { cut_mm: cut * 1000.0 });
         }

@@ -15,10 +15,11 @@
 //! | [`evaluate`] | surface -> places, lines, grid | positions and curvatures with their standard deviations |
 //! | [`measure`](mod@measure) | patch, outline -> [`Measurement`] | the stages from mesh to surface in one call |
 //! | [`target_surface`] | target shape -> [`TargetSurface`] | closed forms; rigid registration (Kabsch) |
+//! | [`template_seat`] | profile under a template -> its seat and gaps | upper convex hull |
 //! | [`correspondence`] | two scans of a plate | outline of the blank by a baseline scan; test for a plate put back turned |
 //! | [`inspection`] | outline, surface -> figures | dimension checks, bending energy, marker detection, calibration |
 //!
-//! Without the feature `measure` there are `plate`, `surface` and `target_surface` alone: what a comparison evaluates.
+//! Without the feature `measure` there are `plate`, `surface`, `target_surface` and `template_seat` alone: what a comparison evaluates.
 //!
 //! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket, and works on one
 //! thread at a time: the same columns give the same result to the last bit.
@@ -42,6 +43,7 @@ pub mod outline;
 pub mod plate;
 pub mod surface;
 pub mod target_surface;
+pub mod template_seat;
 
 #[cfg(feature = "measure")]
 pub use correspondence::{BlankError, Reorientation, reorientation};

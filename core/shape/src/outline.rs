@@ -12,6 +12,7 @@
 //! | `developed_strip` | each edge's surroundings developed into the plane | own |
 //! | `lattice_line` | one lattice line across an edge as an observation: interval, mixed pixels, side face | own |
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
+//! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
@@ -34,6 +35,7 @@ mod height_field;
 mod lattice_line;
 mod plane;
 mod projected_crossing;
+mod side_face;
 mod visible_boundary;
 
 pub use error::OutlineError;
@@ -45,6 +47,7 @@ use crate::{PlateSpec, Vec3};
 use edge::{Edge, EdgeData};
 use plane::Plane;
 use projected_crossing::ProjectedCrossing;
+use side_face::SideFace;
 use visible_boundary::VisibleBoundary;
 
 /// A corner of the scanned face.
@@ -129,6 +132,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         angle: (patch.azimuth_step * patch.elevation_step).sqrt(),
         noise: patch.noise,
     };
+    let side_face = SideFace::of(spec);
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * visible.step;
@@ -137,7 +141,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
             .filter_map(|crossing| ProjectedCrossing::of(crossing, patch, &height_field))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
-        EdgeData::new(&crossings, [from, to], spec.thickness, sampling)
+        EdgeData::new(&crossings, [from, to], spec.thickness, side_face, sampling)
     };
     let data = [side(0)?, side(1)?, side(2)?, side(3)?];
     let mut edges = edge::fit_all(data, sampling)?;

@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 use crate::Vec3;
 use crate::surface::Curvature;
 use cone::Cone;
-use platen_model::{Facing, Plate, RadiusOf, Target, TargetShape};
+use platen_model::{FLATTEST_CONE, Facing, Plate, RadiusOf, Target, TargetShape};
 
 pub use placement::Placement;
 
@@ -68,13 +68,13 @@ pub enum TargetError {
         /// The plate's shorter side, metres.
         side: f64,
     },
-    /// A cone steeper than its straight line is long.
+    /// A cone as good as flat.
     #[error(
-        "target: the radius changes by {change_mm:.0} mm along a straight line of {length_mm:.0} mm; give the radii \
-         at the two ends of that line",
+        "target: the radius changes by {change_mm:.0} mm along a straight line of {length_mm:.0} mm, a cone as good as flat; \
+         give the radii of curvature at the two ends of that line",
         change_mm = change * 1000.0, length_mm = length * 1000.0
     )]
-    Steep {
+    NearlyFlat {
         /// Change of the radius, metres.
         change: f64,
         /// Length of the straight line through the middle, metres.
@@ -97,7 +97,7 @@ impl TargetSurface {
     /// those of normal curvature, as a template shows them that stands upright on the plate.
     ///
     /// # Errors
-    /// [`TargetError`] when a radius is none, would roll the plate up, or a cone is too steep.
+    /// [`TargetError`] when a radius is none, would roll the plate up, or a cone is as good as flat.
     pub fn new(target: &Target, width: f64, height: f64, thickness: f64) -> Result<Self, TargetError> {
         let to_mid = match target.radius_of {
             RadiusOf::Inside => 0.5 * thickness,
@@ -125,8 +125,8 @@ impl TargetSurface {
                 let length = (width / cos.abs()).min(height / sin.abs());
                 let change = radius_end - radius_start;
                 let radius = 0.5 * (above_0(radius_start)? + above_0(radius_end)?);
-                if change.abs() >= length {
-                    return Err(TargetError::Steep { change: change.abs(), length });
+                if change.abs() >= FLATTEST_CONE * length {
+                    return Err(TargetError::NearlyFlat { change: change.abs(), length });
                 }
                 let form = Cone::new(radius, change / length).map_or(Form::Cylinder { radius }, Form::Cone);
                 (form, axis)

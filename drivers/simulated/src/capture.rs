@@ -8,7 +8,7 @@ use platen_sdk::{Result, ScanReceiver};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
     CellCounts, Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
-    Surroundings, scan, truth_document,
+    Surroundings, WideErrors, scan, truth_document,
 };
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::ControlFlow;
@@ -196,9 +196,11 @@ fn surroundings(options: &Options, plate: Option<&Plate>) -> Surroundings {
 
 fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrument {
     let cyclic = Cyclic { amplitude: options.cyclic_mm * 1e-3, period: CYCLIC_PERIOD, phase: 0.0 };
+    let wide_errors = WideErrors { share: options.wide_share, factor: options.wide_factor };
     Instrument {
         range_sigma: options.noise_mm * 1e-3,
         tail_dof: options.tail_dof,
+        wide_errors: (options.wide_share > 0.0).then_some(wide_errors),
         footprint: options.footprint_mrad * 1e-3,
         angular_sigma: options.angular_noise_urad * 1e-6,
         dropout: options.dropout,

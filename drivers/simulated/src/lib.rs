@@ -27,6 +27,7 @@
 //! | `scanner_m`, `scanner_yaw_deg` | position and orientation of the scanner in the frame of the plate's pose |
 //! | `step_deg`, `margin_deg` | angle between cells; scanned margin around the plate |
 //! | `noise_mm`, `tail_dof` | standard deviation of a range at 10 m; degrees of freedom of heavy tails |
+//! | `wide_share`, `wide_factor` | share of the ranges whose standard deviation is larger by a factor |
 //! | `footprint_mrad`, `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
 //! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
 //! | `warm_up_columns` | columns measured before the laser is warm |
@@ -79,6 +80,10 @@ options! {
         noise_mm: f64 = 0.5, unit "mm", min 0.0, max 20.0;
         /// Degrees of freedom of the range error (Student's t, heavy tails); without it the error is normal.
         tail_dof: Option<f64>, min 2.1, max 1000.0;
+        /// Share of the ranges with a wide error.
+        wide_share: f64 = 0.0, min 0.0, max 1.0;
+        /// Factor of the standard deviation of these ranges.
+        wide_factor: f64 = 4.0, min 1.0, max 100.0;
         /// Full width of the beam at 1/e^2 of its intensity.
         footprint_mrad: f64 = 0.3, unit "mrad", min 0.0, max 5.0;
         /// Probability that an echo is lost.

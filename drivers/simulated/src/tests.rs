@@ -25,6 +25,8 @@ fn options() -> Options {
         margin_deg: 4.0,
         noise_mm: 0.5,
         tail_dof: None,
+        wide_share: 0.0,
+        wide_factor: 4.0,
         footprint_mrad: 0.3,
         dropout: 0.006,
         cyclic_mm: 0.0,

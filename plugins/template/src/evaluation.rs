@@ -1,19 +1,19 @@
 //! Evaluation of one template: gap, uncertainty, verdict and sentence.
 
 use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
+use platen_shape::template_seat::Seating;
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
-use crate::seat::{Profile, Seating};
 use crate::section::{Chord, Line, Section};
 
 /// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
 const STRAIGHT: f64 = 0.1e-3;
 
 /// Places under a template: 1 cm apart for a chord of 2 m.
-const PLACES: usize = 201;
+pub(crate) const PLACES: usize = 201;
 
-/// Places under a template during the search for the worst position.
-const SEARCH_PLACES: usize = 41;
+/// Places under a template that is slid over the whole plate for a figure without a verdict.
+pub(crate) const FEW_PLACES: usize = 41;
 
 /// Step of the search as a share of the chord.
 const SEARCH_STEP: f64 = 0.0125;
@@ -126,14 +126,15 @@ impl Evaluator<'_> {
         }
     }
 
-    /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap.
-    pub(crate) fn worst(&self, line: &Line, chord: f64, seat: Seat) -> (f64, f64) {
+    /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap. Where a template is
+    /// about to rock, fewer than [`PLACES`] may let it lie still.
+    pub(crate) fn worst(&self, line: &Line, chord: f64, seat: Seat, n_places: usize) -> (f64, f64) {
         let (first, last) = (0.5 * chord, (line.length - 0.5 * chord).max(0.5 * chord));
         let n_steps = ((last - first) / (SEARCH_STEP * chord)).ceil() as usize;
         let mut worst = (first, f64::NEG_INFINITY);
         for k in 0..=n_steps {
             let centre = first + (last - first) * k as f64 / n_steps.max(1) as f64;
-            let seated = self.seat(line, Chord { centre, length: chord }, seat, SEARCH_PLACES);
+            let seated = self.seat(line, Chord { centre, length: chord }, seat, n_places);
             let gap = seated.gaps[seated.largest].abs();
             if gap > worst.1 {
                 worst = (centre, gap);
@@ -145,7 +146,7 @@ impl Evaluator<'_> {
     fn seat(&self, line: &Line, chord: Chord, seat: Seat, n_places: usize) -> Seated {
         let section = Section::new(self.now, self.target, line, chord, n_places);
         let profile = &section.profile;
-        let (seating, rocks) = seating(profile, seat, chord.length);
+        let (seating, rocks) = profile.seat(seat, chord.length);
         let gaps = profile.gaps(&seating);
         let largest =
             (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() + TIE { k } else { best });
@@ -184,18 +185,6 @@ impl Evaluator<'_> {
 
 /// Gaps that differ by less than this are equal, metres: of equal gaps the first counts, independent of rounding.
 const TIE: f64 = 1e-9;
-
-/// Returns the seating to judge, and whether the template rocks in the gravity seat.
-fn seating(profile: &Profile, seat: Seat, chord: f64) -> (Seating, bool) {
-    match seat {
-        Seat::Balanced => (profile.balanced(), profile.gravity().span(profile) < 0.25 * chord),
-        Seat::Held => (profile.held(), false),
-        Seat::Gravity => {
-            let gravity = profile.gravity();
-            if gravity.span(profile) < 0.25 * chord { (profile.balanced(), true) } else { (gravity, false) }
-        }
-    }
-}
 
 impl Seated {
     fn open(&self) -> Opening {

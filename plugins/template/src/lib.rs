@@ -74,7 +74,6 @@ mod deviation;
 mod evaluation;
 mod figures;
 mod linear_program;
-mod seat;
 mod section;
 
 use platen_model::{Centre, Figure, Findings, NodeState, Report, Task, Template, Verdict};
@@ -82,7 +81,7 @@ use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Res
 use platen_shape::TargetSurface;
 
 use deviation::Deviation;
-use evaluation::{Evaluated, Evaluator};
+use evaluation::{Evaluated, Evaluator, FEW_PLACES, PLACES};
 use section::Line;
 
 platen_sdk::options! {
@@ -140,7 +139,7 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         check()?;
         let centre = match centre {
             Centre::At(centre) => *centre,
-            Centre::Worst => evaluator.worst(line, template.chord, template.seat).0,
+            Centre::Worst => evaluator.worst(line, template.chord, template.seat, PLACES).0,
         };
         evaluated.push(evaluator.evaluate(template, line, centre));
     }
@@ -240,7 +239,7 @@ fn search(
         let mut worst: Option<(f64, [f64; 2])> = None;
         for line in lines.iter().filter(|line| line.length >= template.chord) {
             check()?;
-            let (centre, gap) = evaluator.worst(line, template.chord, template.seat);
+            let (centre, gap) = evaluator.worst(line, template.chord, template.seat, FEW_PLACES);
             if worst.is_none_or(|(most, _)| gap > most) {
                 worst = Some((gap, line.at(centre)));
             }

@@ -1,8 +1,7 @@
 //! Section under a template: profile of the plate along a line relative to the target's.
 
+use platen_shape::template_seat::Profile;
 use platen_shape::{Surface, TargetSurface, Vec3};
-
-use crate::seat::Profile;
 
 /// Straight line on the original rectangle.
 #[derive(Debug, Clone)]

@@ -20,6 +20,10 @@
 //! (a, b) of the ordered rectangle is material point [`Plate::material`]`(a, b)`. A tape laid from corner (0,0) along the first edge
 //! reads u as long as that corner does not move and the next one moves only along u.
 //!
+//! ## Edges
+//! Edges are square or have a double-V bevel (`face_inset_mm`, `root_face_mm`), the same along all four sides. Width and height are those of
+//! the mid-surface; both faces end inside of it.
+//!
 //! ## Frames and units
 //! (u, v) in [0, width] x [0, height], metres. The local frame has its origin in the middle of the mid-surface, x along u there
 //! and z along the upper normal; the pose maps it to the scanner frame. Documents are in millimetres and degrees. Curvature
@@ -27,9 +31,11 @@
 //!
 //! This crate shares no code with the product, so that an error in one of the two is not hidden by the other.
 
+mod bevel;
 mod cone;
 mod cutting_error;
 mod error;
+mod fibre;
 mod material;
 mod plate;
 mod profile;
@@ -40,7 +46,9 @@ mod stroke;
 mod surface;
 mod swept_surface;
 
+pub use bevel::Strip;
 pub use error::PlateError;
+pub use fibre::{FibreSteel, FibreStrip, Press};
 pub use plate::{Curvature, Plate, Side};
 pub use protocol::{Reply, Request};
 pub use shape::{Band, CurvatureStep, Shape};

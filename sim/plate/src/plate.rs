@@ -2,6 +2,7 @@
 //!
 //! The mid-surface is a [`SweptSurface`] or a [`Cone`]; faces are its parallel surfaces at plus and minus half the thickness.
 
+use crate::bevel::{Strip, strips};
 use crate::cone::Cone;
 use crate::cutting_error::CuttingError;
 use crate::material::MaterialMap;
@@ -57,6 +58,7 @@ pub struct Plate {
     width: f64,
     height: f64,
     thickness: f64,
+    strips: Vec<Strip>,
     markers: Vec<[f64; 2]>,
     surface: Surface,
     /// Unit direction of the second surface parameter (the axis) in (u, v).
@@ -79,6 +81,7 @@ impl Plate {
             width,
             height,
             thickness: blank.thickness_mm * 1e-3,
+            strips: strips(blank),
             markers: blank.markers_mm.iter().map(|m| m.map(|c| c * 1e-3)).collect(),
             cut: CuttingError::new(blank),
             surface,
@@ -107,6 +110,16 @@ impl Plate {
     /// Returns the thickness, metres.
     pub fn thickness(&self) -> f64 {
         self.thickness
+    }
+
+    /// Returns the strips of every side face: one, or two flanks and the root face between them.
+    pub fn strips(&self) -> &[Strip] {
+        &self.strips
+    }
+
+    /// Returns the distance of the faces' edges inside the mid-surface's edge, metres.
+    pub fn face_inset(&self) -> f64 {
+        self.strips.iter().map(|strip| strip.inset(strip.to)).fold(0.0, f64::max)
     }
 
     /// Returns the painted markers (u, v), metres.

@@ -43,6 +43,12 @@ pub struct Blank {
     /// Sagitta of the edges v = 0, u = W, v = H, u = 0, positive outwards.
     #[serde(default, skip_serializing_if = "is_default")]
     pub bows_mm: [f64; 4],
+    /// Distance of the faces' edges inside the mid-surface's edge: a double-V bevel; 0 for a square cut.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub face_inset_mm: f64,
+    /// Height of the square root face in the middle of a bevelled edge.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub root_face_mm: f64,
     /// Centres of dark discs painted on the upper face, (u, v).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub markers_mm: Vec<[f64; 2]>,
@@ -125,6 +131,20 @@ impl PlateState {
         if let Some(found) = off.copied().find(|off| off.is_nan() || off.abs() > MAX_CUTTING_ERROR_MM) {
             let advice = "write how far the cut is off the rectangle, 100 mm at most";
             return Err(PlateError::Description { key: "blank.corners_off_mm or bows_mm", found, advice });
+        }
+        let sides = blank.width_mm.min(blank.height_mm);
+        for (key, found, below, advice) in [
+            (
+                "blank.face_inset_mm",
+                blank.face_inset_mm,
+                0.25 * sides,
+                "write less than a quarter of the plate",
+            ),
+            ("blank.root_face_mm", blank.root_face_mm, blank.thickness_mm, "write less than the thickness"),
+        ] {
+            if !(0.0..below).contains(&found) {
+                return Err(PlateError::Description { key, found, advice });
+            }
         }
         let pose = &self.pose;
         let angles = [pose.yaw_deg, pose.pitch_deg, pose.roll_deg];

@@ -37,6 +37,8 @@ pub struct Config {
     pub p_base: u16,
     /// Address of the H block.
     pub h_base: u16,
+    /// Address of 24 registers for advice, which the program shows and reads for nothing else.
+    pub advice_base: Option<u16>,
     /// Modbus unit id.
     pub unit: u8,
     /// Link to the host.
@@ -86,6 +88,7 @@ impl Default for Config {
             map_version: 1,
             p_base: 0,
             h_base: 100,
+            advice_base: None,
             unit: 1,
             link: LinkConfig::default(),
             bind: IpAddr::from([127, 0, 0, 1]),
@@ -216,6 +219,14 @@ impl Config {
             return refuse(
                 "p_base",
                 format!("a block at {} exceeds the table of 65536 words; choose a lower address", p.max(h)),
+            );
+        }
+        if let Some(a) = self.advice_base.map(u32::from)
+            && ((a < p + 32 && p < a + 24) || (a < h + 64 && h < a + 24) || a + 24 > 65_536)
+        {
+            return refuse(
+                "advice_base",
+                format!("found {a}; 24 registers apart from both blocks are needed"),
             );
         }
         if self.timings.cycle_ms == 0 {

@@ -18,6 +18,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::time::Instant;
 
 use crate::Result;
+use crate::driven_ram::OrderedStroke;
 use crate::faults::{LineFaults, StrokeFaults};
 use crate::program::Cause;
 use crate::shared::{Machine, Shared};
@@ -28,6 +29,8 @@ use crate::shared::{Machine, Shared};
 pub enum Command {
     /// Makes the next bend at once, whatever the state of the host.
     Stroke,
+    /// Orders the next stroke of the strategy `operator`.
+    Order(OrderedStroke),
     /// Requests a scan without a bend.
     Baseline,
     /// Requests another scan of the last stroke.
@@ -155,6 +158,7 @@ pub(crate) fn execute(command: Command, shared: &Shared) -> Result<()> {
     let Machine { press, table } = &mut *machine;
     match command {
         Command::Stroke => press.stroke(now)?,
+        Command::Order(order) => press.order(&order)?,
         Command::Baseline => press.request(Cause::Baseline, now)?,
         Command::Rescan => press.request(Cause::Rescan, now)?,
         Command::PartEnd => press.end_part(now),

@@ -54,7 +54,7 @@ pub struct Counters {
     pub reads: u64,
     /// Writes received.
     pub writes: u64,
-    /// Writes with a word outside the H block.
+    /// Writes with a word outside the H block and the registers for advice.
     pub writes_outside: u64,
     /// Writes on a connection that had not read both blocks before.
     pub writes_before_sync: u64,

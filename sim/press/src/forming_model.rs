@@ -13,6 +13,7 @@ use platen_sim_plate::{Blank, Handling, Plan, PlateState, Pose, Programme, Shape
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
+use crate::driven_ram::{DrivenRam, OrderedStroke, RamConfig};
 use crate::registers::{HBlock, Verdict};
 
 /// Share of the closing angle that is applied; half avoids bending too far.
@@ -29,6 +30,8 @@ pub enum Strategy {
     Programme,
     /// Corrects the place of the largest gap until a result passes.
     ClosedLoop,
+    /// Presses what is ordered at the control port, to a depth, until a result passes.
+    Operator,
 }
 
 /// Plate, target and forming programme.
@@ -49,6 +52,8 @@ pub struct PlateConfig {
     pub handling: Handling,
     /// Chord of the template, for the corrections.
     pub chord_mm: f64,
+    /// Steel, die and ram of the strategy `operator`.
+    pub ram: RamConfig,
 }
 
 impl Default for PlateConfig {
@@ -61,6 +66,7 @@ impl Default for PlateConfig {
             pose: Pose::default(),
             handling: Handling::default(),
             chord_mm: 2_000.0,
+            ram: RamConfig::default(),
         }
     }
 }
@@ -72,6 +78,8 @@ pub enum Next {
     Bend(Stroke),
     /// Requests another scan: the last result had no figures.
     Rescan,
+    /// Waits for an order.
+    Wait,
     /// Ends the part.
     End,
 }
@@ -85,6 +93,9 @@ pub struct FormingModel {
     state: PlateState,
     last: Option<HBlock>,
     corrections: usize,
+    ram: DrivenRam,
+    /// Stroke that was ordered and not yet made.
+    ordered: Option<Stroke>,
 }
 
 impl FormingModel {
@@ -92,20 +103,42 @@ impl FormingModel {
     ///
     /// # Errors
     /// [`crate::Error::Plate`] when the target cannot be reached by strokes or the blank is impossible.
-    pub fn new(config: &PlateConfig, strategy: Strategy) -> Result<Self> {
+    pub fn new(config: &PlateConfig, strategy: Strategy, part: u32) -> Result<Self> {
         let mut programme = Programme::toward(&config.target, &config.blank, &config.plan)?.strokes;
         for stroke in &mut programme {
             stroke.angle_deg *= config.share;
         }
         let pose = config.handling.place(&config.pose, 0);
         let state = PlateState { blank: config.blank.clone(), shape: Shape::Flat, pose, strokes: 0 };
-        Ok(Self { config: config.clone(), strategy, programme, state, last: None, corrections: 0 })
+        let axis_deg = programme.first().map_or(90.0, |stroke| stroke.axis_deg);
+        let ram = DrivenRam::new(&config.ram, config, part, axis_deg);
+        Ok(Self {
+            config: config.clone(),
+            strategy,
+            programme,
+            state,
+            last: None,
+            corrections: 0,
+            ram,
+            ordered: None,
+        })
     }
 
     /// Returns the present state of the plate.
     #[must_use]
     pub fn state(&self) -> &PlateState {
         &self.state
+    }
+
+    /// Takes the operator's order for the next stroke.
+    pub fn order(&mut self, order: &OrderedStroke) {
+        self.ordered = Some(self.ram.press(order));
+    }
+
+    /// Returns die set and depth of the last stroke, as the press tells them; `None` before a driven stroke.
+    #[must_use]
+    pub fn told(&self) -> Option<(u16, f64)> {
+        (self.strategy == Strategy::Operator).then(|| (self.ram.die_id(), self.ram.told_mm.unwrap_or(0.0)))
     }
 
     /// Records the latest result.
@@ -120,7 +153,12 @@ impl FormingModel {
         let planned = self.programme.get(made).copied();
         match (self.strategy, planned, &self.last) {
             (Strategy::Programme, None, _) => Next::End,
-            (Strategy::ClosedLoop, _, Some(last)) if made > 0 && last.verdict() == Verdict::Pass => Next::End,
+            (Strategy::ClosedLoop | Strategy::Operator, _, Some(last))
+                if made > 0 && last.verdict() == Verdict::Pass =>
+            {
+                Next::End
+            }
+            (Strategy::Operator, _, _) => self.ordered.map_or(Next::Wait, Next::Bend),
             (_, Some(stroke), _) => Next::Bend(stroke),
             (Strategy::ClosedLoop, None, Some(last)) => match self.correction(last) {
                 Some(stroke) => Next::Bend(stroke),
@@ -136,6 +174,7 @@ impl FormingModel {
     /// # Errors
     /// [`crate::Error::Plate`] when the stroke is oblique to the strokes before it.
     pub fn bend(&mut self, stroke: &Stroke) -> Result<()> {
+        self.ordered = None;
         if usize::try_from(self.state.strokes).is_ok_and(|made| made >= self.programme.len()) {
             self.corrections += 1;
         }

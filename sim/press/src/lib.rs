@@ -26,6 +26,7 @@ mod answer_faults;
 pub mod config;
 pub mod control;
 pub mod counters;
+pub mod driven_ram;
 mod error;
 pub mod faults;
 pub mod forming_model;

@@ -9,6 +9,7 @@ use platen_sim_plate::{PlateState, Reply, Stroke};
 
 use crate::config::Config;
 use crate::counters::{AcceptedResult, Counters, WriteMonitor, whole_ms};
+use crate::driven_ram::OrderedStroke;
 use crate::faults::StrokePlan;
 use crate::forming_model::{FormingModel, Next};
 use crate::program::{Cause, Event, Limits, Program, Request};
@@ -78,7 +79,7 @@ impl Press {
         let session_id = random.u16(1..);
         let mut press = Self {
             program: new_program(config, session_id, Duration::ZERO),
-            forming: FormingModel::new(&config.plate, config.strategy)?,
+            forming: FormingModel::new(&config.plate, config.strategy, config.part_id)?,
             phase: Phase::Rest { until: Duration::from_millis(config.timings.start_ms) },
             plan: StrokePlan::default(),
             random,
@@ -187,6 +188,20 @@ impl Press {
         }
         self.raise(cause, now);
         Ok(())
+    }
+
+    /// Takes the operator's order for the next stroke.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] while a stroke is being made or measured.
+    pub fn order(&mut self, order: &OrderedStroke) -> Result<()> {
+        match self.phase {
+            Phase::Rest { .. } if self.program.request().is_none() => {
+                self.forming.order(order);
+                Ok(())
+            }
+            _ => Err(Error::Refused("the press is not at rest")),
+        }
     }
 
     /// Ends the part; the next one follows if any.
@@ -300,6 +315,14 @@ impl Press {
         self.repeat_until = self.repeat_until.filter(|&until| now < until);
         let request = self.program.request().copied();
         let accepted = request.is_some_and(|request| request.accepted.is_some());
+        if let Some(stroke) =
+            table.advised_after().filter(|stroke| accepted && *stroke != self.program.stroke_id)
+        {
+            self.counters.wrong(format!(
+                "the advice after stroke {stroke} stands while {} is measured",
+                self.program.stroke_id
+            ));
+        }
         if self.hasty_until.is_some_and(|until| now >= until) {
             self.hasty_until = None;
             if request.is_some() && !accepted {
@@ -365,6 +388,7 @@ impl Press {
                 let until = now + Duration::from_millis(self.config.timings.down_ms);
                 self.phase = Phase::Down { until, stroke };
             }
+            Next::Wait => {}
             Next::Rescan => self.raise(Cause::Rescan, now),
             Next::End => self.end_part(now),
         }
@@ -379,7 +403,7 @@ impl Press {
         }
         self.counters.parts += 1;
         self.part_id += 1;
-        self.forming = FormingModel::new(&self.config.plate, self.config.strategy)?;
+        self.forming = FormingModel::new(&self.config.plate, self.config.strategy, self.part_id)?;
         self.baseline_due = self.config.baseline;
         let stroke_id = self.program.stroke_id;
         self.new_session(stroke_id);
@@ -428,6 +452,10 @@ impl Press {
         block[p::PART_NAME..p::PART_NAME + 8].copy_from_slice(&ascii_words(&self.config.part_name));
         block[p::BEND_INDEX] = u16::try_from(self.forming.state().strokes).unwrap_or(u16::MAX);
         block[p::THICKNESS] = (self.config.plate.blank.thickness_mm * 100.0).round() as u16;
+        if let Some((die_id, depth_mm)) = self.forming.told() {
+            block[p::RAM_DEPTH] = ((depth_mm * 100.0).round() as i16).cast_unsigned();
+            block[p::DIE_ID] = die_id;
+        }
         block[p::ATTEMPT] = self.program.attempt;
         block[p::STROKE_ID_TAIL] = tail;
         block

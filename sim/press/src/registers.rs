@@ -10,6 +10,8 @@ use serde::Serialize;
 pub const MAP_VERSION: u16 = 1;
 /// Words of the P block.
 pub const P_LEN: usize = 32;
+/// Number of the registers for advice.
+pub const ADVICE_LEN: usize = 24;
 /// Words of the H block.
 pub const H_LEN: usize = 64;
 
@@ -39,8 +41,12 @@ pub mod p {
     pub const BEND_INDEX: usize = 18;
     /// 0.01 mm.
     pub const THICKNESS: usize = 19;
+    /// Signed, 0.01 mm.
+    pub const RAM_DEPTH: usize = 21;
     /// Rescan requests of this stroke.
     pub const ATTEMPT: usize = 29;
+    /// Die set in use.
+    pub const DIE_ID: usize = 30;
     /// Copy of [`STROKE_ID`].
     pub const STROKE_ID_TAIL: usize = 31;
 }
@@ -227,15 +233,17 @@ pub struct Table {
     words: Vec<u16>,
     p_base: usize,
     h_base: usize,
+    advice: Option<std::ops::Range<usize>>,
 }
 
 impl Table {
     /// Creates a table of zeros with the two blocks at the given addresses; it ends 36 words after the later block.
     #[must_use]
-    pub fn new(p_base: u16, h_base: u16) -> Self {
+    pub fn new(p_base: u16, h_base: u16, advice_base: Option<u16>) -> Self {
         let (p_base, h_base) = (usize::from(p_base), usize::from(h_base));
-        let end = (p_base + P_LEN).max(h_base + H_LEN) + 36;
-        Self { words: vec![0; end], p_base, h_base }
+        let advice = advice_base.map(|base| usize::from(base)..usize::from(base) + ADVICE_LEN);
+        let end = (p_base + P_LEN).max(h_base + H_LEN).max(advice.clone().map_or(0, |it| it.end)) + 36;
+        Self { words: vec![0; end], p_base, h_base, advice }
     }
 
     /// Returns `count` words from `address`, or `None` beyond the end of the table.
@@ -258,11 +266,19 @@ impl Table {
         }
     }
 
-    /// Returns whether all `count` words from `address` lie in the H block.
+    /// Returns whether all `count` words from `address` lie in the H block, or in the registers for advice.
     #[must_use]
-    pub fn in_h_block(&self, address: u16, count: usize) -> bool {
-        let start = usize::from(address);
-        start >= self.h_base && start + count <= self.h_base + H_LEN
+    pub fn is_of_host(&self, address: u16, count: usize) -> bool {
+        let (start, end) = (usize::from(address), usize::from(address) + count);
+        let in_h = start >= self.h_base && end <= self.h_base + H_LEN;
+        in_h || self.advice.as_ref().is_some_and(|it| start >= it.start && end <= it.end)
+    }
+
+    /// Returns the number of the stroke that the advice follows, while it is valid.
+    #[must_use]
+    pub fn advised_after(&self) -> Option<u16> {
+        let words = &self.words[self.advice.clone()?];
+        (words[2] & 1 == 1).then_some(words[1])
     }
 
     /// Returns whether the `count` words from `address` overlap the P block.

@@ -79,7 +79,7 @@ impl Connection {
         if self.read_void.load(Ordering::Relaxed) {
             press.counters.writes_while_void += 1;
         }
-        if !table.in_h_block(address, words.len()) {
+        if !table.is_of_host(address, words.len()) {
             press.counters.writes_outside += 1;
         }
         if !table.write(address, words) {

@@ -47,7 +47,7 @@ impl Shared {
         Ok(Self {
             machine: Mutex::new(Machine {
                 press: Press::new(config)?,
-                table: Table::new(config.p_base, config.h_base),
+                table: Table::new(config.p_base, config.h_base, config.advice_base),
             }),
             line: Mutex::new(Line {
                 faults: config.line_faults.clone(),

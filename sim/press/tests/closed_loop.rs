@@ -80,7 +80,7 @@ fn measure(model: &FormingModel, radii: [Option<f64>; 2], centres: &[f64]) -> HB
 
 /// Bends until the press ends the part; returns the number of strokes and the gaps in millimetres.
 fn press(config: &PlateConfig, radii: [Option<f64>; 2], centres: &[f64]) -> (bool, Vec<f64>) {
-    let mut model = FormingModel::new(config, Strategy::ClosedLoop).unwrap();
+    let mut model = FormingModel::new(config, Strategy::ClosedLoop, 1).unwrap();
     let mut gaps = Vec::new();
     for _ in 0..80 {
         let result = measure(&model, radii, centres);
@@ -88,7 +88,7 @@ fn press(config: &PlateConfig, radii: [Option<f64>; 2], centres: &[f64]) -> (boo
         model.record_result(&result);
         match model.next(0) {
             Next::Bend(stroke) => model.bend(&stroke).unwrap(),
-            Next::Rescan => return (false, gaps),
+            Next::Rescan | Next::Wait => return (false, gaps),
             Next::End => return (result.sense() == 0, gaps),
         }
     }

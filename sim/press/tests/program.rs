@@ -134,7 +134,7 @@ impl Bench {
         let timings = Timings { down_ms: 10, up_ms: 10, restart_ms: 50, ..Timings::default() };
         let config =
             Config { baseline: false, wait_ready: false, timings, stroke_faults, ..Config::default() };
-        Self { press: Press::new(&config).unwrap(), table: Table::new(0, 100), now: 0 }
+        Self { press: Press::new(&config).unwrap(), table: Table::new(0, 100, None), now: 0 }
     }
 
     fn run(&mut self, duration: u64, host: impl Fn(&[u16; 32], &mut [u16; 64])) {

@@ -10,6 +10,8 @@ pub struct Instrument {
     pub range_sigma: f64,
     /// Degrees of freedom of the range error (Student's t, scaled to the same variance); `None`: normal distribution.
     pub tail_dof: Option<f64>,
+    /// Share of the ranges with a wide error; `None`: none.
+    pub wide_errors: Option<WideErrors>,
     /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
     /// Standard deviation of each reported angle against the true direction of the beam.
@@ -30,6 +32,15 @@ pub struct Instrument {
     pub reach: [f64; 2],
     /// Seed of all random numbers.
     pub seed: u64,
+}
+
+/// Contaminated normal distribution of the range error (Tukey 1960): a share of the ranges has a larger standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WideErrors {
+    /// Share of the ranges, 0 to 1.
+    pub share: f64,
+    /// Factor of their standard deviation.
+    pub factor: f64,
 }
 
 /// Cyclic range error `amplitude` * sin(2 pi range / period + phase).
@@ -63,6 +74,7 @@ impl Default for Instrument {
         Self {
             range_sigma: 0.5e-3,
             tail_dof: None,
+            wide_errors: None,
             footprint: 0.3e-3,
             angular_sigma: 0.0,
             dropout: 0.006,

@@ -1,7 +1,7 @@
 //! Terrestrial laser scanner simulated by ray casting, with a press shop around the plate.
 //!
 //! A [`Scene`] is a bent plate and its [`Surroundings`]: dies, table, press, floor, walls, cabinet, people, a chain. Rays are
-//! intersected with the six curved faces of the plate by Newton's method on parametric patches, found through a bounding volume
+//! intersected with the curved faces of the plate by Newton's method on parametric patches, found through a bounding volume
 //! hierarchy, and with boxes and capsules in closed form. [`scan`] casts one ray per direction of a [`SimLattice`], applies the errors
 //! of an [`Instrument`] and delivers [`SimColumn`]s together with the ground truth of every cell.
 //!
@@ -36,7 +36,7 @@ mod truth;
 pub use column::{SimColumn, SimState, TruthCell};
 pub use device::{Device, DeviceError};
 pub use files::{E57Encoding, FileError, FileFormat, FileOrder, SimScan};
-pub use instrument::{Cyclic, Faces, Instrument};
+pub use instrument::{Cyclic, Faces, Instrument, WideErrors};
 pub use lattice::{LOWEST_DEG, SimLattice};
 pub use measure::INTENSITY_MAX;
 pub use ray::{Hit, Label, Ray};

@@ -43,11 +43,16 @@ pub(crate) struct View<'a> {
 enum Purpose {
     Angles = 0,
     Ranges = 1,
+    WideErrors = 2,
 }
 
 impl View<'_> {
     fn rng(&self, column: u32, purpose: Purpose) -> Pcg64 {
-        let stream = u128::from(column) * 2 + purpose as u128;
+        // Two purposes alternate; a third one lies beyond all columns.
+        let stream = match purpose {
+            Purpose::Angles | Purpose::Ranges => u128::from(column) * 2 + purpose as u128,
+            Purpose::WideErrors => (1 << 64) + u128::from(column),
+        };
         Pcg64::new(u128::from(self.instrument.seed), stream)
     }
 
@@ -110,6 +115,7 @@ impl View<'_> {
     ) -> SimColumn {
         let n = here.rays.len();
         let mut rng = self.rng(column, Purpose::Ranges);
+        let mut wide = self.rng(column, Purpose::WideErrors);
         let mut out = SimColumn {
             index: column,
             back_face: self.is_back(column),
@@ -127,7 +133,7 @@ impl View<'_> {
             } else {
                 here.hits[row].map(|hit| self.echo(&hit))
             };
-            let (state, range, intensity) = self.receive(column, echo, &mut rng);
+            let (state, range, intensity) = self.receive(column, echo, self.spread(&mut wide), &mut rng);
             out.range_m.push(range as f32);
             out.intensity.push(intensity);
             out.state.push(state);
@@ -177,8 +183,15 @@ impl View<'_> {
         Some(Echo { hit, strength, mixed })
     }
 
-    /// Simulates the receiver: returns state, range and intensity of an echo.
-    fn receive(&self, column: u32, echo: Option<Echo>, rng: &mut Pcg64) -> (SimState, f64, u16) {
+    /// Draws the factor of a range's standard deviation.
+    fn spread(&self, rng: &mut Pcg64) -> f64 {
+        let wide = self.instrument.wide_errors.filter(|wide| unit_interval(rng) < wide.share);
+        wide.map_or(1.0, |wide| wide.factor)
+    }
+
+    /// Simulates the receiver: returns state, range and intensity of an echo. `spread` is a factor of the range's standard
+    /// deviation.
+    fn receive(&self, column: u32, echo: Option<Echo>, spread: f64, rng: &mut Pcg64) -> (SimState, f64, u16) {
         // Every cell draws the same number of deviates, with or without an echo.
         let lost = unit_interval(rng);
         let error = self.unit_error(rng);
@@ -187,7 +200,7 @@ impl View<'_> {
         if lost < self.instrument.loss(&hit, strength) {
             return (SimState::NoEcho, 0.0, 0);
         }
-        let mut sigma = self.instrument.sigma_at(hit.range, strength);
+        let mut sigma = spread * self.instrument.sigma_at(hit.range, strength);
         if self.is_warm_up(column) {
             sigma = sigma.max(WARM_UP_SIGMA);
         }

@@ -1,8 +1,9 @@
-//! Ray intersection with the six curved faces of a plate, by Newton's method on parametric patches.
+//! Ray intersection with the curved faces of a plate (two faces, four sides of one to three strips), by Newton's method on
+//! parametric patches.
 
 use crate::bounds::Bounds;
 use crate::ray::{Label, Ray};
-use platen_sim_plate::{Jet, Plate, Side, Vec3};
+use platen_sim_plate::{Jet, Plate, Side, Strip, Vec3};
 
 /// Longest edge of a patch, metres: short against the radii, so that Newton's method converges from the patch's middle.
 const PATCH: f64 = 0.12;
@@ -18,11 +19,12 @@ const CLOSE: f64 = 1e-11;
 const OVERLAP: f64 = 1e-9;
 
 /// Face of a plate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Face {
     Top,
     Underside,
-    Side(Side),
+    /// A strip of a side, with its number.
+    Side(Side, Strip, u16),
 }
 
 /// Rectangle in the two parameters of a face: (a, b) of the ordered rectangle, or one of them and the height above the
@@ -43,46 +45,70 @@ pub(crate) struct PatchHit {
 }
 
 impl Face {
-    fn sizes(self, plate: &Plate) -> [f64; 2] {
+    /// Returns the faces of a plate.
+    fn all(plate: &Plate) -> Vec<Self> {
+        let sides = Side::ALL.into_iter().flat_map(|side| {
+            plate.strips().iter().zip(0..).map(move |(strip, number)| Self::Side(side, *strip, number))
+        });
+        [Self::Top, Self::Underside].into_iter().chain(sides).collect()
+    }
+
+    /// Returns the least and the largest parameters.
+    fn range(self, plate: &Plate) -> [[f64; 2]; 2] {
+        let (inset, half) = (plate.face_inset(), plate.thickness() / 2.0);
         match self {
-            Self::Top | Self::Underside => [plate.width(), plate.height()],
-            Self::Side(Side::Bottom | Side::Top) => [plate.width(), plate.thickness()],
-            Self::Side(Side::Right | Side::Left) => [plate.height(), plate.thickness()],
+            Self::Top | Self::Underside => [[inset, inset], [plate.width() - inset, plate.height() - inset]],
+            Self::Side(side, strip, _) => {
+                let length = match side {
+                    Side::Bottom | Side::Top => plate.width(),
+                    Side::Right | Side::Left => plate.height(),
+                };
+                [[0.0, strip.from + half], [length, strip.to + half]]
+            }
         }
     }
 
-    /// Returns the point of the ordered rectangle and the height of the parameters (a, b).
+    /// Returns the point of the ordered rectangle and the height of the parameters (a, b). On a bevel the parameter along the
+    /// side is compressed so that neighbouring sides meet in a mitre.
     fn place(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
         let (width, height, half) = (plate.width(), plate.height(), plate.thickness() / 2.0);
-        match self {
-            Self::Top => [a, b, half],
-            Self::Underside => [a, b, -half],
-            Self::Side(Side::Bottom) => [a, 0.0, b - half],
-            Self::Side(Side::Right) => [width, a, b - half],
-            Self::Side(Side::Top) => [a, height, b - half],
-            Self::Side(Side::Left) => [0.0, a, b - half],
+        let Self::Side(side, strip, _) = self else {
+            return [a, b, if self == Self::Top { half } else { -half }];
+        };
+        let inset = strip.inset(b - half);
+        let along = |length: f64| inset + a * (1.0 - 2.0 * inset / length);
+        match side {
+            Side::Bottom => [along(width), inset, b - half],
+            Side::Right => [width - inset, along(height), b - half],
+            Side::Top => [along(width), height - inset, b - half],
+            Side::Left => [inset, along(height), b - half],
         }
     }
 
     /// Returns 1 where da x db points out of the plate, else -1.
     fn outward(self) -> f64 {
         match self {
-            Self::Top | Self::Side(Side::Bottom | Side::Right) => 1.0,
-            Self::Underside | Self::Side(Side::Top | Side::Left) => -1.0,
+            Self::Top | Self::Side(Side::Bottom | Side::Right, ..) => 1.0,
+            Self::Underside | Self::Side(Side::Top | Side::Left, ..) => -1.0,
         }
     }
 
     /// Returns the point and its derivatives by (a, b).
     fn point(self, plate: &Plate, a: f64, b: f64) -> (Vec3, Vec3, Vec3) {
-        let [a, b, h] = self.place(plate, a, b);
-        let ([u, v], [[u_a, u_b], [v_a, v_b]]) = plate.material(a, b);
+        let [x, y, h] = self.place(plate, a, b);
+        let ([u, v], [[u_x, u_y], [v_x, v_y]]) = plate.material(x, y);
         let Jet { point, du, dv, normal, .. } = plate.jet(u, v, h);
-        let (da, db) = (du * u_a + dv * v_a, du * u_b + dv * v_b);
-        match self {
-            Self::Top | Self::Underside => (point, da, db),
-            Self::Side(Side::Bottom | Side::Top) => (point, da, normal),
-            Self::Side(Side::Right | Side::Left) => (point, db, normal),
-        }
+        let (dx, dy) = (du * u_x + dv * v_x, du * u_y + dv * v_y);
+        let Self::Side(side, strip, _) = self else { return (point, dx, dy) };
+        let (along, across, length) = match side {
+            Side::Bottom => (dx, dy, plate.width()),
+            Side::Top => (dx, -dy, plate.width()),
+            Side::Right => (dy, -dx, plate.height()),
+            Side::Left => (dy, dx, plate.height()),
+        };
+        let compressed = 1.0 - 2.0 * strip.inset(h) / length;
+        let slope = along * (1.0 - 2.0 * a / length) + across;
+        (point, along * compressed, normal + slope * strip.slope)
     }
 }
 
@@ -90,17 +116,17 @@ impl Patch {
     /// Divides the faces of a plate into patches.
     pub(crate) fn all(plate: &Plate) -> Vec<Self> {
         let mut patches = Vec::new();
-        let faces = [Face::Top, Face::Underside].into_iter().chain(Side::ALL.map(Face::Side));
-        for face in faces {
-            let sizes = face.sizes(plate);
+        for face in Face::all(plate) {
+            let [from, to] = face.range(plate);
+            let sizes = [0, 1].map(|k| to[k] - from[k]);
             let [na, nb] = sizes.map(|size| (size / PATCH).ceil().max(1.0) as usize);
-            let place = |i: usize, n: usize, size: f64| size * i as f64 / n as f64;
+            let place = |k: usize, i: usize, n: usize| from[k] + sizes[k] * i as f64 / n as f64;
             for i in 0..na {
                 for j in 0..nb {
                     patches.push(Self {
                         face,
-                        from: [place(i, na, sizes[0]), place(j, nb, sizes[1])],
-                        to: [place(i + 1, na, sizes[0]), place(j + 1, nb, sizes[1])],
+                        from: [place(0, i, na), place(1, j, nb)],
+                        to: [place(0, i + 1, na), place(1, j + 1, nb)],
                     });
                 }
             }
@@ -112,16 +138,16 @@ impl Patch {
         match self.face {
             Face::Top => Label::PlateTop,
             Face::Underside => Label::PlateUnderside,
-            Face::Side(_) => Label::PlateSide,
+            Face::Side(..) => Label::PlateSide,
         }
     }
 
-    /// Returns the number of the face, 0 to 5.
+    /// Returns the number of the face, 0 to 13.
     pub(crate) fn object(&self) -> u16 {
         match self.face {
             Face::Top => 0,
             Face::Underside => 1,
-            Face::Side(side) => 2 + side as u16,
+            Face::Side(side, _, strip) => 2 + side as u16 + 4 * strip,
         }
     }
 

@@ -38,8 +38,11 @@ impl CellCounts {
     }
 }
 
-/// Returns the ground truth as a document: the plate's state, corners, markers and two grids of the upper face (metres, scanner frame),
-/// curvature of the mid-surface (1/m), and numbers of cells.
+/// Returns the ground truth as a document: the plate's state, corners, markers, edges and two grids of the upper face (metres, scanner
+/// frame), curvature of the mid-surface (1/m), and numbers of cells.
+///
+/// `edges` are those of the face, v = 0, u = W, v = H, u = 0, counter-clockwise, with at most 50 mm between points: on a bevelled plate
+/// inside of the rectangle. Corners and grids are those of the rectangle, and of the face's continuation where it is bevelled.
 ///
 /// Grids are regular over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 points with curvatures, `face` is
 /// finer, with at most 50 mm between points, positions only. The result is null when the scene has no plate.
@@ -52,6 +55,7 @@ pub fn truth_document(state: &PlateState, scene: &Scene, counts: &CellCounts) ->
     json!({
         "state": state,
         "corners_m": corners,
+        "edges": (0..4).map(|k| edge(plate, k, fine[k % 2])).collect::<Vec<_>>(),
         "markers": plate.markers().iter().map(marker).collect::<Vec<_>>(),
         "grid": {
             "nu": GRID,
@@ -72,6 +76,21 @@ pub fn truth_document(state: &PlateState, scene: &Scene, counts: &CellCounts) ->
             "mixed": counts.mixed,
         },
     })
+}
+
+/// Returns `n` points of edge `k` of the upper face.
+fn edge(plate: &Plate, k: usize, n: u32) -> Vec<Value> {
+    let inset = plate.face_inset();
+    let along = |length: f64, i: u32| inset + f64::from(i) / f64::from(n - 1) * (length - 2.0 * inset);
+    let (w, h) = (plate.width(), plate.height());
+    let at = |i: u32| match k {
+        0 => (along(w, i), inset),
+        1 => (w - inset, along(h, i)),
+        2 => (along(w, n - 1 - i), h - inset),
+        _ => (inset, along(h, n - 1 - i)),
+    };
+    let material = |(a, b)| plate.material(a, b).0;
+    (0..n).map(at).map(material).map(|[u, v]| position(plate, u, v)).collect()
 }
 
 fn position(plate: &Plate, u: f64, v: f64) -> Value {

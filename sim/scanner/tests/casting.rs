@@ -11,6 +11,15 @@ fn plate(shape: Shape) -> Plate {
     Plate::new(&state).unwrap()
 }
 
+/// Returns the plate with edges bevelled by 30 degrees on both faces, and a root face.
+fn bevelled(shape: Shape) -> Plate {
+    let mut state = PlateState::flat(3000.0, 2500.0, 36.0);
+    (state.blank.face_inset_mm, state.blank.root_face_mm) = (9.24, 4.0);
+    state.shape = shape;
+    state.pose = Pose { centre_mm: [5000.0, 300.0, -3600.0], yaw_deg: 33.0, pitch_deg: 1.0, roll_deg: -0.7 };
+    Plate::new(&state).unwrap()
+}
+
 fn shapes() -> Vec<Shape> {
     let band = |at_mm, angle_deg| Band { at_mm, width_mm: 250.0, angle_deg };
     vec![
@@ -111,6 +120,52 @@ fn no_ray_slips_between_the_faces() {
             let target = plate.top(inside(u, plate.width()), inside(v, plate.height()));
             assert!(scene.cast(&towards(target), 100.0).is_some(), "{side:?} {i}");
         }
+    }
+}
+
+#[test]
+fn flanks_of_a_bevel_lie_at_their_angle_and_close_the_plate() {
+    for shape in shapes() {
+        let plate = bevelled(shape.clone());
+        let scene = Scene::of(Some(plate.clone()), Vec::new());
+        let (w, h) = (plate.width(), plate.height());
+        // Over the edges and corners, across the strip in which flanks and root face show.
+        let mut strips = [0; 3];
+        for side in Side::ALL {
+            for i in 0..=300 {
+                let [u, v] = plate.side_uv(side, f64::from(i) / 300.0);
+                for k in -20..=20 {
+                    let off = 0.002 * f64::from(k);
+                    let [du, dv] =
+                        [[0.0, off], [off, 0.0]][usize::from(matches!(side, Side::Left | Side::Right))];
+                    let ray = towards(plate.top(u + du, v + dv));
+                    let from_edge = (u + du).min(w - u - du).min(v + dv).min(h - v - dv);
+                    // A ray along the face's horizon may pass.
+                    let facing = plate.normal(u + du, v + dv).dot(&-ray.direction).abs() > 1e-3;
+                    let inside = facing && from_edge > plate.face_inset() + 1e-3;
+                    let Some(hit) = scene.cast(&ray, 100.0) else {
+                        assert!(!inside, "{shape:?} {side:?} {i} {k}: no hit");
+                        continue;
+                    };
+                    let [u, v] = hit.uv.unwrap();
+                    let height = (ray.at(hit.range) - plate.mid(u, v)).dot(&plate.normal(u, v));
+                    let from_edge = u.min(w - u).min(v).min(h - v);
+                    match hit.label {
+                        Label::PlateTop => assert!(from_edge > plate.face_inset() - 1e-8, "{from_edge}"),
+                        Label::PlateSide => {
+                            let expected = (height.abs() - 0.002).max(0.0) * (9.24 / 16.0);
+                            assert!(
+                                (from_edge - expected).abs() < 1e-8,
+                                "{shape:?} {side:?}: {from_edge} {expected}"
+                            );
+                            strips[usize::from(height > 0.002) + 2 * usize::from(height < -0.002)] += 1;
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        assert!(strips[0] > 50 && strips[1] > 500, "{shape:?}: {strips:?}");
     }
 }
 

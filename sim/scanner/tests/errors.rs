@@ -3,7 +3,8 @@
 
 use platen_sim_plate::{Plate, PlateState, Pose, Vec3};
 use platen_sim_scanner::{
-    Cyclic, Faces, Instrument, Label, Scene, SimColumn, SimLattice, SimState, Solid, scan, scan_all,
+    Cyclic, Faces, Instrument, Label, Scene, SimColumn, SimLattice, SimState, Solid, WideErrors, scan,
+    scan_all,
 };
 use std::ops::ControlFlow;
 
@@ -87,6 +88,27 @@ fn heavy_tails_keep_the_standard_deviation() {
     assert!((flat - 3.0).abs() < 0.2, "{flat}");
     // Student's t with 6 degrees of freedom: kurtosis 6.
     assert!((4.5..8.5).contains(&heavy) && (heavy_sigma / sigma - 1.0).abs() < 0.04, "{heavy} {heavy_sigma}");
+}
+
+#[test]
+fn a_share_of_the_ranges_has_wide_errors_and_the_others_keep_theirs() {
+    let lattice = narrow(0.01);
+    let wide = WideErrors { share: 0.05, factor: 4.0 };
+    let of = |wide_errors| {
+        let instrument = Instrument { wide_errors, ..Instrument::default() };
+        scan_all(&target(10.0, 60.0), &lattice, &instrument, 2)
+    };
+    let (plain, mixed) = (ranges(&of(None)), ranges(&of(Some(wide))));
+    let pairs = plain.iter().zip(&mixed).map(|((truth, a), (_, b))| (a - truth, b - truth));
+    let (mut n, mut changed) = (0.0, 0.0);
+    for (a, b) in pairs.filter(|(a, _)| a.abs() > 2e-4) {
+        n += 1.0;
+        if (a - b).abs() > 1e-6 {
+            changed += 1.0;
+            assert!((b / a - 4.0).abs() < 0.05, "{a} {b}");
+        }
+    }
+    assert!((changed / n - 0.05_f64).abs() < 0.01, "{changed} of {n}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use platen_model::{Findings, Task};
+use platen_model::{Advice, Findings, PlateHistory, Task};
 use schemars::generate::{SchemaGenerator, SchemaSettings};
 
 /// Compares a schema with its file, or writes it (`PLATEN_BLESS=1`).
@@ -30,4 +30,18 @@ fn the_findings_have_a_schema() {
     // As the host reads them.
     let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_deserialize());
     stands_beside_the_header("platen.findings-1", generator.into_root_schema_for::<Findings>());
+}
+
+#[test]
+fn the_record_has_a_schema() {
+    // As the host writes it.
+    let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_serialize());
+    stands_beside_the_header("platen.record-1", generator.into_root_schema_for::<PlateHistory>());
+}
+
+#[test]
+fn the_advice_has_a_schema() {
+    // As the host reads it.
+    let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_deserialize());
+    stands_beside_the_header("platen.advice-1", generator.into_root_schema_for::<Advice>());
 }

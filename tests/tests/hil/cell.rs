@@ -146,6 +146,13 @@ impl Host {
         Self::run(program, plant)
     }
 
+    /// A host that systemd would have started, with this socket to tell it.
+    pub(crate) fn notifying(plant: &Path, socket: &Path) -> Self {
+        let mut program = platen_tests::program("platen");
+        program.env("NOTIFY_SOCKET", socket);
+        Self::run(program, plant)
+    }
+
     fn run(mut program: Command, plant: &Path) -> Self {
         let log =
             std::fs::File::options().create(true).append(true).open(plant.with_extension("log")).unwrap();
@@ -159,7 +166,7 @@ impl Host {
         self.child.wait().unwrap();
     }
 
-    fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let done = Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status();
         assert!(done.unwrap().success());
     }

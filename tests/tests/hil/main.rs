@@ -6,6 +6,7 @@ mod cell;
 mod rig;
 mod stream;
 
+mod advice;
 mod archive;
 mod bridge_check;
 mod isolation;
@@ -21,4 +22,5 @@ mod scanner_light;
 mod scanner_link;
 mod scanner_record;
 mod screen;
+mod service;
 mod verbs;

@@ -79,7 +79,8 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let truth = Plate::new(&scene.plate).unwrap();
     let [width, height, thickness] = [truth.width(), truth.height(), truth.thickness()];
     let u_axis = Some(truth.corners()[1] - truth.corners()[0]).map(|u| Vec3::new(u.x, u.y, u.z));
-    let spec = PlateSpec { width, height, thickness, face_inset: 0.0, u_axis, region: scene.region };
+    let spec =
+        PlateSpec { width, height, thickness, face_inset: 0.0, root_face: 0.0, u_axis, region: scene.region };
     let window = scene.faces.map(|(_, seam_deg)| over_half_a_turn(seam_deg.to_radians(), scene.clockwise));
     let scanned = stroke::scan(&scanner, JobSpec::untriggered(LIMIT), window.as_ref(), &spec, None)?;
     assert_eq!(scanned.header.seam_column.is_some(), window.is_some());

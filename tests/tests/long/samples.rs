@@ -59,6 +59,7 @@ impl Sample {
             height,
             thickness,
             face_inset: 0.0,
+            root_face: 0.0,
             u_axis: Some(self.vec3("/u_axis_hint")),
             region: None,
         }

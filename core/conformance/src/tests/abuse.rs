@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use platen_engine::plugin::{CancelToken, Comparison, Flattening, JobSpec, Kind, Surfaces};
+use platen_engine::plugin::{Advisor, CancelToken, Comparison, Flattening, JobSpec, Kind, Surfaces};
 use platen_shape::{Flatten, FlattenError};
 
-use crate::answer::{Any, of_comparison, of_flattening};
+use crate::answer::{Any, of_advisor, of_comparison, of_flattening};
 use crate::reference;
 use crate::subject::{Subject, failed};
 use crate::{Test, Verdict};
@@ -123,6 +123,20 @@ fn hard(subject: &Subject) -> Result<(), Verdict> {
             }
             Ok(())
         }
+        Kind::Advisor => {
+            let advisor = subject.advisor(subject.settings.limit)?;
+            for (name, radius, seen) in
+                [("nothing seen", 6.0, 0.0), ("a corner seen", 6.0, 0.02), ("rolled to 1 m", 1.0, 1.0)]
+            {
+                let now = reference::surface(radius, seen)
+                    .ok_or_else(|| failed("the kit has no reference surface"))?;
+                match advisor.advise(&reference::history(1), &now, None, CancelToken::default()) {
+                    Err(error) if error.is_fault() => return Err(failed(format!("{name}: {error}"))),
+                    _ => {}
+                }
+            }
+            Ok(())
+        }
         Kind::Scanner => Ok(()),
     }
 }
@@ -186,6 +200,9 @@ fn little(subject: &Subject) -> Result<(), Verdict> {
         }
         Kind::Comparison => {
             of_comparison(&Comparison::create(&library, values, subject.settings.limit).map_err(failed)?)
+        }
+        Kind::Advisor => {
+            of_advisor(&Advisor::create(&library, values, subject.settings.limit).map_err(failed)?)
         }
         Kind::Scanner => return Ok(()),
     };

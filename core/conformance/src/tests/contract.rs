@@ -3,7 +3,7 @@
 use platen_engine::plugin::{Kind, PluginError};
 use platen_plant::{OptionDecl, OptionType, OptionValue, Value};
 
-use crate::answer::{self, charts, digest, reports};
+use crate::answer::{self, Any, charts, digest, reports};
 use crate::reference;
 use crate::subject::{Subject, failed};
 use crate::{Test, Verdict};
@@ -162,22 +162,14 @@ fn same(subject: &Subject) -> Result<(), Verdict> {
 }
 
 fn again(subject: &Subject) -> Result<(), Verdict> {
-    use crate::answer::{of_comparison, of_flattening};
+    let limit = subject.settings.limit;
     let unanswered = |verdict| match verdict {
         Verdict::Failed(why) => Verdict::LeftOut(why),
         other => other,
     };
-    let (first, second) = match subject.kind()? {
-        Kind::Flattening => {
-            let mut one = subject.flattening(subject.settings.limit)?;
-            (of_flattening(&mut one).map_err(unanswered)?, of_flattening(&mut one))
-        }
-        Kind::Comparison => {
-            let one = subject.comparison(subject.settings.limit)?;
-            (of_comparison(&one).map_err(unanswered)?, of_comparison(&one))
-        }
-        Kind::Scanner => return Ok(()),
-    };
+    let mut one = Any::of(subject, limit)?;
+    let first = one.answer(limit).map_err(unanswered)?;
+    let second = one.answer(limit);
     if first == second? {
         Ok(())
     } else {

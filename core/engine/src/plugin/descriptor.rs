@@ -13,6 +13,8 @@ pub enum Kind {
     Flattening,
     /// Comparison: from surfaces to findings.
     Comparison,
+    /// Advisor: from the history of a plate to its next stroke.
+    Advisor,
 }
 
 impl Kind {
@@ -22,6 +24,7 @@ impl Kind {
             Self::Scanner => "scanner",
             Self::Flattening => "flattening",
             Self::Comparison => "comparison",
+            Self::Advisor => "advisor",
         }
     }
 }

@@ -21,10 +21,24 @@ pub enum Part {
     Tables,
     /// Accuracy over many seeds: plates of every shape, strokes, templates
     Accuracy,
+    /// Strokes to the target: the advice beside four shop strategies, on plates of a hidden steel
+    Advice,
     /// Time and memory from 1.6 to 44 million cells
     Scale,
     /// All of these
     All,
+}
+
+/// A family of random scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Family {
+    /// Square edges, normal range errors
+    #[default]
+    Square,
+    /// Edges with a double-V bevel of 20 to 40 degrees
+    Bevel,
+    /// 5 % of the ranges with errors of four times the standard deviation of the others
+    Tails,
 }
 
 /// A lattice of the part `scale`.
@@ -42,7 +56,7 @@ pub enum Cells {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen bench\n  platen bench --flattening harmonic --repeat 11\n  \
                         platen bench --json | jq .tables.table_2\n  platen bench accuracy --seeds 50 --noise-mm 0.5,2 --threads 2\n  \
-                        platen bench accuracy --random 40 --flattening harmonic --threads 2\n  platen bench scale --cells dome\n\n\
+                        platen bench accuracy --random 40 --flattening harmonic --threads 2\n  platen bench advice --plates 100 --threads 2\n  platen bench scale --cells dome\n\n\
                         Scans come from the `simulated` driver library; the true shape is written beside them into --out. \
                         A measurement runs on one thread by design: times are processor time of one measurement, whatever --threads is.")]
 pub struct BenchArguments {
@@ -64,6 +78,12 @@ pub struct BenchArguments {
     /// Random scenes of `accuracy` instead of the plates of a shop; seeds count up from --seed
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub random: Option<usize>,
+    /// Family of the random scenes: edges of the plate and errors of the scanner
+    #[arg(long, value_enum, default_value_t, requires = "random")]
+    pub family: Family,
+    /// Plates of `advice`, two fifths of them where a part or a press is varied; seeds count up from --seed
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub plates: u64,
     /// Threads that cast rays; those of `accuracy` also measure plates side by side
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = at_least_one)]
     pub threads: usize,

@@ -82,6 +82,7 @@ fn check_plugin(role: PluginRole, used: &PluginUse, catalogue: &Catalogue) -> Ve
         PluginRole::Scanner => Kind::Scanner,
         PluginRole::Flattening => Kind::Flattening,
         PluginRole::Comparison => Kind::Comparison,
+        PluginRole::Advisor => Kind::Advisor,
     };
     if descriptor.kind != needed {
         let (found, needed) = (descriptor.kind.name(), needed.name());

@@ -1,6 +1,7 @@
 //! `platen demo`: a simulated press bends a plate and the host measures it, over real sockets and plugin libraries.
 
 mod files;
+mod operator;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -10,6 +11,8 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use platen_model::Verdict;
 use platen_plant::{PlantFile, Screen};
+
+use operator::Operator;
 
 use super::cell::{AcceptedResult, Cell};
 use super::run::{runtime, stop_signal};
@@ -25,9 +28,11 @@ const LIMIT: Duration = Duration::from_secs(300);
 const MOST_STROKES: u32 = 15;
 
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  platen demo\n  platen demo --screen --pace 20\n\n\
+#[command(
+    after_help = "Examples:\n  platen demo\n  platen demo --screen --pace 20\n  platen demo --advice --screen\n\n\
                         Only steel and light are simulated: platen-sim bends the plate and serves Modbus, the simulated scanner casts rays, \
-                        the host measures with the plugin libraries beside the program and writes the results to the press.")]
+                        the host measures with the plugin libraries beside the program and writes the results to the press."
+)]
 pub(super) struct Command {
     /// Folder for the results; an earlier demo there is replaced
     #[arg(long, value_name = "DIR", default_value = "platen-demo")]
@@ -38,16 +43,23 @@ pub(super) struct Command {
     /// Pause between two strokes, as in a shop: seconds
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(0..=3600))]
     pace: Option<u32>,
+    /// Advise each stroke; the press is driven to ordered depths, its steel is hidden, and its operator follows the advice or ignores it
+    #[arg(long, value_name = "OPERATOR", num_args = 0..=1, default_missing_value = "follow")]
+    advice: Option<Operator>,
+    /// Seed of the hidden steel and of the operator's and the ram's scatter, with --advice
+    #[arg(long, default_value_t = 1, requires = "advice")]
+    seed: u64,
 }
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let start = Instant::now();
     files::prepare(&command.out)?;
-    let mut cell = Cell::start(&files::press_file(&command.out, command.pace)?, &["--modbus-port", "0"])?;
+    let press_file = files::press_file(&command.out, command.pace, command.advice, command.seed)?;
+    let mut cell = Cell::start(&press_file, &["--modbus-port", "0"])?;
     let Some(modbus) = cell.modbus else {
         return Err(CliError::Failed("the demo's press serves no Modbus TCP".into()));
     };
-    let plant_file = files::plant_file(&command.out, modbus, cell.plate)?;
+    let plant_file = files::plant_file(&command.out, modbus, cell.plate, command.advice)?;
     let mut plant = PlantFile::load(&plant_file)?;
     plant.screen = command.screen.map(Screen::on);
     let pages = Pages::open(&plant).map_err(HostError::from)?;
@@ -68,7 +80,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let catalogue = common.catalogue();
         let host = run::run(&plant, press, &catalogue, pages, stopped, sender);
         tokio::pin!(host);
-        let pauses = Duration::from_secs(u64::from(command.pace.unwrap_or(0))) * MOST_STROKES;
+        let most = if command.advice.is_some() { operator::MOST_ADVISED + 1 } else { MOST_STROKES };
+        let pauses = Duration::from_secs(u64::from(command.pace.unwrap_or(0))) * most;
         let limit = tokio::time::sleep(LIMIT + pauses);
         tokio::pin!(limit);
         let mut look = tokio::time::interval(Duration::from_millis(100));
@@ -77,6 +90,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                 ended = &mut host => return Ok::<_, CliError>((ended, None)),
                 Some(report) = strokes.recv() => {
                     progress(&report);
+                    if let (Some(operator), Ok(record), Some(folder)) = (command.advice, &report.result, &report.folder) {
+                        let strokes = reports.iter().filter(|earlier: &&StrokeReport| !earlier.baseline).count();
+                        let made = u32::try_from(strokes).unwrap_or(u32::MAX) + u32::from(!report.baseline);
+                        tokio::task::block_in_place(|| operator.order(&mut cell, record, folder, made))?;
+                    }
                     reports.push(report);
                 }
                 _ = look.tick() => if cell.is_done()? { break },
@@ -186,7 +204,8 @@ fn summary(
             "files: {} (the plate's report plate-1.html; one folder a stroke: result.json, tables, mesh, pictures; history.sqlite)",
             command.out.join("results").display()
         ))?;
-        output::line(&format!("next: platen history list {}", command.out.join("plant.toml").display()))?;
+        let verb = if command.advice.is_some() { "advice" } else { "list" };
+        output::line(&format!("next: platen history {verb} {}", command.out.join("plant.toml").display()))?;
     }
     Ok(ExitCode::from(u8::from(!(passed && correct && safe))))
 }

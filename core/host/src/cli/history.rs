@@ -1,9 +1,12 @@
-//! `platen history`: queries of the record; all of them only read.
+//! `platen history`: queries of the record, and its backup; all of them but `restore` only read.
 
+mod advice;
+mod backup;
 mod compare;
 mod export;
 mod pick;
 mod sequence;
+mod skill;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,10 +26,13 @@ use pick::RunRef;
                         platen history show config/plant-north.toml 1042\n  \
                         platen history compare config/plant-north.toml 12:3 14:3 --out compared\n  \
                         platen history sequence config/plant-north.toml 12\n  \
+                        platen history advice config/plant-north.toml --json\n  \
                         platen history export config/plant-north.toml --out strokes.parquet\n  \
-                        platen history report config/plant-north.toml 12\n\n\
+                        platen history report config/plant-north.toml 12\n  \
+                        platen history backup config/plant-north.toml /backup/press-3-monday\n  \
+                        platen history restore /backup/press-3-monday config/plant-north.toml\n\n\
                         A stroke is named by its run id (1042) or as plate:stroke (12:3, 12:blank); plates have the numbers of the list. \
-                        All verbs only read and may run beside a host.")]
+                        All verbs but restore only read and may run beside a host.")]
 pub(super) struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -56,6 +62,16 @@ enum Verb {
     Compare(compare::Command),
     /// Print the bending sequence of a plate: bends, overshoot, re-hits, energy left
     Sequence(sequence::Command),
+    /// Compare strokes with the advice before them: angles and gaps inside their intervals
+    Advice(advice::Command),
+    /// Compare crews, by codes, with the hardness of their plates taken out
+    Skill(skill::Command),
+    /// Copy the record and its documents into a folder, also while the host runs
+    Backup(backup::Backup),
+    /// Check a backup: every file, the database, a document for each stroke
+    Verify(backup::Verify),
+    /// Begin a record from a backup, on this machine or another
+    Restore(backup::Restore),
     /// Export all strokes as a table, CSV or Parquet
     Export(export::Command),
     /// Write the report of one plate as HTML that prints on A4
@@ -85,6 +101,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         }
         Verb::Compare(command) => compare::run(common, command)?,
         Verb::Sequence(command) => sequence::run(common, command)?,
+        Verb::Advice(command) => advice::run(common, command)?,
+        Verb::Skill(command) => skill::run(common, command)?,
+        Verb::Backup(command) => backup::backup(common, command)?,
+        Verb::Verify(command) => backup::verify(common, command)?,
+        Verb::Restore(command) => backup::restore(common, command)?,
         Verb::Export(command) => export::run(common, command)?,
         Verb::Report { plant, plate, out } => {
             let (plant, archive) = open(plant)?;

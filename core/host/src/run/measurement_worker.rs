@@ -15,7 +15,7 @@ use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Progre
 use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
 use platen_history::History;
-use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey};
+use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey, Task};
 use platen_plant::press::Press;
 use platen_plant::{PlantFile, PlateFile};
 use platen_press::{Answer, Command};
@@ -25,12 +25,14 @@ use platen_scan::Window;
 use platen_shape::{PlateSpec, Scanned, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::advice::{AdviceDesk, AdviceJob};
 use super::figures;
 use super::plugin_status::{PluginStates, PluginStatus};
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
 use super::screen::{Event, MeasuredStroke, Teller};
+use crate::plate_history::MeasuredPlate;
 use crate::plugin_records;
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
@@ -75,6 +77,7 @@ struct JudgedStroke {
     record: ResultRecord,
     surface: Surface,
     reports: Vec<Result<Report, PluginError>>,
+    task: Task,
     /// Folder of its files; `None` when they could not be written.
     folder: Option<PathBuf>,
 }
@@ -109,6 +112,7 @@ pub(super) struct Receivers {
     pub(super) lost: Arc<AtomicU64>,
     pub(super) screen: Teller,
     pub(super) plugins: PluginStates,
+    pub(super) advice: AdviceDesk,
 }
 
 impl MeasurementWorker {
@@ -369,9 +373,10 @@ impl MeasurementWorker {
         let (baseline, started) = (stroke.data.baseline, stroke.started);
         let (folder, buffer) = (self.folder(stroke.run_id), stroke.buffer.take());
         match self.measure(&stroke, start) {
-            Ok(JudgedStroke { answer, record, surface, reports, folder }) => {
+            Ok(JudgedStroke { answer, record, surface, reports, task, folder }) => {
                 self.answer(Answer::Result(key, Box::new(answer)));
                 let elapsed = started.elapsed();
+                self.ask_for_advice(&stroke, &task, &surface, &reports, folder.as_deref());
                 self.show(stroke.run_id, &record, &reports);
                 // The press waits for its answer, not for pictures.
                 if let Some(folder) = &folder {
@@ -401,6 +406,25 @@ impl MeasurementWorker {
         });
         let measured = MeasuredStroke::new(run_id, record, &sound, strokes);
         self.receivers.screen.tell(Event::Measured(Box::new(measured)));
+    }
+
+    /// Hands a result over to the advisor, if there is one. Trials teach nothing, and a result without files has no place for advice.
+    fn ask_for_advice(
+        &self,
+        stroke: &ActiveStroke,
+        task: &Task,
+        surface: &Surface,
+        reports: &[Result<Report, PluginError>],
+        folder: Option<&Path>,
+    ) {
+        let Some(folder) = folder.filter(|_| self.receivers.advice.is_open() && !stroke.data.dry_run) else {
+            return;
+        };
+        let sound: Vec<&Report> = reports.iter().flatten().collect();
+        let measured =
+            MeasuredPlate::new((stroke.run_id, stroke.key), &stroke.data, &stroke.plate, task, &sound);
+        let (surface, folder, since) = (surface.clone(), folder.to_owned(), Instant::now());
+        self.receivers.advice.ask(AdviceJob { measured, surface, folder, since });
     }
 
     fn folder(&self, run_id: u32) -> PathBuf {
@@ -465,7 +489,7 @@ impl MeasurementWorker {
         let retried = record.plugins.iter().any(|plugin| plugin.retried);
         let warnings = [(folder.is_none(), Code::StorageDegraded), (retried, Code::PluginRestarted)];
         answer.warning = warnings.into_iter().find_map(|(raised, code)| raised.then_some(code));
-        Ok(JudgedStroke { answer, record, surface: measured.measurement.surface, reports, folder })
+        Ok(JudgedStroke { answer, record, surface: measured.measurement.surface, reports, task, folder })
     }
 
     fn history(&self) -> MutexGuard<'_, History> {

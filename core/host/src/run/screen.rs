@@ -16,6 +16,7 @@ use platen_model::{Code, Field, Report, StrokeData, StrokeKey};
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
 use platen_press::Status;
+use platen_report::advice::AdviceRecord;
 use platen_report::picture::StripPoint;
 use platen_report::result::{Next, ResultRecord};
 use platen_screen::{Access, Listener, Server, ServerError, Snapshot, Token, TokenError};
@@ -59,6 +60,8 @@ pub(super) enum Event {
     Measured(Box<MeasuredStroke>),
     /// The place of the next hit after this stroke was bent before.
     Again(u32),
+    /// Advice after a measured stroke.
+    Advised(Box<AdviceRecord>),
 }
 
 /// A measured stroke, as the pages show it.
@@ -223,8 +226,8 @@ impl Screen {
         let Some(run_id) = status.host.result.as_ref().map(|result| result.run_id) else { return };
         let is_known = lock(&self.board.facts).knows(run_id);
         if !is_known {
-            let measured = self.site.recorded(run_id);
-            lock(&self.board.facts).recall(run_id, measured);
+            let (measured, advice) = (self.site.recorded(run_id), self.site.advised(run_id));
+            lock(&self.board.facts).recall(run_id, measured, advice);
         }
     }
 

@@ -27,19 +27,32 @@ pub(super) fn point(
     key: &str,
     plate: Option<Rectangle>,
 ) -> Result<[f64; 2], Reported> {
-    let point = table.vector::<2>(key).try_map(|[u_mm, v_mm]| {
-        let (u, v) = (metres(u_mm), metres(v_mm));
-        match plate {
-            Some(Rectangle { width, height })
-                if !(0.0..=width).contains(&u) || !(0.0..=height).contains(&v) =>
-            {
-                let (width, height) = (millimetres(width), millimetres(height));
-                Err(format!("found [{u_mm}, {v_mm}], outside the plate of {width} x {height} mm"))
-            }
-            _ => Ok([u, v]),
-        }
+    table.vector::<2>(key).try_map(|at| on_plate(at, plate)).required()
+}
+
+/// Reads two or more points of the plate, edges included; returns metres.
+pub(super) fn points(
+    table: &mut TomlTable<'_>,
+    key: &str,
+    plate: Option<Rectangle>,
+) -> Result<Vec<[f64; 2]>, Reported> {
+    let points = table.vectors::<2>(key).try_map(|points| match points.len() {
+        0 | 1 => Err("a line needs two points or more".to_owned()),
+        _ => points.into_iter().map(|at| on_plate(at, plate)).collect(),
     });
-    point.required()
+    points.required()
+}
+
+/// Returns a point in metres, if it lies on the plate.
+fn on_plate([u_mm, v_mm]: [f64; 2], plate: Option<Rectangle>) -> Result<[f64; 2], String> {
+    let (u, v) = (metres(u_mm), metres(v_mm));
+    match plate {
+        Some(Rectangle { width, height }) if !(0.0..=width).contains(&u) || !(0.0..=height).contains(&v) => {
+            let (width, height) = (millimetres(width), millimetres(height));
+            Err(format!("found [{u_mm}, {v_mm}], outside the plate of {width} x {height} mm"))
+        }
+        _ => Ok([u, v]),
+    }
 }
 
 /// Names taken so far in one array of tables, each with its place.

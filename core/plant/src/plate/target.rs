@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use platen_model::{Facing, RadiusOf, Target, TargetShape};
+use platen_model::{FLATTEST_CONE, Facing, RadiusOf, Target, TargetShape};
 
 use super::place::Rectangle;
 use crate::document::Reported;
@@ -111,7 +111,7 @@ fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), S
     Ok(())
 }
 
-/// Refuses a cone whose radius changes by more than the length of its straight line.
+/// Refuses a cone as good as flat.
 fn slopes(
     document: &Document,
     axis: f64,
@@ -120,13 +120,13 @@ fn slopes(
     plate: Option<Rectangle>,
 ) -> Result<(), Reported> {
     let length = plate.map_or(f64::INFINITY, |plate| plate.through_middle(axis));
-    if (end.value - start).abs() < length {
+    if (end.value - start).abs() < FLATTEST_CONE * length {
         return Ok(());
     }
     let (change, length) = (millimetres((end.value - start).abs()), millimetres(length));
     let message = format!(
-        "the radius changes by {change} mm, but its straight line across the plate is only {length} mm long; \
-         give the radii at the two ends of that line"
+        "the radius changes by {change} mm along a straight line of {length} mm, a cone as good as flat; \
+         give the radii of curvature at the two ends of that line"
     );
     Err(document.fault(&end.place, message))
 }

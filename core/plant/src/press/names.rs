@@ -114,6 +114,7 @@ names! {
         PlcMs "plc_ms" Count "milliseconds of that time"
         Attempt "attempt" Count "0 for the first measurement of a stroke, one more per rescan request"
         DieId "die_id" Count "die set in use, for the record"
+        Crew "crew" Count "code of the crew, never of a person; recorded only where the plant file has the table crews"
         StrokeIdTail "stroke_id_tail" Count "copy of stroke_id, written before it; while they differ the block is being written"
     }
 }

@@ -67,6 +67,7 @@ impl Press {
             map: map.map,
             timeouts,
             policy: policy?,
+            advice: None,
         })
     }
 }

@@ -155,6 +155,7 @@ impl Reader<'_> {
                 .filter(|&unix_s| unix_s > 0)
                 .map(|unix_s| Timestamp { unix_s, ms: self.count(Input::PlcMs).unwrap_or(0) }),
             die_id: self.count(Input::DieId).filter(|die| *die != 0),
+            crew: self.count(Input::Crew).filter(|crew| *crew != 0),
             baseline: self.switch(Input::Baseline).unwrap_or(false),
             dry_run: self.switch(Input::DryRun).unwrap_or(false),
         }

@@ -9,6 +9,7 @@ use tokio::time::{Instant, sleep, sleep_until};
 
 use super::journal::{Done, Recorder};
 use super::{Answer, Metrics, Order, PressSide, Status};
+use crate::advice_block::AdviceWriter;
 use crate::handshake::{Effect, Event, Handshake, LinkState, Transition, Work};
 use crate::reconcile::Reconciler;
 use crate::{Client, Code, Consequence, Link, LinkError, PressImage, Torn, Verdict, consequence, saturates};
@@ -31,6 +32,7 @@ pub(super) struct Runner<L> {
     pub(super) press: Press,
     pub(super) handshake: Handshake,
     pub(super) registers: Reconciler,
+    pub(super) advice: AdviceWriter,
     pub(super) client: Client<L>,
     pub(super) metrics: Metrics,
     pub(super) journal: Recorder,
@@ -148,6 +150,7 @@ impl<L: Link> Runner<L> {
             self.client.connect().await?;
         }
         self.registers.forget();
+        self.advice.forget();
         self.faults = Faults { unreachable_told: self.faults.unreachable_told, ..Faults::default() };
         self.clock.connected = Instant::now();
         self.clock.next_poll = self.clock.connected;
@@ -220,7 +223,7 @@ impl<L: Link> Runner<L> {
         }
         let image = self.handshake.image().clone();
         if !self.registers.is_due(&image) && self.handshake.state().work != Work::Publish {
-            return Ok(());
+            return self.advice.write(&mut self.client).await;
         }
         if self.registers.write(&mut self.client, &image, false).await? {
             if image.busy && std::mem::take(&mut self.clock.busy_untold) {
@@ -228,7 +231,7 @@ impl<L: Link> Runner<L> {
             }
             self.step(Event::Written);
         }
-        Ok(())
+        self.advice.write(&mut self.client).await
     }
 
     /// Writes the safe registers after a stop: no ready, busy or valid remains.
@@ -238,7 +241,9 @@ impl<L: Link> Runner<L> {
             if !self.handshake.may_write() || !self.client.connected() {
                 return;
             }
-            match self.registers.write(&mut self.client, &image, true).await {
+            self.advice.withdraw();
+            let advice = self.advice.write(&mut self.client).await;
+            match advice.and(self.registers.write(&mut self.client, &image, true).await) {
                 Ok(_) => return,
                 Err(error) => tracing::warn!(%error, "writing the safe registers failed"),
             }
@@ -295,6 +300,7 @@ impl<L: Link> Runner<L> {
         if !matches!(self.handshake.state().link, LinkState::Fault(_)) {
             tracing::error!(%error, "fault");
         }
+        self.advice.withdraw();
         self.step(Event::Fault(code));
     }
 
@@ -345,6 +351,10 @@ impl<L: Link> Runner<L> {
             }
             Answer::Failed(key, code) => Event::Failed(key, code),
             Answer::Scanner { ready, estimate } => Event::Scanner { ready, estimate },
+            Answer::Advice(stroke, advice) => {
+                self.advice.offer(stroke, *advice);
+                return;
+            }
             Answer::Reset => Event::Reset,
             Answer::Stop => Event::Stop,
         };
@@ -409,6 +419,7 @@ impl<L: Link> Runner<L> {
             Transition::WaitingStrokeAccepted | Transition::StrokeAccepted | Transition::RescanAccepted => {
                 self.arrived();
                 self.metrics.strokes += 1;
+                self.advice.withdraw();
                 self.clock.triggered = self.clock.polled;
                 self.clock.busy_untold = true;
             }
@@ -431,6 +442,7 @@ impl<L: Link> Runner<L> {
     /// Logs one line for a stroke.
     fn delivered(&mut self) {
         let Some(result) = &self.handshake.image().result else { return };
+        self.advice.publish(result.key);
         let stroke_to_result = self.clock.triggered.elapsed();
         self.clock.delivered = Instant::now();
         self.metrics.stroke_to_result.add(stroke_to_result);

@@ -8,8 +8,25 @@ use platen_model::Field;
 
 use super::canvas::{Canvas, draw};
 use super::{Caption, PictureError, PictureScale, View};
-use crate::result::{Next, PlateRecord};
+use crate::result::{Next, NextPlace, PlateRecord};
 pub(super) use layout::{Layout, Look, SQUARE};
+
+/// Where to press next, on the map of the missing curvature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mark<'a> {
+    /// Place of the next hit: framed.
+    Place(&'a NextPlace),
+    /// Advised bend line, its ends (u, v), millimetres.
+    Line([[f64; 2]; 2]),
+}
+
+impl<'a> Mark<'a> {
+    /// Returns the mark of a result's next place.
+    #[must_use]
+    pub fn of(next: Option<&'a Next>) -> Option<Self> {
+        next.and_then(Next::place).map(Self::Place)
+    }
+}
 
 /// Layout in files and reports.
 const LOOK: Look =
@@ -31,7 +48,7 @@ pub fn map(
         canvas.head(caption, &layout.title, layout.view.language)?;
         let (from, to) = layout.corners();
         layout.shades(field).paint(canvas, from, to)?;
-        words(&layout, field, next, canvas)
+        words(&layout, field, Mark::of(next), canvas)
     })
 }
 
@@ -39,12 +56,12 @@ pub fn map(
 pub(super) fn words(
     layout: &Layout<'_>,
     field: &Field,
-    next: Option<&Next>,
+    mark: Option<Mark<'_>>,
     canvas: &Canvas<'_>,
 ) -> Result<(), PictureError> {
     layout.axes(canvas)?;
+    marks::next(mark, field, layout, canvas)?;
     marks::part_means(field, layout, canvas)?;
-    marks::next_place(next, field, layout, canvas)?;
     legend::draw(field, layout, canvas)
 }
 
@@ -53,7 +70,7 @@ mod tests {
     use platen_model::{NodeState, Verdict};
 
     use super::*;
-    use crate::result::{CURVATURE_DEFICIT, NextPlace, NoNext};
+    use crate::result::{CURVATURE_DEFICIT, NoNext};
 
     const SIDE: usize = 21;
 

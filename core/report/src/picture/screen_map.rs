@@ -4,9 +4,9 @@
 use platen_model::Field;
 
 use super::canvas::{Text, overlay};
-use super::map::{self, Layout, Look, SQUARE};
+use super::map::{self, Layout, Look, Mark, SQUARE};
 use super::{PictureError, View};
-use crate::result::{Next, PlateRecord};
+use crate::result::PlateRecord;
 
 /// Layout on a screen.
 const LOOK: Look =
@@ -22,7 +22,8 @@ pub struct ScreenMap {
 }
 
 /// Draws one field over the plate, with the scale of the plate's pictures. The map of the missing curvature frames the place of the
-/// next hit.
+/// next hit,
+/// or draws the advised bend line.
 ///
 /// # Errors
 /// An encoder fails.
@@ -30,7 +31,7 @@ pub fn screen_map(
     field: &Field,
     plate: &PlateRecord,
     view: View,
-    next: Option<&Next>,
+    mark: Option<Mark<'_>>,
 ) -> Result<ScreenMap, PictureError> {
     let layout = Layout::new(field, plate, &plate.scale, view, LOOK);
     let (size, (from, to)) = (layout.size(), layout.corners());
@@ -41,7 +42,7 @@ pub fn screen_map(
     let svg = overlay(size, |canvas| {
         canvas.text(&layout.title, (24.0, 34.0), Text::new(24.0 * LOOK.letters).bold())?;
         shades.hatch(canvas, from, to)?;
-        map::words(&layout, field, next, canvas)
+        map::words(&layout, field, mark, canvas)
     })?;
     Ok(ScreenMap { png: png.map_err(|e| PictureError(e.to_string()))?, svg })
 }
@@ -65,7 +66,7 @@ mod tests {
 
     use super::*;
     use crate::picture::{Caption, Turn, Units, map};
-    use crate::result::{CURVATURE_DEFICIT, NextPlace};
+    use crate::result::{CURVATURE_DEFICIT, Next, NextPlace};
 
     const SIDE: usize = 101;
     /// Curvature that opens 1 mm under the template of 2 m, 1/m.
@@ -212,7 +213,7 @@ mod tests {
             chord_mm: 2000.0,
         });
         let view = View { language: Language::Ja, units: Units::Inch, turn: Turn::Press };
-        let svg = screen_map(&rainbow(), &plate(Some([0, 1])), view, Some(&next)).unwrap().svg;
+        let svg = screen_map(&rainbow(), &plate(Some([0, 1])), view, Mark::of(Some(&next))).unwrap().svg;
         // The ladder ends at 150 mm, the template is 2 m long, the plate 118 in.
         for text in [
             "曲げ不足",

@@ -1,5 +1,6 @@
 //! Words of pictures in each language, one row each.
 
+pub(super) use platen_model::fill;
 use platen_model::{Texts, Verdict, texts};
 
 texts! { pub(super),
@@ -51,13 +52,6 @@ pub(super) fn verdict(verdict: Verdict) -> Texts {
         Verdict::Fail => FAIL,
         Verdict::NotMeasured => NOT_MEASURED,
     }
-}
-
-/// Fills the places `{}` of a text in their order.
-pub(super) fn fill(text: &str, values: &[&str]) -> String {
-    let mut parts = text.split("{}");
-    let first = parts.next().unwrap_or_default().to_owned();
-    parts.zip(values).fold(first, |filled, (part, value)| filled + value + part)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! `/`: the operator's page, read from two metres: verdict, place of the next hit, gap against its limit, states, one alarm.
 
+mod advice;
+
 use maud::{Markup, html};
 use platen_model::{Audience, Severity, Texts};
 use platen_report::picture::PictureScale;
@@ -41,6 +43,7 @@ pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
                 h2 { (cells.span("place-title")) }
                 p.figure { (cells.span("left")) " " (cells.span("left-words")) }
                 p.figure { (cells.span("near")) " " (cells.span("near-words")) }
+                (cells.p("advice"))
                 h2 { (cells.span("gap-title")) " " (cells.span("limit")) }
                 p.figure { (cells.span("gap")) " " (cells.span("gap-more")) }
                 svg.bar viewBox=(view_box(BAR_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::GAP)) {
@@ -65,6 +68,7 @@ pub(super) fn cells(snapshot: &Snapshot, view: View) -> Cells {
     let mut cells = Cells::default();
     band(&mut cells, snapshot, view);
     place(&mut cells, snapshot, view);
+    advice::cells(&mut cells, snapshot, view);
     gap(&mut cells, snapshot, view);
     strip(&mut cells, snapshot);
     states(&mut cells, snapshot, view);
@@ -113,7 +117,9 @@ fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         let (result, field) = (result?, field?);
         Some(view.link(&format!("/strokes/{}/{field}.{ending}", result.run)))
     };
-    for (id, ending) in [("map", "png"), ("overlay", "svg")] {
+    // Another address once the advice is there: its line lies on the map.
+    let advised = result.is_some_and(|result| result.advice.is_some());
+    for (id, ending) in [("map", "png"), ("overlay", if advised { "svg?advised" } else { "svg" })] {
         cells.set(id, "src", picture(ending));
         cells.set(id, "alt", Some(if id == "map" { text(words::MAP) } else { String::new() }));
     }

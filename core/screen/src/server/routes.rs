@@ -9,7 +9,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::{Extension, Router};
 use maud::Markup;
-use platen_report::picture;
+use platen_report::picture::{self, Mark};
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 
@@ -248,7 +248,9 @@ async fn stroke_picture(
         let (field, ending) = name.rsplit_once('.').unwrap_or((&name, ""));
         let record = source.result(run)?;
         let values = source.field(run, field)?;
-        let map = picture::screen_map(&values, &record.plate_file, view.picture(), record.next.as_ref());
+        let line = advised_line(source, run);
+        let mark = line.map(Mark::Line).or_else(|| Mark::of(record.next.as_ref()));
+        let map = picture::screen_map(&values, &record.plate_file, view.picture(), mark);
         let map = map.map_err(|e| SourceError::Unreadable(e.to_string()))?;
         match ending {
             "png" => Ok((map.png, "image/png")),
@@ -257,6 +259,14 @@ async fn stroke_picture(
         }
     });
     finished(answer.await)
+}
+
+/// Returns the advised bend line after a stroke, while its result is shown.
+fn advised_line(source: &dyn Source, run: u32) -> Option<[[f64; 2]; 2]> {
+    let snapshots = source.snapshots();
+    let snapshot = snapshots.borrow();
+    let result = snapshot.result.as_ref().filter(|result| result.run == run)?;
+    result.advice.as_ref()?.bend.map(|bend| bend.line_mm)
 }
 
 /// Returns the mesh: number of nodes of a side, then x, y, z, seen of each node as 32-bit floats, little endian.

@@ -1,9 +1,9 @@
-//! The task of a comparison, its findings and its fields.
+//! The task of a comparison, its findings and its fields; the plate's history for an advisor, and its advice.
 
 use std::ffi::CStr;
 
 use platen_abi::payload::{self, Header};
-use platen_model::{Field, Findings, NodeState, Task};
+use platen_model::{Advice, Field, Findings, NodeState, PlateHistory, Task};
 
 use super::{Arrays, DecodeError, Payload};
 
@@ -36,6 +36,8 @@ macro_rules! json {
 json! {
     Task = payload::TASK;
     Findings = payload::FINDINGS;
+    PlateHistory = payload::RECORD;
+    Advice = payload::ADVICE;
 }
 
 impl Payload for Field {

@@ -25,18 +25,19 @@ const FIT_FAR: usize = 3;
 const FRONT_BOUND: f64 = 4.0;
 
 /// Returns all crossings of the cells of `face`, by cell, in the order up, down, back, next. `number` gives the place of a cell
-/// of the face among the samples. Also returns the length over which the region of interest cuts the face, metres.
+/// of the face among the samples, `flank_depth` is that of the upper flank of a bevelled edge. Also returns the length over which the region of interest cuts the face, metres.
 pub(super) fn find(
     window: &Window,
     noise: &Noise,
     face: &[bool],
     pixels: &[Pixel],
+    flank_depth: Option<f64>,
     number: impl Fn(usize) -> u32,
 ) -> (Vec<Crossing>, f64) {
     let mut fits: BTreeMap<(usize, usize), Option<LocalQuadric>> = BTreeMap::new();
     let mut crossings = Vec::new();
     let mut cut = 0.0;
-    let scene = Scene { window, noise, face, pixels };
+    let scene = Scene { window, noise, face, pixels, flank_depth };
     let inside = |i: usize| face.get(i).is_some_and(|f| *f);
     // Cells amid the face leave it nowhere.
     let is_rim = |i: &usize| {
@@ -85,6 +86,7 @@ struct Scene<'a> {
     noise: &'a Noise,
     face: &'a [bool],
     pixels: &'a [Pixel],
+    flank_depth: Option<f64>,
 }
 
 impl Scene<'_> {
@@ -181,7 +183,7 @@ impl Scene<'_> {
     }
 
     /// Locates where the face meets a side face: its ranges fall behind the face's continuation in proportion to the way
-    /// from the common edge. Needs three sound cells in a row that do so.
+    /// from the common edge. Needs three sound cells in a row that do so, of a bevelled edge on its upper flank.
     fn crease(
         &self,
         fit: &LocalQuadric,
@@ -207,6 +209,13 @@ impl Scene<'_> {
         let straight = bend.abs() <= 4.0 * 6.0_f64.sqrt() * sigma + 0.1 * slope;
         if slope < 3.0 * sigma || !straight || !(-2.5..=1.2).contains(&start) {
             return None;
+        }
+        if let Some(flank) = self.flank_depth {
+            let (x, y) = self.window.place_of(index);
+            let edge = fit.at(self.window, x, y)?;
+            if -edge.normal.dot(&edge.point.normalize()) * excess[2] > flank + 3.0 * sigma {
+                return None;
+            }
         }
         let half_width = 2.0 * sigma / slope;
         Some((start - half_width, start + half_width))

@@ -211,8 +211,15 @@ impl Rectangle {
 mod tests {
     use super::*;
 
-    const SPEC: PlateSpec =
-        PlateSpec { width: 3.0, height: 2.5, thickness: 0.036, face_inset: 0.0, u_axis: None, region: None };
+    const SPEC: PlateSpec = PlateSpec {
+        width: 3.0,
+        height: 2.5,
+        thickness: 0.036,
+        face_inset: 0.0,
+        root_face: 0.0,
+        u_axis: None,
+        region: None,
+    };
 
     /// A level face around `centre` of the given sides, of which `part` is seen.
     fn face(centre: [f64; 3], [a, b]: [f64; 2], part: f64, hidden: f64) -> Candidate {

@@ -75,6 +75,7 @@ impl Scene {
             height: self.size[1],
             thickness: self.thickness,
             face_inset: self.inset,
+            root_face: 0.0,
             u_axis: None,
             region: None,
         }

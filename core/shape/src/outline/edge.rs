@@ -17,6 +17,7 @@ use super::edge_posterior::Posterior;
 use super::footprint;
 use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
+use super::side_face::SideFace;
 use super::{OutlineError, Sampling};
 use crate::Vec3;
 
@@ -52,6 +53,7 @@ const FOOTPRINT_ROUNDS: usize = 3;
 #[derive(Debug, Clone)]
 pub(super) struct EdgeData {
     strip: DevelopedStrip,
+    side_face: SideFace,
     lines: Vec<LatticeLine>,
     dithered: bool,
     from: Vec3,
@@ -67,13 +69,14 @@ impl EdgeData {
         crossings: &[ProjectedCrossing],
         [from, to]: [Vec3; 2],
         thickness: f64,
+        side_face: SideFace,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let strip = DevelopedStrip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
-        let line = |crossing| LatticeLine::new(&strip, crossing, thickness, sampling);
+        let line = |crossing| LatticeLine::new(&strip, crossing, &side_face, sampling);
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
-        Ok(Self { strip, lines, dithered, from, to })
+        Ok(Self { strip, side_face, lines, dithered, from, to })
     }
 }
 
@@ -115,6 +118,7 @@ fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> b
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
     strip: DevelopedStrip,
+    side_face: SideFace,
     posterior: Posterior,
     /// Half the angle that a beam sees, radians.
     footprint: f64,
@@ -131,7 +135,7 @@ impl Edge {
     /// [`OutlineError::Edge`] when too little of it is seen.
     pub(super) fn fit(data: EdgeData, footprint: f64, sampling: Sampling) -> Result<Self, OutlineError> {
         let Sampling { step, noise, .. } = sampling;
-        let EdgeData { strip, lines, dithered, from, to } = data;
+        let EdgeData { strip, side_face, lines, dithered, from, to } = data;
         let (start, end) = strip.span();
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
@@ -162,7 +166,7 @@ impl Edge {
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        Ok(Self { strip, posterior, footprint: beam.footprint, seen, from, to })
+        Ok(Self { strip, side_face, posterior, footprint: beam.footprint, seen, from, to })
     }
 
     /// Returns the point of the edge at a distance along it.
@@ -192,7 +196,7 @@ impl Edge {
 
     fn footprint_error(&self, along: f64) -> f64 {
         let (point, normal, inward) = (self.point(along), self.strip.normal(along), self.strip.inward(along));
-        if lattice_line::shows_side_face(point, normal, inward) {
+        if self.side_face.is_seen(point, normal, inward) {
             return 0.0;
         }
         let darkness = -(-normal.dot(&point.normalize())).ln();

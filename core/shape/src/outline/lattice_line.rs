@@ -5,9 +5,9 @@
 //!
 //! - A mixed pixel sees both sides: the edge is within a footprint of its beam. A beam that is not mixed has its centre on its
 //!   own side, and most likely a footprint away; a quarter of the mixed beams is mixed too little to be detected.
-//! - Where the plate's side face is visible, its lower edge mixes the beams; that edge's place beside the upper one follows from
-//!   the thickness. A beam on a side face of a few millimetres falls behind the face's continuation in proportion to its
-//!   distance from the edge: a direct observation.
+//! - Where the plate's side face is visible, its silhouette mixes the beams; the silhouette's place beside the edge follows from
+//!   thickness and bevel (`side_face`). A beam on a side face of a few millimetres falls behind the face's continuation in
+//!   proportion to its distance from the edge, on a bevel in the proportion of the strip it meets: a direct observation.
 //! - The last cell taken for one of the face may itself lie on the side face, within the noise: both its range and that of the
 //!   first cell not taken enter, else the selection would bias the edge outwards.
 //!
@@ -18,6 +18,7 @@ use super::Sampling;
 use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation};
 use super::projected_crossing::ProjectedCrossing;
+use super::side_face::SideFace;
 use crate::Vec3;
 use crate::extract::Beyond;
 
@@ -31,9 +32,6 @@ const FACE_NOISE: f64 = 0.03;
 /// may be out of square.
 const SIDE_SLACK: f64 = 1.1;
 const SIDE_SLOPE: f64 = 0.1;
-
-/// The direction of an edge is known to about this, radians: a side face visible under a smaller angle is taken as hidden.
-const DIRECTION: f64 = 0.02;
 
 /// Properties of the beams.
 #[derive(Debug, Clone, Copy)]
@@ -69,16 +67,18 @@ pub(super) struct LatticeLine {
     pub(super) per_angle: f64,
     /// Distance inwards per lattice step.
     pub(super) per_step: f64,
-    /// Distance outside of the edge at which the plate's lower edge is seen, on the face's continuation; 0 where it is hidden.
+    /// Distance outside of the edge at which the plate's silhouette is seen, on the face's continuation; 0 where the side face is hidden.
     side: f64,
-    /// Distance inwards per range by which a beam falls behind the face's continuation on a square side face.
+    /// Distance inwards per range of the beam.
     per_range: f64,
-    /// The nearest cell off the face, and its range behind the face's continuation.
+    /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and that distance per range.
     off: f64,
-    excess: f64,
-    /// The last cell of the face, and its range behind the face.
+    on_side: f64,
+    off_per_range: f64,
+    /// The last cell of the face, and the same of it.
     cell: f64,
-    residual: f64,
+    behind: f64,
+    cell_per_range: f64,
 }
 
 impl LatticeLine {
@@ -86,7 +86,7 @@ impl LatticeLine {
     pub(super) fn new(
         strip: &DevelopedStrip,
         settled: &ProjectedCrossing,
-        thickness: f64,
+        side_face: &SideFace,
         Sampling { angle, .. }: Sampling,
     ) -> Self {
         let crossing = &settled.crossing;
@@ -95,14 +95,13 @@ impl LatticeLine {
         let along = 0.5 * (inside.x + outside.x);
         let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
         let per_radian = inwards_per_radian(crossing.inside, normal, inward);
-        // The lower edge lies `thickness` below; its beam meets the face's plane, `height` from the scanner, at
-        // height / (height + thickness) of its way.
-        let height = -normal.dot(&crossing.inside);
-        let side = inward.dot(&crossing.inside) * thickness / (height + thickness);
+        let sight = side_face.seen_by(crossing.inside, normal, inward);
         let (off, excess) = match mixed {
             Some([near, _]) => (near, crossing.mixed_excess),
             None => (inside.y.min(outside.y), crossing.excess),
         };
+        let (on_side, off_per_range) = sight.outside(f64::from(excess));
+        let (behind, cell_per_range) = sight.outside(settled.residual);
         Self {
             along,
             place: settled.place,
@@ -114,12 +113,14 @@ impl LatticeLine {
             per_radian,
             per_angle: angle * per_radian,
             per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
-            side: if side > DIRECTION * thickness { side } else { 0.0 },
+            side: sight.silhouette,
             per_range: inward.dot(&beam),
             off,
-            excess: f64::from(excess),
+            on_side,
+            off_per_range,
             cell: strip.flatten(settled.cell).y,
-            residual: settled.residual,
+            behind,
+            cell_per_range,
         }
     }
 
@@ -136,25 +137,25 @@ impl LatticeLine {
 
     /// Returns the likelihood of an edge position given this line; `noise` is that of ranges, metres.
     pub(super) fn likelihood(&self, beam: BeamModel, noise: f64) -> EdgeLikelihood {
-        let noise = noise * self.per_range.abs();
-        let soft = norm(beam.softness * self.per_angle, FACE_NOISE * noise);
+        let soft = norm(beam.softness * self.per_angle, FACE_NOISE * (noise * self.per_range.abs()));
+        let [off_noise, cell_noise] =
+            [self.off_per_range, self.cell_per_range].map(|per_range| noise * per_range.abs());
         let seen = beam.footprint * self.per_radian;
         let of = |terms| EdgeLikelihood { along: self.along, terms };
-        let last =
-            EdgeObservation::Last { cell: self.cell, behind: self.residual * self.per_range }.within(noise);
+        let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(cell_noise);
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
             let soft = norm(soft, 0.25 * (self.high - self.low));
             return of([EdgeObservation::At(0.5 * (self.low + self.high)).within(soft), last]);
         }
-        let on_side = self.excess * self.per_range;
+        let on_side = self.on_side;
         // Of a side face a few beams wide each may pass for mixed.
         if self.side > 0.0
             && self.beyond == Beyond::Behind
-            && (self.mixed.is_none() || on_side > -3.0 * noise)
-            && on_side < SIDE_SLACK * self.side + 3.0 * noise
+            && (self.mixed.is_none() || on_side > -3.0 * off_noise)
+            && on_side < SIDE_SLACK * self.side + 3.0 * off_noise
         {
-            let soft = norm(norm(soft, noise), SIDE_SLOPE * on_side);
+            let soft = norm(norm(soft, off_noise), SIDE_SLOPE * on_side);
             return of([EdgeObservation::At(self.off + on_side).within(soft), last]);
         }
         let mut above = Bound { sure: self.low, likely: self.low };
@@ -169,7 +170,7 @@ impl LatticeLine {
             let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
             above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
             below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
-        } else if self.side > seen && noise > 0.0 {
+        } else if self.side > seen && cell_noise > 0.0 {
             return of([EdgeObservation::Above(above).within(soft), last]);
         }
         of([EdgeObservation::Above(above), EdgeObservation::Below(below)]
@@ -185,11 +186,6 @@ pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64
     // inward part of that, over all e across the beam, is the length of this vector.
     let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
     point.norm() * (lever - beam * lever.dot(&beam)).norm()
-}
-
-/// Returns true when the side face below the edge at `point` is seen: there the edge is located by the ranges on it.
-pub(super) fn shows_side_face(point: Vec3, normal: Vec3, inward: Vec3) -> bool {
-    inward.dot(&point) > -normal.dot(&point) * DIRECTION
 }
 
 /// Returns the length of (a, b) without the range checks of `hypot`.

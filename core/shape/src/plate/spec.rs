@@ -13,6 +13,8 @@ pub struct PlateSpec {
     pub thickness: f64,
     /// Distance from the mid-surface's edge inwards to that of the scanned face (bevelled edges), metres.
     pub face_inset: f64,
+    /// Height of the square root face in the middle of a bevelled edge, metres.
+    pub root_face: f64,
     /// Rough direction of growing u, scanner frame, any length. Decides which corner is (0, 0).
     pub u_axis: Option<Vec3>,
     /// Box that contains the plate, scanner frame.
@@ -24,6 +26,13 @@ impl PlateSpec {
     #[must_use]
     pub fn rectangle(&self) -> Blank {
         Blank::rectangle(self.width, self.height)
+    }
+
+    /// Returns the depth of the upper flank of a double-V bevel, metres; `None` where the edges are square.
+    #[must_use]
+    pub fn flank_depth(&self) -> Option<f64> {
+        let depth = 0.5 * (self.thickness - self.root_face);
+        (self.face_inset > 0.0 && depth > 0.0).then_some(depth)
     }
 }
 

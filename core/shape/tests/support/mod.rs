@@ -42,6 +42,7 @@ pub fn read(folder: &Path) -> Sample {
         height: metres("H_mm"),
         thickness: metres("thickness_mm"),
         face_inset: 0.0,
+        root_face: 0.0,
         u_axis: Some(vec3(&job["u_axis_hint"])),
         region: None,
     };

@@ -184,6 +184,7 @@ impl Scene {
             height: plate.height,
             thickness: plate.thickness,
             face_inset: 0.0,
+            root_face: 0.0,
             u_axis: Some(plate.to_scanner(Vec3::x())),
             region: None,
         }

@@ -117,11 +117,10 @@ fn the_worst_place_is_where_the_bend_is_missing() {
     task.templates[0].centre = Centre::Worst;
     let found = finding(&now, &task);
     assert!(found.says.starts_with("under-bent"), "{}", found.says);
-    // Half of the missing slope on either side of the flat, 0.5 m away: 0.0375 * (0.5 - 0.15) = 13 mm.
-    assert!((0.011..0.015).contains(&found.max_gap), "{found:?}");
-    let middle = found.start + 0.5;
-    // Found: 0.5 mm; a step of the search is 12.5 mm.
-    assert!((middle - 1.8).abs() < 0.0125, "template round {middle}");
+    // Balanced over the middle of the flat: half of the missing slope, 0.5 m away, 0.0375 * (0.5 - 0.15) = 13.1 mm. A little more where it
+    // lies on the bend before the flat, just before it rocks there: 0.46^2 / 16 = 13.2 mm at its end over the flat.
+    assert!((0.0131..0.0137).contains(&found.max_gap), "{found:?}");
+    assert!(!found.rocks && (found.max_gap_at[0] - 1.96).abs() < 0.0125, "{found:?}");
 }
 
 /// The lowest place of a rigid template on a plate, both closed curves in the section plane, by exhaustive search: for every tilt of the
@@ -199,6 +198,45 @@ fn a_rigid_template_lowered_by_trying_shows_the_same_gap() {
         let contacts = found.contacts.iter().map(|contact| contact.at[0] - 0.5 * WIDTH);
         for (contact, touched) in contacts.zip(touched) {
             assert!((contact - touched).abs() < 0.08, "round {round}: touches at {contact}, tried {touched}");
+        }
+    }
+}
+
+/// A plate after some of the strokes that roll it: bends of 0.028 rad, each 0.1 m long, and flat behind the last one.
+fn half_rolled(bends: &[f64]) -> Surface {
+    surface(20_000, 1e-6, 1, |u, v| {
+        // Slope in sections of 5 mm, from the flat end.
+        let slope =
+            |s: f64| -> f64 { bends.iter().map(|at| 0.028 * ((at + 0.05 - s) / 0.1).clamp(0.0, 1.0)).sum() };
+        let n = (((WIDTH - u) / 0.005).ceil() as usize).max(1);
+        let step = (WIDTH - u) / n as f64;
+        let (mut x, mut z) = (WIDTH, 0.0);
+        for k in 0..n {
+            let (sin, cos) = slope(WIDTH - (k as f64 + 0.5) * step).sin_cos();
+            x -= step * cos;
+            z += step * sin;
+        }
+        let (sin, cos) = slope(u).sin_cos();
+        (Vec3::new(x, v, z), Vec3::new(sin, 0.0, cos))
+    })
+}
+
+/// With few places the search misses the worst position by 2.7 mm after six bends, and by 23 mm on a noisy plate after four.
+#[test]
+fn the_worst_position_is_the_worst_of_all() {
+    let all = [0.27, 0.41, 0.66, 0.88, 1.11, 1.37, 1.69, 1.93];
+    for done in 1..all.len() {
+        let plate = half_rolled(&all[..done]);
+        let gap = |centre: Centre| {
+            let mut task = task(cylinder(9.0), Facing::Inside, Seat::Gravity);
+            task.templates[0].centre = centre;
+            finding(&plate, &task).max_gap.abs()
+        };
+        let worst = gap(Centre::Worst);
+        for k in 0..=40 {
+            let centre = 1.0 + 0.025 * f64::from(k);
+            let other = gap(Centre::At(centre));
+            assert!(other <= worst + 1e-9, "{done} bends: {other} at {centre}, worst {worst}");
         }
     }
 }

@@ -20,8 +20,11 @@ pub(super) unsafe fn read(desc: *const Desc) -> Result<Descriptor, String> {
             "scanner" => Kind::Scanner,
             "flattening" => Kind::Flattening,
             "comparison" => Kind::Comparison,
+            "advisor" => Kind::Advisor,
             other => {
-                return Err(format!("its kind is `{other}`, known are scanner, flattening and comparison"));
+                return Err(format!(
+                    "its kind is `{other}`, known are scanner, flattening, comparison and advisor"
+                ));
             }
         };
         let id = text(desc.id);

@@ -180,6 +180,7 @@ fn formats(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
         Kind::Scanner => (&["platen.window/1"], &["platen.scan/1", "platen.column/2", "platen.scan-end/1"]),
         Kind::Flattening => (&["platen.mesh/2"], &["platen.chart/1"]),
         Kind::Comparison => (&["platen.task/1", "platen.surface/1"], &["platen.findings/1", "platen.grid/1"]),
+        Kind::Advisor => (&["platen.record/1", "platen.surface/1"], &["platen.advice/1"]),
     }
 }
 

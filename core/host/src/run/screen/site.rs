@@ -10,7 +10,8 @@ use platen_engine::plugin::{Catalogue, Surfaces};
 use platen_history::{Archive, Filter, PlateRecord, Stroke};
 use platen_model::{Field, Task, Verdict};
 use platen_plant::press::{Mode, Press};
-use platen_plant::{PlantFile, PluginUse};
+use platen_plant::{PlantFile, PluginUse, Show};
+use platen_report::advice::AdviceRecord;
 use platen_report::result::ResultRecord;
 use platen_report::sequence::Sequence;
 use platen_report::{history_view, output_folder, plate_report};
@@ -84,6 +85,12 @@ impl Site {
         let record = self.result(run).ok()?;
         let strokes = history_view::strokes_until(&self.archive().ok()?, run, &record).ok()?;
         Some(MeasuredStroke { run_id: run, record, fields: Vec::new(), strokes })
+    }
+
+    /// Returns the advice after a stroke measured before this start, if it was shown.
+    pub(super) fn advised(&self, run: u32) -> Option<AdviceRecord> {
+        let record = AdviceRecord::beside(&self.document(run).ok()?).ok()??;
+        (record.show == Show::Screen.name()).then_some(record)
     }
 
     fn newest(&self, run: u32) -> Option<MeasuredStroke> {

@@ -13,10 +13,11 @@ use jiff::Timestamp;
 use platen_model::{Code, Publication, Severity, StrokeData, StrokeKey};
 use platen_plant::press::{Mode, Press};
 use platen_press::{LinkState, PressImage, Status, Work};
+use platen_report::advice::AdviceRecord;
 use platen_report::history_view::worst_template;
 use platen_screen::{
-    HostPart, PlatePart, PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState, ShownAlarm,
-    Snapshot, Stage, StripPart, StrokePart, Worst,
+    AdvicePart, HostPart, PlatePart, PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState,
+    ShownAlarm, Snapshot, Stage, StripPart, StrokePart, Worst,
 };
 
 use super::{Event, MeasuredStroke};
@@ -37,6 +38,8 @@ pub(super) struct Facts {
     recalled: Option<u32>,
     /// A stroke after which the place of the next hit was bent before.
     again: Option<u32>,
+    /// The newest advice.
+    advice: Option<Box<AdviceRecord>>,
     /// Record of the last stroke of a part that has ended.
     ended: Option<u32>,
     raised: BTreeMap<Code, u64>,
@@ -69,6 +72,7 @@ impl Facts {
             measured: None,
             recalled: None,
             again: None,
+            advice: None,
             ended: None,
             raised: BTreeMap::new(),
             standing: BTreeMap::new(),
@@ -97,6 +101,7 @@ impl Facts {
             }
             Event::Measured(measured) => self.measured = Some(*measured),
             Event::Again(run_id) => self.again = Some(run_id),
+            Event::Advised(record) => self.advice = Some(record),
         }
     }
 
@@ -117,8 +122,14 @@ impl Facts {
     }
 
     /// Takes the record of a result that was published before this start.
-    pub(super) fn recall(&mut self, run_id: u32, measured: Option<MeasuredStroke>) {
+    pub(super) fn recall(
+        &mut self,
+        run_id: u32,
+        measured: Option<MeasuredStroke>,
+        advice: Option<AdviceRecord>,
+    ) {
         self.recalled = Some(run_id);
+        self.advice = advice.map(Box::new).or(self.advice.take());
         self.measured = measured.or(self.measured.take());
     }
 
@@ -161,7 +172,7 @@ impl Facts {
             },
             plate: self.plate(status, measured),
             stroke: self.stroke(status),
-            result: result.map(|result| shown(result, measured, self.again)),
+            result: result.map(|result| self.shown(result, measured)),
             strip: measured.map(strip).unwrap_or_default(),
             alarms: self.alarms(),
         }
@@ -177,6 +188,35 @@ impl Facts {
             == (status.host.ack_stroke_id, status.host.session, status.host.attempt);
         let press = status.press.as_ref()?;
         (is_last && self.ended != Some(result.run_id) && in_hand(result, data, press)).then_some(result)
+    }
+
+    /// Returns the result with what its document and the advice add.
+    fn shown(&self, result: &Publication, measured: Option<&MeasuredStroke>) -> ResultPart {
+        let record = measured.map(|measured| &*measured.record);
+        let worst = record.and_then(worst_template).map(|template| Worst {
+            gap_mm: template.max_gap_mm,
+            uncertainty_mm: template.uncertainty_mm,
+            limit_mm: template.limit_mm,
+            at_mm: template.max_gap_at_mm,
+            sense: template.sense,
+        });
+        let reason = result.measurement.reason();
+        ResultPart {
+            run: result.run_id,
+            verdict: result.measurement.verdict(),
+            reason,
+            why: reason.map(|code| ShownAlarm::new(code, 0, 0).text),
+            worst,
+            next: record.and_then(|record| record.next.clone()),
+            again: self.again == Some(result.run_id),
+            advice: self.advice_of(result.run_id),
+            fields: measured.map(|m| m.fields.iter().map(|f| f.name.clone()).collect()).unwrap_or_default(),
+        }
+    }
+
+    fn advice_of(&self, run_id: u32) -> Option<AdvicePart> {
+        let record = self.advice.as_ref().filter(|record| record.run_id == run_id)?;
+        record.advice.as_ref().map(AdvicePart::from)
     }
 
     fn record_of(&self, run_id: u32) -> Option<&MeasuredStroke> {
@@ -252,29 +292,6 @@ fn stage(work: Work) -> Stage {
         Work::Evaluating => Stage::Measuring,
         Work::Aborted | Work::Publish => Stage::Ending,
         Work::Idle | Work::Blocked | Work::WaitAck | Work::Clear => Stage::Done,
-    }
-}
-
-/// Returns the result with what its document adds.
-fn shown(result: &Publication, measured: Option<&MeasuredStroke>, again: Option<u32>) -> ResultPart {
-    let record = measured.map(|measured| &*measured.record);
-    let worst = record.and_then(worst_template).map(|template| Worst {
-        gap_mm: template.max_gap_mm,
-        uncertainty_mm: template.uncertainty_mm,
-        limit_mm: template.limit_mm,
-        at_mm: template.max_gap_at_mm,
-        sense: template.sense,
-    });
-    let reason = result.measurement.reason();
-    ResultPart {
-        run: result.run_id,
-        verdict: result.measurement.verdict(),
-        reason,
-        why: reason.map(|code| ShownAlarm::new(code, 0, 0).text),
-        worst,
-        next: record.and_then(|record| record.next.clone()),
-        again: again == Some(result.run_id),
-        fields: measured.map(|m| m.fields.iter().map(|f| f.name.clone()).collect()).unwrap_or_default(),
     }
 }
 

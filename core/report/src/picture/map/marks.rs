@@ -2,12 +2,13 @@
 
 use platen_model::{Field, NodeState};
 
+use super::Mark;
 use super::layout::Layout;
 use crate::picture::canvas::{Canvas, Text};
 use crate::picture::colour::{self, INK, PAPER};
 use crate::picture::scale::Scale;
 use crate::picture::{PictureError, words};
-use crate::result::{CURVATURE_DEFICIT, Next};
+use crate::result::{CURVATURE_DEFICIT, NextPlace};
 
 /// Parts of the plate with their mean written on them, along u and v.
 const PARTS: [usize; 2] = [5, 4];
@@ -32,15 +33,31 @@ pub(super) fn part_means(
     Ok(())
 }
 
-/// Frames the place of the next hit on the map of the missing curvature, and names it inside the frame, away from the means.
-pub(super) fn next_place(
-    next: Option<&Next>,
+/// Marks where to press next on the map of the missing curvature.
+pub(super) fn next(
+    mark: Option<Mark<'_>>,
     field: &Field,
     layout: &Layout<'_>,
     canvas: &Canvas<'_>,
 ) -> Result<(), PictureError> {
-    let is_shown = field.name == CURVATURE_DEFICIT;
-    let Some(place) = next.and_then(Next::place).filter(|_| is_shown) else { return Ok(()) };
+    match mark.filter(|_| field.name == CURVATURE_DEFICIT) {
+        None => Ok(()),
+        Some(Mark::Place(place)) => frame(place, field, layout, canvas),
+        Some(Mark::Line(ends)) => {
+            let ends = ends.map(|[u, v]| layout.at(u, v));
+            canvas.line(&ends, PAPER, 12)?;
+            canvas.line(&ends, INK, 6)
+        }
+    }
+}
+
+/// Frames the place of the next hit, and names it inside the frame, away from the means.
+fn frame(
+    place: &NextPlace,
+    field: &Field,
+    layout: &Layout<'_>,
+    canvas: &Canvas<'_>,
+) -> Result<(), PictureError> {
     let ([u, v], [w, h]) = (place.at_mm, place.extent_mm.map(|mm| 0.5 * mm));
     let (a, b) = (layout.at(u - w, v - h), layout.at(u + w, v + h));
     let (from, to) = ((a.0.min(b.0), a.1.min(b.1)), (a.0.max(b.0), a.1.max(b.1)));

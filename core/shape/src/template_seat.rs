@@ -4,18 +4,20 @@
 //! template rests on the plate from above on a line a + b x >= d(x); the gap is a + b x - d(x). The gravity seat minimises a,
 //! a linear program in two unknowns whose solution is an edge of the upper convex hull of d.
 
+use platen_model::Seat;
+
 /// Height profile of the plate over the template's edge.
 #[derive(Debug, Clone)]
-pub(crate) struct Profile {
+pub struct Profile {
     /// Increasing, from one end of the template to the other, 0 at its middle.
-    pub(crate) x: Vec<f64>,
+    pub x: Vec<f64>,
     /// Height of the plate over the edge at each x.
-    pub(crate) d: Vec<f64>,
+    pub d: Vec<f64>,
 }
 
 /// Position of a template on a profile: the line offset + tilt x.
 #[derive(Debug, Clone)]
-pub(crate) struct Seating {
+pub struct Seating {
     offset: f64,
     tilt: f64,
     support: Support,
@@ -32,18 +34,45 @@ enum Support {
     Held,
 }
 
+/// Share of the chord that the contacts must span; with less the template rocks.
+const ROCKS: f64 = 0.25;
+/// Contacts lie on a grid, so that their span often is that share: rounding must not decide, metres.
+const ROUNDING: f64 = 1e-9;
+
 impl Profile {
-    /// Returns the gravity seat: the line above d that is lowest at x = 0, the edge of the upper hull of d over x = 0.
-    pub(crate) fn gravity(&self) -> Seating {
+    /// Returns the seating to judge of a template `chord` metres long, and whether it rocks in the gravity seat: then the balanced
+    /// seat is judged.
+    #[must_use]
+    pub fn seat(&self, seat: Seat, chord: f64) -> (Seating, bool) {
+        let rocks = |gravity: &Seating| gravity.span(self) < ROCKS * chord - ROUNDING;
+        match seat {
+            Seat::Balanced => (self.balanced(), rocks(&self.gravity())),
+            Seat::Held => (self.held(), false),
+            Seat::Gravity => {
+                let gravity = self.gravity();
+                if rocks(&gravity) { (self.balanced(), true) } else { (gravity, false) }
+            }
+        }
+    }
+
+    /// Returns the gravity seat: the line above d that is lowest at x = 0, the edge of the upper hull of d over x = 0. A contact at x = 0
+    /// itself ends two such edges; the shorter one is taken, so that a mirrored profile has the mirrored seat.
+    #[must_use]
+    pub fn gravity(&self) -> Seating {
         let hull = self.upper_hull();
-        let right = hull.iter().position(|&i| self.x[i] > 0.0).unwrap_or(hull.len() - 1).max(1);
+        let length = |right: usize| self.x[hull[right]] - self.x[hull[right - 1]];
+        let mut right = hull.iter().position(|&i| self.x[i] > 0.0).unwrap_or(hull.len() - 1).max(1);
+        if right > 1 && self.x[hull[right - 1]] == 0.0 && length(right - 1) < length(right) {
+            right -= 1;
+        }
         let [i, j] = [hull[right - 1], hull[right]];
         let tilt = self.slope(i, j);
         Seating { offset: self.d[i] - tilt * self.x[i], tilt, support: Support::OnTwo([i, j]) }
     }
 
     /// Returns the balanced seat: equal gaps at both ends.
-    pub(crate) fn balanced(&self) -> Seating {
+    #[must_use]
+    pub fn balanced(&self) -> Seating {
         let tilt = self.slope(0, self.last());
         let above = |i: usize| self.d[i] - tilt * self.x[i];
         let contact = (0..self.x.len()).fold(0, |best, i| if above(i) > above(best) { i } else { best });
@@ -51,19 +80,22 @@ impl Profile {
     }
 
     /// Returns the held seat: both ends set on the profile.
-    pub(crate) fn held(&self) -> Seating {
+    #[must_use]
+    pub fn held(&self) -> Seating {
         let tilt = self.slope(0, self.last());
         Seating { offset: self.d[0] - tilt * self.x[0], tilt, support: Support::Held }
     }
 
     /// Returns the gap at every place; negative only in the held seat.
-    pub(crate) fn gaps(&self, seating: &Seating) -> Vec<f64> {
+    #[must_use]
+    pub fn gaps(&self, seating: &Seating) -> Vec<f64> {
         self.x.iter().zip(&self.d).map(|(x, d)| seating.offset + seating.tilt * x - d).collect()
     }
 
     /// Returns the gap at place `k` as a weighted sum of heights of the plate: (place, weight). The gap is smallest at the
     /// contacts, so it does not change to first order when they move.
-    pub(crate) fn functional(&self, seating: &Seating, k: usize) -> Vec<(usize, f64)> {
+    #[must_use]
+    pub fn functional(&self, seating: &Seating, k: usize) -> Vec<(usize, f64)> {
         let share = |i: usize, j: usize, m: usize| (self.x[k] - self.x[m]) / (self.x[j] - self.x[i]);
         let (first, last) = (0, self.last());
         match seating.support {
@@ -83,7 +115,8 @@ impl Profile {
     }
 
     /// Returns the places where the template touches.
-    pub(crate) fn contacts(&self, seating: &Seating) -> Vec<usize> {
+    #[must_use]
+    pub fn contacts(&self, seating: &Seating) -> Vec<usize> {
         match seating.support {
             Support::OnTwo(both) => both.to_vec(),
             Support::Balanced(one) => vec![one],
@@ -92,7 +125,8 @@ impl Profile {
     }
 
     /// Returns the range of tilts while the template touches, from one end touching to the other, radians.
-    pub(crate) fn rocking(&self) -> f64 {
+    #[must_use]
+    pub fn rocking(&self) -> f64 {
         let hull = self.upper_hull();
         let n = hull.len();
         self.slope(hull[0], hull[1]) - self.slope(hull[n - 2], hull[n - 1])
@@ -123,7 +157,8 @@ impl Profile {
 
 impl Seating {
     /// Returns the distance between the contacts.
-    pub(crate) fn span(&self, profile: &Profile) -> f64 {
+    #[must_use]
+    pub fn span(&self, profile: &Profile) -> f64 {
         match self.support {
             Support::OnTwo([i, j]) => profile.x[j] - profile.x[i],
             Support::Balanced(_) => 0.0,

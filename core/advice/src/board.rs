@@ -1,0 +1,149 @@
+//! Boards: the templates across the bends, with the height of the plate over the target along their lines.
+//!
+//! On cylinder and cone a bend by the angle th along a line adds th times the distance behind the line to the height of the plate over
+//! the target: heights are linear in the angles. They are integrated from the difference of the curvatures of plate and target, in which
+//! the strokes before add up without the error of slopes; a rigid motion of the plate is free, as a template seats itself.
+
+use platen_model::{Centre, Seat, Template};
+use platen_shape::template_seat::Profile;
+
+use crate::bend_lines::BendLines;
+
+/// Distance of the places along a board's line, metres.
+pub const STEP: f64 = 0.025;
+
+/// Steps of the integration from one place to the next: the curvature of a sharp bend lives on a few centimetres.
+const FINE: usize = 5;
+
+/// Step of the search for the worst place of a template, places.
+const SLIDE: usize = 2;
+
+/// A template on its line.
+#[derive(Debug, Clone)]
+pub struct Board {
+    /// Name of the template.
+    pub name: String,
+    /// Largest gap that passes, metres.
+    pub limit: f64,
+    /// Uncertainty (95 %) of its gap at the last scan, metres.
+    pub uncertainty: f64,
+    chord: f64,
+    centre: Centre,
+    seat: Seat,
+    /// Places along the line, metres from its first point.
+    along: Vec<f64>,
+    /// The same on the plate.
+    at: Vec<[f64; 2]>,
+    /// Height of the plate over the target, metres, towards the scanner.
+    pub(crate) height: Vec<f64>,
+}
+
+/// Largest gap under a board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Gap, metres.
+    pub gap: f64,
+    /// The board bridges it: the plate is more hollow there than the template.
+    pub hollow: bool,
+    /// Index of its place on the line.
+    pub place: usize,
+}
+
+impl Board {
+    /// Lays a template on a line from the difference of curvature, plate minus target along the line, 1/m, positive towards the
+    /// scanner, at any distance along the line, metres.
+    #[must_use]
+    pub fn new(
+        template: &Template,
+        uncertainty: f64,
+        from: [f64; 2],
+        to: [f64; 2],
+        difference: impl Fn(f64, [f64; 2]) -> f64,
+    ) -> Self {
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let n = (length / STEP).round().max(2.0) as usize;
+        let step = length / n as f64;
+        let fine = step / FINE as f64;
+        let place = |s: f64| [0, 1].map(|k| from[k] + s / length * (to[k] - from[k]));
+        let at_distance = |s: f64| difference(s.min(length), place(s.min(length)));
+        let (mut height, mut slope, mut rise) = (vec![0.0], 0.0, 0.0);
+        let mut first = at_distance(0.0);
+        for k in 0..n * FINE {
+            let s = fine * k as f64;
+            let (middle, last) = (at_distance(s + 0.5 * fine), at_distance(s + fine));
+            // Exact for a curvature that is a parabola in each fine step.
+            rise += slope * fine + fine * fine / 6.0 * (first + 2.0 * middle);
+            slope += fine / 6.0 * (first + 4.0 * middle + last);
+            first = last;
+            if (k + 1) % FINE == 0 {
+                height.push(rise);
+            }
+        }
+        let along: Vec<f64> = (0..=n).map(|k| step * k as f64).collect();
+        Self {
+            name: template.name.clone(),
+            limit: template.limit,
+            uncertainty,
+            chord: template.chord,
+            centre: template.centre,
+            seat: template.seat,
+            at: along.iter().map(|s| place(*s)).collect(),
+            along,
+            height,
+        }
+    }
+
+    /// Returns the change of the heights by a unit bend along the line x, metres per radian.
+    pub(crate) fn ramp<'a>(&'a self, lines: &'a BendLines, x: f64) -> impl Iterator<Item = f64> + 'a {
+        self.at.iter().map(move |at| lines.distance(x, *at).max(0.0))
+    }
+
+    /// Returns the place of an index on the plate.
+    #[must_use]
+    pub fn place(&self, index: usize) -> [f64; 2] {
+        self.at[index]
+    }
+
+    /// Returns the heights of the plate over the target along the line, metres, towards the scanner.
+    #[must_use]
+    pub fn height(&self) -> &[f64] {
+        &self.height
+    }
+
+    /// Returns the length of the template, metres.
+    #[must_use]
+    pub fn chord(&self) -> f64 {
+        self.chord
+    }
+
+    /// Returns the largest gap for these heights of the plate over the target.
+    #[must_use]
+    pub fn worst(&self, height: &[f64]) -> Gap {
+        let last = self.along.len() - 1;
+        let step = self.along[last] / last as f64;
+        let half = ((0.5 * self.chord / step).round() as usize).min(last / 2);
+        let gap_at = |middle: usize| {
+            let (from, to) = (middle - half, (middle + half).min(last));
+            let x = self.along[from..=to].iter().map(|s| s - self.along[middle]).collect();
+            let profile = Profile { x, d: height[from..=to].to_vec() };
+            let (seating, _) = profile.seat(self.seat, self.chord);
+            let gaps = profile.gaps(&seating);
+            let largest =
+                (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() { k } else { best });
+            let contacts = profile.contacts(&seating);
+            let between = contacts.first() < Some(&largest) && Some(&largest) < contacts.last();
+            Gap { gap: gaps[largest].abs(), hollow: between && gaps[largest] > 0.0, place: from + largest }
+        };
+        match self.centre {
+            Centre::At(centre) => {
+                gap_at(((centre / step).round() as usize).clamp(half, (last - half).max(half)))
+            }
+            Centre::Worst => {
+                let mut middles: Vec<usize> = (half..=(last - half).max(half)).step_by(SLIDE).collect();
+                middles.push((last - half).max(half));
+                let worst = middles.into_iter().map(gap_at).reduce(|a, b| if b.gap > a.gap { b } else { a });
+                worst.unwrap_or(Gap { gap: 0.0, hollow: false, place: 0 })
+            }
+        }
+    }
+}

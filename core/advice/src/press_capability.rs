@@ -1,0 +1,95 @@
+//! Press capability: what the scatter of the ram leaves under a board, beside the limit.
+//!
+//! A ram that repeats to s turns the plate by s / (w / 4) more or less in a die of opening w; under a board of chord c that is a gap of
+//! c s / w. A third of the limit is as much as a press may take of it: the rest is for places, plates and the scan.
+
+use platen_model::units::mm;
+
+/// Share of the limit that a press may take.
+const SHARE: f64 = 1.0 / 3.0;
+/// Least number of strokes from which a scatter is told.
+pub const LEAST_STROKES: usize = 10;
+
+/// What a press can hold.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct PressCapability {
+    /// Standard deviation of the reached about the wanted depth, metres.
+    pub ram_sigma: f64,
+    /// The gap that it leaves under the board, one standard deviation, metres.
+    pub gap_sigma: f64,
+    /// Chord of the board, metres.
+    pub chord: f64,
+    /// Its limit, metres.
+    pub limit: f64,
+}
+
+impl PressCapability {
+    /// Assesses a ram of this scatter over a die of this opening, under a board; metres.
+    #[must_use]
+    pub fn new(ram_sigma: f64, opening: f64, chord: f64, limit: f64) -> Self {
+        Self { ram_sigma, gap_sigma: chord / opening * ram_sigma, chord, limit }
+    }
+
+    /// Returns whether the press cannot hold the limit.
+    #[must_use]
+    pub fn is_too_coarse(&self) -> bool {
+        self.gap_sigma > SHARE * self.limit
+    }
+
+    /// Returns it in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let Self { ram_sigma, gap_sigma, chord, limit } = *self;
+        let word = if self.is_too_coarse() { "too coarse" } else { "fine enough" };
+        format!(
+            "this press is {word} for the limit: its ram repeats to {:.2} mm, that is {:.1} mm under a board of {chord:.1} m, limit {:.1} mm",
+            mm(ram_sigma),
+            mm(gap_sigma),
+            mm(limit)
+        )
+    }
+}
+
+/// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` below [`LEAST_STROKES`].
+/// Strokes that stopped short, three robust standard deviations or more, are left out.
+#[must_use]
+pub fn ram_scatter(offs: &[f64]) -> Option<[f64; 3]> {
+    let mut sizes: Vec<f64> = offs.iter().map(|off| off.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // The median of |x| is 0.6745 standard deviations.
+    let robust = sizes.get(sizes.len() / 2)? / 0.6745;
+    let kept: Vec<f64> = offs.iter().copied().filter(|off| *off > -3.0 * robust).collect();
+    if kept.len() < LEAST_STROKES {
+        return None;
+    }
+    let n = kept.len() as f64;
+    let sigma = (kept.iter().map(|off| off * off).sum::<f64>() / n).sqrt();
+    // Chi squared by Wilson and Hilferty.
+    let chi = |z: f64| n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3);
+    Some([sigma * (n / chi(1.96)).sqrt(), sigma, sigma * (n / chi(-1.96)).sqrt()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ram_of_a_study_is_too_coarse() {
+        let fine = PressCapability::new(0.1e-3, 0.36, 2.0, 3e-3);
+        let coarse = PressCapability::new(0.3e-3, 0.36, 2.0, 3e-3);
+        assert!(!fine.is_too_coarse() && coarse.is_too_coarse());
+        assert!((coarse.gap_sigma - 1.667e-3).abs() < 1e-6);
+    }
+
+    /// Tables of chi squared: 20 degrees, 9.591 and 34.17.
+    #[test]
+    fn scatter_has_its_interval_and_leaves_out_what_stopped_short() {
+        let mut offs: Vec<f64> = (0..20).map(|k| if k % 2 == 0 { 1e-4 } else { -1e-4 }).collect();
+        offs.push(-3e-3);
+        let [low, sigma, high] = ram_scatter(&offs).unwrap_or_default();
+        assert!((sigma - 1e-4).abs() < 1e-12);
+        assert!((low / sigma - (20.0_f64 / 34.17).sqrt()).abs() < 2e-3, "{low}");
+        assert!((high / sigma - (20.0_f64 / 9.591).sqrt()).abs() < 5e-3, "{high}");
+        assert_eq!(ram_scatter(&offs[..9]), None);
+    }
+}

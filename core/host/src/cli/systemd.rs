@@ -1,0 +1,129 @@
+//! `platen systemd`: the drop-in of the unit `platen@` with what the plant file needs of the machine.
+
+use std::fmt::Write as _;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use platen_plant::PlantFile;
+use platen_plant::press::{Role, Transport};
+
+use super::{CliError, Common, output};
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  platen systemd /etc/platen/press-3.toml\n  \
+                        mkdir -p /etc/systemd/system/platen@press-3.service.d\n  \
+                        platen systemd /etc/platen/press-3.toml > /etc/systemd/system/platen@press-3.service.d/plant.conf\n  \
+                        systemctl daemon-reload && systemctl enable --now platen@press-3\n\n\
+                        The unit allows no address, no device and no folder beyond its own record; the drop-in allows those that the plant \
+                        file names. Names of hosts are listed as comments: write their addresses.")]
+pub(super) struct Command {
+    /// Plant file
+    plant: PathBuf,
+}
+
+pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
+    let plant = PlantFile::load(&command.plant)?;
+    let needs = Needs::of(&plant);
+    let text = needs.drop_in(&command.plant);
+    output::either(
+        common,
+        &serde_json::json!({ "addresses": needs.addresses, "names": needs.names, "devices": needs.devices,
+        "writes": needs.writes, "drop_in": text }),
+        text.trim_end(),
+    )?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What a plant needs of its machine.
+#[derive(Debug, Default)]
+struct Needs {
+    /// Addresses; `any` where the host listens for all.
+    addresses: Vec<String>,
+    /// Names of hosts whose addresses are not known here.
+    names: Vec<String>,
+    /// Serial lines.
+    devices: Vec<PathBuf>,
+    /// Folders that are written.
+    writes: Vec<PathBuf>,
+}
+
+impl Needs {
+    fn of(plant: &PlantFile) -> Self {
+        let mut needs = Self::default();
+        match plant.press.as_ref().map(|press| &press.link.transport) {
+            Some(Transport::Tcp(socket) | Transport::RtuOverTcp(socket, _)) => {
+                // A host that serves the registers names the addresses that may connect instead.
+                match plant.press.as_ref().map(|press| press.role) {
+                    Some(Role::Server) => socket.peers.iter().for_each(|peer| needs.host(&peer.to_string())),
+                    _ => needs.host(&socket.host),
+                }
+            }
+            Some(Transport::Rtu(line, _)) => needs.devices.push(line.device.clone()),
+            None => {}
+        }
+        for option in plant.scanner.iter().flat_map(|scanner| scanner.options.texts()) {
+            if let Some((host, port)) = option.rsplit_once(':')
+                && port.parse::<u16>().is_ok()
+            {
+                needs.host(host);
+            }
+        }
+        if plant.screen.as_ref().is_some_and(|screen| !screen.listen.ip().is_loopback()) {
+            // The pages' readers are not in the plant file.
+            needs.addresses.push("any".into());
+        }
+        let folders = [Some(plant.output.folder.as_path()), plant.output.history.parent()];
+        let calibration = plant.calibration.as_ref().and_then(|it| it.file.parent());
+        for folder in folders.into_iter().chain([calibration]).flatten() {
+            if !folder.starts_with("/var/lib/platen") && !needs.writes.iter().any(|it| it == folder) {
+                needs.writes.push(folder.to_owned());
+            }
+        }
+        needs
+    }
+
+    fn host(&mut self, host: &str) {
+        let all = [IpAddr::V4(Ipv4Addr::UNSPECIFIED), IpAddr::V6(Ipv6Addr::UNSPECIFIED)];
+        let host = host.trim_matches(['[', ']']);
+        let address = host.parse::<IpAddr>().or_else(|_| host.parse::<SocketAddr>().map(|it| it.ip()));
+        let list = match address {
+            Ok(address) if address.is_loopback() => return,
+            Ok(address) if all.contains(&address) => {
+                self.addresses.push("any".into());
+                return;
+            }
+            Ok(_) => &mut self.addresses,
+            Err(_) => &mut self.names,
+        };
+        if !list.iter().any(|it| it == host) {
+            list.push(host.to_owned());
+        }
+    }
+
+    fn drop_in(&self, plant: &Path) -> String {
+        let mut text = format!(
+            "# Made by `platen systemd {}`: make it anew after a change there.\n[Service]\n",
+            plant.display()
+        );
+        // Writing to a String cannot fail.
+        for address in &self.addresses {
+            let _ = writeln!(text, "IPAddressAllow={address}");
+        }
+        for name in &self.names {
+            let _ = writeln!(text, "# write the address of {name}:\n# IPAddressAllow=");
+        }
+        for device in &self.devices {
+            let _ = writeln!(
+                text,
+                "PrivateDevices=no\nDeviceAllow={} rw\nSupplementaryGroups=dialout",
+                device.display()
+            );
+        }
+        for folder in &self.writes {
+            let _ = writeln!(text, "ReadWritePaths={}", folder.display());
+        }
+        text
+    }
+}

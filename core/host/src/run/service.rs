@@ -1,0 +1,52 @@
+//! State of the host for systemd, `sd_notify(3)`: ready, what it does, and its watchdog.
+//!
+//! The status of the press side changes with each cycle that polls the press. Each change feeds the watchdog; a cycle that hangs feeds
+//! nothing, and systemd restarts the host. The mode `off` has no cycle and is fed by time.
+
+use std::time::{Duration, Instant};
+
+use platen_plant::press::Mode;
+use platen_press::Status;
+use sd_notify::NotifyState;
+use tokio::sync::watch;
+
+/// Shortest time between two feedings.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// Notifies systemd until the press side ends. Does nothing where systemd did not start the host.
+pub(super) async fn keep(mode: Mode, mut status: watch::Receiver<Status>) {
+    if std::env::var_os("NOTIFY_SOCKET").is_none() {
+        return;
+    }
+    let mut fed: Option<Instant> = None;
+    let mut told = String::new();
+    loop {
+        if mode == Mode::Off {
+            tokio::time::sleep(PERIOD).await;
+        } else if status.changed().await.is_err() {
+            return;
+        }
+        let state = status.borrow_and_update().state.to_string();
+        let mut notices = Vec::new();
+        if fed.is_none() {
+            notices.push(NotifyState::Ready);
+        }
+        if fed.is_none_or(|fed| fed.elapsed() >= PERIOD) {
+            notices.push(NotifyState::Watchdog);
+            fed = Some(Instant::now());
+        }
+        if state != told {
+            notices.push(NotifyState::Status(&state));
+        }
+        if let Err(error) = sd_notify::notify(&notices) {
+            tracing::warn!("systemd cannot be told: {error}");
+        }
+        told = state;
+    }
+}
+
+/// Tells systemd that the host is stopping.
+pub(super) fn stopping() {
+    // Without systemd there is nobody to tell.
+    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+}

@@ -1,0 +1,68 @@
+//! Advice on the operator's page: the line along which to press in place of the place of the next hit, the depth, what comes of it.
+
+use platen_model::{Texts, fill};
+use platen_report::picture::SeenPlate;
+
+use super::clean;
+use crate::cells::Cells;
+use crate::view::View;
+use crate::{AdvicePart, AdvisedBend, AdvisedStep, Snapshot, words};
+
+/// A line whose ends lie within this is said by one number, millimetres.
+const STRAIGHT: f64 = 5.0;
+
+/// Fills the cells of the advice, over those of the next place.
+pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
+    let advice = snapshot.result.as_ref().and_then(|result| result.advice.as_ref());
+    let text = |texts: Texts| texts.of(view.language);
+    cells.text("advice", advice.map_or(String::new(), |advice| sentence(advice, view)));
+    let seen = snapshot.plate.as_ref().and_then(|it| Some(view.turn.of(it.size_mm?, it.press_side)));
+    let Some((advice, (bend, seen))) = advice.and_then(|it| Some((it, it.bend.as_ref().zip(seen)?))) else {
+        return;
+    };
+    let title = if advice.step == AdvisedStep::TurnOver { words::TURN_OVER } else { words::PRESS_LINE };
+    cells.text("place-title", text(title));
+    let (from, [near, far]) = distances(bend, seen);
+    cells.text("left", view.place(near));
+    let far = ((near - far).abs() > STRAIGHT).then(|| view.place(far));
+    cells.text(
+        "left-words",
+        match far {
+            None => text(from).to_owned(),
+            Some(far) => fill(text(words::FAR_END), &[text(from), &far]),
+        },
+    );
+    cells.text("near", bend.depth_mm.map_or(String::new(), |depth| view.length(depth)));
+    cells.text("near-words", if bend.depth_mm.is_some() { text(words::DEPTH) } else { "" });
+}
+
+/// Returns the edge from which a line is measured, and the distances of its ends, the nearer to the operator (or to the left) first,
+/// millimetres.
+fn distances(bend: &AdvisedBend, seen: SeenPlate) -> (Texts, [f64; 2]) {
+    let [[x1, y1], [x2, y2]] = bend.line_mm.map(|end| seen.place_mm(end));
+    if (x1 - x2).abs() <= (y1 - y2).abs() {
+        (words::FROM_LEFT, if y1 <= y2 { [x1, x2] } else { [x2, x1] })
+    } else {
+        let from = if seen.press_below { words::FROM_PRESS } else { words::FROM_BOTTOM };
+        (from, if x1 <= x2 { [y1, y2] } else { [y2, y1] })
+    }
+}
+
+/// Returns the largest depth, what comes of the stroke, the number of strokes left, or why there is no advice.
+fn sentence(advice: &AdvicePart, view: View) -> String {
+    let text = |texts: Texts| texts.of(view.language);
+    let most = advice.bend.and_then(|bend| bend.depth_mm.and(bend.depth_not_beyond_mm));
+    let most = most.map(|most| fill(text(words::NOT_BEYOND), &[&view.length(most)]));
+    let then = advice.bend.map(|bend| {
+        let [low, gap, high] = bend.gap_after_mm.map(|gap| view.units.number(gap));
+        fill(text(words::THEN), &[&format!("{gap} {}", view.units.symbol()), &low, &high])
+    });
+    let left = advice
+        .strokes_left
+        .filter(|left| left[1] > 0)
+        .map(|[few, many]| fill(text(words::STROKES_LEFT), &[&few.to_string(), &many.to_string()]));
+    let why = advice.why.map(|why| fill(text(words::NO_ADVICE), &[text(why)]));
+    let says = advice.says.first().map(|says| clean(says));
+    let parts: Vec<String> = [why, most, then, left, says].into_iter().flatten().collect();
+    parts.join("; ")
+}

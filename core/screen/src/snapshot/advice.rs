@@ -1,0 +1,76 @@
+//! Advice for the next stroke, as the pages show it: millimetres and sentences of what an advisor said.
+
+use platen_model::units::mm;
+use platen_model::{Advice, NextBend, Step, Texts};
+use serde::Serialize;
+
+/// Advice for the next stroke.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AdvicePart {
+    /// What to do.
+    pub step: AdvisedStep,
+    /// The bend of `bend` and `turn_over`.
+    pub bend: Option<AdvisedBend>,
+    /// Why there is none.
+    pub why: Option<Texts>,
+    /// Fewest strokes that are left, and a number that is seldom exceeded.
+    pub strokes_left: Option<[u32; 2]>,
+    /// Sentences of the advisor, most important first.
+    pub says: Vec<String>,
+}
+
+/// What to do with the plate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AdvisedStep {
+    /// Bend along a line.
+    Bend,
+    /// Turn the plate over and bend it back along a line.
+    TurnOver,
+    /// Bend at the place of the result; how much cannot be told.
+    Place,
+    /// Enough.
+    Done,
+    /// No advice.
+    Cannot,
+}
+
+/// A bend along a line.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AdvisedBend {
+    /// Ends of the line, (u, v).
+    pub line_mm: [[f64; 2]; 2],
+    /// Angle that should remain.
+    pub angle_deg: f64,
+    /// Depth of the ram; null where none can be told.
+    pub depth_mm: Option<f64>,
+    /// Depth beyond which the plate could no longer be finished from one side.
+    pub depth_not_beyond_mm: Option<f64>,
+    /// Largest gap under a template after it: lower end of the 95 % interval, expected, upper end.
+    pub gap_after_mm: [f64; 3],
+}
+
+impl From<&NextBend> for AdvisedBend {
+    fn from(bend: &NextBend) -> Self {
+        Self {
+            line_mm: bend.line.map(|end| end.map(mm)),
+            angle_deg: bend.angle.to_degrees(),
+            depth_mm: bend.depth.map(mm),
+            depth_not_beyond_mm: bend.depth_not_beyond.map(mm),
+            gap_after_mm: bend.gap_after.map(mm),
+        }
+    }
+}
+
+impl From<&Advice> for AdvicePart {
+    fn from(advice: &Advice) -> Self {
+        let (step, bend, why) = match &advice.step {
+            Step::Bend(bend) => (AdvisedStep::Bend, Some(bend.into()), None),
+            Step::TurnOver(bend) => (AdvisedStep::TurnOver, Some(bend.into()), None),
+            Step::Place { .. } => (AdvisedStep::Place, None, None),
+            Step::Done => (AdvisedStep::Done, None, None),
+            Step::Cannot { reason } => (AdvisedStep::Cannot, None, Some(reason.texts())),
+        };
+        Self { step, bend, why, strokes_left: advice.strokes_left, says: advice.says.clone() }
+    }
+}

@@ -1,0 +1,200 @@
+//! Advice in the real host: the whole loop with an operator who follows it, and advisors that crash or hang.
+
+use std::path::Path;
+
+use platen_tests::{faulty, program};
+use serde_json::Value as Json;
+
+use crate::cell::{Host, Press, assert_clean, plant, until};
+
+/// Standard output of the program, which must succeed.
+#[track_caller]
+fn said(arguments: &[&str]) -> Vec<u8> {
+    let output = program("platen").args(arguments).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output.stdout
+}
+
+fn json(bytes: &[u8]) -> Json {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+/// Advice after a run, from the file beside its result.
+fn advice(plant: &Path, run: u64) -> Option<Json> {
+    let path = plant.with_file_name(format!("results/run-{run:06}/advice.json"));
+    std::fs::read(path).ok().map(|text| json(&text))
+}
+
+/// Found: 11 strokes, 6 to 50 ms from the result to the advice; all angles and all gaps inside their intervals.
+#[test]
+fn a_plate_is_bent_as_advised_until_it_passes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("demo");
+    let demo = json(&said(&["demo", "--advice", "--seed", "1", "--json", "--out", out.to_str().unwrap()]));
+    assert_eq!((&demo["bent"], &demo["registers_correct"]), (&Json::Bool(true), &Json::Bool(true)));
+    let strokes = demo["strokes"].as_array().unwrap();
+    assert!((6..=16).contains(&strokes.len()), "{} strokes with the blank", strokes.len());
+
+    let plant = out.join("plant.toml");
+    let path = plant.to_str().unwrap();
+    let scores = json(&said(&["history", "advice", path, "--json"]));
+    println!(
+        "{} strokes: {} of the angles, {} of the gaps inside",
+        strokes.len() - 1,
+        scores["angle_inside"],
+        scores["gap_inside"]
+    );
+    assert_eq!(scores["followed"], 1.0);
+    assert!(scores["angle_inside"].as_f64().unwrap() > 0.8 && scores["gap_inside"].as_f64().unwrap() > 0.7);
+
+    // Asked again, every stroke's advice is the same to the last byte, and the one on record.
+    for (k, stroke) in strokes.iter().enumerate() {
+        let run = k as u64 + 1;
+        let name = if k == 0 { "blank".to_owned() } else { stroke["stroke"].to_string() };
+        let again = || said(&["advise", path, "1", "--stroke", &name, "--json"]);
+        let first = again();
+        assert_eq!(first, again(), "{name}");
+        let on_record = advice(&plant, run).unwrap();
+        assert_eq!(json(&first), on_record["advice"], "{name}");
+        assert_eq!(on_record["run_id"], run);
+        println!("{name}: advice {} ms after the result", on_record["elapsed_ms"]);
+    }
+    let last = json(&said(&["advise", path, "1", "--json"]));
+    assert_eq!(last["step"]["kind"], "done");
+}
+
+/// What the strokes left at the press and on record.
+#[derive(Debug, PartialEq)]
+struct Results {
+    figures: Vec<Json>,
+    words: Vec<Vec<Json>>,
+}
+
+/// A blank and three strokes.
+struct Run {
+    results: Results,
+    advised: Vec<Option<Json>>,
+    log: String,
+}
+
+/// Verdict and figures of every stroke without times, and the words of each result that the press took, from verdict to gap's place.
+fn results(plant: &Path, stats: &Json) -> Results {
+    let figures = Host::history(plant).into_iter().map(|mut record| {
+        record["figures"].as_object_mut().unwrap().retain(|name, _| !name.ends_with("_time"));
+        serde_json::json!([record["verdict"], record["figures"]])
+    });
+    let words = |taken: &Json| taken["words"].as_array().unwrap()[53..].to_vec();
+    let taken = stats["taken"].as_array().unwrap();
+    Results { figures: figures.collect(), words: taken.iter().map(words).collect() }
+}
+
+/// Runs a blank and three strokes with an advisor; `fault` is done in each of its jobs.
+fn run(fault: Option<&str>, show: Option<&str>) -> Run {
+    let folder = tempfile::tempdir().unwrap();
+    let plugins = folder.path().join("plugins");
+    std::fs::create_dir(&plugins).unwrap();
+    if let Some(fault) = fault {
+        faulty(&plugins, "line-bends", "run", fault, 0);
+    }
+    let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    if let Some(show) = show {
+        let text = std::fs::read_to_string(&plant).unwrap();
+        // A hang is waited for; else a busy machine may take its time.
+        let deadline = if fault.is_some() { 1000 } else { 30_000 };
+        let more = format!(
+            "[[comparison]]\nplugin = \"curvature\"\n[advice]\nplugin = \"line-bends\"\nshow = \"{show}\"\ndeadline_ms = {deadline}\n\
+             [[die]]\nid = 1\nopening_mm = 400.0\n"
+        );
+        std::fs::write(&plant, text + &more).unwrap();
+    } else {
+        let text = std::fs::read_to_string(&plant).unwrap();
+        std::fs::write(&plant, text + "[[comparison]]\nplugin = \"curvature\"\n").unwrap();
+    }
+    let mut host = Host::with_plugins(&plant, &plugins);
+    for (run, ask) in [(1, "baseline"), (2, "stroke"), (3, "stroke"), (4, "stroke")] {
+        until("the host to be ready", || (press.host_status() & 1 == 1).then_some(()));
+        press.ask(&format!(r#"{{"do":"{ask}"}}"#));
+        press.wait_taken(run);
+        if show.is_some() {
+            // The next trigger would end it.
+            until("the advice after the stroke", || advice(&plant, run as u64));
+        }
+    }
+    let stats = press.stats();
+    assert_clean(&stats, &host.log());
+    let log = host.log();
+    assert_eq!(host.stop(), Some(0), "{log}");
+    let advised = (1..=4).map(|run| advice(&plant, run)).collect();
+    Run { results: results(&plant, &stats), advised, log }
+}
+
+#[test]
+fn an_advisor_that_crashes_or_hangs_costs_the_advice_alone() {
+    let without = run(None, None);
+    assert!(without.advised.iter().all(Option::is_none), "no [advice], no file");
+    let with = run(None, Some("shadow"));
+    assert_eq!(with.results, without.results, "{}", with.log);
+    let advised =
+        with.advised.iter().flatten().filter(|it| it["advice"].is_object() && it["show"] == "shadow");
+    assert_eq!(advised.count(), 4, "{:#?}", with.advised);
+    for (fault, word) in [("segv", "SIGSEGV"), ("hang", "hangs")] {
+        let Run { results, advised, log, .. } = run(Some(fault), Some("screen"));
+        assert_eq!(results, without.results, "{fault}: {log}");
+        let last = advised[3].as_ref().unwrap();
+        println!("{fault}: {}", last["failed"]);
+        assert!(last["advice"].is_null() && last["failed"].is_string(), "{fault}: {last:#}");
+        assert!(log.lines().any(|line| line.contains("no advice") && line.contains(word)), "{fault}: {log}");
+    }
+}
+
+/// The press itself counts writes outside of its blocks, and advice that stands while another stroke is measured.
+#[test]
+fn the_advice_registers_show_the_last_stroke_and_nothing_after_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false\nadvice_base = 164");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let text = std::fs::read_to_string(&plant).unwrap();
+    let more = "[[comparison]]\nplugin = \"curvature\"\n[advice]\nplugin = \"line-bends\"\nshow = \"screen_and_registers\"\n\
+        deadline_ms = 30000\n[[die]]\nid = 1\nopening_mm = 400.0\n[press.write]\nallow = [\"100..=163\", \"164..=187\"]\n";
+    std::fs::write(&plant, text + more).unwrap();
+    let mut host = Host::start(&plant);
+    let registers = || {
+        let dump = ["press", "dump", plant.to_str().unwrap(), "--raw", "--range", "164..188", "--json"];
+        let words = json(&said(&dump));
+        words["words"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|pair| pair[1].as_u64().unwrap() as u16)
+            .collect::<Vec<_>>()
+    };
+    for (run, ask) in [(1, "baseline"), (2, "stroke"), (3, "stroke")] {
+        until("the host to be ready", || (press.host_status() & 1 == 1).then_some(()));
+        press.ask(&format!(r#"{{"do":"{ask}"}}"#));
+        let shown = until("the advice in the registers", || {
+            Some(registers()).filter(|words| words[2] & 1 == 1 && u64::from(words[0]) == run)
+        });
+        let record = until("its record", || advice(&plant, run));
+        let (key, advice) = (&record["key"], &record["advice"]);
+        assert_eq!(u64::from(shown[1]), key["stroke"].as_u64().unwrap(), "{}", host.log());
+        // The flag of its kind, of the bend its line.
+        let flag = match advice["step"]["kind"].as_str().unwrap() {
+            "bend" => 1 << 1,
+            "cannot" => 1 << 4,
+            other => panic!("{other}"),
+        };
+        assert_eq!(shown[2], 1 | flag);
+        if let Some(line) = advice["step"]["line"].as_array() {
+            let ends = line.iter().flat_map(|end| end.as_array().unwrap());
+            let mm: Vec<f64> = ends.map(|at| (1e3 * at.as_f64().unwrap()).round()).collect();
+            assert_eq!(shown[4..8].iter().map(|word| f64::from(*word as i16)).collect::<Vec<_>>(), mm);
+        }
+        // No depth on the panel unless it is wanted by name.
+        assert_eq!(shown[18..20], [0x8000, 0x8000]);
+    }
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    let left = registers();
+    assert_eq!((left[0], left[2]), (3, 0), "{}", host.log());
+    assert_clean(&press.stats(), &host.log());
+}
