@@ -36,6 +36,12 @@ const STROKE: &str = "SELECT s.run_id, s.press, s.session, s.stroke, s.attempt, 
                       s.accepted, s.scanned, s.finished, s.acked, s.ack, s.seq, s.verdict, s.reason, s.figures, s.data, \
                       s.publication, s.document, s.scan, s.scan_sha256 FROM stroke s";
 
+/// Columns of a plate, in the order in which [`plate`] reads them.
+const PLATE: &str = "SELECT p.plate, p.press, p.part_id, p.part_name, p.began, p.ended, \
+                     (SELECT count(*) FROM stroke s WHERE s.plate = p.plate), \
+                     (SELECT s.verdict FROM stroke s WHERE s.plate = p.plate AND s.verdict IS NOT NULL \
+                      ORDER BY s.run_id DESC LIMIT 1) FROM plate p";
+
 /// Condition of a stroke that was measured and can be compared with.
 const MEASURED: &str = "s.verdict IS NOT NULL AND s.verdict <> 'not_measured'";
 
@@ -136,24 +142,16 @@ impl Archive {
     /// # Errors
     /// [`Error::Storage`].
     pub fn plates(&self) -> Result<Vec<PlateRecord>, Error> {
-        let sql = "SELECT p.plate, p.press, p.part_id, p.part_name, p.began, p.ended, \
-                   (SELECT count(*) FROM stroke s WHERE s.plate = p.plate), \
-                   (SELECT s.verdict FROM stroke s WHERE s.plate = p.plate AND s.verdict IS NOT NULL \
-                    ORDER BY s.run_id DESC LIMIT 1) FROM plate p ORDER BY p.plate";
-        let read = |row: &Row<'_>| {
-            let verdict: Option<String> = row.get(7)?;
-            Ok(PlateRecord {
-                plate: row.get(0)?,
-                press: row.get(1)?,
-                part_id: row.get(2)?,
-                part_name: row.get(3)?,
-                began: time(row, 4)?,
-                ended: optional_time(row, 5)?,
-                strokes: row.get(6)?,
-                verdict: verdict.as_deref().and_then(Verdict::from_text),
-            })
-        };
-        self.rows(sql, [], read).map_err(Error::storage(&self.path))
+        self.rows(&format!("{PLATE} ORDER BY p.plate"), [], plate).map_err(Error::storage(&self.path))
+    }
+
+    /// Returns one plate; `None` where the record has none of this number.
+    ///
+    /// # Errors
+    /// [`Error::Storage`].
+    pub fn plate(&self, number: u32) -> Result<Option<PlateRecord>, Error> {
+        let found = self.rows(&format!("{PLATE} WHERE p.plate = ?1"), [number], plate);
+        Ok(found.map_err(Error::storage(&self.path))?.pop())
     }
 
     /// Reads strokes. The first column is the run id, so that the error of a damaged row contains it.
@@ -192,6 +190,20 @@ fn key_from(row: &Row<'_>, first: usize) -> rusqlite::Result<StrokeKey> {
         session: row.get(first + 1)?,
         stroke: row.get(first + 2)?,
         attempt: row.get(first + 3)?,
+    })
+}
+
+fn plate(row: &Row<'_>) -> rusqlite::Result<PlateRecord> {
+    let verdict: Option<String> = row.get(7)?;
+    Ok(PlateRecord {
+        plate: row.get(0)?,
+        press: row.get(1)?,
+        part_id: row.get(2)?,
+        part_name: row.get(3)?,
+        began: time(row, 4)?,
+        ended: optional_time(row, 5)?,
+        strokes: row.get(6)?,
+        verdict: verdict.as_deref().and_then(Verdict::from_text),
     })
 }
 

@@ -10,6 +10,7 @@ pub mod cell;
 mod check;
 mod convert;
 mod demo;
+mod forward;
 mod generate;
 mod history;
 mod inspect;
@@ -103,6 +104,8 @@ enum Verb {
     Plate(plate::Command),
     /// Print the register map, read registers, test link and handshake
     Press(press::Command),
+    /// Send the record to databases and brokers, beside the host
+    Forward(forward::Command),
     /// Show the state of a running host
     Status(status::Command),
     /// Print the drop-in of the unit platen@ for a plant: its addresses, devices, folders
@@ -192,6 +195,7 @@ pub fn main() -> ExitCode {
         Verb::Check(command) => check::run(&cli.common, command),
         Verb::Plate(command) => plate::run(&cli.common, command),
         Verb::Press(command) => press::run(&cli.common, command),
+        Verb::Forward(command) => forward::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
         Verb::Systemd(command) => systemd::run(&cli.common, command),
         Verb::Screen(command) => screen::run(&cli.common, command),

@@ -29,7 +29,10 @@ pub use fault::{Fault, Faults};
 pub use key::{Located, TomlKey};
 pub use nearest::nearest;
 pub use option::{OptionDecl, OptionType, OptionValue, RawOptions, Value, check_options};
-pub use plant::{AdviceUse, PlantFile, PluginRole, PluginUse, ScanWindow, Screen, Show, Survey, Worker};
+pub use plant::{
+    AdviceUse, Crews, Forward, PlantFile, PluginRole, PluginUse, ScanWindow, Screen, Show, SinkKind, SinkUse,
+    Survey, Worker,
+};
 pub use plate::PlateFile;
 pub use source::Place;
 pub use table::TomlTable;

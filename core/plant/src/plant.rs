@@ -5,6 +5,7 @@
 
 mod advice;
 mod calibration;
+mod forward;
 mod frame;
 mod output;
 mod plugin_use;
@@ -12,6 +13,7 @@ mod screen;
 
 pub use advice::{AdviceUse, Show};
 pub use calibration::CalibrationUse;
+pub use forward::{Forward, SinkKind, SinkUse};
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
 pub use plugin_use::{PluginUse, Worker};
@@ -88,11 +90,22 @@ pub struct PlantFile {
     /// Dies of the press.
     pub dies: Vec<Die>,
     /// Purpose for which the codes of crews are recorded; without it none is.
-    pub crews: Option<String>,
+    pub crews: Option<Crews>,
     /// Destination of results.
     pub output: Output,
     /// Browser pages; without the table none are served.
     pub screen: Option<Screen>,
+    /// Destinations of the record; without the table nothing leaves the host.
+    pub forward: Option<Forward>,
+}
+
+/// Codes of crews in the record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Crews {
+    /// Purpose for which they are recorded.
+    pub purpose: String,
+    /// Whether `platen forward` sends them.
+    pub forward: bool,
 }
 
 /// Use of a plugin: the table of the plant file that names it.
@@ -143,6 +156,7 @@ impl Default for PlantFile {
             crews: None,
             output: Output::in_folder(Path::new("")),
             screen: None,
+            forward: None,
         }
     }
 }
@@ -231,8 +245,9 @@ impl PlantFile {
         let crews = root.table("crews").optional().and_then(|table| {
             let Some(mut table) = table else { return Ok(None) };
             let purpose = table.name("purpose").required();
+            let forward = table.bool("forward").or(false);
             table.finish();
-            purpose.map(Some)
+            Ok(Some(Crews { purpose: purpose?, forward: forward? }))
         });
         let listed = root.has("comparison");
         if !root.has("flattening") {
@@ -266,6 +281,8 @@ impl PlantFile {
         let output = root.section("output").and_then(|table| Output::read(table, folder));
         let screen = root.table("screen").optional();
         let screen = screen.and_then(|table| table.map(|table| Screen::read(table, folder)).transpose());
+        let forward = root.table("forward").optional();
+        let forward = forward.and_then(|table| table.map(|table| Forward::read(table, folder)).transpose());
         let root_place = &root.place().clone();
         root.finish();
 
@@ -302,6 +319,7 @@ impl PlantFile {
             crews,
             output: output?,
             screen: screen?,
+            forward: forward?,
         })
     }
 }

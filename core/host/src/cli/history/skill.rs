@@ -15,7 +15,7 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (plant, archive) = open(&command.plant)?;
-    let Some(purpose) = &plant.crews else {
+    let Some(purpose) = plant.crews.as_ref().map(|crews| &crews.purpose) else {
         return Err(CliError::Usage(format!(
             "{}: has no [crews]: figures of crews are off; agree on their purpose, then write it there",
             command.plant.display()

@@ -1,0 +1,95 @@
+//! Parts of a result document that go with a message: what is judged and how well it is known, without surfaces, grids and profiles.
+
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::{Map, Value as Json, json};
+use sha2::{Digest as _, Sha256};
+
+/// Members of `platen.result/1` that are taken as they are.
+const TAKEN: [&str; 12] = [
+    "software",
+    "plate",
+    "says",
+    "supports",
+    "calibration",
+    "scan",
+    "corners_seen",
+    "next",
+    "quality",
+    "plugins",
+    "timings_ms",
+    "clock",
+];
+/// Members of a template that are taken: not its profile.
+const OF_TEMPLATE: [&str; 10] = [
+    "name",
+    "seat",
+    "rocks",
+    "max_gap_mm",
+    "uncertainty_mm",
+    "max_gap_at_mm",
+    "limit_mm",
+    "sense",
+    "verdict",
+    "chord_mm",
+];
+
+/// Parts of a result document.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DocumentExcerpt {
+    /// SHA-256 of the whole document, hexadecimal.
+    pub sha256: String,
+    /// Each template with the name of its line.
+    pub templates: Vec<Json>,
+    /// Bends that the stroke made, as `curvature` found them.
+    pub bends: Vec<Json>,
+    /// Members of `platen.result/1`, as they stand there.
+    #[serde(flatten)]
+    pub taken: Map<String, Json>,
+}
+
+impl DocumentExcerpt {
+    /// Reads a document; `None` where there is none or it is damaged.
+    pub(super) fn load(path: &Path) -> Option<Self> {
+        let bytes = std::fs::read(path).ok()?;
+        let document: Json = serde_json::from_slice(&bytes).ok()?;
+        let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let taken = members(&document, &TAKEN);
+        let lines = document["reference_lines"].as_array().into_iter().flatten();
+        let templates = lines.flat_map(|line| {
+            line["templates"].as_array().into_iter().flatten().map(|template| {
+                let mut kept = members(template, &OF_TEMPLATE);
+                kept.insert("line".into(), line["name"].clone());
+                Json::Object(kept)
+            })
+        });
+        let bends = document["comparisons"].as_array().into_iter().flatten().flat_map(bends_of);
+        Some(Self { sha256, templates: templates.collect(), bends: bends.collect(), taken })
+    }
+}
+
+fn members(of: &Json, names: &[&str]) -> Map<String, Json> {
+    let found = names.iter().filter_map(|name| Some(((*name).to_owned(), of.get(*name)?.clone())));
+    found.collect()
+}
+
+/// Returns the bends among a comparison's figures, `bend.N.angle` with its place, `.direction`, `.length` and `.width`.
+fn bends_of(comparison: &Json) -> Vec<Json> {
+    let figures: Vec<&Json> = comparison["figures"].as_array().into_iter().flatten().collect();
+    let named = |name: String| figures.iter().find(|figure| figure["name"] == *name);
+    let bend = |n: usize| {
+        let angle = named(format!("bend.{n}.angle"))?;
+        let of = |part: &str, key: &str| named(format!("bend.{n}.{part}")).map(|figure| figure[key].clone());
+        Some(json!({
+            "at_mm": angle["at_mm"],
+            "angle_deg": angle["value_deg"],
+            "uncertainty_deg": angle["uncertainty_deg"],
+            "direction_deg": of("direction", "value_deg"),
+            "length_mm": of("length", "value_mm"),
+            "width_mm": of("width", "value_mm"),
+        }))
+    };
+    (1..).map_while(bend).collect()
+}
