@@ -5,6 +5,7 @@
 //! goes back to where the new one begins.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use platen_history::Owner;
 use rusqlite::{Connection, OptionalExtension as _};
@@ -103,6 +104,20 @@ impl Cursors {
 
     fn error(&self, error: &rusqlite::Error) -> CursorError {
         CursorError { path: self.path.clone(), why: sentence(error) }
+    }
+}
+
+/// Cursors that several tasks use.
+#[derive(Debug, Clone)]
+pub(crate) struct SharedCursors(Arc<Mutex<Cursors>>);
+
+impl SharedCursors {
+    pub(crate) fn open(path: &Path) -> Result<Self, CursorError> {
+        Ok(Self(Arc::new(Mutex::new(Cursors::open(path)?))))
+    }
+
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Cursors> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

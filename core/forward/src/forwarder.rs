@@ -3,7 +3,7 @@
 //! A sink that stalls, lies or is away delays no other sink, and nothing that is done here reaches the press: the record is read only.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use platen_history::Owner;
@@ -11,12 +11,13 @@ use platen_plant::{Forward, PlantFile, SinkKind, SinkUse};
 use tokio::sync::watch;
 use tokio::task::{JoinSet, LocalSet};
 
-use crate::cursor::{CursorError, Cursors};
+use crate::cursor::{CursorError, SharedCursors};
 use crate::feed::Feed;
 use crate::message::{Message, Names};
 use crate::mqtt::MqttSink;
 use crate::postgresql::PostgresqlSink;
 use crate::sink::{Sink, SinkError};
+use crate::sparkplug::SparkplugSink;
 use crate::status::{ForwardStatus, SinkStatus};
 
 /// File of the cursors, beside the record.
@@ -83,7 +84,7 @@ async fn serve(
     let names = Names { site: forward.site.clone(), press: forward.press.clone(), crews };
     let sinks = forward.sinks.iter().map(|sink| SinkStatus::new(&sink.name, sink.kind.name())).collect();
     let shared = Arc::new(Shared {
-        cursors: Mutex::new(Cursors::open(&plant.output.history.with_file_name(CURSORS))?),
+        cursors: SharedCursors::open(&plant.output.history.with_file_name(CURSORS))?,
         sinks: Mutex::new(sinks),
     });
     let feed = || Feed::new(&plant.output.history, &names);
@@ -129,8 +130,10 @@ fn spawn(
 ) -> Result<(), ForwardError> {
     match sink.kind {
         SinkKind::Postgresql => tasks.spawn_local(pump.run(PostgresqlSink::new(sink, names)?, stop)),
-        SinkKind::Mqtt | SinkKind::Sparkplug => {
-            tasks.spawn_local(pump.run(MqttSink::new(sink, names, folder)?, stop))
+        SinkKind::Mqtt => tasks.spawn_local(pump.run(MqttSink::new(sink, names, folder)?, stop)),
+        SinkKind::Sparkplug => {
+            let cursors = pump.shared.cursors.clone();
+            tasks.spawn_local(pump.run(SparkplugSink::new(sink, names, folder, cursors)?, stop))
         }
     };
     Ok(())
@@ -145,9 +148,9 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
         Start::Time(at) => feed.before(at)?,
     };
     for sink in &forward.sinks {
-        let now = shared.cursors().of(&sink.name, &owners)?;
+        let now = shared.cursors.lock().of(&sink.name, &owners)?;
         if let Some(owner) = owners.last() {
-            shared.cursors().set(&sink.name, owner.owner, before.min(now))?;
+            shared.cursors.lock().set(&sink.name, owner.owner, before.min(now))?;
         }
     }
     Ok(())
@@ -156,15 +159,11 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
 /// What the tasks share.
 #[derive(Debug)]
 struct Shared {
-    cursors: Mutex<Cursors>,
+    cursors: SharedCursors,
     sinks: Mutex<Vec<SinkStatus>>,
 }
 
 impl Shared {
-    fn cursors(&self) -> MutexGuard<'_, Cursors> {
-        self.cursors.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn status(&self) -> ForwardStatus {
         let sinks = self.sinks.lock().unwrap_or_else(PoisonError::into_inner).clone();
         ForwardStatus { at: jiff::Timestamp::now(), pid: std::process::id(), sinks }
@@ -272,7 +271,7 @@ impl Pump {
                     self.refused(owner, *n, why)?;
                 }
                 self.deliver(sink, &batch.messages, &owners).await?;
-                self.shared.cursors().set(&self.name, owner, batch.last)?;
+                self.shared.cursors.lock().set(&self.name, owner, batch.last)?;
             }
         };
         match served.await {
@@ -328,7 +327,7 @@ impl Pump {
     /// Returns the cursor and the owner numbers; notes how far the sink is behind.
     fn look(&mut self) -> Result<(u64, Vec<Owner>), Leave> {
         let owners = self.feed.owners()?;
-        let after = self.shared.cursors().of(&self.name, &owners)?;
+        let after = self.shared.cursors.lock().of(&self.name, &owners)?;
         let backlog = self.feed.backlog(after)?;
         self.update(|it| (it.backlog, it.behind_s) = (backlog.changes, backlog.oldest_s));
         Ok((after, owners))
@@ -337,7 +336,7 @@ impl Pump {
     fn refused(&self, owner: u16, n: u64, why: &str) -> Result<(), CursorError> {
         tracing::warn!("{}: change {n} is passed over: {why}", self.name);
         let count = {
-            let cursors = self.shared.cursors();
+            let cursors = self.shared.cursors.lock();
             cursors.refuse(&self.name, owner, n, why)?;
             cursors.refused(&self.name)?
         };

@@ -23,6 +23,7 @@ mod postgresql;
 mod press_state;
 pub mod schema;
 mod sink;
+mod sparkplug;
 mod status;
 mod tls;
 

@@ -10,11 +10,15 @@
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
 //! | `screen` | the browser pages, where the plant file has `[screen]` |
 //! | `advice` | the next stroke, after the result, where the plant file has `[advice]` |
+//! | `alarms` | an alarm to the log, the record, the status and the pages |
+//! | `forward` | the state of `platen forward`, where the plant file has `[forward]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
 //! | `figures` | findings to figures of the press's registers |
 
 mod advice;
+mod alarms;
 mod disk;
+mod forward;
 mod measurement_worker;
 
 mod figures;
@@ -33,18 +37,20 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_history::{Error as HistoryError, History};
-use platen_model::{Language, StrokeKey};
+use platen_model::StrokeKey;
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
 use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
+pub use forward::ForwardRecord;
 pub use measurement_worker::StrokeReport;
 pub use plugin_status::PluginStatus;
 pub use screen::{Pages, ScreenError};
 pub use status::{LinkRecord, StatusRecord, reset_request};
 
 use advice::AdviceDesk;
+use alarms::Alarms;
 use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, Quarantine};
@@ -119,6 +125,12 @@ pub async fn run(
     let worker = std::thread::Builder::new().name("measure".into()).spawn(move || worker.serve(&inbox));
     let worker = worker.map_err(HostError::Thread)?;
 
+    let alarms =
+        Alarms { history: Arc::clone(&history), newest: beside.alarm.clone(), screen: teller.clone() };
+    let forward = plant.forward.as_ref().map(|_| {
+        let state = Arc::clone(&beside.forward);
+        tokio::spawn(forward::watch(plant.output.folder.clone(), state, alarms.clone()))
+    });
     let link = PressLink::new(&press);
     let status = tokio::spawn(status::keep(
         plant.output.folder.clone(),
@@ -153,7 +165,7 @@ pub async fn run(
                 if matches!(order, Order::Command(Command::Scan { .. } | Command::PartEnd)) {
                     desk.cancel();
                 }
-                dispatch(order, &commands, &mut scanning, &history, &beside.alarm, &teller);
+                dispatch(order, &commands, &mut scanning, &alarms);
             }
         }
     };
@@ -163,6 +175,9 @@ pub async fn run(
         token.cancel();
     }
     status.abort();
+    if let Some(forward) = forward {
+        forward.abort();
+    }
     if let Some(screen) = screen {
         screen.abort();
     }
@@ -184,9 +199,7 @@ fn dispatch(
     order: Order,
     commands: &std::sync::mpsc::Sender<(Command, CancelToken)>,
     scanning: &mut Option<(StrokeKey, CancelToken)>,
-    history: &Arc<Mutex<History>>,
-    newest: &status::NewestAlarm,
-    screen: &Teller,
+    alarms: &Alarms,
 ) {
     match order {
         Order::Command(Command::Cancel(key)) => {
@@ -195,8 +208,9 @@ fn dispatch(
             }
         }
         Order::Command(Command::PartEnd) => {
-            screen.tell(screen::Event::PartEnded);
-            let ended = history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
+            alarms.screen.tell(screen::Event::PartEnded);
+            let ended =
+                alarms.history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
             if let Err(error) = ended {
                 tracing::error!("end of part: {error}");
             }
@@ -204,23 +218,17 @@ fn dispatch(
         Order::Command(command) => {
             let token = CancelToken::default();
             if let Command::Scan { key, run_id, data } = &command {
-                screen.tell(screen::Event::Accepted { key: *key, run_id: *run_id, data: data.clone() });
+                alarms.screen.tell(screen::Event::Accepted {
+                    key: *key,
+                    run_id: *run_id,
+                    data: data.clone(),
+                });
                 *scanning = Some((*key, token.clone()));
             }
             // The dispatcher notices a worker that has ended.
             let _ = commands.send((command, token));
         }
-        Order::Alarm { code, stroke, detail } => {
-            screen.tell(screen::Event::Alarm(code));
-            let alarm = code.alarm();
-            let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
-            let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
-            let text =
-                format!("{stroke}{}{detail}; {}", alarm.text(Language::En), alarm.remedy(Language::En));
-            tracing::warn!(code = code.number(), "{text}");
-            let newest_now = (Timestamp::now(), format!("{} {text}", code.number()));
-            *newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(newest_now);
-        }
+        Order::Alarm { code, stroke, detail } => alarms.raise(code, stroke, detail.as_deref()),
         Order::Seen(image) => tracing::debug!(?image, "the press says"),
     }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use platen_plant::PlantFile;
 
 use super::{CliError, Common, output};
-use crate::run::StatusRecord;
+use crate::run::{ForwardRecord, StatusRecord};
 
 /// Age of the status beyond which the host is not running, or hangs, seconds.
 const STALE_S: f64 = 5.0;
@@ -72,6 +72,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             free.unwrap_or_default(),
             status.records_lost
         ))?;
+        // Of this moment: the forwarder runs also without the host.
+        let forward = plant.forward.as_ref().map(|_| ForwardRecord::load(folder));
+        for (name, line) in forward.iter().flat_map(ForwardRecord::lines) {
+            output::line(&format!("{name}: {line}"))?;
+        }
         for plugin in &status.plugins {
             output::line(&format!("{} {}: {}", plugin.kind, plugin.plugin, plugin.line()))?;
         }

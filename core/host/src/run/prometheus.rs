@@ -1,5 +1,6 @@
 //! Metrics of a host in the Prometheus text format 0.0.4, for a textfile collector: the host opens no port.
 
+use platen_forward::SinkStatus;
 use platen_press::ROUND_TRIP_LIMITS_MS;
 
 use super::StatusRecord;
@@ -64,6 +65,23 @@ impl StatusRecord {
                         ms / 1000.0
                     );
                 }
+            }
+        }
+        for (name, help, value) in [
+            (
+                "connected",
+                "1 while the sink is connected",
+                (|it| f64::from(u8::from(it.connected))) as fn(&SinkStatus) -> f64,
+            ),
+            ("backlog", "changes of the record that the sink has not got", |it| it.backlog as f64),
+            ("behind_seconds", "age of the oldest of them", |it| it.behind_s.unwrap_or(0.0)),
+            ("conflicts", "changes that differ from what the sink has", |it| it.conflicts as f64),
+            ("refused", "changes that the sink refused", |it| it.refused as f64),
+        ] {
+            let Some(forward) = &self.forward else { continue };
+            text += &format!("# HELP platen_sink_{name} {help}\n# TYPE platen_sink_{name} gauge\n");
+            for sink in &forward.sinks {
+                text += &format!("platen_sink_{name}{{{label},sink=\"{}\"}} {}\n", sink.name, value(sink));
             }
         }
         text += "# TYPE platen_exceptions_total counter\n";

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
 use super::disk;
+use super::forward::{ForwardRecord, ForwardState};
 use super::plugin_status::{PluginStates, PluginStatus};
 
 /// The newest alarm, set by the dispatcher.
@@ -28,6 +29,7 @@ pub(super) struct Beside {
     /// Address of the pages, where they are served.
     pub(super) pages: Option<String>,
     pub(super) plugins: PluginStates,
+    pub(super) forward: ForwardState,
 }
 
 /// Its name in the output folder.
@@ -102,6 +104,9 @@ pub struct StatusRecord {
     /// Its plugins and their processes.
     #[serde(default)]
     pub plugins: Vec<PluginStatus>,
+    /// Forwarding of the record; null where the plant file has none.
+    #[serde(default)]
+    pub forward: Option<ForwardRecord>,
 }
 
 /// Counters of the link since the start.
@@ -177,6 +182,7 @@ impl StatusRecord {
             reset_at,
             pages: beside.pages.clone(),
             plugins: beside.plugins.lock().unwrap_or_else(PoisonError::into_inner).clone(),
+            forward: beside.forward.lock().unwrap_or_else(PoisonError::into_inner).clone(),
         }
     }
 

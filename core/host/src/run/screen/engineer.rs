@@ -148,7 +148,8 @@ fn status(site: &Installation, board: &Board) -> Vec<(String, String)> {
         ("records lost", record.records_lost.to_string()),
         ("clock", jiff::Timestamp::now().strftime("%F %T UTC").to_string()),
     ];
-    rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    let sinks = record.forward.iter().flat_map(|forward| forward.lines());
+    rows.into_iter().map(|(name, value)| (name.to_owned(), value)).chain(sinks).collect()
 }
 
 /// Counts of round trips by their time.

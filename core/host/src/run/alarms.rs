@@ -1,0 +1,38 @@
+//! Where an alarm goes: the log, the record, `platen status`, the pages.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use jiff::Timestamp;
+use platen_history::History;
+use platen_model::{Code, Language, StrokeKey};
+
+use super::screen::{Event, Teller};
+use super::status::NewestAlarm;
+
+/// Passes alarms on. Those of the press side are in its registers already.
+#[derive(Clone)]
+pub(super) struct Alarms {
+    pub(super) history: Arc<Mutex<History>>,
+    pub(super) newest: NewestAlarm,
+    pub(super) screen: Teller,
+}
+
+impl Alarms {
+    /// Raises an alarm, of a stroke or not.
+    pub(super) fn raise(&self, code: Code, stroke: Option<StrokeKey>, detail: Option<&str>) {
+        self.screen.tell(Event::Alarm(code));
+        let alarm = code.alarm();
+        let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
+        let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
+        let text = format!("{stroke}{}{detail}; {}", alarm.text(Language::En), alarm.remedy(Language::En));
+        tracing::warn!(code = code.number(), "{text}");
+        let now = Timestamp::now();
+        let numbered = format!("{} {text}", code.number());
+        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(error) = history.note("alarm", None, &numbered, now) {
+            tracing::warn!("the alarm is not on record: {error}");
+        }
+        drop(history);
+        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = Some((now, numbered));
+    }
+}

@@ -1,0 +1,141 @@
+//! Watches `platen forward`: its sinks in the status, and an alarm when one is far behind or keeps this press's strokes apart.
+//!
+//! The forwarder is a process of its own; it leaves its state in a file of the output folder. One that does not run is behind, too.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use platen_forward::{ForwardStatus, SinkStatus};
+use platen_model::Code;
+use serde::{Deserialize, Serialize};
+
+use super::alarms::Alarms;
+
+/// Time between two looks.
+const PERIOD: Duration = Duration::from_secs(1);
+/// Age of its state from which on the forwarder does not run, seconds.
+const STALE_S: f64 = 10.0;
+/// How far a sink may be behind.
+const BEHIND: Duration = Duration::from_secs(3600);
+
+/// State of the forwarding as the host sees it.
+pub(super) type ForwardState = Arc<Mutex<Option<ForwardRecord>>>;
+
+/// State of the forwarding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ForwardRecord {
+    /// Whether `platen forward` runs.
+    pub running: bool,
+    /// Its sinks, as it last told.
+    pub sinks: Vec<SinkStatus>,
+}
+
+impl ForwardRecord {
+    /// Reads what the forwarder left in an output folder.
+    #[must_use]
+    pub fn load(folder: &Path) -> Self {
+        let found = ForwardStatus::load(folder).ok().flatten();
+        let age =
+            |status: &ForwardStatus| jiff::Timestamp::now().duration_since(status.at).as_secs_f64().abs();
+        let running = found.as_ref().is_some_and(|status| age(status) < STALE_S);
+        Self { running, sinks: found.map(|status| status.sinks).unwrap_or_default() }
+    }
+
+    /// Returns one line for each sink; one in all where the forwarder has never run.
+    #[must_use]
+    pub fn lines(&self) -> Vec<(String, String)> {
+        let not = if self.running { "" } else { "platen forward does not run; as it last told: " };
+        let lines: Vec<_> = self
+            .sinks
+            .iter()
+            .map(|sink| (format!("sink {}", sink.name), format!("{not}{}", sink.line())))
+            .collect();
+        match lines.is_empty() {
+            true => vec![(
+                "sinks".to_owned(),
+                "platen forward has not run; start it with this plant file".to_owned(),
+            )],
+            false => lines,
+        }
+    }
+}
+
+/// Looks at the forwarder's state each second, for ever.
+pub(super) async fn watch(folder: PathBuf, state: ForwardState, alarms: Alarms) {
+    let mut since_alive = Instant::now();
+    let mut raised = Raised::default();
+    loop {
+        let record = ForwardRecord::load(&folder);
+        if record.running {
+            since_alive = Instant::now();
+        }
+        for (code, detail) in raised.next(&record, since_alive.elapsed()) {
+            alarms.raise(code, None, Some(&detail));
+        }
+        *state.lock().unwrap_or_else(PoisonError::into_inner) = Some(record);
+        tokio::time::sleep(PERIOD).await;
+    }
+}
+
+/// Alarms that stand: each is raised once, and again after it has gone.
+#[derive(Debug, Default)]
+struct Raised {
+    behind: bool,
+    apart: bool,
+}
+
+impl Raised {
+    /// Returns the alarms that this state raises anew.
+    fn next(&mut self, record: &ForwardRecord, silent: Duration) -> Vec<(Code, String)> {
+        let late = |sink: &&SinkStatus| sink.behind_s.is_some_and(|s| s > BEHIND.as_secs_f64());
+        let behind = match record.sinks.iter().find(late) {
+            Some(sink) => Some(format!("{}: {}", sink.name, sink.line())),
+            None => (silent > BEHIND).then(|| "platen forward does not run".to_owned()),
+        };
+        let apart =
+            record.sinks.iter().find_map(|sink| Some(format!("{}: {}", sink.name, sink.apart.as_ref()?)));
+        let mut alarms = Vec::new();
+        for (stands, now, code) in
+            [(&mut self.behind, behind, Code::SinkBehind), (&mut self.apart, apart, Code::SinkApart)]
+        {
+            let before = std::mem::replace(stands, now.is_some());
+            alarms.extend(now.filter(|_| !before).map(|detail| (code, detail)));
+        }
+        alarms
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sink(behind_s: Option<f64>, apart: Option<&str>) -> ForwardRecord {
+        let sink = serde_json::json!({
+            "name": "historian", "kind": "postgresql", "connected": true, "error": null, "backlog": 0, "behind_s": behind_s, "sent": 0,
+            "conflicts": 0, "refused": 0, "apart": apart,
+        });
+        ForwardRecord { running: true, sinks: vec![serde_json::from_value(sink).unwrap()] }
+    }
+
+    #[test]
+    fn an_hour_behind_is_an_alarm_once_and_again_after_it_has_gone() {
+        let mut raised = Raised::default();
+        let codes = |raised: &mut Raised, record: &ForwardRecord, silent: u64| {
+            raised
+                .next(record, Duration::from_secs(silent))
+                .into_iter()
+                .map(|(code, _)| code)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(codes(&mut raised, &sink(Some(3599.0), None), 0), []);
+        assert_eq!(codes(&mut raised, &sink(Some(3601.0), None), 0), [Code::SinkBehind]);
+        assert_eq!(codes(&mut raised, &sink(Some(3602.0), None), 0), []);
+        assert_eq!(codes(&mut raised, &sink(None, Some("taken")), 0), [Code::SinkApart]);
+        assert_eq!(
+            codes(&mut raised, &sink(None, Some("taken")), 3601),
+            [Code::SinkBehind],
+            "nobody forwards"
+        );
+    }
+}
