@@ -9,7 +9,7 @@ use crate::{Archive, Error};
 pub struct Change {
     /// Number, rising with the commits; never given twice.
     pub n: u64,
-    /// Owner number of the record when it was made.
+    /// Owner number of the record when it was made; of a stroke, when the stroke was accepted.
     pub owner: u16,
     /// The stroke; none of a plate's end.
     pub run_id: Option<u32>,
@@ -75,7 +75,9 @@ impl Archive {
             return Ok(Vec::new());
         }
         let sql = "SELECT n, run_id, plate, event, kind, at, \
-                   (SELECT owner FROM owner WHERE after_change < c.n ORDER BY owner.n DESC LIMIT 1) \
+                   (SELECT owner FROM owner WHERE after_change < ifnull((SELECT min(n) FROM change a \
+                    WHERE a.run_id = c.run_id AND a.kind = 'accepted' AND c.kind IN ('accepted', 'finished', 'acked')), c.n) \
+                    ORDER BY owner.n DESC LIMIT 1) \
                    FROM change c WHERE n > ?1 ORDER BY n LIMIT ?2";
         self.rows(sql, (signed(after), most), |row| {
             let kind: String = row.get(4)?;

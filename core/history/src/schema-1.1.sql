@@ -8,6 +8,7 @@ CREATE TABLE change (
     kind   TEXT NOT NULL,
     at     TEXT NOT NULL
 ) STRICT;
+CREATE INDEX change_run ON change (run_id, kind, n);
 
 CREATE TRIGGER stroke_accepted AFTER INSERT ON stroke BEGIN
     INSERT INTO change (run_id, plate, kind, at) VALUES (NEW.run_id, NEW.plate, 'accepted', NEW.accepted);
@@ -25,7 +26,8 @@ CREATE TRIGGER event_noted AFTER INSERT ON event BEGIN
     INSERT INTO change (run_id, event, kind, at) VALUES (NEW.run_id, NEW.event, 'event', NEW.at);
 END;
 
--- Owner numbers that the record has had, in their order: a restored record gets another one, and a change keeps the number under which it was made.
+-- Owner numbers that the record has had, in their order: a restored record gets another one, and a change keeps the number under
+-- which it was made, that of a stroke the number under which the stroke was accepted.
 CREATE TABLE owner (
     n            INTEGER PRIMARY KEY AUTOINCREMENT,
     owner        INTEGER NOT NULL,

@@ -580,8 +580,14 @@ fn a_restored_copy_has_the_same_strokes_and_another_owner() {
     drop(restored);
     let mut goes_on = History::open(&copy, PRESS, Timestamp::UNIX_EPOCH).unwrap();
     goes_on.note("alarm", None, "after", Timestamp::UNIX_EPOCH).unwrap();
+    let key = StrokeKey { press: PRESS, session: 1, stroke: 1, attempt: 0 };
+    goes_on.acked(key, "late", Timestamp::UNIX_EPOCH).unwrap();
     let changes = goes_on.archive().changes(0, 10).unwrap();
-    assert_eq!(changes.iter().map(|it| it.owner).collect::<Vec<_>>(), [old, new]);
+    assert_eq!(
+        changes.iter().map(|it| it.owner).collect::<Vec<_>>(),
+        [old, new, old],
+        "a stroke keeps its owner"
+    );
     let owners = goes_on.archive().owners().unwrap();
     assert_eq!(owners.iter().map(|it| (it.owner, it.after_change)).collect::<Vec<_>>(), [(old, 0), (new, 1)]);
 }

@@ -214,10 +214,12 @@ fn explain(error: &ConnectionError) -> String {
         ConnectionError::MqttState(StateError::ServerDisconnect {
             reason_code: DisconnectReasonCode::SessionTakenOver,
             ..
-        }) => "another host sends under this press's name; give each press a name of its own in [forward]"
-            .to_owned(),
-        ConnectionError::MqttState(StateError::ConnectionAborted) => {
-            "the broker closed the connection".to_owned()
+        })
+        | ConnectionError::MqttState(StateError::ConnectionAborted) => {
+            // Not every broker says why: mosquitto 2.0 closes without a word when a client id comes again.
+            "the broker closed the connection; where this comes again and again, another client has this press's name: \
+             give each press a name of its own in [forward]"
+                .to_owned()
         }
         ConnectionError::Timeout(_) => {
             format!("no answer in {} s; look at the broker and the network", ANSWER.as_secs())
