@@ -28,12 +28,15 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         }
         // Pages: no press, no plugin, no database; the host is their source.
         (_, "platen-screen") => &["platen-model", "platen-report"],
+        // Documents and names: no press, no plugin, no geometry.
+        (_, "platen-forward") => &["platen-history", "platen-model", "platen-plant"],
         (_, "platen") => &[
             "platen-abi",
             "platen-advice",
             "platen-conformance",
             "platen-engine",
             "platen-formats",
+            "platen-forward",
             "platen-history",
             "platen-model",
             "platen-plant",

@@ -119,7 +119,8 @@ class Mosquitto:
         pem, key = certificate or authority.sign("mosquitto")
         (folder / "conf").write_text(
             f"user root\nlistener {self.port} 127.0.0.1\ncafile {authority.file}\ncertfile {pem}\nkeyfile {key}\npassword_file {folder / 'passwords'}\n"
-            f"acl_file {folder / 'access'}\nallow_anonymous false\nmax_queued_messages 0\n")
+            f"acl_file {folder / 'access'}\nallow_anonymous false\nmax_queued_messages 0\n"
+            f"persistence true\npersistence_location {folder}/\nautosave_on_changes true\nautosave_interval 1\n")
         self.admit_all([])
 
     def admit_all(self, presses):
@@ -163,6 +164,7 @@ class Plant:
         (folder / "press.toml").write_text(
             f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 1)}\nbaseline = false\n"
             "[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\nhost_ms = 60000\n"
+            f"[plate.plan]\nstrokes_per_pass = {max(strokes, 2)}\npasses = 1\n"
             "[plate]\ntarget = { shape = \"cylinder\", radius_mm = 9018.0, axis_deg = 90.0 }\n"
             "[plate.blank]\nwidth_mm = 3000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n")
         self.plant = folder / "plant.toml"

@@ -216,9 +216,9 @@ fn explain(error: &ConnectionError) -> String {
             ..
         })
         | ConnectionError::MqttState(StateError::ConnectionAborted) => {
-            // Not every broker says why: mosquitto 2.0 closes without a word when a client id comes again.
-            "the broker closed the connection; where this comes again and again, another client has this press's name: \
-             give each press a name of its own in [forward]"
+            // Not every broker says why: mosquitto 2.0.11 closes without a word when a client id comes again, and when its access list is against it.
+            "the broker closed the connection; where this comes again and again, its access list is against this user, or another \
+             client has this press's name"
                 .to_owned()
         }
         ConnectionError::Timeout(_) => {
