@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
-use rusqlite::{Connection, Params, Row, named_params};
+use rusqlite::{Connection, Params, Row, ToSql};
 
 use crate::{Error, PlateRecord, Stroke, StrokeKey, Verdict, schema};
 
@@ -29,6 +29,27 @@ pub struct Filter {
     pub verdict: Option<Verdict>,
     /// Largest number of strokes; the newest are kept.
     pub newest: Option<u32>,
+}
+
+impl Filter {
+    /// Returns the query. It has the given conditions alone: SQLite finds no index for one that may be empty, and would read the whole
+    /// record for the strokes of one plate.
+    fn sql(&self) -> String {
+        let conditions = [
+            (self.plate.is_some(), "s.plate = :plate"),
+            (self.part_id.is_some(), "p.part_id = :part_id"),
+            (self.since.is_some(), "s.accepted >= :since"),
+            (self.until.is_some(), "s.accepted < :until"),
+            (self.verdict.is_some(), "s.verdict = :verdict"),
+        ];
+        let given: Vec<&str> = conditions.into_iter().filter(|it| it.0).map(|it| it.1).collect();
+        let condition = if given.is_empty() { "1".to_owned() } else { given.join(" AND ") };
+        let newest = if self.newest.is_some() { "LIMIT :newest" } else { "" };
+        format!(
+            "SELECT * FROM ({STROKE} JOIN plate p USING (plate) WHERE {condition} ORDER BY s.run_id DESC {newest}) \
+             ORDER BY run_id"
+        )
+    }
 }
 
 /// Columns of a stroke, in the order in which [`stroke`] reads them.
@@ -76,20 +97,20 @@ impl Archive {
     /// # Errors
     /// [`Error::Storage`], [`Error::Damaged`].
     pub fn strokes(&self, filter: &Filter) -> Result<Vec<Stroke>, Error> {
-        let sql = format!(
-            "SELECT * FROM ({STROKE} JOIN plate p USING (plate) WHERE (:plate IS NULL OR s.plate = :plate) \
-             AND (:part_id IS NULL OR p.part_id = :part_id) AND (:since IS NULL OR s.accepted >= :since) \
-             AND (:until IS NULL OR s.accepted < :until) AND (:verdict IS NULL OR s.verdict = :verdict) \
-             ORDER BY s.run_id DESC LIMIT ifnull(:newest, -1)) ORDER BY run_id"
-        );
-        self.query(
-            &sql,
-            named_params! {
-                ":plate": filter.plate, ":part_id": filter.part_id, ":since": filter.since.map(text),
-                ":until": filter.until.map(text), ":verdict": filter.verdict.map(Verdict::as_str),
-                ":newest": filter.newest,
-            },
-        )
+        let sql = filter.sql();
+        let (since, until) = (filter.since.map(text), filter.until.map(text));
+        let verdict = filter.verdict.map(Verdict::as_str);
+        let values: [(&str, Option<&dyn ToSql>); 6] = [
+            (":plate", filter.plate.as_ref().map(|it| it as _)),
+            (":part_id", filter.part_id.as_ref().map(|it| it as _)),
+            (":since", since.as_ref().map(|it| it as _)),
+            (":until", until.as_ref().map(|it| it as _)),
+            (":verdict", verdict.as_ref().map(|it| it as _)),
+            (":newest", filter.newest.as_ref().map(|it| it as _)),
+        ];
+        let given: Vec<(&str, &dyn ToSql)> =
+            values.into_iter().filter_map(|(name, value)| Some((name, value?))).collect();
+        self.query(&sql, &given[..])
     }
 
     /// Returns one stroke.
@@ -256,4 +277,22 @@ fn optional_time(row: &Row<'_>, column: usize) -> rusqlite::Result<Option<Timest
 
 fn wrong(column: usize, why: String) -> rusqlite::Error {
     rusqlite::Error::FromSqlConversionFailure(column, rusqlite::types::Type::Text, why.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The advice asks for the strokes of hundreds of plates after each stroke.
+    #[test]
+    fn strokes_of_a_plate_are_found_by_an_index() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("history.sqlite");
+        drop(crate::History::open(&path, 1, Timestamp::UNIX_EPOCH).unwrap());
+        let archive = Archive::open(&path).unwrap();
+        let filter = Filter { plate: Some(1), ..Filter::default() };
+        let sql = format!("EXPLAIN QUERY PLAN {}", filter.sql());
+        let plan = archive.rows(&sql, &[(":plate", &1)], |row| row.get::<_, String>(3)).unwrap();
+        assert!(plan.iter().any(|step| step.contains("stroke_plate")), "{plan:?}");
+    }
 }
