@@ -55,6 +55,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
             "platen-numerics",
             "platen-plant",
             "platen-press",
+            "platen-report",
             "platen-scan",
             "platen-shape",
             // The hidden steel of the advice's study.

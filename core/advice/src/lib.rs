@@ -8,7 +8,9 @@
 //! | [`press_law`] | angle -> depth | three-point bending with springback in closed form |
 //! | [`learner`] | told depths, measured angles -> offset and slope | Kalman filter |
 //! | `planner`, `nnls` | heights -> fewest bends | non-negative least squares, settled lines |
-//! | `next_bend` | plan, learner -> [`Advice`] | guard against bending too far; intervals |
+//! | `past` | strokes of the history -> bends in the plate, depth law | |
+//! | `next_bend` | plan, depth law -> [`Advice`] | guard against bending too far; intervals |
+//! | `remarks` | what the strokes say of press and plate file -> sentences | |
 //! | [`press_capability`] | scatter of the ram -> gap under a board | first order |
 //! | `place` | double curvature -> place and direction | largest mean missing curvature |
 //!
@@ -19,14 +21,19 @@ pub mod board;
 pub mod learner;
 mod next_bend;
 mod nnls;
+mod past;
 mod place;
 mod planner;
 pub mod press_capability;
 pub mod press_law;
+mod remarks;
+mod settings;
 pub mod situation;
 
-pub use next_bend::{Order, Settings, advise, depth_at, expected_angle};
+pub use next_bend::advise;
+pub use past::{depth_at, expected_angle};
 pub use platen_model::Advice;
+pub use settings::{Order, Settings};
 pub use situation::Situation;
 
 use platen_model::{CannotAdvise, PlateHistory};

@@ -2,11 +2,12 @@
 //!
 //! Bending both ways stretches the plate, so that neither the gap after a bend nor a plan can be told from bends along lines.
 
-use platen_model::{Advice, CannotAdvise, PlateHistory, Step, Verdict};
+use platen_model::{Advice, CannotAdvise, PlateHistory, Sentence, Step};
 use platen_shape::surface::Curvature;
 use platen_shape::{Surface, TargetSurface};
 
-use crate::next_bend::{cannot, of};
+use crate::next_bend::{cannot, done, of, passes};
+use crate::remarks::STRETCHES;
 
 /// Distance of the places that are tried, metres, and half the side of the square over which each is averaged.
 const GRID: f64 = 0.1;
@@ -16,8 +17,8 @@ const LEAST: f64 = 5e-3;
 
 /// Returns the place after the last stroke.
 pub(crate) fn advise(history: &PlateHistory, target: &TargetSurface, now: &Surface) -> Advice {
-    if !history.templates.is_empty() && history.templates.iter().all(|it| it.verdict == Verdict::Pass) {
-        return Advice { strokes_left: Some([0, 0]), ..of(Step::Done) };
+    if passes(history) {
+        return done();
     }
     let count = |length: f64| ((length - 2.0 * HALF) / GRID).floor().max(0.0) as usize;
     let (n_u, n_v) = (count(now.width()), count(now.height()));
@@ -37,8 +38,8 @@ pub(crate) fn advise(history: &PlateHistory, target: &TargetSurface, now: &Surfa
         Some((_, at, missing)) => {
             let [x, y] = missing.strongest_direction();
             let direction = x.atan2(-y).rem_euclid(std::f64::consts::PI);
-            let says = "bending both ways stretches the plate: the place is told, neither angle nor gap";
-            Advice { says: vec![says.into()], ..of(Step::Place { at, direction }) }
+            let says = vec![Sentence::new(STRETCHES, &[])];
+            Advice { says, ..of(Step::Place { at, direction }) }
         }
         None if any_seen => cannot(CannotAdvise::BentTooFar),
         None => cannot(CannotAdvise::Unseen),

@@ -4,6 +4,7 @@
 //! c s / w. A third of the limit is as much as a press may take of it: the rest is for places, plates and the scan.
 
 use platen_model::units::mm;
+use platen_model::{Sentence, texts};
 
 /// Share of the limit that a press may take.
 const SHARE: f64 = 1.0 / 3.0;
@@ -38,16 +39,21 @@ impl PressCapability {
 
     /// Returns it in words.
     #[must_use]
-    pub fn words(&self) -> String {
-        let Self { ram_sigma, gap_sigma, chord, limit } = *self;
-        let word = if self.is_too_coarse() { "too coarse" } else { "fine enough" };
-        format!(
-            "this press is {word} for the limit: its ram repeats to {:.2} mm, that is {:.1} mm under a board of {chord:.1} m, limit {:.1} mm",
-            mm(ram_sigma),
-            mm(gap_sigma),
-            mm(limit)
-        )
+    pub fn sentence(&self) -> Sentence {
+        let texts = if self.is_too_coarse() { TOO_COARSE } else { FINE_ENOUGH };
+        let values = [
+            format!("{:.2}", mm(self.ram_sigma)),
+            format!("{:.1}", mm(self.gap_sigma)),
+            format!("{:.1}", self.chord),
+            format!("{:.1}", mm(self.limit)),
+        ];
+        Sentence::new(texts, &values.each_ref().map(String::as_str))
     }
+}
+
+texts! { ,
+    TOO_COARSE "this press is too coarse for the limit: its ram repeats to {} mm, that is {} mm under a board of {} m, limit {} mm" "このプレスは許容値に対して粗すぎます: ラムの繰返し {} mm はすき間 {} mm に当たります (型板 {} m、許容 {} mm)"
+    FINE_ENOUGH "this press is fine enough for the limit: its ram repeats to {} mm, that is {} mm under a board of {} m, limit {} mm" "このプレスは許容値に対して十分です: ラムの繰返し {} mm はすき間 {} mm に当たります (型板 {} m、許容 {} mm)"
 }
 
 /// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` below [`LEAST_STROKES`].

@@ -5,6 +5,8 @@
 //! gap of the true plate exceeded the limit on a plate more hollow than the template, once on the way. One dimension: the same along a
 //! bend line everywhere, no weight of the plate, no tilt of the ram.
 
+#[cfg(test)]
+mod crews;
 mod hidden_plate;
 mod strategies;
 
@@ -54,6 +56,10 @@ struct Figures {
     not_advised: Option<f64>,
     /// Plates on which the advice said that the press is too coarse.
     said_too_coarse: Option<usize>,
+    /// Plates on which the first stroke came out so far off that the advice asked for a look at plate and die, and share of the third strokes
+    /// inside their interval.
+    said_look: Option<usize>,
+    third_inside: Option<f64>,
     advise_ms: Option<f64>,
 }
 
@@ -82,6 +88,10 @@ pub(super) fn study(arguments: &BenchArguments, json: bool) -> Result<Json, CliE
     for shop in Shop::worse() {
         add(&usual, &shop, Strategy::ByHand, few);
         add(&usual, &shop, advice, few);
+    }
+    for shop in Shop::wrong_files() {
+        add(&usual, &shop, Strategy::ByHand, few);
+        add(&usual, &shop, Strategy::Advice(Advised { like: false, ..Advised::default() }), few);
     }
     let table = DepthTable::new();
     let mut all = Vec::new();
@@ -149,6 +159,8 @@ impl Figures {
             not_advised: advised
                 .then(|| outcomes.iter().map(|it| it.not_advised).sum::<usize>() as f64 / made as f64),
             said_too_coarse: advised.then(|| count(|it| it.said_too_coarse)),
+            said_look: advised.then(|| count(|it| it.said_look)),
+            third_inside: inside(2),
             advise_ms: advised.then(|| advise_ms / made as f64),
         }
     }
@@ -170,6 +182,8 @@ impl Figures {
             share(self.gap_inside),
             share(self.not_advised),
             self.said_too_coarse.map_or_else(String::new, |it| it.to_string()),
+            self.said_look.map_or_else(String::new, |it| it.to_string()),
+            share(self.third_inside),
         ]
     }
 }
@@ -188,6 +202,8 @@ fn print(all: &[Figures]) -> Result<(), CliError> {
         "gap inside",
         "not advised",
         "too coarse",
+        "look at plate",
+        "third inside",
     ];
     let mut from = 0;
     while from < all.len() {

@@ -108,5 +108,6 @@ pub(crate) fn history(strokes: usize) -> PlateHistory {
         strokes: (0..strokes).map(stroke).collect(),
         like: None,
         may_turn_over: true,
+        tells_depth: true,
     }
 }

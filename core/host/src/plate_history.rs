@@ -10,13 +10,18 @@ use platen_model::{
     Bend, Die, LikePlates, NextBend, PlateHistory, PressModel, PressedStroke, Report, Steel, Step,
     StrokeData, StrokeKey, Target, TargetShape, Task, TemplateFinding, Verdict, WantedBend,
 };
+use platen_plant::press::Input;
 use platen_plant::{AdviceUse, PlantFile, PlateFile};
 use platen_report::advice::{ADVICE_SCHEMA, AdviceRecord, PlateClass, Score};
 use platen_report::output_folder;
 use platen_shape::{Surface, TargetSurface};
 
-/// Distance of a bend from the advised line within which it followed the advice, metres, and difference of depth, share.
-const FOLLOWED: (f64, f64) = (0.1, 0.25);
+/// Distance of a bend from the advised line, metres, and difference of depth, share, up to which a stroke tells where the die is and how the ram
+/// scatters: it was meant as advised.
+const MEANT: (f64, f64) = (0.1, 0.25);
+/// Distance of a bend from its place, metres, and difference of depth, standard deviations of the ram and metres at least, up to which the advised
+/// interval of the gap is the stroke's own.
+const FOLLOWED: (f64, f64, f64) = (0.03, 3.0, 0.3e-3);
 /// Plates that are looked through for like ones, the newest.
 const LOOKED_THROUGH: usize = 200;
 /// Depth law of a plate without a steel, as the shipped advisor assumes it, pascals.
@@ -146,6 +151,7 @@ pub(crate) fn gather(
             strokes,
             like,
             may_turn_over: wanted.turn_over,
+            tells_depth: plant.press.as_ref().is_none_or(|press| press.map.input(Input::RamDepth).is_some()),
         },
         advice: None,
         failed: None,
@@ -190,7 +196,8 @@ fn pressed(
             && (stroke.key.session, stroke.key.stroke) != (measured.key.session, measured.key.stroke)
     });
     let bends = measured.bends.clone().filter(|_| earlier.is_some());
-    let told = measured.data.ram_depth.filter(|_| !between);
+    // On other supports the plate's own weight changes the bends.
+    let told = measured.data.ram_depth.filter(|_| !between && !measured.task.supports_changed);
     let stroke = PressedStroke {
         run_id: i64::from(measured.run_id),
         stroke: measured.key.stroke,
@@ -198,10 +205,11 @@ fn pressed(
         depth: told,
         force: measured.data.force,
         not_measured: bends.is_none(),
+        missed_before: between,
         bends: bends.unwrap_or_default(),
     };
     let advised = earlier.filter(|earlier| earlier.show != "shadow" && !between).and_then(next_bend);
-    let wanted = advised.filter(|next| has_followed(next, &measured.task, &stroke));
+    let wanted = advised.filter(|next| is_meant(next, &measured.task, &stroke));
     let wanted = wanted.map(|next| WantedBend { at: middle(next), angle: next.angle, depth: next.depth });
     Ok(PressedStroke { wanted, ..stroke })
 }
@@ -217,15 +225,30 @@ fn middle(next: &NextBend) -> [f64; 2] {
     [0, 1].map(|k| 0.5 * (next.line[0][k] + next.line[1][k]))
 }
 
-fn has_followed(next: &NextBend, task: &Task, stroke: &PressedStroke) -> bool {
+/// Returns whether the operator meant the advised bend.
+fn is_meant(next: &NextBend, task: &Task, stroke: &PressedStroke) -> bool {
     let near = stroke.bends.first().zip(BendLines::of_task(task)).is_some_and(|(bend, lines)| {
-        (lines.coordinate(bend.at) - lines.coordinate(middle(next))).abs() <= FOLLOWED.0
+        (lines.coordinate(bend.at) - lines.coordinate(middle(next))).abs() <= MEANT.0
     });
     let as_deep = match (stroke.depth, next.depth) {
-        (Some(told), Some(advised)) => (told / advised - 1.0).abs() <= FOLLOWED.1,
+        (Some(told), Some(advised)) => (told / advised - 1.0).abs() <= MEANT.1,
         _ => true,
     };
     near && as_deep
+}
+
+/// Returns whether a stroke whose bend lies `off_line` from the advised line was pressed as advised.
+fn has_followed(advice: &AdviceRecord, next: &NextBend, off_line: f64, told: Option<f64>) -> bool {
+    let (off_mark, ram) = advice
+        .advice
+        .as_ref()
+        .and_then(|advice| advice.model)
+        .map_or((0.0, 0.0), |model| (model.off_mark, model.ram_sigma));
+    let (place, sigmas, depth) = FOLLOWED;
+    let as_deep = told
+        .zip(next.depth)
+        .is_none_or(|(told, advised)| (told - advised).abs() <= (sigmas * ram).max(depth));
+    (off_line - off_mark).abs() <= place && as_deep
 }
 
 /// Compares a stroke with the advice before it.
@@ -248,15 +271,16 @@ fn scored(
         expected_angle(&settings, &earlier.history, &situation, x, depth)
     });
     let gap = measured.templates.iter().map(|found| found.max_gap.abs()).reduce(f64::max);
+    let off_line = x - lines.coordinate(middle(next));
     Some(Score {
         made,
-        off_line: x - lines.coordinate(middle(next)),
+        off_line,
         advised_angle: next.angle,
         expected_angle: expected.map(|it| it[0]),
         expected_to: expected.map(|it| it[1].hypot(platen_shape::EXPANDED * made.sigma)),
         foretold_gap: next.gap_after,
         gap,
-        followed: has_followed(next, task, stroke),
+        followed: has_followed(earlier, next, off_line, stroke.depth),
     })
 }
 

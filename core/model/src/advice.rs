@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Texts, texts};
+use crate::{Sentence, Texts, texts};
 
 /// Advice for the next stroke of a plate. It is displayed and recorded; it commands nothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -10,14 +10,14 @@ use crate::{Texts, texts};
 pub struct Advice {
     /// What to do.
     pub step: Step,
-    /// Fewest strokes that the plan still needs, and the number that is seldom exceeded.
+    /// Fewest strokes that the plan still needs, and the number that is seldom exceeded; `None` where nobody can promise one.
     pub strokes_left: Option<[u32; 2]>,
     /// The whole plan, the next bend first.
     pub plan: Vec<PlannedBend>,
     /// Middles of zones that are bent too far (u, v), metres.
     pub too_far: Vec<[f64; 2]>,
     /// Sentences for the operator, most important first.
-    pub says: Vec<String>,
+    pub says: Vec<Sentence>,
     /// What was learned of the press.
     pub model: Option<PressModel>,
 }
@@ -125,6 +125,8 @@ pub enum CannotAdvise {
     PressUnlikeRecord,
     /// The plate is bent too far and may not be turned over.
     BentTooFar,
+    /// The plate lies on other supports than at the scan before, so that its own weight bends it otherwise.
+    SupportsChanged,
 }
 
 texts! { pub(crate),
@@ -136,6 +138,7 @@ texts! { pub(crate),
     EDGE "what is missing lies nearer to an edge than the die reaches: narrower die, pre-bend or trim" "端部の不足分に金型が届きません: 狭い金型、端曲げ、または切断が必要です"
     UNLIKE "the press does not do what the record says: check die, zero and steel" "プレスの動作が記録と一致しません: 金型、原点、鋼種を確認してください"
     TOO_FAR "the plate is bent too far: flatten it; this press may not turn it over" "曲げ過ぎです: 平らに戻してください (裏返し不可)"
+    SUPPORTS "the plate lies on other supports than at the scan before: its weight bends it otherwise; lay it as before, or judge the next stroke yourself" "支持が前回と異なり、自重によるたわみが変わっています: 支持を元に戻すか、次の曲げは作業者が判断してください"
 }
 
 impl CannotAdvise {
@@ -151,6 +154,7 @@ impl CannotAdvise {
             Self::EdgeOutOfReach => 6,
             Self::PressUnlikeRecord => 7,
             Self::BentTooFar => 8,
+            Self::SupportsChanged => 9,
         }
     }
 
@@ -166,6 +170,7 @@ impl CannotAdvise {
             Self::EdgeOutOfReach => EDGE,
             Self::PressUnlikeRecord => UNLIKE,
             Self::BentTooFar => TOO_FAR,
+            Self::SupportsChanged => SUPPORTS,
         }
     }
 }

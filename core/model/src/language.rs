@@ -1,6 +1,6 @@
 //! Texts for people in each language.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Language of texts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,6 +28,34 @@ impl Texts {
         match language {
             Language::En => self.en,
             Language::Ja => self.ja,
+        }
+    }
+}
+
+/// A sentence with its numbers, in each language.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Sentence {
+    /// English.
+    pub en: String,
+    /// Japanese; empty: the English one is shown.
+    #[serde(default)]
+    pub ja: String,
+}
+
+impl Sentence {
+    /// Fills a text, its places in their order.
+    #[must_use]
+    pub fn new(texts: Texts, values: &[&str]) -> Self {
+        Self { en: fill(texts.en, values), ja: fill(texts.ja, values) }
+    }
+
+    /// Returns the sentence in a language.
+    #[must_use]
+    pub fn of(&self, language: Language) -> &str {
+        match language {
+            Language::Ja if !self.ja.is_empty() => &self.ja,
+            _ => &self.en,
         }
     }
 }

@@ -12,7 +12,7 @@
 //! | `verdict`, `figures`, `publication` | [`Verdict`], [`Figures`], [`Publication`]: the result as the press receives it |
 //! | `journal` | [`Record`], [`Recalled`]: the steps of a stroke that survive a power cut |
 //! | `alarm` | [`Code`]: numbers, texts and remedies of the alarms |
-//! | `language` | [`Language`], [`Texts`]: texts for people in each language |
+//! | `language` | [`Language`], [`Texts`], [`Sentence`]: texts for people in each language |
 //!
 //! Lengths in metres, angles in radians, places as (u, v) on the original rectangle. [`units`] converts to the units of
 //! people. Plain data with serde: no I/O, no clock.
@@ -40,7 +40,7 @@ pub use field::{Field, NodeState};
 pub use figures::{Figures, Measure};
 pub use findings::{Contact, Figure, Findings, Report, TemplateFinding};
 pub use journal::{Acknowledgement, Entry, Recalled, Record, Stage};
-pub use language::{Language, Texts, fill};
+pub use language::{Language, Sentence, Texts, fill};
 pub use plate::{Marker, Plate, Quantity, ReferenceLine, Station, Support, TrimLine};
 pub use plate_history::{Bend, Die, LikePlates, PlateHistory, PressedStroke, Steel, WantedBend};
 pub use publication::{Judgement, Measurement, Publication};

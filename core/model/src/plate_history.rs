@@ -22,6 +22,14 @@ pub struct PlateHistory {
     pub like: Option<LikePlates>,
     /// The plate may be turned over on this press.
     pub may_turn_over: bool,
+    /// The press tells the depth of its ram.
+    #[serde(default = "told")]
+    pub tells_depth: bool,
+}
+
+/// Records of before this was asked come from presses that tell it.
+fn told() -> bool {
+    true
 }
 
 /// A die set.
@@ -65,6 +73,8 @@ pub struct PressedStroke {
     pub force: Option<f64>,
     /// Its bends are not known.
     pub not_measured: bool,
+    /// A stroke before it was not measured: the bends are those of both, and the depth belongs to one of them alone.
+    pub missed_before: bool,
     /// Bends that this stroke made, the largest first.
     pub bends: Vec<Bend>,
 }

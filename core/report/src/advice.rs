@@ -89,7 +89,8 @@ pub struct Score {
     pub foretold_gap: [f64; 3],
     /// Largest gap as measured, metres.
     pub gap: Option<f64>,
-    /// The stroke followed the advice: within 100 mm of the line, depth within a quarter.
+    /// The stroke was pressed as advised: within 30 mm of where a bend for that line comes to lie, to a depth within three standard deviations of
+    /// the ram.
     pub followed: bool,
 }
 
@@ -154,7 +155,7 @@ pub fn words(advice: &Advice) -> Vec<String> {
     if let Some([few, many]) = advice.strokes_left.filter(|left| left[1] > 0) {
         words.push(format!("{few} to {many} strokes left"));
     }
-    words.extend(advice.says.iter().cloned());
+    words.extend(advice.says.iter().map(|says| says.en.clone()));
     words.extend(advice.model.as_ref().map(|model| {
         format!(
             "learned from {} like plates and {} strokes of this one: offset {:.2} mm, slope {:.1} mm/rad; the ram repeats to {:.2} mm",

@@ -275,7 +275,7 @@ fn finished(archive: &Archive, plate: u32) -> Result<Finished, HistoryError> {
     let crews: Vec<Option<u16>> = bent.iter().map(|it| it.press_data().crew).collect();
     let one = crews.first().copied().flatten().filter(|crew| crews.iter().all(|other| *other == Some(*crew)));
     let least =
-        first.filter(|first| first.baseline).and_then(|first| first.advice?.strokes_left).map(|left| left[0]);
+        first.filter(|first| first.baseline).and_then(|first| u32::try_from(first.advice?.plan.len()).ok());
     let model = last.as_ref().and_then(|last| last.advice.as_ref()?.model);
     let (Some(crew), Some(least), Some(model), Some(last)) =
         (one, least.filter(|least| *least > 0), model, last)

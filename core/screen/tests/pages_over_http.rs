@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use platen_model::{CannotAdvise, Code, Field, Verdict};
+use platen_model::{CannotAdvise, Code, Field, Sentence, Verdict};
 use platen_report::result::ResultRecord;
 use platen_report::sequence::Sequence;
 use platen_screen::{
@@ -450,7 +450,7 @@ fn bend(line_mm: [[f64; 2]; 2]) -> AdvicePart {
         bend: Some(bend),
         why: None,
         strokes_left: Some([5, 7]),
-        says: vec![EVIL.into()],
+        says: vec![Sentence { en: EVIL.into(), ja: "金型を確認".into() }],
     }
 }
 
@@ -473,7 +473,8 @@ fn advice_is_a_line_a_depth_and_what_comes_of_it() {
     }
     assert!(!page.contains("<script>alert"), "sentences of a plugin are text");
     let (_, _, page) = site.get("/?lang=ja&units=in");
-    for text in ["線に沿って押す", ">65.0 in<", "左から", ">0.19 in<", "残り 5 ~ 7 回"] {
+    for text in ["線に沿って押す", ">65.0 in<", "左から", ">0.19 in<", "残り 5 ~ 7 回", "金型を確認"]
+    {
         assert!(page.contains(text), "{text}");
     }
     // Across, and oblique: from the press, with both ends.

@@ -107,10 +107,11 @@ pub(super) struct Outcome {
     pub(super) finished: bool,
     /// True gap at the end, metres.
     pub(super) gap: f64,
-    /// Advised strokes that came out inside their intervals, of all: angle, gap.
-    pub(super) inside: [(usize, usize); 2],
+    /// Advised strokes that came out inside their intervals, of all: angle, gap, angle of the third stroke.
+    pub(super) inside: [(usize, usize); 3],
     pub(super) not_advised: usize,
     pub(super) said_too_coarse: bool,
+    pub(super) said_look: bool,
     /// What was learned of the press.
     pub(super) model: Option<PressModel>,
     pub(super) advise: Duration,
@@ -155,7 +156,8 @@ pub(super) fn bend(
     like: Option<&LikePlates>,
 ) -> Outcome {
     let plate = HiddenPlate::new(order, shop, seed);
-    let mut job = Job { order, shop, plate, table, outcome: Outcome::default(), correction: 0.0 };
+    let outcome = Outcome::default();
+    let mut job = Job { order, shop, plate, table, outcome, strokes: Vec::new(), correction: 0.0 };
     match strategy {
         Strategy::Advice(advised) => job.by_advice(advised, like),
         _ => job.by_shop(strategy),
@@ -172,6 +174,8 @@ struct Job<'a> {
     plate: HiddenPlate<'a>,
     table: &'a DepthTable,
     outcome: Outcome,
+    /// Strokes as the record has them.
+    strokes: Vec<PressedStroke>,
     /// Depth that the operator adds to his table, metres.
     correction: f64,
 }
@@ -183,6 +187,8 @@ impl Job<'_> {
         self.outcome.turned_over += usize::from(backwards);
         let (gap, board) = worst(&self.plate.boards());
         self.outcome.too_far |= gap.hollow && gap.gap > self.order.task.templates[board].limit;
+        let stroke = self.on_record(&pressed);
+        self.strokes.push(stroke);
         pressed
     }
 
@@ -201,7 +207,16 @@ impl Job<'_> {
         }
     }
 
+    /// Bends the plate by a shop's strategy; what its strokes teach is learned in shadow, from a flat blank.
     fn by_shop(&mut self, strategy: Strategy) {
+        self.by_habit(strategy);
+        let scan = self.plate.scan();
+        let situation = situation(self.order, &scan, Vec::new());
+        let history = self.history(&situation.boards, true);
+        self.outcome.model = advise(&settings(self.order, &Advised::default()), &history, &situation).model;
+    }
+
+    fn by_habit(&mut self, strategy: Strategy) {
         let passes: &[f64] = match strategy {
             Strategy::TwoPassesGap | Strategy::TwoPassesMap => &[0.6, 0.85],
             _ => &[1.0],
@@ -256,33 +271,19 @@ impl Job<'_> {
     }
 
     fn by_advice(&mut self, advised: Advised, like: Option<&LikePlates>) {
-        let steel = Steel { grade: None, yield_strength: YIELD, heat: None };
-        let mut record = PlateHistory {
-            task: self.order.task.clone(),
-            templates: Vec::new(),
-            die: Some(die()),
-            steel: Some(steel),
-            strokes: Vec::new(),
-            like: like.copied().filter(|_| advised.like),
-            may_turn_over: true,
-        };
-        let settings = Settings {
-            largest: (self.order.curvature() * advised.feed).min(3.0_f64.to_radians()),
-            order: Onward::Onward,
-            guard: advised.guard,
-            learns: advised.learns,
-        };
+        let settings = settings(self.order, &advised);
         let blank = blank_curvature(&self.plate.scan(), self.order);
         let mut kept: Option<Vec<(f64, f64)>> = None;
         while self.outcome.strokes < GIVEN_UP {
             let scan = self.plate.scan();
-            let boards = self.order.boards(&|x| scan.curvature(x));
-            record.templates = boards.iter().map(finding).collect();
-            let situation = Situation { lines: self.order.lines, boards, side: 1.0, blank: blank.clone() };
+            let situation = situation(self.order, &scan, blank.clone());
+            let like = like.copied().filter(|_| advised.like);
+            let history = PlateHistory { like, ..self.history(&situation.boards, advised.depth) };
             let start = Instant::now();
-            let advice = advise(&settings, &record, &situation);
+            let advice = advise(&settings, &history, &situation);
             self.outcome.advise += start.elapsed();
-            self.outcome.said_too_coarse |= advice.says.iter().any(|says| says.contains("too coarse"));
+            self.outcome.said_too_coarse |= advice.says.iter().any(|says| says.en.contains("too coarse"));
+            self.outcome.said_look |= advice.says.iter().any(|says| says.en.contains("check its thickness"));
             self.outcome.model = advice.model.or(self.outcome.model);
             let (next, backwards) = match advice.step {
                 Step::Done => {
@@ -298,8 +299,7 @@ impl Job<'_> {
                     let gap = worst(&situation.boards).0;
                     let angle = (0.35 * 4.0 * gap.gap / 2.0).clamp(6e-3, 0.03);
                     let depth = self.table.depth(angle) + self.plate.sag(x);
-                    let pressed = self.stroke(x, depth, false);
-                    record.strokes.push(self.pressed(&pressed, None, advised));
+                    self.stroke(x, depth, false);
                     continue;
                 }
             };
@@ -315,7 +315,7 @@ impl Job<'_> {
                 });
                 if let Some(planned) = plan.pop() {
                     (x, angle) = planned;
-                    depth = platen_advice::depth_at(&settings, &record, &situation, x, angle);
+                    depth = platen_advice::depth_at(&settings, &history, &situation, x, angle);
                 }
             }
             let depth_wanted = depth.filter(|_| advised.depth).unwrap_or_else(|| {
@@ -330,20 +330,43 @@ impl Job<'_> {
             // A stroke that stopped short says nothing of an interval given the wanted depth.
             let short = pressed.told < depth_wanted - 0.5e-3;
             if !backwards && !short && advised.replans {
-                let [angles, gaps] = &mut self.outcome.inside;
-                angles.1 += 1;
-                angles.0 += usize::from((next.angle_95[0]..=next.angle_95[1]).contains(&pressed.angle));
+                let [angles, gaps, third] = &mut self.outcome.inside;
+                let inside = usize::from((next.angle_95[0]..=next.angle_95[1]).contains(&pressed.angle));
+                *angles = (angles.0 + inside, angles.1 + 1);
+                if self.outcome.strokes == 3 {
+                    *third = (inside, 1);
+                }
                 let gap = worst(&self.plate.boards()).0.gap;
                 gaps.1 += 1;
                 gaps.0 += usize::from((next.gap_after[0]..=next.gap_after[2]).contains(&gap));
             }
-            let pressed = self.pressed(&pressed, Some(wanted), advised);
-            record.strokes.push(pressed);
+            if let Some(stroke) = self.strokes.last_mut() {
+                stroke.wanted = Some(wanted);
+            }
         }
     }
 
-    /// Returns a stroke as the record has it.
-    fn pressed(&self, pressed: &Pressed, wanted: Option<WantedBend>, advised: Advised) -> PressedStroke {
+    /// Returns the history of the plate so far, with its boards as they are now, on a press that tells its depth or does not.
+    fn history(&self, boards: &[Board], tells_depth: bool) -> PlateHistory {
+        let depth = |stroke: &PressedStroke| stroke.depth.filter(|_| tells_depth);
+        PlateHistory {
+            task: self.order.task.clone(),
+            templates: boards.iter().map(finding).collect(),
+            die: Some(die()),
+            steel: Some(Steel { grade: None, yield_strength: YIELD, heat: None }),
+            strokes: self
+                .strokes
+                .iter()
+                .map(|stroke| PressedStroke { depth: depth(stroke), ..stroke.clone() })
+                .collect(),
+            like: None,
+            may_turn_over: true,
+            tells_depth,
+        }
+    }
+
+    /// Returns a stroke as the record has it, pressed without advice.
+    fn on_record(&self, pressed: &Pressed) -> PressedStroke {
         let bend = |[x, angle]: [f64; 2]| {
             let x = x.clamp(0.0, self.order.lines.length());
             let ends = self.order.lines.ends(x).unwrap_or([[x, 0.0]; 2]);
@@ -356,12 +379,26 @@ impl Job<'_> {
             }
         };
         PressedStroke {
-            wanted,
-            depth: advised.depth.then_some(pressed.told),
+            depth: Some(pressed.told),
             bends: pressed.seen.map(bend).into_iter().collect(),
             ..PressedStroke::default()
         }
     }
+}
+
+/// Returns the choices of a shop that bends by this advice.
+pub(super) fn settings(order: &Order, advised: &Advised) -> Settings {
+    Settings {
+        largest: (order.curvature() * advised.feed).min(3.0_f64.to_radians()),
+        order: Onward::Onward,
+        guard: advised.guard,
+        learns: advised.learns,
+    }
+}
+
+/// Returns the plate as a scan shows it.
+fn situation(order: &Order, scan: &Scan, blank: Vec<f64>) -> Situation {
+    Situation { lines: order.lines, boards: order.boards(&|x| scan.curvature(x)), side: 1.0, blank }
 }
 
 /// Returns the largest gap and its board.

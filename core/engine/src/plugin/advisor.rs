@@ -105,7 +105,7 @@ fn checked(mut advice: Advice, size: [f64; 2]) -> Result<Advice, String> {
         return Err(format!("{few} to {many} strokes left"));
     }
     advice.says.truncate(SENTENCES);
-    for text in &mut advice.says {
+    for text in advice.says.iter_mut().flat_map(|says| [&mut says.en, &mut says.ja]) {
         *text = printable(text).chars().take(SENTENCE).collect();
     }
     Ok(advice)

@@ -1,7 +1,7 @@
 //! Advice for the next stroke, as the pages show it: millimetres and sentences of what an advisor said.
 
 use platen_model::units::mm;
-use platen_model::{Advice, NextBend, Step, Texts};
+use platen_model::{Advice, NextBend, Sentence, Step, Texts};
 use serde::Serialize;
 
 /// Advice for the next stroke.
@@ -16,7 +16,7 @@ pub struct AdvicePart {
     /// Fewest strokes that are left, and a number that is seldom exceeded.
     pub strokes_left: Option<[u32; 2]>,
     /// Sentences of the advisor, most important first.
-    pub says: Vec<String>,
+    pub says: Vec<Sentence>,
 }
 
 /// What to do with the plate.

@@ -55,7 +55,7 @@ pub(super) fn plant_file(
         .replace("folder = \"../platen-results\"", "folder = \"results\"");
     if let Some(operator) = advice {
         let show = if operator == Operator::Follow { "screen" } else { "shadow" };
-        text.push_str(&format!("\n[advice]\nplugin = \"line-bends\"\nshow = \"{show}\"\n{DIE}"));
+        text.push_str(&format!("\n[advice]\nplugin = \"line-bends\"\nshow = \"{show}\"\ndeadline_ms = 30000    # a busy computer may take its time; 2000 by default\n{DIE}"));
     }
     std::fs::write(&path, text)?;
     Ok(path)

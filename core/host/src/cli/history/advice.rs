@@ -112,7 +112,7 @@ impl Ram {
             Some(([low, _, high], press)) => {
                 format!(
                     "die {die}: {} ({:.2} to {:.2} mm from {n} strokes)",
-                    press.words(),
+                    press.sentence().en,
                     mm(low),
                     mm(high)
                 )

@@ -62,7 +62,7 @@ fn sentence(advice: &AdvicePart, view: View) -> String {
         .filter(|left| left[1] > 0)
         .map(|[few, many]| fill(text(words::STROKES_LEFT), &[&few.to_string(), &many.to_string()]));
     let why = advice.why.map(|why| fill(text(words::NO_ADVICE), &[text(why)]));
-    let says = advice.says.first().map(|says| clean(says));
+    let says = advice.says.first().map(|says| clean(says.of(view.language)));
     let parts: Vec<String> = [why, most, then, left, says].into_iter().flatten().collect();
     parts.join("; ")
 }

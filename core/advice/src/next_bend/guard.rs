@@ -1,0 +1,81 @@
+//! Guard against bending too far: a bend backwards costs turning the plate over, so that a bend is made smaller while it could end there.
+
+use super::{Adviser, LEAST_BEND};
+use crate::learner::LEAST_ANGLE;
+
+/// Standard deviations up to which a bend may come out larger than intended, 99.5 % of them.
+const GUARD: f64 = 2.6;
+/// Share of the angle at which the first stroke aims when neither like plates nor a stroke taught anything.
+const CAUTIOUS: f64 = 0.6;
+/// Share by which a bend is made smaller in each step.
+const SMALLER: f64 = 0.85;
+
+impl Adviser<'_> {
+    /// Returns a planned bend, smaller while the plate could not be finished if it came out larger than intended. Where even a small one is
+    /// too much there, as near the end of a plate, it is the small bend anywhere that helps with the least hazard.
+    pub(super) fn safe(&self, (line, planned): (usize, f64)) -> (usize, f64) {
+        let mut angle = planned.min(self.settings.largest * 1.03);
+        let nothing_known = self.history.like.is_none() && self.history.strokes.is_empty();
+        if nothing_known {
+            angle *= CAUTIOUS;
+        }
+        if !self.settings.guard {
+            return (line, angle.max(LEAST_BEND));
+        }
+        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(angle));
+        while angle > LEAST_BEND {
+            if finishes(angle) {
+                return (line, angle);
+            }
+            angle *= SMALLER;
+        }
+        match finishes(LEAST_BEND) {
+            true => (line, LEAST_BEND),
+            false => self.least_hazard().unwrap_or((line, LEAST_BEND)),
+        }
+    }
+
+    /// Returns the smallest bend that lowers the largest gap and, if it came out larger than intended, bends the plate too far by the least;
+    /// `None` where no such bend helps.
+    fn least_hazard(&self) -> Option<(usize, f64)> {
+        let now = self.planner.worst(&self.heights)?.excess;
+        // Deeper after each stroke in a row that left no bend.
+        let idle = self.history.strokes.iter().rev().take_while(|stroke| stroke.bends.is_empty()).count();
+        let small = LEAST_ANGLE * (1.0 + 0.4 * idle as f64);
+        let large = small + GUARD * self.sigma(small);
+        let excess =
+            |line: usize, angle: f64| self.planner.worst(&self.planner.bent(&self.heights, line, angle));
+        let hazard = |line: usize| {
+            let expected = excess(line, small)?.excess;
+            let large = excess(line, large)?;
+            let far = if self.is_too_far(&large.gap) { large.excess.max(0.0) } else { 0.0 };
+            (expected < now).then_some(expected + far)
+        };
+        let least = |anywhere: bool| {
+            let lines = (0..self.planner.grid.len()).filter(|line| anywhere || !self.is_old(*line));
+            lines.filter_map(|line| Some((line, hazard(line)?))).min_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        least(false).or_else(|| least(true)).map(|(line, _)| (line, small))
+    }
+
+    /// Returns whether the plate can still be finished by bends of one side after this one.
+    fn finishes(&self, line: usize, angle: f64) -> bool {
+        let before = self.planner.least_excess(&self.heights).max(0.0);
+        let after = self.planner.bent(&self.heights, line, angle);
+        self.planner.least_excess(&after) <= before
+    }
+
+    /// Returns the largest angle to intend whose 99 % value still lets the plate be finished.
+    pub(super) fn deepest(&self, line: usize, angle: f64) -> f64 {
+        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(angle));
+        let (mut low, mut high) = (angle, 2.0 * angle + 0.02);
+        if finishes(high) {
+            return high;
+        }
+        for _ in 0..8 {
+            let middle = 0.5 * (low + high);
+            if finishes(middle) { low = middle } else { high = middle }
+        }
+        low
+    }
+}
