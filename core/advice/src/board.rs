@@ -119,10 +119,21 @@ impl Board {
     /// Returns the largest gap for these heights of the plate over the target.
     #[must_use]
     pub fn worst(&self, height: &[f64]) -> Gap {
+        let worst = self.gaps(height).reduce(|a, b| if b.gap > a.gap { b } else { a });
+        worst.unwrap_or(Gap { gap: 0.0, hollow: false, place: 0 })
+    }
+
+    /// Returns the largest gap at each place of the template along its line.
+    pub(crate) fn gaps<'a>(&'a self, height: &'a [f64]) -> impl Iterator<Item = Gap> + 'a {
         let last = self.along.len() - 1;
         let step = self.along[last] / last as f64;
         let half = ((0.5 * self.chord / step).round() as usize).min(last / 2);
-        let gap_at = |middle: usize| {
+        let most = (last - half).max(half);
+        let middles: Vec<usize> = match self.centre {
+            Centre::At(centre) => vec![((centre / step).round() as usize).clamp(half, most)],
+            Centre::Worst => (half..=most).step_by(SLIDE).chain([most]).collect(),
+        };
+        middles.into_iter().map(move |middle| {
             let (from, to) = (middle - half, (middle + half).min(last));
             let x = self.along[from..=to].iter().map(|s| s - self.along[middle]).collect();
             let profile = Profile { x, d: height[from..=to].to_vec() };
@@ -133,17 +144,6 @@ impl Board {
             let contacts = profile.contacts(&seating);
             let between = contacts.first() < Some(&largest) && Some(&largest) < contacts.last();
             Gap { gap: gaps[largest].abs(), hollow: between && gaps[largest] > 0.0, place: from + largest }
-        };
-        match self.centre {
-            Centre::At(centre) => {
-                gap_at(((centre / step).round() as usize).clamp(half, (last - half).max(half)))
-            }
-            Centre::Worst => {
-                let mut middles: Vec<usize> = (half..=(last - half).max(half)).step_by(SLIDE).collect();
-                middles.push((last - half).max(half));
-                let worst = middles.into_iter().map(gap_at).reduce(|a, b| if b.gap > a.gap { b } else { a });
-                worst.unwrap_or(Gap { gap: 0.0, hollow: false, place: 0 })
-            }
-        }
+        })
     }
 }

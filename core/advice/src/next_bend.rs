@@ -138,12 +138,16 @@ impl<'a> Adviser<'a> {
         let planned = |&(line, angle): &(usize, f64)| self.ends(line).map(|line| PlannedBend { line, angle });
         let coarse = self.past.press(self.history).is_some_and(|press| press.is_too_coarse());
         let re_hit = self.is_old(line).then(|| Sentence::new(remarks::RE_HIT, &[]));
+        let flatten = too_far.first().map(|at| {
+            let [u, v] = at.map(|it| format!("{:.0}", mm(it)));
+            Sentence::new(remarks::FLATTEN_LAST, &[&u, &v])
+        });
         Advice {
             // What such a press makes of the next strokes, nobody knows.
             strokes_left: (!coarse).then_some([n, n + 2]),
             plan: in_order.filter_map(planned).collect(),
             too_far,
-            says: re_hit.into_iter().collect(),
+            says: flatten.into_iter().chain(re_hit).collect(),
             model: self.past.learner.as_ref().map(|it| it.model(angle)),
             ..of(Step::Bend(bend))
         }
@@ -154,11 +158,11 @@ impl<'a> Adviser<'a> {
         gap.hollow == (self.situation.side > 0.0)
     }
 
-    /// Returns the places of the boards that are bent too far.
+    /// Returns the worst place under each board that is bent too far, also where the plate is flatter elsewhere under the same board.
     fn too_far(&self) -> Vec<[f64; 2]> {
         let far = self.situation.boards.iter().filter_map(|board| {
-            let gap = board.worst(&board.height);
-            (self.is_too_far(&gap) && gap.gap > board.limit).then(|| board.place(gap.place))
+            let far = board.gaps(&board.height).filter(|gap| self.is_too_far(gap) && gap.gap > board.limit);
+            far.reduce(|a, b| if b.gap > a.gap { b } else { a }).map(|gap| board.place(gap.place))
         });
         far.collect()
     }

@@ -9,6 +9,8 @@ use crate::past::{Past, YIELD};
 const P95: f64 = 1.96;
 /// Strokes and distance, metres, from which an offset of the die is told.
 const OFF_MARK: (usize, f64) = (3, 0.012);
+/// Like plates, and strokes of this one, below which the advice says how little it has learned.
+const FEW: u32 = 3;
 /// Distance from which a short stop is told, metres.
 const SHORT: f64 = 0.3e-3;
 
@@ -27,6 +29,8 @@ texts! { pub(crate),
     RE_HIT "the line lies on an earlier bend: no other one reaches the limit" "線は以前の曲げの上です: 他の線では許容値に届きません"
     MORE_BENT "under {} the plate is more bent than under the other templates, by up to {} mm of gap: no whole line mends it; shim the bed or tilt the ram" "{} の下は他の型板より曲がっています (すき間 {} mm まで): 全長の曲げでは直せません。敷板またはラムの傾きを調整してください"
     FLATTER "under {} the plate is flatter than under the other templates, by up to {} mm of gap: no whole line mends it; shim the bed or tilt the ram" "{} の下は他の型板より平らです (すき間 {} mm まで): 全長の曲げでは直せません。敷板またはラムの傾きを調整してください"
+    FLATTEN_LAST "bent too far around {} mm along u, {} mm along v: flatten there last" "u {} mm、v {} mm 付近は曲げ過ぎです: そこは最後に平らに戻してください"
+    LEARNED "learned from {} like plates and {} strokes: the intervals are still wide" "学習: 同種の板 {} 枚、ストローク {} 回 (区間はまだ広い)"
     STRETCHES "bending both ways stretches the plate: the place is told, neither angle nor gap" "二方向の曲げは板を伸ばします: 位置だけを示し、角度とすき間は示しません"
 }
 
@@ -67,6 +71,11 @@ pub(crate) fn of_strokes(past: &Past, history: &PlateHistory) -> Vec<Sentence> {
     if past.marks >= OFF_MARK.0 && off.abs() > OFF_MARK.1 {
         let texts = if off > 0.0 { OFF_ONWARD } else { OFF_BACK };
         says.push(Sentence::new(texts, &[&format!("{:.0}", mm(off.abs()))]));
+    }
+    let strokes = learner.model(0.0).strokes_learned;
+    if strokes < FEW && history.like.is_none_or(|like| like.plates < FEW) {
+        let plates = history.like.map_or(0, |like| like.plates).to_string();
+        says.push(Sentence::new(LEARNED, &[&plates, &strokes.to_string()]));
     }
     if history.steel.is_none() {
         says.push(Sentence::new(STEEL_ASSUMED, &[&format!("{:.0}", YIELD * 1e-6)]));

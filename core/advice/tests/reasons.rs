@@ -85,6 +85,20 @@ fn a_plate_bent_too_far_is_turned_over_only_where_that_is_allowed() {
     assert!(matches!(&advice.step, Step::TurnOver(bend) if bend.angle < 0.0), "{:?}", advice.step);
 }
 
+/// Two thirds of the plate are bent too far, the last one is flat: bending goes on there, and the zone is told.
+#[test]
+fn a_zone_that_is_bent_too_far_is_flattened_last() {
+    let advice = Case::default().advice(|u, _| if u < 2.0 { 1.3 / 9.0 } else { 0.0 });
+    assert!(bend(&advice).line[0][0] > 1.9, "{:?}", advice.step);
+    assert!(!advice.too_far.is_empty());
+    says(&advice, "flatten there last");
+}
+
+#[test]
+fn what_is_learned_from_few_plates_and_strokes_is_said() {
+    says(&Case::default().advice(|_, _| 0.0), "learned from 0 like plates and 0 strokes");
+}
+
 /// The last 600 mm are flat, and the die reaches to 700 mm from the end: bends beside it help, until no other does.
 #[test]
 fn what_lies_beyond_the_reach_of_the_die_is_said() {

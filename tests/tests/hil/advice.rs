@@ -47,6 +47,21 @@ fn a_plate_is_bent_as_advised_until_it_passes() {
     assert_eq!(scores["followed"], 1.0);
     assert!(scores["angle_inside"].as_f64().unwrap() > 0.8 && scores["gap_inside"].as_f64().unwrap() > 0.7);
 
+    // The coverage can be counted from the exported table.
+    let table = String::from_utf8(said(&["history", "export", path])).unwrap();
+    let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    let column =
+        |name: &str| head.iter().position(|it| *it == name).unwrap_or_else(|| panic!("no {name}: {head:?}"));
+    let [made, expected, to] =
+        ["made_angle", "expected_angle", "expected_to"].map(|name| column(&format!("advice.{name}")));
+    let rows = table.lines().skip(1).map(|row| row.split(',').collect::<Vec<_>>());
+    let angles: Vec<[f64; 3]> = rows
+        .filter(|row| !row[expected].is_empty())
+        .map(|row| [made, expected, to].map(|k| row[k].parse().unwrap()))
+        .collect();
+    let inside = angles.iter().filter(|[made, expected, to]| (made.abs() - expected).abs() <= *to).count();
+    assert_eq!(inside as f64 / angles.len() as f64, scores["angle_inside"].as_f64().unwrap());
+
     // Asked again, every stroke's advice is the same to the last byte, and the one on record.
     for (k, stroke) in strokes.iter().enumerate() {
         let run = k as u64 + 1;

@@ -18,7 +18,7 @@ struct Preset {
     chord_mm: f64,
     /// Largest gap, millimetres.
     limit_mm: f64,
-    /// Origin of the rule, its reliability and its use.
+    /// Origin of the rule: clause, edition, who typed it in, its reliability and its use.
     source: &'static str,
 }
 
@@ -28,21 +28,22 @@ const PRESETS: &[Preset] = &[
         name: "spherical-petal",
         chord_mm: 2000.0,
         limit_mm: 3.0,
-        source: "spherical tank petals, 2 m board, gap up to 3 mm (trade practice, one secondary source)",
+        source: "spherical tank petals, 2 m board, gap up to 3 mm (trade practice, one secondary source; edition not known; \
+                 typed in by the project)",
     },
     Preset {
         name: "api-650-peaking",
         chord_mm: 900.0,
         limit_mm: 13.0,
         source: "API 650, 7.5.4, peaking: 900 mm board at nominal radius across a vertical weld, up to 13 mm \
-                 (weld seams only: even a flat plate passes it from 7.8 m radius on)",
+                 (weld seams only: even a flat plate passes it from 7.8 m radius on; edition not known; typed in by the project)",
     },
     Preset {
         name: "api-650-banding",
         chord_mm: 900.0,
         limit_mm: 13.0,
         source: "API 650, 7.5.4, banding: 900 mm straight board across a horizontal weld, up to 13 mm \
-                 (weld seams only; lay it along the straight lines of the target)",
+                 (weld seams only; lay it along the straight lines of the target; edition not known; typed in by the project)",
     },
 ];
 
