@@ -1,4 +1,4 @@
-//! What cannot be advised, and sentences about press and plate: each in both languages, and never a number that is not known.
+//! Reasons for no advice, and sentences about press and plate: each in both languages, and never a number that is not known.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod cases;
