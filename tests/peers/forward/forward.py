@@ -193,7 +193,7 @@ def check_the_press_side_is_not_moved(site):
             for pid in pids:
                 os.kill(pid, signal.SIGCONT)
             assert "no answer in 5 s" in line, line
-            said(next(it for it in line.splitlines() if it.startswith("sink postgresql")))
+            said(next(it for it in line.splitlines() if it.startswith("sink mqtt")))
         plant.end_all()
     said("trigger to busy, median and 99 %: " + "; ".join(f"{what} {a:.0f}, {b:.0f} ms" for what, (a, b) in times.items()))
 

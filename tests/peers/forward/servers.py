@@ -162,9 +162,9 @@ class Plant:
         self.user = f"{site}/{name}"
         (folder / "password").write_text("secret\n")
         (folder / "press.toml").write_text(
-            f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 1)}\nbaseline = false\n"
+            f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 14)}\nbaseline = false\n"
             "[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\nhost_ms = 60000\n"
-            f"[plate.plan]\nstrokes_per_pass = {max(strokes, 2)}\npasses = 1\n"
+            f"[plate.plan]\nstrokes_per_pass = {max(strokes, 14)}\npasses = 1\n"
             "[plate]\ntarget = { shape = \"cylinder\", radius_mm = 9018.0, axis_deg = 90.0 }\n"
             "[plate.blank]\nwidth_mm = 3000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n")
         self.plant = folder / "plant.toml"
