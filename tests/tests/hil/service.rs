@@ -66,6 +66,66 @@ fn systemd_hears_ready_then_the_cycle_then_stopping() {
     assert!(last.contains("STOPPING=1"), "{last}");
 }
 
+/// A forwarder of a plant, ended with the test.
+struct Forwarder(std::process::Child);
+
+impl Drop for Forwarder {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Nobody listens: the host says so, nothing is lost, one forwarder has the cursors, and an alarm is an event of the record.
+#[test]
+fn a_sink_that_is_away_is_told_by_the_host_and_forgotten_by_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false\nbaseline = false");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    // A port that was free a moment ago, and that nobody takes while it is held without listening.
+    let held = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = held.local_addr().unwrap().port();
+    drop(held);
+    let mut text = std::fs::read_to_string(&plant).unwrap();
+    text += &format!(
+        "[forward]\nsite = \"kure\"\npress = \"press-3\"\n[[forward.sink]]\ntype = \"postgresql\"\nhost = \"127.0.0.1\"\nport = {port}\ntls = false\n\
+         [[forward.sink]]\ntype = \"mqtt\"\nhost = \"127.0.0.1\"\nport = {port}\ntls = false\n"
+    );
+    std::fs::write(&plant, text).unwrap();
+    let mut host = Host::start(&plant);
+    stroke(&mut press, 1);
+    let sinks =
+        |host: &Host| host.status().and_then(|status| status["status"]["forward"].as_object().cloned());
+    let before = until("the host's word", || sinks(&host));
+    assert_eq!((&before["running"], before["sinks"].as_array().map(Vec::len)), (&Json::from(false), Some(0)));
+    let start =
+        || program("platen").arg("forward").arg(&plant).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut forwarder = Forwarder(start());
+    let told = until("both sinks away, with what is to be sent", || {
+        let told = sinks(&host)?;
+        let all = told["sinks"].as_array()?.iter().all(|it| it["backlog"] == 3 && it["error"].is_string());
+        (all && told["sinks"].as_array()?.len() == 2).then_some(told)
+    });
+    for sink in told["sinks"].as_array().unwrap() {
+        assert!(sink["error"].as_str().unwrap().contains(&format!("127.0.0.1:{port}: ")), "{sink}");
+    }
+    let second = start().wait_with_output().unwrap();
+    let said = String::from_utf8(second.stderr).unwrap();
+    assert!(second.status.code() == Some(1) && said.contains("another platen forward has it"), "{said}");
+    let ended = std::process::Command::new("kill").arg(forwarder.0.id().to_string()).status();
+    assert!(ended.unwrap().success());
+    assert_eq!(until("its end", || forwarder.0.try_wait().unwrap()).code(), Some(0));
+
+    // The press goes away: the alarm is on record, where the forwarder finds it.
+    drop(press);
+    let file = folder.path().join("results/history.sqlite");
+    let noted = until("the alarm on record", || {
+        platen_history::Archive::open(&file).unwrap().events(0, 10).unwrap().into_iter().next()
+    });
+    assert!(noted.kind == "alarm" && noted.text.starts_with("10"), "{noted:?}");
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
+
 /// Makes a stroke and waits for its result.
 fn stroke(press: &mut Press, taken: usize) {
     until("the host to be ready", || (press.host_status() & 1 == 1).then_some(()));
