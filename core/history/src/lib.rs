@@ -8,7 +8,7 @@
 //! steps in order and refuses one that does not follow from those on record; a repeated step changes nothing, so that the
 //! caller may repeat it after a crash. [`History::recall`] returns the state to continue from.
 //!
-//! Data of the press and results are stored as JSON, beside the few columns that queries need. [`StrokeTable`] exports strokes
+//! Data of the press and results are stored as JSON, beside the few columns that queries need. [`Table`] exports strokes
 //! as CSV and Parquet. This crate does not depend on Modbus, plugins or geometry, and reads no clock: callers pass the time.
 
 mod archive;
@@ -20,9 +20,11 @@ mod event;
 mod export;
 mod history;
 mod journal;
+mod list;
 mod lock;
 mod schema;
 mod stroke;
+mod table;
 
 pub use archive::{Archive, Filter};
 pub use backup::adopt;
@@ -30,8 +32,9 @@ pub use change::{Change, ChangeKind, Owner};
 pub use compare::{Difference, compare};
 pub use error::Error;
 pub use event::Event;
-pub use export::StrokeTable;
 pub use history::{Accepted, Finished, History};
+pub use list::run_ids;
 pub use stroke::{PlateRecord, Stroke};
+pub use table::{Columns, Table};
 
 use platen_model::{StrokeKey, Verdict};

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use jiff::{SignedDuration, Timestamp};
 use platen_history::{
-    Accepted, Archive, ChangeKind, Difference, Error, Filter, Finished, History, Stroke, StrokeTable, compare,
+    Accepted, Archive, ChangeKind, Difference, Error, Filter, Finished, History, Stroke, Table, compare,
 };
 use platen_model::{Stage, StrokeKey, Verdict};
 
@@ -345,7 +345,7 @@ fn two_strokes_compare_figure_by_figure_and_all_export_as_one_table() {
         compare(&strokes[0], &strokes[1]),
         [difference("deviation.max", None, Some(0.01)), difference("gap.max", Some(0.001), Some(0.002)),]
     );
-    let table = StrokeTable::new(&strokes);
+    let table = Table::of_strokes(&strokes);
     let mut csv = Vec::new();
     table.write_csv(&mut csv).unwrap();
     let expected = "run_id,press,session,stroke,attempt,plate,recipe,baseline,dry_run,accepted,scanned,finished,acked,\
@@ -389,7 +389,7 @@ fn cells_are_quoted_only_where_rfc_4180_requires_it() {
         let now = fixture.tick();
         fixture.history().finish(&result, now).unwrap();
         let mut csv = Vec::new();
-        StrokeTable::new(&fixture.archive().strokes(&Filter::default()).unwrap())
+        Table::of_strokes(&fixture.archive().strokes(&Filter::default()).unwrap())
             .write_csv(&mut csv)
             .unwrap();
         let csv = String::from_utf8(csv).unwrap();
@@ -422,14 +422,14 @@ fn values_of_the_press_are_exported_in_their_own_types() {
     fixture.accept_as(1, 2, 0, None, |stroke| stroke.data = r#"{"die_id":null}"#.to_owned());
     let strokes = fixture.archive().strokes(&Filter::default()).unwrap();
     let mut csv = Vec::new();
-    StrokeTable::new(&strokes).write_csv(&mut csv).unwrap();
+    Table::of_strokes(&strokes).write_csv(&mut csv).unwrap();
     let csv = String::from_utf8(csv).unwrap();
     let lines: Vec<&str> = csv.lines().collect();
     assert!(lines[0].ends_with(",verdict,reason,press.die_id,press.force,press.part_name"), "{csv}");
     assert!(lines[1].ends_with("Z,,,,,,4,1500000,\"a,b\""), "{csv}");
     assert!(lines[2].ends_with("Z,,,,,,,,"), "a missing value is an empty cell: {csv}");
     let mut parquet = Vec::new();
-    StrokeTable::new(&strokes).write_parquet(&mut parquet).unwrap();
+    Table::of_strokes(&strokes).write_parquet(&mut parquet).unwrap();
     assert!(rows(parquet)[1].ends_with("press.die_id: null, press.force: null, press.part_name: null"));
 }
 

@@ -20,15 +20,19 @@ pub mod output;
 mod plate;
 mod plugins;
 pub mod press;
+mod remeasure;
 pub mod run;
 mod scan;
 mod scan_source;
 mod screen;
+mod selection;
 mod setup;
 mod status;
 mod systemd;
 mod verify;
 mod worker;
+
+pub(crate) use measure::scan_file;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -88,6 +92,8 @@ enum Verb {
     Run(run::Command),
     /// Measure the plate in one scan file
     Measure(measure::Command),
+    /// Measure the strokes of a record again from their kept scans
+    Remeasure(remeasure::Command),
     /// Write one scan of the plant's scanner to a file
     Scan(scan::Command),
     /// Convert a scan file to another format
@@ -204,6 +210,7 @@ pub fn main() -> ExitCode {
         Verb::Calibrate(command) => calibrate::run(&cli.common, command),
         Verb::Verify(command) => verify::run(&cli.common, command),
         Verb::Measure(command) => measure::run(&cli.common, command),
+        Verb::Remeasure(command) => remeasure::run(&cli.common, command),
         Verb::Plugins(command) => plugins::run(&cli.common, command),
         Verb::Bridge(command) => bridge::run(&cli.common, command),
         Verb::Bench(_) => bench::start(),

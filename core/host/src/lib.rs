@@ -1,7 +1,10 @@
 //! The program `platen`: command line, and `run`, which serves a press.
 
 pub mod cli;
+mod judgement;
 mod plate_history;
 mod plugin_records;
 pub mod progress;
+mod remeasure;
 pub mod run;
+mod sha256;

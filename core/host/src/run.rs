@@ -21,10 +21,10 @@ mod disk;
 mod forward;
 mod measurement_worker;
 
-mod figures;
+pub(crate) mod figures;
 mod journal;
 mod plugin_status;
-mod previous_scans;
+pub(crate) mod previous_scans;
 mod prometheus;
 mod region;
 mod scan_retention;

@@ -12,14 +12,18 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use platen_history::{Archive, Filter, Stroke};
+use platen_history::{Archive, Stroke};
 use platen_model::units::mm;
 use platen_plant::PlantFile;
 use platen_report::plate_report;
 
+use super::selection::Selection;
 use super::{CliError, Common, output};
 
 use pick::RunRef;
+
+/// Strokes that `history list` shows without `--newest`.
+const LISTED: u32 = 50;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history list config/plant-north.toml --newest 20\n  \
@@ -40,16 +44,12 @@ pub(super) struct Command {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// List strokes, oldest first, one line each
+    /// List strokes, oldest first, one line each: the newest 50 without --newest
     List {
         /// Plant file
         plant: PathBuf,
-        /// Only strokes of this plate, by its number in the history
-        #[arg(long)]
-        plate: Option<u32>,
-        /// Number of strokes, the newest
-        #[arg(long, default_value_t = 50)]
-        newest: u32,
+        #[command(flatten)]
+        selection: Selection,
     },
     /// Show the whole record of one stroke
     Show {
@@ -88,10 +88,9 @@ enum Verb {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     match &command.verb {
-        Verb::List { plant, plate, newest } => {
+        Verb::List { plant, selection } => {
             let (_, archive) = open(plant)?;
-            let filter = Filter { plate: *plate, newest: Some(*newest), ..Filter::default() };
-            let strokes = archive.strokes(&filter)?;
+            let strokes = archive.strokes(&selection.filter(Some(LISTED)))?;
             if common.json { output::json(&strokes)? } else { list(&strokes)? }
         }
         Verb::Show { plant, run } => {

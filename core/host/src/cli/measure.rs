@@ -2,25 +2,24 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Args;
 use jiff::Timestamp;
 use platen_engine::calibration;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{Catalogue, JobSpec, Surfaces};
-use platen_engine::scanner_error::ScannerError;
-use platen_engine::stroke::{self, Baseline, PreviousPose};
+use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose};
 use platen_plant::PlateFile;
 use platen_report::output_folder;
-use platen_report::result::{Context, ResultRecord};
+use platen_report::result::ResultRecord;
 use platen_shape::Surface;
-use platen_shape::{Measured, Scanned};
+use platen_shape::{Measured, PlateSpec, Scanned};
 
 use super::scan_source::{self, READ_LIMIT};
 use super::setup::Setup;
 use super::{CliError, Common, output};
-use crate::{plugin_records, progress};
+use crate::judgement::{self, Circumstances, Judgement};
+use crate::progress;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen measure scan.e57 --plate config/plates/plate-017.toml\n  \
@@ -86,27 +85,15 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     progress::phase("comparing");
     let surfaces =
         Surfaces { now: &now.measurement.surface, before: before.as_ref(), baseline: baseline.as_ref() };
-    let start = Instant::now();
-    let surface = &now.measurement.surface;
-    let assumed = || ScannerError::assumed(plant.range_error, scanned.header.range_error_m, surface);
-    let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
-    scanner.log();
-    let task = scanner.task(&plate, false);
-    let reports = stroke::compare(&rig, &task, surfaces);
-    let compare = start.elapsed();
-    let verdict = stroke::verdict(&reports);
-    let context = Context {
+    let circumstances = Circumstances {
+        plant: &plant,
         plate: &plate,
-        task: &task,
-        assumption: scanner.assumption.as_deref(),
-        press: rig.press,
+        calibration: calibration.as_ref(),
+        scanner: None,
         stroke: None,
-        verdict,
-        reports: &reports,
-        compare,
+        supports_changed: false,
     };
-    let mut record = ResultRecord::new(&scanned, &now, context);
-    record.name_plugins(plugin_records::records(rig.instances()));
+    let Judgement { record, reports, .. } = judgement::judge(&rig, &scanned, &now, surfaces, circumstances);
     progress::done();
 
     let sound: Vec<_> = reports.iter().flatten().collect();
@@ -136,14 +123,22 @@ pub(super) fn measure_file(
     last: Option<PreviousPose<'_>>,
     baseline: Baseline<'_>,
 ) -> Result<(Scanned, Measured), CliError> {
-    let failed = |e: &dyn std::fmt::Display| CliError::Failed(format!("{}: {e}", scan.display()));
+    let failed = |e: NotMeasured| CliError::Failed(format!("{}: {e}", scan.display()));
+    let spec = rig.spec(plate);
+    let scanned = scan_file(catalogue, scan, &spec)?.map_err(failed)?;
+    let measured = stroke::measure_scanned(rig, &scanned, &spec, last, baseline).map_err(failed)?;
+    Ok((scanned, measured))
+}
+
+/// Reads one scan file through the driver `faro-file` and finds the plate in it; the inner error is the plate's.
+pub(crate) fn scan_file(
+    catalogue: &Catalogue,
+    scan: &Path,
+    spec: &PlateSpec,
+) -> Result<Result<Scanned, NotMeasured>, CliError> {
     let scanner = scan_source::open(catalogue, scan, None)?;
     progress::phase(&format!("measuring {}", scan.display()));
-    let spec = rig.spec(plate);
-    let job = JobSpec::untriggered(READ_LIMIT);
-    let scanned = stroke::scan(&scanner, job, None, &spec, None).map_err(|e| failed(&e))?;
-    let measured = stroke::measure_scanned(rig, &scanned, &spec, last, baseline).map_err(|e| failed(&e))?;
-    Ok((scanned, measured))
+    Ok(stroke::scan(&scanner, JobSpec::untriggered(READ_LIMIT), None, spec, None))
 }
 
 fn print(record: &ResultRecord) -> Result<(), CliError> {

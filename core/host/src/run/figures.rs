@@ -14,6 +14,13 @@ pub(super) fn measurement(
     times: [(Measure, std::time::Duration); 3],
     scanned_at: jiff::Timestamp,
 ) -> Measurement {
+    let mut figures = of_plate(measured, source, plate);
+    figures.values.extend(times.map(|(measure, time)| (measure, time.as_secs_f64())));
+    Measurement { judgement: verdict.into(), figures, scanned_at: timestamp(scanned_at), warning: None }
+}
+
+/// Returns the figures of a plate from the comparison that fills the registers, without the times of its stroke.
+pub(crate) fn of_plate(measured: &Measured, source: Option<&Report>, plate: &PlateFile) -> Figures {
     let mut figures = Figures::default();
     let mut put = |measure: Measure, value: f64| {
         if value.is_finite() {
@@ -27,16 +34,13 @@ pub(super) fn measurement(
         }
     }
     put(Measure::Coverage, measured.measurement.quality.coverage);
-    for (measure, time) in times {
-        put(measure, time.as_secs_f64());
-    }
     let station = |station: &platen_model::Station| {
         let name = format!("station.{}", station.name);
         let value = found().find(|figure| figure.name == name)?.value;
         value.is_finite().then_some(value)
     };
     figures.stations = plate.stations.iter().map(station).collect();
-    Measurement { judgement: verdict.into(), figures, scanned_at: timestamp(scanned_at), warning: None }
+    figures
 }
 
 fn timestamp(at: jiff::Timestamp) -> Option<Timestamp> {

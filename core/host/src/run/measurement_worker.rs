@@ -12,14 +12,13 @@ use std::time::{Duration, Instant};
 use platen_engine::calibration::{self, Calibration};
 use platen_engine::pipeline::{self, Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, ProgressSink, Scanner, Surfaces};
-use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::{self, Baseline, NotMeasured, PreviousPose, ScanBuffer};
 use platen_history::History;
 use platen_model::{Code, Measure, Measurement, Report, StrokeData, StrokeKey, Task};
 use platen_plant::press::Press;
 use platen_plant::{PlantFile, PlateFile};
 use platen_press::{Answer, Command};
-use platen_report::result::{Context, ResultRecord};
+use platen_report::result::ResultRecord;
 use platen_report::{history_view, output_folder, plate_report};
 use platen_scan::Window;
 use platen_shape::{PlateSpec, Scanned, Surface};
@@ -32,8 +31,8 @@ use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
 use super::screen::{Event, MeasuredStroke, Teller};
+use crate::judgement::{self, Circumstances, Judgement};
 use crate::plate_history::MeasuredPlate;
-use crate::plugin_records;
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
@@ -452,30 +451,18 @@ impl MeasurementWorker {
             before: earlier.before.as_ref().map(|before| &before.surface),
             baseline: earlier.baseline.as_ref().map(|baseline| &baseline.surface),
         };
-        let comparing = Instant::now();
         let calibration = self.calibration().ok().flatten();
         let supports = earlier.last().and_then(|last| last.supports.as_deref());
-        let stated = stroke.scanned.header.range_error_m;
-        let assumed = || ScannerError::assumed(self.plant.range_error, stated, surfaces.now);
-        let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
-        scanner.log();
-        let task = scanner.task(&stroke.plate, history_view::supports_changed(supports, &stroke.plate));
-        let reports = stroke::compare(&self.pipeline, &task, surfaces);
-        let compare = comparing.elapsed();
-        let verdict = stroke::verdict(&reports);
-        let context = Context {
+        let circumstances = Circumstances {
+            plant: &self.plant,
             plate: &stroke.plate,
-            task: &task,
-            assumption: scanner.assumption.as_deref(),
-            press: self.pipeline.press,
+            calibration: calibration.as_ref(),
+            scanner: self.scanner.as_ref().map(Scanner::instance),
             stroke: Some(u64::from(stroke.key.stroke)),
-            verdict,
-            reports: &reports,
-            compare,
+            supports_changed: history_view::supports_changed(supports, &stroke.plate),
         };
-        let mut record = ResultRecord::new(&stroke.scanned, &measured, context);
-        let scanner = self.scanner.iter().map(Scanner::instance);
-        record.name_plugins(plugin_records::records(scanner.chain(self.pipeline.instances())));
+        let Judgement { record, reports, task } =
+            judgement::judge(&self.pipeline, &stroke.scanned, &measured, surfaces, circumstances);
         let folder = self.keep(stroke, &record, &measured.measurement.surface);
         let times = [
             (Measure::ScanTime, stroke.scanned.acquire + stroke.scanned.extract),
@@ -484,7 +471,7 @@ impl MeasurementWorker {
         ];
         let source = self.pipeline.register_source.and_then(|place| reports[place].as_ref().ok());
         let mut answer =
-            figures::measurement(&measured, source, verdict, &stroke.plate, times, stroke.scanned_at);
+            figures::measurement(&measured, source, record.verdict, &stroke.plate, times, stroke.scanned_at);
         // A result without files still goes to the press, with a warning.
         let retried = record.plugins.iter().any(|plugin| plugin.retried);
         let warnings = [(folder.is_none(), Code::StorageDegraded), (retried, Code::PluginRestarted)];

@@ -5,30 +5,30 @@ use platen_report::{history_view, output_folder};
 use platen_shape::{Blank, Surface};
 
 #[derive(Debug)]
-pub(super) struct Earlier {
-    pub(super) surface: Surface,
+pub(crate) struct Earlier {
+    pub(crate) surface: Surface,
     /// Outline that its (u, v) refer to, where a scan of the blank gave one.
-    pub(super) blank: Option<Blank>,
-    pub(super) supports: Option<String>,
+    pub(crate) blank: Option<Blank>,
+    pub(crate) supports: Option<String>,
     /// Feed rotation as reported by the press, radians.
-    pub(super) plate_rot: Option<f64>,
+    pub(crate) plate_rot: Option<f64>,
 }
 
 /// The stroke before a run, and the scan of the blank.
 #[derive(Debug, Default)]
-pub(super) struct PreviousScans {
-    pub(super) before: Option<Earlier>,
-    pub(super) baseline: Option<Earlier>,
+pub(crate) struct PreviousScans {
+    pub(crate) before: Option<Earlier>,
+    pub(crate) baseline: Option<Earlier>,
 }
 
 impl PreviousScans {
     /// Reads those on record whose files exist; the log names the others.
-    pub(super) fn of(archive: &Archive, run_id: u32) -> Self {
+    pub(crate) fn of(archive: &Archive, run_id: u32) -> Self {
         Self { before: load(archive.before(run_id)), baseline: load(archive.baseline(run_id)) }
     }
 
     /// Returns the last scan of the plate: the stroke before, else the baseline.
-    pub(super) fn last(&self) -> Option<&Earlier> {
+    pub(crate) fn last(&self) -> Option<&Earlier> {
         self.before.as_ref().or(self.baseline.as_ref())
     }
 }

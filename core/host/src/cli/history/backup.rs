@@ -2,17 +2,15 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use platen_history::{Archive, Filter};
 use platen_plant::PlantFile;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use super::{CliError, Common, open, output};
-use crate::progress;
+use crate::{progress, sha256};
 
 /// Version of the manifest.
 const SCHEMA: &str = "platen.backup/1";
@@ -233,18 +231,7 @@ fn run_folder(run_id: u32) -> String {
 fn described(folder: &Path, relative: &Path) -> Result<Copied, CliError> {
     let path = folder.join(relative);
     let bytes = std::fs::metadata(&path).map_err(failed(&path))?.len();
-    let mut sha = Sha256::new();
-    let mut file = BufReader::with_capacity(1 << 16, File::open(&path).map_err(failed(&path))?);
-    loop {
-        let chunk = file.fill_buf().map_err(failed(&path))?;
-        if chunk.is_empty() {
-            break;
-        }
-        sha.update(chunk);
-        let taken = chunk.len();
-        file.consume(taken);
-    }
-    let sha256 = sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    let sha256 = sha256::of_file(&path).map_err(failed(&path))?;
     Ok(Copied { path: relative.to_owned(), bytes, sha256 })
 }
 

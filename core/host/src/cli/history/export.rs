@@ -4,10 +4,11 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use platen_history::{Filter, Stroke, StrokeTable};
+use platen_history::{Stroke, Table};
 use platen_report::advice::AdviceRecord;
 
 use super::open;
+use crate::cli::selection::Selection;
 use crate::cli::{CliError, Common, output};
 
 #[derive(Debug, Args)]
@@ -25,9 +26,8 @@ pub(super) struct Command {
     /// Format; by default that of the file name's ending, else CSV
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Only strokes of this plate, by its number in the history
-    #[arg(long)]
-    plate: Option<u32>,
+    #[command(flatten)]
+    selection: Selection,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -38,9 +38,9 @@ enum Format {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let (_, archive) = open(&command.plant)?;
-    let mut strokes = archive.strokes(&Filter { plate: command.plate, ..Filter::default() })?;
+    let mut strokes = archive.strokes(&command.selection.filter(None))?;
     strokes.iter_mut().for_each(add_advice);
-    let table = StrokeTable::new(&strokes);
+    let table = Table::of_strokes(&strokes);
     let parquet = command.out.as_ref().and_then(|out| out.extension()).is_some_and(|end| end == "parquet");
     let format = command.format.unwrap_or(if parquet { Format::Parquet } else { Format::Csv });
     let mut bytes = Vec::new();
