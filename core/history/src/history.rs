@@ -193,6 +193,19 @@ impl History {
         self.change(run_id, "UPDATE stroke SET document = ?2 WHERE run_id = ?1", (run_id, document))
     }
 
+    /// Records the SHA-256 of a run's raw scan and, once it lies in the scan store, its path there.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchRun`], [`Error::Storage`].
+    pub fn attach_scan(&mut self, run_id: u32, sha256: &str, stored: Option<&Path>) -> Result<(), Error> {
+        let stored = stored.map(Path::to_string_lossy);
+        self.change(
+            run_id,
+            "UPDATE stroke SET scan_sha256 = ?2, scan = ifnull(?3, scan) WHERE run_id = ?1",
+            (run_id, sha256, stored),
+        )
+    }
+
     /// Applies one change to the newest run of a stroke.
     fn step(
         &mut self,

@@ -43,7 +43,7 @@ CREATE TABLE stroke (
 CREATE INDEX stroke_key ON stroke (press, session, stroke, attempt, run_id);
 CREATE INDEX stroke_plate ON stroke (plate, run_id);
 
--- Alarms and jumps of the clock. The columns scan and scan_sha256 above are not written by this version.
+-- Alarms and jumps of the clock.
 CREATE TABLE event (
     event  INTEGER PRIMARY KEY,
     at     TEXT NOT NULL,

@@ -46,9 +46,9 @@ pub struct Stroke {
     pub publication: Option<String>,
     /// Path of the result document.
     pub document: Option<PathBuf>,
-    /// Path of the raw scan, where recorded.
+    /// Path of the raw scan in the scan store, where it is stored.
     pub scan: Option<PathBuf>,
-    /// SHA-256 of the raw scan, where recorded.
+    /// SHA-256 of the raw scan, where it was kept.
     pub scan_sha256: Option<String>,
 }
 

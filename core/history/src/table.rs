@@ -90,6 +90,13 @@ impl<'a, R> Columns<'a, R> {
 }
 
 impl Table {
+    /// Returns a table of these rows, with the same columns.
+    #[must_use]
+    pub fn of_rows(&self, rows: &[usize]) -> Self {
+        let columns = self.columns.iter().map(|(name, column)| (name.clone(), column.of_rows(rows)));
+        Self { columns: columns.collect(), n_rows: rows.len() }
+    }
+
     /// Writes CSV (RFC 4180).
     ///
     /// # Errors
@@ -125,6 +132,19 @@ impl Table {
 }
 
 impl Column {
+    fn of_rows(&self, rows: &[usize]) -> Self {
+        fn take<T: Clone>(cells: &[Option<T>], rows: &[usize]) -> Vec<Option<T>> {
+            rows.iter().map(|row| cells[*row].clone()).collect()
+        }
+        match self {
+            Self::Unsigned(cells) => Self::Unsigned(take(cells, rows)),
+            Self::Boolean(cells) => Self::Boolean(take(cells, rows)),
+            Self::Text(cells) => Self::Text(take(cells, rows)),
+            Self::Time(cells) => Self::Time(take(cells, rows)),
+            Self::Float(cells) => Self::Float(take(cells, rows)),
+        }
+    }
+
     fn cell(&self, row: usize) -> String {
         fn shown<T: ToString>(value: Option<&T>) -> String {
             value.map(T::to_string).unwrap_or_default()

@@ -8,6 +8,7 @@
 //! | `journal` | steps of a stroke in the history, before each promise to the press |
 //! | `previous_scans`, `region` | the stroke before and the baseline, from the history; the window of the next scan |
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
+//! | `scan_store` | copies of kept scans in a store, by the rule of the plant file |
 //! | `screen` | the browser pages, where the plant file has `[screen]` |
 //! | `advice` | the next stroke, after the result, where the plant file has `[advice]` |
 //! | `alarms` | an alarm to the log, the record, the status and the pages |
@@ -28,6 +29,7 @@ pub(crate) mod previous_scans;
 mod prometheus;
 mod region;
 mod scan_retention;
+mod scan_store;
 mod screen;
 mod service;
 mod status;

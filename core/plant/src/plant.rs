@@ -9,6 +9,7 @@ mod forward;
 mod frame;
 mod output;
 mod plugin_use;
+mod scan_store;
 mod screen;
 
 pub use advice::{AdviceUse, Show};
@@ -17,6 +18,7 @@ pub use forward::{Forward, SinkKind, SinkUse};
 pub use frame::{Frame, RegionOfInterest, RigidTransform};
 pub use output::{KeepScans, Output};
 pub use plugin_use::{PluginUse, Worker};
+pub use scan_store::{ScanStore, StoredScans};
 pub use screen::Screen;
 
 use std::path::{Path, PathBuf};
@@ -97,6 +99,8 @@ pub struct PlantFile {
     pub screen: Option<Screen>,
     /// Destinations of the record; without the table nothing leaves the host.
     pub forward: Option<Forward>,
+    /// Store of raw scans by rule; without the table none are stored.
+    pub scan_store: Option<ScanStore>,
 }
 
 /// Codes of crews in the record.
@@ -157,6 +161,7 @@ impl Default for PlantFile {
             output: Output::in_folder(Path::new("")),
             screen: None,
             forward: None,
+            scan_store: None,
         }
     }
 }
@@ -283,6 +288,9 @@ impl PlantFile {
         let screen = screen.and_then(|table| table.map(|table| Screen::read(table, folder)).transpose());
         let forward = root.table("forward").optional();
         let forward = forward.and_then(|table| table.map(|table| Forward::read(table, folder)).transpose());
+        let scan_store = root.table("scan_store").optional();
+        let scan_store =
+            scan_store.and_then(|table| table.map(|table| ScanStore::read(table, folder)).transpose());
         let root_place = &root.place().clone();
         root.finish();
 
@@ -320,6 +328,7 @@ impl PlantFile {
             output: output?,
             screen: screen?,
             forward: forward?,
+            scan_store: scan_store?,
         })
     }
 }

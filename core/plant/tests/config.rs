@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use platen_model::{Centre, Facing, Quantity, RadiusOf, Seat, TargetShape};
-use platen_plant::plant::{KeepScans, RegionOfInterest, plate_files};
+use platen_plant::plant::{KeepScans, RegionOfInterest, StoredScans, plate_files};
 use platen_plant::{PlantFile, PlateFile, ScanWindow};
 
 fn config() -> PathBuf {
@@ -174,6 +174,7 @@ fn an_empty_plant_file_says_what_the_default_says() {
     assert_eq!(plant, PlantFile { file, name: "plant-north".to_owned(), ..PlantFile::default() });
     assert!(plant.scanner.is_none() && plant.frame.u_axis.is_none());
     assert!(PlantFile::parse("p.toml", "comparison = []").unwrap().comparisons.is_empty());
+    assert_eq!(plant.scan_store, None);
     let always = PlantFile::parse("p.toml", "[output]\nkeep_scans = 'always'").unwrap();
     assert_eq!(always.output.keep_scans, KeepScans::Always);
 }
@@ -210,4 +211,19 @@ fn the_scan_window_is_one_of_three_words() {
         refused.starts_with("p.toml:3:10: scanner.window") && refused.contains("everything"),
         "{refused}"
     );
+}
+
+#[test]
+fn a_scan_store_has_a_rule() {
+    let read = |text: &str| PlantFile::parse("hall/plant.toml", text).map(|plant| plant.scan_store.unwrap());
+    let store = read("[scan_store]\nfolder = 'store'").unwrap();
+    assert_eq!(store.folder, Path::new("hall/store"));
+    let all = [StoredScans::Baseline, StoredScans::Last, StoredScans::CannotTell, StoredScans::NotMeasured];
+    assert_eq!((store.which.as_slice(), store.share), (all.as_slice(), 0.0));
+    let store = read("[scan_store]\nfolder = '/mnt/scans'\nwhich = ['last']\nshare = 0.01").unwrap();
+    assert_eq!((store.which.as_slice(), store.share), ([StoredScans::Last].as_slice(), 0.01));
+    let faults = read("[scan_store]\nwhich = ['first']\nshare = 2").unwrap_err().to_string();
+    for part in ["folder", "\"first\", expected one of baseline, last, cannot_tell, not_measured", "share"] {
+        assert!(faults.contains(part), "{faults}");
+    }
 }

@@ -122,3 +122,86 @@ fn nothing_is_kept_when_the_plant_says_so() {
             .all(|run| run.join("result.json").exists() && !run.join("scan.e57").exists())
     );
 }
+
+/// Files of the store.
+fn stored(store: &Path) -> Vec<PathBuf> {
+    let folders = std::fs::read_dir(store.join("scans")).into_iter().flatten().flatten().map(|it| it.path());
+    let mut files: Vec<PathBuf> = folders
+        .filter(|path| path.is_dir())
+        .flat_map(|path| std::fs::read_dir(path).unwrap().map(|file| file.unwrap().path()))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn scans_are_stored_by_rule_and_measured_again_from_the_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("store");
+    let mut press = Press::start(folder.path(), "strokes = 2");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let text = std::fs::read_to_string(&plant).unwrap();
+    let with = |rule: &str| {
+        std::fs::write(&plant, format!("{text}[scan_store]\nfolder = \"store\"\n{rule}\n")).unwrap();
+    };
+    // A store that cannot be reached costs nothing else.
+    std::fs::write(&store, "no folder").unwrap();
+    with("which = [\"baseline\"]");
+    let mut host = Host::start(&plant);
+    let stats = press.wait_done();
+    crate::cell::until("the failure of the store", || {
+        host.log().contains("the scan is not stored").then_some(())
+    });
+    std::fs::remove_file(&store).unwrap();
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    crate::cell::assert_clean(&stats, &host.log());
+
+    // The next start copies what belongs there.
+    let mut host = Host::start(&plant);
+    crate::cell::until("the baseline in the store", || (stored(&store).len() == 1).then_some(()));
+    let record = crate::cell::until("the record of it", || {
+        Some(Host::history(&plant)).filter(|record| record[0]["scan"].is_string())
+    });
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    for (run, stroke) in runs(folder.path()).iter().zip(&record) {
+        assert_eq!(stroke["scan_sha256"].as_str().unwrap().len(), 64, "every kept scan has its digest");
+        assert_eq!(stroke["scan"].is_string(), stroke["baseline"] == true);
+        assert!(run.join("scan.e57").exists());
+    }
+    let first = &stored(&store)[0];
+    assert_eq!(record[0]["scan"], first.to_str().unwrap());
+    assert!(first.ends_with(format!("{}.e57", record[0]["scan_sha256"].as_str().unwrap())));
+    assert_eq!(
+        std::fs::read(first).unwrap(),
+        std::fs::read(runs(folder.path())[0].join("scan.e57")).unwrap()
+    );
+
+    // All others, as their share says; then the kept ones may go.
+    with("which = []\nshare = 1.0");
+    let mut host = Host::start(&plant);
+    crate::cell::until("all scans in the store", || (stored(&store).len() == 3).then_some(()));
+    crate::cell::until("the record of them", || {
+        Host::history(&plant).iter().all(|stroke| stroke["scan"].is_string()).then_some(())
+    });
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    runs(folder.path()).iter().for_each(|run| std::fs::remove_file(run.join("scan.e57")).unwrap());
+    let again = folder.path().join("again");
+    let mut command = platen_tests::program("platen");
+    let output = command
+        .arg("remeasure")
+        .arg(&plant)
+        .arg("--out")
+        .arg(&again)
+        .args(["--compare", "--json"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let done: Json = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&done["measured"], &done["verdict_changed"]), (&Json::from(3), &serde_json::json!([])));
+    for run in runs(folder.path()) {
+        let name = run.file_name().unwrap();
+        let then = comparable(load(&run.join("result.json")));
+        let now = comparable(load(&again.join(name).join("result.json")));
+        assert_eq!(then, now, "{}", run.display());
+    }
+}

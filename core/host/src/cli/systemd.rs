@@ -76,7 +76,8 @@ impl Needs {
         }
         let folders = [Some(plant.output.folder.as_path()), plant.output.history.parent()];
         let calibration = plant.calibration.as_ref().and_then(|it| it.file.parent());
-        for folder in folders.into_iter().chain([calibration]).flatten() {
+        let store = plant.scan_store.as_ref().map(|store| store.folder.as_path());
+        for folder in folders.into_iter().chain([calibration, store]).flatten() {
             if !folder.starts_with("/var/lib/platen") && !needs.writes.iter().any(|it| it == folder) {
                 needs.writes.push(folder.to_owned());
             }

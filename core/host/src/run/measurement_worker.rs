@@ -30,6 +30,7 @@ use super::plugin_status::{PluginStates, PluginStatus};
 use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
+use super::scan_store;
 use super::screen::{Event, MeasuredStroke, Teller};
 use crate::judgement::{self, Circumstances, Judgement};
 use crate::plate_history::MeasuredPlate;
@@ -134,8 +135,12 @@ impl MeasurementWorker {
             in_reach: None,
             reported: None,
             scan_limit: press.timeouts.scan,
+            archive: ScanRetention::start(
+                &plant.output,
+                Arc::clone(&history),
+                scan_store::start(plant, Arc::clone(&history)),
+            ),
             history,
-            archive: ScanRetention::start(&plant.output),
             receivers,
             active: None,
         }
@@ -285,7 +290,7 @@ impl MeasurementWorker {
                 }
                 let found_no_plate = matches!(code, Code::PlateNotFound);
                 self.fail(key, data.baseline, code, why, started);
-                self.archive.keep(self.folder(run_id), buffer.filter(|_| found_no_plate));
+                self.archive.keep(run_id, self.folder(run_id), buffer.filter(|_| found_no_plate));
             }
         }
     }
@@ -388,7 +393,7 @@ impl MeasurementWorker {
                 self.fail(key, baseline, code, why, started);
             }
         }
-        self.archive.keep(folder, buffer);
+        self.archive.keep(stroke.run_id, folder, buffer);
     }
 
     /// Passes a result on to the pages, if there are any.

@@ -7,18 +7,22 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use platen_engine::stroke::ScanBuffer;
 use platen_formats::{ScanFile, WriteError};
+use platen_history::History;
 use platen_plant::plant::{KeepScans, Output};
 use platen_scan::{Column, ScanEnd, ScanHeader};
 
 use super::disk;
+use super::scan_store::Waker;
+use crate::sha256;
 
 /// Name of a scan in a result's folder.
-const NAME: &str = "scan.e57";
+pub(super) const NAME: &str = "scan.e57";
 /// Bytes of a disk reserved for results and history.
 const RESERVE: u64 = 1 << 30;
 /// Bytes of a cell in the file: three f64, state, intensity, row and column.
@@ -28,6 +32,7 @@ const WAITING: usize = 1;
 
 #[derive(Debug)]
 struct Order {
+    run_id: u32,
     folder: PathBuf,
     buffer: ScanBuffer,
 }
@@ -41,15 +46,23 @@ pub(super) struct ScanRetention {
 
 impl ScanRetention {
     /// Starts the thread and removes scans that are too old; keeps none where the plant file forbids it.
-    pub(super) fn start(output: &Output) -> Self {
+    pub(super) fn start(output: &Output, history: Arc<Mutex<History>>, store: Option<Waker>) -> Self {
         let age = match output.keep_scans {
             KeepScans::Always => None,
             KeepScans::For(age) => Some(age),
         };
         let (orders, inbox) = sync_channel(WAITING);
         let folder = output.folder.clone();
-        let thread =
-            std::thread::Builder::new().name("archive".into()).spawn(move || serve(&folder, age, &inbox));
+        let thread = std::thread::Builder::new().name("archive".into()).spawn(move || {
+            serve(&folder, age, &inbox, |run_id, sha256| {
+                let attached =
+                    history.lock().unwrap_or_else(PoisonError::into_inner).attach_scan(run_id, sha256, None);
+                if let Err(why) = attached {
+                    tracing::warn!("the digest of the scan is not recorded: {why}");
+                }
+                store.iter().for_each(Waker::wake);
+            });
+        });
         match thread {
             Ok(thread) if age != Some(Duration::ZERO) => Self { orders: Some(orders), thread: Some(thread) },
             // Without orders it removes what is too old, and ends.
@@ -67,9 +80,9 @@ impl ScanRetention {
     }
 
     /// Queues a scan for the folder of its result, which need not exist.
-    pub(super) fn keep(&self, folder: PathBuf, buffer: Option<ScanBuffer>) {
+    pub(super) fn keep(&self, run_id: u32, folder: PathBuf, buffer: Option<ScanBuffer>) {
         let (Some(orders), Some(buffer)) = (&self.orders, buffer) else { return };
-        match orders.try_send(Order { folder, buffer }) {
+        match orders.try_send(Order { run_id, folder, buffer }) {
             Ok(()) => {}
             Err(TrySendError::Full(order)) => {
                 let folder = order.folder.display();
@@ -92,28 +105,33 @@ impl Drop for ScanRetention {
     }
 }
 
-fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>) {
+/// Writes scans as they come; `kept` gets the run and the digest of each.
+fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>, kept: impl Fn(u32, &str)) {
     let clean = || {
         clean(results, age, SystemTime::now()).unwrap_or_else(|e| {
             tracing::warn!("{}: old scans are not removed: {e}", results.display());
         });
     };
     clean();
-    while let Ok(Order { folder, buffer }) = inbox.recv() {
-        if let Err(why) = write(&folder, buffer) {
-            tracing::warn!("{}: the scan is not kept: {why}", folder.display());
+    while let Ok(Order { run_id, folder, buffer }) = inbox.recv() {
+        match write(&folder, buffer) {
+            Ok(sha256) => kept(run_id, &sha256),
+            Err(why) => tracing::warn!("{}: the scan is not kept: {why}", folder.display()),
         }
         clean();
     }
 }
 
-fn write(folder: &Path, buffer: ScanBuffer) -> Result<(), String> {
+/// Writes a scan into a folder and returns its digest.
+fn write(folder: &Path, buffer: ScanBuffer) -> Result<String, String> {
     let (header, columns, end) = buffer.finish()?;
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
     let cells: usize = columns.iter().map(Column::len).sum();
     let needed = cells as u64 * CELL_BYTES;
     check_room(needed, disk::free(folder).map_err(|e| e.to_string())?)?;
-    save(&folder.join(NAME), &header, columns, &end).map_err(|e| e.to_string())
+    let path = folder.join(NAME);
+    save(&path, &header, columns, &end).map_err(|e| e.to_string())?;
+    sha256::of_file(&path).map_err(|e| e.to_string())
 }
 
 /// Writes a scan; each column is freed once it is written.

@@ -1,11 +1,15 @@
-//! `platen history export`: the strokes of a history as one table, CSV or Parquet.
+//! `platen history export`: the strokes of a history as one table, CSV or Parquet, or as a Parquet file a month.
 
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use platen_history::{Stroke, Table};
+use jiff::tz::TimeZone;
+use platen_history::{Filter, Stroke, Table};
 use platen_report::advice::AdviceRecord;
+use platen_report::output_folder;
 
 use super::open;
 use crate::cli::selection::Selection;
@@ -13,19 +17,28 @@ use crate::cli::{CliError, Common, output};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen history export config/plant-north.toml > strokes.csv\n  \
-                        platen history export config/plant-north.toml --out strokes.parquet\n\n\
+                        platen history export config/plant-north.toml --out strokes.parquet\n  \
+                        platen history export config/plant-north.toml --by month --out lake --site north\n\n\
                         One row a stroke: identity, times, verdict, data of the press (press.die_id, press.force, ...; newtons, metres, radians) \
                         and every figure (gap.max, deviation.rms, ...; metres, radians, seconds, shares of one). advice.* is the stroke against the \
-                        advice before it. Unknown values are empty.")]
+                        advice before it. Unknown values are empty.\n\
+                        --by month writes DIR/site=SITE/year=YYYY/month=MM/press-N.parquet, months in UTC, and replaces each file by one rename: \
+                        SELECT * FROM read_parquet('lake/**/*.parquet', hive_partitioning = true, union_by_name = true) in DuckDB.")]
 pub(super) struct Command {
     /// Plant file
     plant: PathBuf,
-    /// File to write; stdout by default
+    /// File to write, stdout by default; with --by the folder
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Format; by default that of the file name's ending, else CSV
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "by")]
     format: Option<Format>,
+    /// Write one Parquet file for each month, of the whole record
+    #[arg(long, value_enum, requires = "out", conflicts_with = "Selection")]
+    by: Option<Period>,
+    /// Name of the site in the folders of --by; by default the plant's
+    #[arg(long, requires = "by")]
+    site: Option<String>,
     #[command(flatten)]
     selection: Selection,
 }
@@ -36,8 +49,19 @@ enum Format {
     Parquet,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Period {
+    Month,
+}
+
 pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
-    let (_, archive) = open(&command.plant)?;
+    let (plant, archive) = open(&command.plant)?;
+    if let (Some(Period::Month), Some(folder)) = (command.by, &command.out) {
+        let site = command.site.as_deref().unwrap_or(&plant.name);
+        let mut strokes = archive.strokes(&Filter::default())?;
+        strokes.iter_mut().for_each(add_advice);
+        return by_month(common, folder, site, &strokes);
+    }
     let mut strokes = archive.strokes(&command.selection.filter(None))?;
     strokes.iter_mut().for_each(add_advice);
     let table = Table::of_strokes(&strokes);
@@ -83,4 +107,49 @@ fn add_advice(stroke: &mut Stroke) {
     ];
     let given = figures.into_iter().filter_map(|(name, value)| Some((format!("advice.{name}"), value?)));
     stroke.figures.extend(given);
+}
+
+/// Writes a file for each press and month; all have the same columns.
+fn by_month(common: &Common, folder: &Path, site: &str, strokes: &[Stroke]) -> Result<(), CliError> {
+    let table = Table::of_strokes(strokes);
+    let mut months: BTreeMap<(i16, i8, u16), Vec<usize>> = BTreeMap::new();
+    for (row, stroke) in strokes.iter().enumerate() {
+        let day = stroke.accepted.to_zoned(TimeZone::UTC).date();
+        months.entry((day.year(), day.month(), stroke.key.press)).or_default().push(row);
+    }
+    let mut files = Vec::new();
+    for ((year, month, press), rows) in &months {
+        let place = folder.join(format!("site={}/year={year:04}/month={month:02}", escaped(site)));
+        std::fs::create_dir_all(&place)
+            .map_err(|e| CliError::Failed(format!("{}: {e}; choose another --out", place.display())))?;
+        let mut bytes = Vec::new();
+        table.of_rows(rows).write_parquet(&mut bytes)?;
+        files.push(output_folder::put(&place, &format!("press-{press}.parquet"), &bytes)?);
+    }
+    let text = format!("wrote {} strokes to {} files in {}", strokes.len(), files.len(), folder.display());
+    output::either(common, &serde_json::json!({ "files": files, "strokes": strokes.len() }), &text)
+}
+
+/// Escapes a name for a folder of Hive's layout: percent encoding, which DuckDB and pyarrow decode.
+fn escaped(name: &str) -> String {
+    name.bytes().fold(String::new(), |mut text, byte| {
+        if byte.is_ascii_alphanumeric() || b"-_.".contains(&byte) {
+            text.push(byte.into());
+        } else {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "%{byte:02X}");
+        }
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::escaped;
+
+    #[test]
+    fn a_site_is_one_folder_whatever_its_name() {
+        assert_eq!(escaped("North hall, press 3"), "North%20hall%2C%20press%203");
+        assert_eq!(escaped("a/../b=\u{c4}"), "a%2F..%2Fb%3D%C3%84");
+    }
 }
