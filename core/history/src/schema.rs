@@ -37,14 +37,36 @@ pub(crate) fn open_writer(path: &Path) -> Result<Connection, Error> {
     Ok(connection)
 }
 
-/// Opens the database for reading, beside a writer or not.
+/// Opens the database for reading, beside a writer or not. A transaction that died with its process is rolled back first.
 pub(crate) fn open_reader(path: &Path) -> Result<Connection, Error> {
     std::fs::metadata(path).map_err(|source| Error::Unreachable { path: path.to_owned(), source })?;
+    match read_only(path) {
+        Err(Error::Storage { source, .. }) if needs_rollback(&source) => {
+            roll_back(path).map_err(Error::storage(path))?;
+            read_only(path)
+        }
+        opened => opened,
+    }
+}
+
+fn read_only(path: &Path) -> Result<Connection, Error> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(path, flags).map_err(Error::storage(path))?;
     connection.busy_timeout(BUSY).map_err(Error::storage(path))?;
     check(&connection, path)?;
     Ok(connection)
+}
+
+/// Whether a rollback journal lies beside the database, which a connection for reading alone may not apply.
+fn needs_rollback(error: &rusqlite::Error) -> bool {
+    error.sqlite_error().is_some_and(|error| error.extended_code == rusqlite::ffi::SQLITE_READONLY_ROLLBACK)
+}
+
+/// Applies the rollback journal: SQLite does so before the first read of a connection that may write, unless a living process holds it.
+fn roll_back(path: &Path) -> rusqlite::Result<()> {
+    let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+    connection.busy_timeout(BUSY)?;
+    connection.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(()))
 }
 
 /// Creates all tables and both marks in one transaction: a process that dies here leaves an empty file, which the next one

@@ -3,4 +3,5 @@
 
 mod check;
 mod formats;
+mod records;
 mod refusals;
