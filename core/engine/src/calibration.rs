@@ -12,6 +12,9 @@ use platen_plant::{Document, Error as PlantError, Reported, TomlTable};
 /// Largest plausible standard deviation, millimetres: above it a plate was bent or the scanner moved.
 const LARGEST_SIGMA_MM: f64 = 20.0;
 
+/// Largest difference between the clocks of two computers that counts as none, seconds.
+const CLOCK_SLACK_S: f64 = 60.0;
+
 /// Errors of one scanner at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
@@ -39,6 +42,9 @@ pub enum Invalid {
     /// Older than allowed.
     #[error("calibration: {} is {age_d:.0} days old, {limit_d:.0} are allowed; run platen calibrate", .file.display())]
     TooOld { file: PathBuf, age_d: f64, limit_d: f64 },
+    /// Made after now: the clock is wrong, or was when the calibration was made.
+    #[error("calibration: {} was made at {made}, which is to come; check the clock of this computer, or run platen calibrate", .file.display())]
+    Future { file: PathBuf, made: Timestamp },
     /// The scanner is warming up.
     #[error("calibration: the scanner is still warming up, {left_min:.0} minutes are left")]
     Cold { left_min: f64 },
@@ -109,6 +115,9 @@ impl Calibration {
 pub fn in_force(wanted: &CalibrationUse, now: Timestamp, in_reach: Duration) -> Result<Calibration, Invalid> {
     let calibration = Calibration::load(&wanted.file)?;
     let age = now.duration_since(calibration.made).as_secs_f64();
+    if age < -CLOCK_SLACK_S {
+        return Err(Invalid::Future { file: wanted.file.clone(), made: calibration.made });
+    }
     let days = |seconds: f64| seconds / 86_400.0;
     match wanted.max_age.map(|limit| limit.as_secs_f64()) {
         Some(limit) if age > limit => {
@@ -180,6 +189,11 @@ mod tests {
                 .unwrap_err()
                 .contains("10 days old, 9 are allowed")
         );
+        let mut early = wanted(folder.path(), None, 0);
+        early.file = folder.path().join("early.toml");
+        let made = "2026-05-15T10:00:00Z".parse().unwrap();
+        std::fs::write(&early.file, Calibration { made, ..calibration() }.to_toml()).unwrap();
+        assert!(says(&early, hour).unwrap_err().contains("which is to come; check the clock"));
         let cold = says(&wanted(folder.path(), None, 30), Duration::from_secs(61)).unwrap_err();
         assert!(cold.contains("warming up, 29 minutes"), "{cold}");
     }

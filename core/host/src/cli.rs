@@ -28,6 +28,7 @@ mod screen;
 mod selection;
 mod setup;
 mod status;
+mod stop;
 mod systemd;
 mod verify;
 mod worker;
@@ -114,6 +115,8 @@ enum Verb {
     Forward(forward::Command),
     /// Show the state of a running host
     Status(status::Command),
+    /// Stop a running host, at once or between two plates
+    Stop(stop::Command),
     /// Print the drop-in of the unit platen@ for a plant: its addresses, devices, folders
     Systemd(systemd::Command),
     /// Make the token of the browser pages
@@ -203,6 +206,7 @@ pub fn main() -> ExitCode {
         Verb::Press(command) => press::run(&cli.common, command),
         Verb::Forward(command) => forward::run(&cli.common, command),
         Verb::Status(command) => status::run(&cli.common, command),
+        Verb::Stop(command) => stop::run(&cli.common, command),
         Verb::Systemd(command) => systemd::run(&cli.common, command),
         Verb::Screen(command) => screen::run(&cli.common, command),
         Verb::Advise(command) => advise::run(&cli.common, command),

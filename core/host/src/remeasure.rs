@@ -5,7 +5,7 @@
 //! its own with its [`Inputs`]; where a result with the same inputs is there already, nothing is measured.
 //!
 //! Limits: the plate file is today's file of the stroke's recipe, not that of the day of the stroke; the calibration is the one of the plant
-//! file, if it is valid at the time of the stroke.
+//! file, unless it was too old at the time of the stroke.
 
 mod comparison;
 mod inputs;
@@ -343,7 +343,10 @@ impl<'a> Remeasurer<'a> {
     fn calibration(&self, stroke: &Stroke) -> Option<Calibration> {
         let wanted = self.plant.calibration.as_ref()?;
         // The record has no warm-up of the scanner: it counts as warm.
-        let valid = calibration::in_force(wanted, stroke.accepted, wanted.warm_up);
+        // A calibration made after the stroke counts: to measure again with it is why it was made.
+        let made = Calibration::load(&wanted.file).map(|calibration| calibration.made).ok();
+        let now = made.unwrap_or(stroke.accepted).max(stroke.accepted);
+        let valid = calibration::in_force(wanted, now, wanted.warm_up);
         valid.inspect_err(|why| tracing::warn!("run {}: {why}", stroke.run_id)).ok()
     }
 }

@@ -14,10 +14,13 @@
 //! | `alarms` | an alarm to the log, the record, the status and the pages |
 //! | `forward` | the state of `platen forward`, where the plant file has `[forward]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
+//! | `clock` | synchronisation and jumps of the machine's clock |
+//! | `stopping` | requests to stop, between two plates |
 //! | `figures` | findings to figures of the press's registers |
 
 mod advice;
 mod alarms;
+mod clock;
 mod disk;
 mod forward;
 mod measurement_worker;
@@ -33,13 +36,14 @@ mod scan_store;
 mod screen;
 mod service;
 mod status;
+mod stopping;
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use jiff::Timestamp;
 use platen_history::{Error as HistoryError, History};
-use platen_model::StrokeKey;
+use platen_model::{Code, StrokeKey};
 use platen_plant::PlantFile;
 use platen_plant::press::Press;
 use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
@@ -50,6 +54,7 @@ pub use measurement_worker::StrokeReport;
 pub use plugin_status::PluginStatus;
 pub use screen::{Pages, ScreenError};
 pub use status::{LinkRecord, StatusRecord, reset_request};
+pub use stopping::{StopRequest, stop_request};
 
 use advice::AdviceDesk;
 use alarms::Alarms;
@@ -57,6 +62,7 @@ use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, Quarantine};
 use screen::{Screen, Teller};
+use stopping::PlateInHand;
 
 /// Time for the last scan to be written when the host stops.
 const LAST_SCAN: Duration = Duration::from_secs(20);
@@ -121,6 +127,7 @@ pub async fn run(
         lost: Arc::clone(&beside.lost),
         screen: teller.clone(),
         plugins: Arc::clone(&beside.plugins),
+        clock: beside.clock.clone(),
         advice: desk.clone(),
     };
     let worker = MeasurementWorker::new(plant, catalogue, pipeline, &press, Arc::clone(&history), receivers);
@@ -141,6 +148,11 @@ pub async fn run(
         beside.clone(),
         host.answers.clone(),
     ));
+    let clock = {
+        let alarms = alarms.clone();
+        let raise = move || alarms.raise(Code::ClockUnsynchronised, None, None);
+        tokio::spawn(clock::keep(beside.clock.clone(), Arc::clone(&history), raise))
+    };
     let service = tokio::spawn(service::keep(press.mode, host.status.clone()));
     let mut press_side =
         tokio::spawn(run_press(press, link, journal::HistoryJournal(Arc::clone(&history)), side));
@@ -167,11 +179,12 @@ pub async fn run(
                 if matches!(order, Order::Command(Command::Scan { .. } | Command::PartEnd)) {
                     desk.cancel();
                 }
-                dispatch(order, &commands, &mut scanning, &alarms);
+                dispatch(order, &commands, &mut scanning, &alarms, &beside.plate);
             }
         }
     };
     service.abort();
+    clock.abort();
     drop(commands);
     if let Some((_, token)) = scanning {
         token.cancel();
@@ -202,6 +215,7 @@ fn dispatch(
     commands: &std::sync::mpsc::Sender<(Command, CancelToken)>,
     scanning: &mut Option<(StrokeKey, CancelToken)>,
     alarms: &Alarms,
+    plate: &PlateInHand,
 ) {
     match order {
         Order::Command(Command::Cancel(key)) => {
@@ -210,6 +224,7 @@ fn dispatch(
             }
         }
         Order::Command(Command::PartEnd) => {
+            plate.ended();
             alarms.screen.tell(screen::Event::PartEnded);
             let ended =
                 alarms.history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
@@ -220,6 +235,7 @@ fn dispatch(
         Order::Command(command) => {
             let token = CancelToken::default();
             if let Command::Scan { key, run_id, data } = &command {
+                plate.stroke();
                 alarms.screen.tell(screen::Event::Accepted {
                     key: *key,
                     run_id: *run_id,
@@ -234,3 +250,4 @@ fn dispatch(
         Order::Seen(image) => tracing::debug!(?image, "the press says"),
     }
 }
+

@@ -164,6 +164,8 @@ alarms! {
         "プレスのレジスタマップの版が違います" "プレスのプログラムまたは press.map.in.map_version を更新してください"
     PressId = 502 Error Operator "this is another press than the plant file says" "correct host, unit or press_id in the plant file"
         "プラントファイルと違うプレスに接続されています" "プラントファイルの host、unit、press_id を修正してください"
+    ClockUnsynchronised = 503 Warning Engineer "the clock of the host has not been synchronised for an hour" "start chrony or systemd-timesyncd, and look whether it reaches its server"
+        "ホストの時計が 1 時間以上同期していません" "chrony または systemd-timesyncd を起動し、時刻サーバに接続できるか確認してください"
 }
 
 impl Code {

@@ -46,6 +46,7 @@ measures! {
     ScanTime "scan_time" "duration of the scan"
     EvaluateTime "evaluate_time" "duration of the evaluation"
     StrokeToResultTime "stroke_to_result_time" "from the trigger to the result"
+    ClockError "clock.error" "largest error of the host's clock; absent while it is not synchronised"
 }
 
 impl Measure {

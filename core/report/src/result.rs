@@ -6,6 +6,7 @@
 //! radians.
 
 mod checks;
+mod clock;
 mod fields;
 mod grid;
 mod lines;
@@ -16,6 +17,7 @@ mod plugins;
 mod trim;
 
 pub use checks::{CheckRecord, EdgeRecord, ShapeChecksRecord};
+pub use clock::ClockRecord;
 pub use grid::GridRecord;
 pub use lines::{LineRecord, PointRecord, TemplateRecord};
 pub use next::{CURVATURE_DEFICIT, Next, NextPlace, NoNext};
@@ -64,6 +66,9 @@ pub struct ResultRecord {
     pub outline: Option<OutlineRecord>,
     /// Calibration of the scanner.
     pub calibration: CalibrationRecord,
+    /// Clock of the host; null without a host, where the system does not tell, and in documents older than it.
+    #[serde(default)]
+    pub clock: Option<ClockRecord>,
     /// Scan.
     pub scan: ScanRecord,
     /// Corners (0,0), (W,0), (W,H), (0,H) on the scanned face, scanner frame.
@@ -254,6 +259,7 @@ impl ResultRecord {
                 sigma_true_mm: context.task.sigma_true.map(mm),
                 assumption: context.assumption.map(str::to_owned),
             },
+            clock: None,
             scan: ScanRecord {
                 rows: scanned.header.n_rows,
                 columns: scanned.header.n_columns,

@@ -33,6 +33,7 @@ fn measured(scan: &Path, plant: &Path, more: &[(&str, &Path)]) -> Json {
 fn comparable(mut result: Json) -> Json {
     let object = result.as_object_mut().unwrap();
     object.remove("timings_ms").unwrap();
+    object.remove("clock").unwrap();
     object.remove("stroke").unwrap();
     // One of the two was read from a file, and says so: the other has a scanner.
     object["plugins"].as_array_mut().unwrap().retain(|plugin| plugin["kind"] != "scanner");

@@ -153,6 +153,16 @@ impl Host {
         Self::run(program, plant)
     }
 
+    /// A host whose realtime clock is off by the seconds in the file `shift`.
+    pub(crate) fn with_shifted_clock(plant: &Path, shift: &Path) -> Self {
+        let library = plant.with_file_name("libshifted_clock.so");
+        let arguments = ["-shared", "-fPIC", "-Wno-pedantic"];
+        platen_tests::compile_c(&platen_tests::c_source("shifted_clock.c"), &library, &arguments);
+        let mut program = platen_tests::program("platen");
+        program.env("LD_PRELOAD", library).env("CLOCK_SHIFT", shift);
+        Self::run(program, plant)
+    }
+
     fn run(mut program: Command, plant: &Path) -> Self {
         let log =
             std::fs::File::options().create(true).append(true).open(plant.with_extension("log")).unwrap();

@@ -9,6 +9,7 @@ mod stream;
 mod advice;
 mod archive;
 mod bridge_check;
+mod clock;
 mod isolation;
 mod kill;
 mod line;

@@ -141,7 +141,11 @@ fn a_record_goes_on_from_a_backup_taken_while_its_host_ran() {
     let mut host = Host::start(&plant);
     stroke(&mut press, 1);
     stroke(&mut press, 2);
-    until("stroke 2 acknowledged", || Host::history(&plant)[1]["ack"].is_string().then_some(()));
+    // The digest of a scan follows its result.
+    until("stroke 2 acknowledged, its scan kept", || {
+        let record = Host::history(&plant);
+        ["ack", "scan_sha256"].iter().all(|it| record[1][it].is_string()).then_some(())
+    });
     let backup = folder.path().join("backup");
     let (file, copy) = (plant.to_str().unwrap(), backup.to_str().unwrap());
     let made = json(&["history", "backup", file, copy]);
@@ -177,4 +181,32 @@ fn a_record_goes_on_from_a_backup_taken_while_its_host_ran() {
     std::fs::write(&document, text.replace("fail", "pass")).unwrap();
     let said = refused(&["history", "verify", copy], 1);
     assert!(said.contains("run-000001/result.json: is not what was backed up"), "{said}");
+}
+
+#[test]
+fn a_host_asked_to_stop_waits_for_the_end_of_the_plate() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press =
+        Press::start(folder.path(), "strokes = 9\nautomatic = false\nbaseline = false\nparts = 2");
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
+    let file = plant.to_str().unwrap();
+    let mut host = Host::start(&plant);
+    stroke(&mut press, 1);
+    until("stroke 1 acknowledged", || Host::history(&plant)[0]["ack"].is_string().then_some(()));
+    assert_eq!(json(&["stop", file, "--when-idle"])["when_idle"], true);
+    until("the request in the state", || (host.status()?["status"]["stop_asked"] == true).then_some(()));
+    // The plate goes on, and so does the host.
+    stroke(&mut press, 2);
+    until("stroke 2 acknowledged", || Host::history(&plant)[1]["ack"].is_string().then_some(()));
+    assert_eq!(host.status().unwrap()["running"], true, "{}", host.log());
+    press.ask(r#"{"do":"part_end"}"#);
+    assert_eq!(host.wait(), Some(0), "{}", host.log());
+    assert_clean(&press.stats(), &host.log());
+    assert!(refused(&["stop", file], 1).contains("no host runs with this plant file"));
+
+    let mut host = Host::start(&plant);
+    until("the host to be ready", || (press.host_status() & 1 == 1).then_some(()));
+    json(&["stop", file]);
+    assert_eq!(host.wait(), Some(0), "{}", host.log());
+    assert_clean(&press.stats(), &host.log());
 }

@@ -60,7 +60,10 @@ impl Cell {
     pub fn start(config: &Path, options: &[&str]) -> Result<Self, CliError> {
         let program =
             std::env::current_exe()?.with_file_name(format!("platen-sim{}", std::env::consts::EXE_SUFFIX));
-        let what = format!("{}: cannot be started (`cargo build --release` builds it)", program.display());
+        let what = format!(
+            "{}: cannot be started (the package platen-sim has it, `cargo build --release` builds it)",
+            program.display()
+        );
         let mut child = Command::new(&program)
             .arg("press")
             .arg(config)

@@ -31,7 +31,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         CliError::Failed(format!("no host has run with this plant file ({}: {e})", folder.display()))
     })?;
     let age_s = jiff::Timestamp::now().duration_since(status.at).as_secs_f64();
-    let running = age_s < STALE_S;
+    // Negative right after the clock was set back.
+    let running = age_s.abs() < STALE_S;
     if command.prometheus {
         output::line(status.prometheus(running).trim_end())?;
     } else if common.json {
@@ -51,6 +52,15 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             if let Some(text) = text {
                 output::line(&format!("{what}: {text}"))?;
             }
+        }
+        if let Some(clock) = &status.clock {
+            output::line(&format!("clock: {}", clock.words()))?;
+        }
+        if status.restart_pending {
+            output::line("restart pending: the program was replaced; `platen stop --when-idle`")?;
+        }
+        if status.stop_asked {
+            output::line("stops at the end of the plate in hand, as asked")?;
         }
         if let Some((at, text)) = &status.alarm {
             output::line(&format!("newest alarm, {at:.0}: {text}"))?;

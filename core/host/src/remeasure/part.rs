@@ -33,8 +33,8 @@ pub(crate) fn table(rows: &[Row], compared: bool) -> Table {
         .text("scan_sha256", |row| Some(row.now.inputs.scan.clone()))
         .text("verdict", |row| Some(row.now.verdict.as_str().to_owned()))
         .text("reason", |row| row.now.reason.clone());
-    // Times of the stroke are those of the press side, which is not there.
-    let times = [Measure::ScanTime, Measure::EvaluateTime, Measure::StrokeToResultTime];
+    // Times of the stroke, and the clock that gave them, are not there.
+    let times = [Measure::ScanTime, Measure::EvaluateTime, Measure::StrokeToResultTime, Measure::ClockError];
     for measure in Measure::ALL.iter().filter(|measure| !times.contains(measure)) {
         columns = columns.float(measure.name(), |row| row.now.figures.get(measure.name()).copied());
     }

@@ -25,6 +25,7 @@ use platen_shape::{PlateSpec, Scanned, Surface};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::advice::{AdviceDesk, AdviceJob};
+use super::clock::Clock;
 use super::figures;
 use super::plugin_status::{PluginStates, PluginStatus};
 use super::previous_scans::PreviousScans;
@@ -112,6 +113,7 @@ pub(super) struct Receivers {
     pub(super) lost: Arc<AtomicU64>,
     pub(super) screen: Teller,
     pub(super) plugins: PluginStates,
+    pub(super) clock: Clock,
     pub(super) advice: AdviceDesk,
 }
 
@@ -466,8 +468,9 @@ impl MeasurementWorker {
             stroke: Some(u64::from(stroke.key.stroke)),
             supports_changed: history_view::supports_changed(supports, &stroke.plate),
         };
-        let Judgement { record, reports, task } =
+        let Judgement { mut record, reports, task } =
             judgement::judge(&self.pipeline, &stroke.scanned, &measured, surfaces, circumstances);
+        record.clock = self.receivers.clock.record();
         let folder = self.keep(stroke, &record, &measured.measurement.surface);
         let times = [
             (Measure::ScanTime, stroke.scanned.acquire + stroke.scanned.extract),
@@ -477,9 +480,16 @@ impl MeasurementWorker {
         let source = self.pipeline.register_source.and_then(|place| reports[place].as_ref().ok());
         let mut answer =
             figures::measurement(&measured, source, record.verdict, &stroke.plate, times, stroke.scanned_at);
+        if let Some(bound_ms) = record.clock.and_then(|clock| clock.error_bound_ms) {
+            answer.figures.values.insert(Measure::ClockError, bound_ms / 1000.0);
+        }
         // A result without files still goes to the press, with a warning.
         let retried = record.plugins.iter().any(|plugin| plugin.retried);
-        let warnings = [(folder.is_none(), Code::StorageDegraded), (retried, Code::PluginRestarted)];
+        let warnings = [
+            (folder.is_none(), Code::StorageDegraded),
+            (retried, Code::PluginRestarted),
+            (self.receivers.clock.is_overdue(), Code::ClockUnsynchronised),
+        ];
         answer.warning = warnings.into_iter().find_map(|(raised, code)| raised.then_some(code));
         Ok(JudgedStroke { answer, record, surface: measured.measurement.surface, reports, task, folder })
     }

@@ -28,6 +28,10 @@ impl StatusRecord {
         ] {
             one(name, "gauge", help, f64::from(u8::from(on)));
         }
+        if let Some(clock) = self.clock {
+            let help = "1 while a time server disciplines the clock";
+            one("clock_synchronised", "gauge", help, f64::from(u8::from(clock.synchronised)));
+        }
         one("result_waits_seconds", "gauge", "how long it has waited", self.result_waits_s.unwrap_or(0.0));
         if let Some(free) = self.disk_free {
             one("disk_free_bytes", "gauge", "free where results are written", free as f64);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use platen_engine::stroke::ScanBuffer;
 use platen_formats::{ScanFile, WriteError};
@@ -107,8 +107,10 @@ impl Drop for ScanRetention {
 
 /// Writes scans as they come; `kept` gets the run and the digest of each.
 fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>, kept: impl Fn(u32, &str)) {
+    // Ages run on the monotonic clock while the host lives: a clock that is set forward removes nothing.
+    let (start, since) = (SystemTime::now(), Instant::now());
     let clean = || {
-        clean(results, age, SystemTime::now()).unwrap_or_else(|e| {
+        clean(results, age, start + since.elapsed()).unwrap_or_else(|e| {
             tracing::warn!("{}: old scans are not removed: {e}", results.display());
         });
     };

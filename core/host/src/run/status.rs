@@ -10,12 +10,16 @@ use platen_model::{Code, Language};
 use platen_plant::press::Press;
 use platen_press::{Answer, Durations, Status};
 use platen_report::output_folder;
+use platen_report::result::ClockRecord;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{mpsc, watch};
 
+use super::clock::Clock;
 use super::disk;
 use super::forward::{ForwardRecord, ForwardState};
 use super::plugin_status::{PluginStates, PluginStatus};
+use super::service;
+use super::stopping::{PlateInHand, StopRequest, restart_pending};
 
 /// The newest alarm, set by the dispatcher.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
@@ -30,10 +34,15 @@ pub(super) struct Beside {
     pub(super) pages: Option<String>,
     pub(super) plugins: PluginStates,
     pub(super) forward: ForwardState,
+    pub(super) clock: Clock,
+    pub(super) plate: PlateInHand,
 }
 
 /// Its name in the output folder.
 const FILE: &str = "status.json";
+
+/// State of the handshake between two strokes.
+const IDLE: &str = "idle";
 
 /// Time from a reset until the press side has reported its state after it.
 const RESET_SHOWS: Duration = Duration::from_millis(400);
@@ -107,6 +116,15 @@ pub struct StatusRecord {
     /// Forwarding of the record; null where the plant file has none.
     #[serde(default)]
     pub forward: Option<ForwardRecord>,
+    /// Clock of the host; null where the system does not tell.
+    #[serde(default)]
+    pub clock: Option<ClockRecord>,
+    /// Whether the program was replaced since the start, so that the next start takes another one.
+    #[serde(default)]
+    pub restart_pending: bool,
+    /// Whether the host stops at the end of the plate in hand.
+    #[serde(default)]
+    pub stop_asked: bool,
 }
 
 /// Counters of the link since the start.
@@ -183,6 +201,9 @@ impl StatusRecord {
             pages: beside.pages.clone(),
             plugins: beside.plugins.lock().unwrap_or_else(PoisonError::into_inner).clone(),
             forward: beside.forward.lock().unwrap_or_else(PoisonError::into_inner).clone(),
+            clock: beside.clock.record(),
+            restart_pending: restart_pending(),
+            stop_asked: false,
         }
     }
 
@@ -195,7 +216,7 @@ impl StatusRecord {
     }
 }
 
-/// Keeps the file up to date, at most once a second but at once when the state changes; hands on requests for a reset.
+/// Keeps the file up to date, at most once a second but at once when the state changes; hands on requests for a reset and for a stop.
 pub(super) async fn keep(
     folder: PathBuf,
     press: Press,
@@ -206,7 +227,17 @@ pub(super) async fn keep(
     let request = reset_request(&folder);
     let mut reset_at = None;
     let mut reported = false;
+    let mut stop_asked = false;
     loop {
+        let asked = StopRequest::take(&folder);
+        stop_asked |= asked.is_some();
+        let is_idle = status.borrow().state.to_string() == IDLE && beside.plate.is_none();
+        if asked == Some(StopRequest::AtOnce) || stop_asked && is_idle {
+            tracing::warn!("the host stops, as `platen stop` asked");
+            service::stopping();
+            // The press side makes the registers safe and ends, and the host with it.
+            let _ = answers.send(Answer::Stop);
+        }
         if std::fs::remove_file(&request).is_ok() {
             tracing::warn!("faults are reset by `platen press reset`");
             reset_at = Some(jiff::Timestamp::now());
@@ -214,7 +245,8 @@ pub(super) async fn keep(
             let _ = answers.send(Answer::Reset);
             tokio::time::sleep(RESET_SHOWS).await;
         }
-        let record = StatusRecord::of(&press, &folder, &status.borrow_and_update(), &beside, reset_at);
+        let mut record = StatusRecord::of(&press, &folder, &status.borrow_and_update(), &beside, reset_at);
+        record.stop_asked = stop_asked;
         if let Err(error) = write(&folder, &record)
             && !std::mem::replace(&mut reported, true)
         {

@@ -81,7 +81,9 @@ fn timeline(archive: &Archive) -> Vec<TimelineRow> {
     let strokes = archive.strokes(&filter).unwrap_or_default();
     let row = |stroke: &platen_history::Stroke| {
         let since = |at: Option<jiff::Timestamp>| {
-            at.map(|at| at.duration_since(stroke.accepted).as_secs_f64() * 1000.0)
+            let ms = at?.duration_since(stroke.accepted).as_secs_f64() * 1000.0;
+            // The clock was set back between the two.
+            (ms >= 0.0).then_some(ms)
         };
         TimelineRow {
             stroke: history_view::label(stroke),
@@ -112,6 +114,16 @@ fn status(site: &Installation, board: &Board) -> Vec<(String, String)> {
         || "none: the range error of the data sheet counts".to_owned(),
         |wanted| wanted.file.display().to_string(),
     );
+    let clock = format!(
+        "{}, {}",
+        jiff::Timestamp::now().strftime("%F %T UTC"),
+        record.clock.map_or("synchronisation unknown".to_owned(), |clock| clock.words())
+    );
+    let restart = if record.restart_pending {
+        "pending: the program was replaced; platen stop --when-idle"
+    } else {
+        "none pending"
+    };
     let rows = [
         (
             "strokes",
@@ -146,7 +158,8 @@ fn status(site: &Installation, board: &Board) -> Vec<(String, String)> {
             record.disk_free.map_or("unknown".to_owned(), |bytes| format!("{:.1} GB", bytes as f64 / 1e9)),
         ),
         ("records lost", record.records_lost.to_string()),
-        ("clock", jiff::Timestamp::now().strftime("%F %T UTC").to_string()),
+        ("clock", clock),
+        ("restart", restart.to_owned()),
     ];
     let sinks = record.forward.iter().flat_map(|forward| forward.lines());
     rows.into_iter().map(|(name, value)| (name.to_owned(), value)).chain(sinks).collect()
