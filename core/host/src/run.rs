@@ -250,4 +250,3 @@ fn dispatch(
         Order::Seen(image) => tracing::debug!(?image, "the press says"),
     }
 }
-
