@@ -10,7 +10,8 @@
 //! | `cursor` | how far each sink has got |
 //! | `sink` | what a destination does |
 //! | `postgresql`, `mqtt`, `sparkplug` | the destinations |
-//! | `forwarder` | one task a sink |
+//! | `pump` | one sink's task |
+//! | `forwarder` | all of them |
 //! | [`schema`] | tables of the database |
 //! | `status` | the state for `platen status` |
 
@@ -21,6 +22,7 @@ pub mod message;
 mod mqtt;
 mod postgresql;
 mod press_state;
+mod pump;
 pub mod schema;
 mod sink;
 mod sparkplug;
