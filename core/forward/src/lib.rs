@@ -8,7 +8,7 @@
 //! | [`message`] | a change of the record as `platen.stroke/1` |
 //! | `feed` | the next messages after a cursor |
 //! | `cursor` | how far each sink has got |
-//! | `sink` | what a destination does |
+//! | `sink` | a destination |
 //! | `postgresql`, `mqtt`, `sparkplug` | the destinations |
 //! | `pump` | one sink's task |
 //! | `forwarder` | all of them |

@@ -1,4 +1,4 @@
-//! What a destination does: takes messages in order and says when it has them for good.
+//! Destination of messages: takes them in order and says when it has them for good.
 
 use std::time::Duration;
 
