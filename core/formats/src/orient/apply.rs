@@ -25,6 +25,8 @@ pub struct Columns<'a> {
     plan: &'a Plan,
     cells: Cells<'a>,
     waiting: Vec<Vec<Sample>>,
+    /// Room of the last column delivered, for the next that begins.
+    spare: Vec<Sample>,
     near: NearDirection,
     seen: u64,
     points: u64,
@@ -39,6 +41,7 @@ impl<'a> Columns<'a> {
             plan,
             cells,
             waiting: vec![Vec::new(); plan.cells.len()],
+            spare: Vec::new(),
             near: NearDirection::default(),
             seen: 0,
             points: 0,
@@ -89,6 +92,7 @@ impl<'a> Columns<'a> {
         let samples = &mut self.waiting[column as usize];
         let expected = self.plan.cells[column as usize] as usize;
         if samples.capacity() == 0 {
+            *samples = std::mem::take(&mut self.spare);
             samples.reserve_exact(expected);
         }
         if samples.len() == expected {
@@ -103,7 +107,8 @@ impl<'a> Columns<'a> {
             _ => Face::Front,
         };
         let column = Column { face, ..to_column(column, samples) };
-        *samples = Vec::new();
+        self.spare = std::mem::take(samples);
+        self.spare.clear();
         self.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
         Ok(Some(column))
     }
@@ -133,6 +138,7 @@ struct NearDirection {
 }
 
 impl NearDirection {
+    #[inline]
     fn of(&mut self, [x, y, z]: [f64; 3]) -> Direction {
         let azimuth = self.azimuth.of(y, x);
         Direction { azimuth: wrap_azimuth(azimuth), elevation: self.elevation.of(z, (x * x + y * y).sqrt()) }
@@ -173,6 +179,7 @@ impl Plan {
         up_to_zenith.then(|| (range, Direction { azimuth: wrap_azimuth(direction.azimuth), ..direction }))
     }
 
+    #[inline]
     fn sample(&self, cell: &RawCell, row: u32, near: &mut NearDirection) -> Sample {
         let (range_m, direction) = self.beam(cell).unwrap_or_else(|| {
             let position = self.position(cell);
