@@ -228,7 +228,7 @@ class Plant:
         return json.loads(run("forward", self.plant, "--until-sent", "--json"))["sinks"]
 
     def strokes(self):
-        return json.loads(run("history", "list", self.plant, "--json"))
+        return json.loads(run("history", "list", self.plant, "--newest", "1000000", "--json"))
 
     def database(self):
         return sqlite3.connect(self.folder / "results/history.sqlite", timeout=30)
