@@ -11,7 +11,7 @@ const SHARE: f64 = 1.0 / 3.0;
 /// Least number of strokes from which a scatter is told.
 pub const LEAST_STROKES: usize = 10;
 
-/// What a press can hold.
+/// Press capability: repeatability of the ram, and the gap under a board that it leaves.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct PressCapability {
     /// Standard deviation of the reached about the wanted depth, metres.

@@ -33,7 +33,7 @@ struct Row {
     plates: u64,
 }
 
-/// What a row gave.
+/// Figures of a row: one strategy on one shop.
 #[derive(Debug, Clone, Serialize)]
 struct Figures {
     order: String,

@@ -18,7 +18,7 @@ use serde_json::Value as Json;
 use crate::{Outcome, Verdict};
 use scans::Recorded;
 
-/// What the tests of a bridge need.
+/// Bridge under test: its address, members of Start, limits, and the scan that several tests look at.
 #[derive(Debug)]
 pub struct BridgeSubject {
     address: SocketAddr,

@@ -108,7 +108,7 @@ pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMu
 /// Returns a digest of the plugin's answers to the reference inputs, hexadecimal: equal in both isolations.
 ///
 /// # Errors
-/// What the plugin answered instead.
+/// The answer of the plugin in place of a digest: its error, in words.
 pub fn digest(subject: &Subject) -> Result<String, String> {
     answer::digest(subject).map_err(|error| error.to_string())
 }

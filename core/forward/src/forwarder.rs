@@ -145,7 +145,7 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
     Ok(())
 }
 
-/// What the tasks share.
+/// State shared by the tasks: cursors, and the status of each sink.
 #[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) cursors: SharedCursors,

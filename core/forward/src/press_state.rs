@@ -28,7 +28,7 @@ pub(crate) struct PressState {
     pub(crate) warning: Option<String>,
 }
 
-/// What is read of the host's status.
+/// Members of the host's status file that are read.
 #[derive(Deserialize)]
 struct Status {
     at: Timestamp,

@@ -29,7 +29,7 @@ impl SinkError {
     }
 }
 
-/// What a sink said of messages that it has.
+/// Receipt of a sink for messages that it has.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Receipt {
     /// The sink keeps messages of this press apart, or saw another host with its name: a sentence.

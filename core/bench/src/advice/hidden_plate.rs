@@ -322,7 +322,7 @@ impl<'a> HiddenPlate<'a> {
     }
 }
 
-/// What a scan shows of a plate.
+/// Measured profile of a plate: spline of its height across the lines, with the noise of a scan in the coefficients.
 pub(super) struct Scan {
     spline: Option<SplineCurve>,
     length: f64,

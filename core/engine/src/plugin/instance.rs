@@ -71,7 +71,7 @@ struct State {
     retried: bool,
 }
 
-/// What changes with the content of a file, to be had without opening it.
+/// Inode, size and modification time (seconds, nanoseconds) of a file, which change with its content and are had without opening it.
 type Stamp = (u64, u64, i64, i64);
 
 fn stamp(path: &Path) -> Option<Stamp> {

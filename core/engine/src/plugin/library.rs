@@ -26,7 +26,7 @@ pub struct Settings {
     pub limits: Limits,
 }
 
-/// What loading a library did to its process.
+/// Effects of loading a library on its process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LoadFacts {
     /// From the start of the process to the description.

@@ -35,7 +35,7 @@ pub(super) use process::printable;
 pub use serve::serve_stdin;
 pub(super) use wire::{CallError, Device, Health, Job, LoadFault, LoadedLibrary, ToHost};
 
-/// What a worker may use.
+/// Resource limits of a worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Private memory, bytes (`RLIMIT_DATA`).

@@ -21,7 +21,7 @@ pub(super) struct Session {
     primary_at: u64,
 }
 
-/// What a received message asks for.
+/// Request in a received message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Heard {
     /// Nothing.
