@@ -13,6 +13,7 @@ use platen_model::{
 use platen_plant::press::Input;
 use platen_plant::{AdviceUse, PlantFile, PlateFile};
 use platen_report::advice::{ADVICE_SCHEMA, AdviceRecord, PlateClass, Score};
+use platen_report::bend_figures::{BendFigures, bend_figures};
 use platen_report::output_folder;
 use platen_shape::{Surface, TargetSurface};
 
@@ -74,17 +75,13 @@ impl MeasuredPlate {
 
 /// Returns the bends of a report of `curvature`, the largest first.
 fn bends(report: &Report) -> Vec<Bend> {
-    let figure = |name: String| report.findings.figures.iter().find(|figure| figure.name == name);
-    let bend = |k: usize| {
-        let angle = figure(format!("bend.{k}.angle"))?;
-        Some(Bend {
-            at: angle.at?,
-            direction: figure(format!("bend.{k}.direction"))?.value,
-            angle: angle.value,
-            sigma: angle.uncertainty.unwrap_or(0.0) / platen_shape::EXPANDED,
-        })
+    let bend = |found: BendFigures| Bend {
+        at: found.at,
+        direction: found.direction,
+        angle: found.angle,
+        sigma: found.uncertainty.unwrap_or(0.0) / platen_shape::EXPANDED,
     };
-    let mut bends: Vec<Bend> = (1..).map_while(bend).collect();
+    let mut bends: Vec<Bend> = bend_figures(&report.findings.figures).into_iter().map(bend).collect();
     bends.sort_by(|a, b| b.angle.abs().total_cmp(&a.angle.abs()));
     bends
 }

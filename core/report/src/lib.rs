@@ -13,6 +13,7 @@
 //! This crate has no access to press, plugins or network.
 
 pub mod advice;
+pub mod bend_figures;
 pub mod field_export;
 pub mod history_view;
 pub mod output_folder;

@@ -23,6 +23,7 @@ use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::{PlantFile, PlateFile};
 use platen_shape::{BendingEnergy, Surface, TargetSurface};
 
+use crate::bend_figures::{BendFigures, bend_figures};
 use crate::picture::PictureScale;
 use crate::{history_view, output_folder};
 
@@ -211,37 +212,29 @@ impl SequenceStroke {
     }
 }
 
-/// Reads the bends from the figures of `curvature`: `bend.N.angle` with its place, `.direction`, `.length` and `.width`.
+/// Returns the bends of a stroke, the largest first, each with its relation to those of earlier strokes.
 fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Vec<Bend> {
-    let find = |name: String| figures.iter().find(|figure| figure.name == name);
-    let mut bends = Vec::new();
-    for number in 1.. {
-        let part = |part: &str| find(format!("bend.{number}.{part}"));
-        let (Some(angle), Some(direction), Some(length), Some(width)) =
-            (part("angle"), part("direction"), part("length"), part("width"))
-        else {
-            break;
-        };
-        let Some([u, v]) = angle.at else { break };
+    let last = earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first());
+    let bend = |found: BendFigures| {
         let mut bend = Bend {
-            at_mm: mm_pair([u, v]),
-            angle_deg: angle.value.to_degrees(),
-            uncertainty_deg: angle.uncertainty.map(f64::to_degrees),
-            direction_deg: direction.value.to_degrees(),
-            length_mm: mm(length.value),
-            width_mm: mm(width.value),
+            at_mm: mm_pair(found.at),
+            angle_deg: found.angle.to_degrees(),
+            uncertainty_deg: found.uncertainty.map(f64::to_degrees),
+            direction_deg: found.direction.to_degrees(),
+            length_mm: mm(found.length?),
+            width_mm: mm(found.width?),
             feed_mm: None,
             rehit_of: None,
-            bent_back: bent_back(file, [u, v], direction.value, angle.value),
+            bent_back: bent_back(file, found.at, found.direction, found.angle),
         };
-        let last = earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first());
         bend.feed_mm = last.map(|last| bend.apart(last.at_mm)[0]);
         bend.rehit_of = earlier
             .iter()
             .find(|stroke| stroke.bends.iter().flatten().any(|other| bend.lies_on(other)))
             .map(|stroke| stroke.stroke.clone());
-        bends.push(bend);
-    }
+        Some(bend)
+    };
+    let mut bends: Vec<Bend> = bend_figures(figures).into_iter().map_while(bend).collect();
     bends.sort_by(|a, b| b.angle_deg.abs().total_cmp(&a.angle_deg.abs()));
     bends
 }
