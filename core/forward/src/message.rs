@@ -191,7 +191,7 @@ pub fn message(archive: &Archive, names: &Names, change: &Change) -> Result<Opti
             Ok(Some(sealed(key(change.n), Document { plate: plate.as_ref().map(plate_of), ..empty() })))
         }
         (ChangeKind::Event, run_id, Some(event)) => {
-            let Some(event) = archive.events(event - 1, 1)?.pop() else { return Ok(None) };
+            let Some(event) = archive.events(event.saturating_sub(1), 1)?.pop() else { return Ok(None) };
             let of = EventOf { kind: &event.kind, run_id, text: &event.text };
             Ok(Some(sealed(key(event.event.into()), Document { event: Some(of), ..empty() })))
         }
@@ -219,7 +219,7 @@ fn seal(change: &Change, names: &Names, key: Key, parts: Document<'_>) -> Messag
     let document = Document { site: &names.site, press: &names.press, key: &key, at: &change.at, ..parts };
     // A record holds nothing that JSON cannot; a text with the character 0 is one that databases refuse.
     let text = serde_json::to_string(&document).unwrap_or_default().replace("\\u0000", "\\ufffd");
-    let sha256 = Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
+    let sha256 = sha256(text.as_bytes());
     Message { n: change.n, at: change.at.clone(), text, sha256, key }
 }
 
@@ -261,6 +261,11 @@ fn press_data(stroke: &Stroke, names: &Names) -> Json {
         values.remove("crew");
     }
     data
+}
+
+/// Returns the SHA-256 of bytes, hexadecimal.
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn time(at: jiff::Timestamp) -> String {

@@ -5,7 +5,6 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
-use sha2::{Digest as _, Sha256};
 
 /// Members of `platen.result/1` that are taken as they are.
 const TAKEN: [&str; 12] = [
@@ -55,7 +54,7 @@ impl DocumentExcerpt {
     pub(super) fn load(path: &Path) -> Option<Self> {
         let bytes = std::fs::read(path).ok()?;
         let document: Json = serde_json::from_slice(&bytes).ok()?;
-        let sha256 = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let sha256 = super::sha256(&bytes);
         let taken = members(&document, &TAKEN);
         let lines = document["reference_lines"].as_array().into_iter().flatten();
         let templates = lines.flat_map(|line| {
