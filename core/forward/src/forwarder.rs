@@ -3,7 +3,7 @@
 //! A sink that stalls, lies or is away delays no other sink, and nothing that is done here reaches the press: the record is read only.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use platen_plant::{Forward, PlantFile, SinkKind, SinkUse};
@@ -16,6 +16,7 @@ use crate::message::Names;
 use crate::mqtt::MqttSink;
 use crate::postgresql::PostgresqlSink;
 use crate::pump::Pump;
+use crate::shared::Shared;
 use crate::sparkplug::SparkplugSink;
 use crate::status::{ForwardStatus, SinkStatus};
 
@@ -143,20 +144,6 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
         }
     }
     Ok(())
-}
-
-/// State shared by the tasks: cursors, and the status of each sink.
-#[derive(Debug)]
-pub(crate) struct Shared {
-    pub(crate) cursors: SharedCursors,
-    pub(crate) sinks: Mutex<Vec<SinkStatus>>,
-}
-
-impl Shared {
-    fn status(&self) -> ForwardStatus {
-        let sinks = self.sinks.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        ForwardStatus { at: jiff::Timestamp::now(), pid: std::process::id(), sinks }
-    }
 }
 
 /// Writes the state to the output folder, at most once a second.

@@ -10,6 +10,7 @@
 //! | `cursor` | how far each sink has got |
 //! | `sink` | a destination |
 //! | `postgresql`, `mqtt`, `sparkplug` | the destinations |
+//! | `shared` | cursors and states that the tasks share |
 //! | `pump` | one sink's task |
 //! | `forwarder` | all of them |
 //! | [`schema`] | tables of the database |
@@ -24,6 +25,7 @@ mod postgresql;
 mod press_state;
 mod pump;
 pub mod schema;
+mod shared;
 mod sink;
 mod sparkplug;
 mod status;

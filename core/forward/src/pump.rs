@@ -8,8 +8,8 @@ use tokio::sync::watch;
 
 use crate::cursor::CursorError;
 use crate::feed::Feed;
-use crate::forwarder::Shared;
 use crate::message::Message;
+use crate::shared::Shared;
 use crate::sink::{Sink, SinkError};
 use crate::status::SinkStatus;
 
