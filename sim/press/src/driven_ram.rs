@@ -3,12 +3,10 @@
 //! The steel gives the angle that stays after unloading ([`FibreStrip`]); the plate's shape takes it as a bend band of a third of the die's opening, the
 //! reach of the plastic hinge under three-point bending.
 
-use platen_sim_plate::{FibreSteel, FibreStrip, Press, Stroke};
+use platen_sim_plate::{Blank, FibreSteel, FibreStrip, Press, Stroke};
 use rand_distr::{Distribution as _, Normal};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
-
-use crate::forming_model::PlateConfig;
 
 /// Steel, die and ram as they are. Every key has a default.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -87,11 +85,11 @@ pub struct DrivenRam {
 impl DrivenRam {
     /// Creates the ram with a flat plate; `part` draws its steel.
     #[must_use]
-    pub fn new(config: &RamConfig, plate: &PlateConfig, part: u32, axis_deg: f64) -> Self {
+    pub fn new(config: &RamConfig, blank: &Blank, part: u32, axis_deg: f64) -> Self {
         let mut random = Pcg64::new(u128::from(config.seed) << 32 | u128::from(part), 0x72_616d);
         let (sin, cos) = axis_deg.to_radians().sin_cos();
-        let length = 1e-3 * (plate.blank.width_mm * sin.abs() + plate.blank.height_mm * cos.abs());
-        let thickness = 1e-3 * plate.blank.thickness_mm;
+        let length = 1e-3 * (blank.width_mm * sin.abs() + blank.height_mm * cos.abs());
+        let thickness = 1e-3 * blank.thickness_mm;
         let scatter = 1.0 + config.yield_scatter * draw(1.0, &mut random);
         let steel = FibreSteel {
             yield_strength: 1e6 * config.yield_mpa * scatter,

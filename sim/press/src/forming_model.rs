@@ -111,7 +111,7 @@ impl FormingModel {
         let pose = config.handling.place(&config.pose, 0);
         let state = PlateState { blank: config.blank.clone(), shape: Shape::Flat, pose, strokes: 0 };
         let axis_deg = programme.first().map_or(90.0, |stroke| stroke.axis_deg);
-        let ram = DrivenRam::new(&config.ram, config, part, axis_deg);
+        let ram = DrivenRam::new(&config.ram, &config.blank, part, axis_deg);
         Ok(Self {
             config: config.clone(),
             strategy,
