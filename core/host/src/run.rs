@@ -12,7 +12,7 @@
 //! | `screen` | the browser pages, where the plant file has `[screen]` |
 //! | `advice` | the next stroke, after the result, where the plant file has `[advice]` |
 //! | `alarms` | an alarm to the log, the record, the status and the pages |
-//! | `forward` | the state of `platen forward`, where the plant file has `[forward]` |
+//! | `forward`, `forward_record` | watch of `platen forward` and its state, where the plant file has `[forward]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
 //! | `clock` | synchronisation and jumps of the machine's clock |
 //! | `stopping` | requests to stop, between two plates |
@@ -23,6 +23,7 @@ mod alarms;
 mod clock;
 mod disk;
 mod forward;
+mod forward_record;
 mod measurement_worker;
 
 pub(crate) mod figures;
@@ -49,7 +50,7 @@ use platen_plant::press::Press;
 use platen_press::{Command, Order, PressLink, RunError, channels, run_press};
 use tokio::sync::watch;
 
-pub use forward::ForwardRecord;
+pub use forward_record::ForwardRecord;
 pub use measurement_worker::StrokeReport;
 pub use plugin_status::PluginStatus;
 pub use screen::{Pages, ScreenError};

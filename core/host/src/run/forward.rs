@@ -2,64 +2,20 @@
 //!
 //! The forwarder is a process of its own; it leaves its state in a file of the output folder. One that does not run is behind, too.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::PathBuf;
+use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
-use platen_forward::{ForwardStatus, SinkStatus};
+use platen_forward::SinkStatus;
 use platen_model::Code;
-use serde::{Deserialize, Serialize};
 
 use super::alarms::Alarms;
+use super::forward_record::{ForwardRecord, ForwardState};
 
 /// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
-/// Age of its state from which on the forwarder does not run, seconds.
-const STALE_S: f64 = 10.0;
 /// How far a sink may be behind.
 const BEHIND: Duration = Duration::from_secs(3600);
-
-/// State of the forwarding as the host sees it.
-pub(super) type ForwardState = Arc<Mutex<Option<ForwardRecord>>>;
-
-/// State of the forwarding.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ForwardRecord {
-    /// Whether `platen forward` runs.
-    pub running: bool,
-    /// Its sinks, as it last told.
-    pub sinks: Vec<SinkStatus>,
-}
-
-impl ForwardRecord {
-    /// Reads what the forwarder left in an output folder.
-    #[must_use]
-    pub fn load(folder: &Path) -> Self {
-        let found = ForwardStatus::load(folder).ok().flatten();
-        let age =
-            |status: &ForwardStatus| jiff::Timestamp::now().duration_since(status.at).as_secs_f64().abs();
-        let running = found.as_ref().is_some_and(|status| age(status) < STALE_S);
-        Self { running, sinks: found.map(|status| status.sinks).unwrap_or_default() }
-    }
-
-    /// Returns one line for each sink; one in all where the forwarder has never run.
-    #[must_use]
-    pub fn lines(&self) -> Vec<(String, String)> {
-        let not = if self.running { "" } else { "platen forward does not run; as it last told: " };
-        let lines: Vec<_> = self
-            .sinks
-            .iter()
-            .map(|sink| (format!("sink {}", sink.name), format!("{not}{}", sink.line())))
-            .collect();
-        match lines.is_empty() {
-            true => vec![(
-                "sinks".to_owned(),
-                "platen forward has not run; start it with this plant file".to_owned(),
-            )],
-            false => lines,
-        }
-    }
-}
 
 /// Looks at the forwarder's state each second, for ever.
 pub(super) async fn watch(folder: PathBuf, state: ForwardState, alarms: Alarms) {

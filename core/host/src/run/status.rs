@@ -16,7 +16,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::clock::Clock;
 use super::disk;
-use super::forward::{ForwardRecord, ForwardState};
+use super::forward_record::{ForwardRecord, ForwardState};
 use super::plugin_status::{PluginStates, PluginStatus};
 use super::service;
 use super::stopping::{PlateInHand, StopRequest, restart_pending};
