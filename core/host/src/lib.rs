@@ -5,6 +5,5 @@ mod judgement;
 mod plate_history;
 mod plugin_records;
 pub mod progress;
-mod remeasure;
 pub mod run;
 mod sha256;

@@ -17,6 +17,9 @@ use crate::result::{CURVATURE_DEFICIT, LineRecord, Next, PlateRecord, ResultReco
 /// Name of the surface's file: the `platen.surface/1` buffer of `platen.h` that comparisons receive.
 pub const SURFACE: &str = "surface.platen";
 
+/// Name of the raw scan, where it is kept.
+pub const SCAN: &str = "scan.e57";
+
 /// Fields whose colours are written as a picture of the plate alone, for the plate in 3D.
 pub const TEXTURES: [&str; 2] = [CURVATURE_DEFICIT, "deviation"];
 

@@ -1,5 +1,7 @@
 //! `platen remeasure`: measures the strokes of a record again from their kept scans.
 
+mod remeasurer;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,7 +17,7 @@ use serde_json::json;
 use super::selection::Selection;
 use super::{CliError, Common, output};
 use crate::progress;
-use crate::remeasure::{Difference, Outcome, Remeasured, Remeasurer, Row, result_folder, table};
+use remeasurer::{Difference, Outcome, Remeasured, Remeasurer, Row, result_folder, table};
 
 #[derive(Debug, Args)]
 #[command(

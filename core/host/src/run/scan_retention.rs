@@ -15,14 +15,13 @@ use platen_engine::stroke::ScanBuffer;
 use platen_formats::{ScanFile, WriteError};
 use platen_history::History;
 use platen_plant::plant::{KeepScans, Output};
+use platen_report::output_folder;
 use platen_scan::{Column, ScanEnd, ScanHeader};
 
 use super::disk;
 use super::scan_store::Waker;
 use crate::sha256;
 
-/// Name of a scan in a result's folder.
-pub(super) const NAME: &str = "scan.e57";
 /// Bytes of a disk reserved for results and history.
 const RESERVE: u64 = 1 << 30;
 /// Bytes of a cell in the file: three f64, state, intensity, row and column.
@@ -131,7 +130,7 @@ fn write(folder: &Path, buffer: ScanBuffer) -> Result<String, String> {
     let cells: usize = columns.iter().map(Column::len).sum();
     let needed = cells as u64 * CELL_BYTES;
     check_room(needed, disk::free(folder).map_err(|e| e.to_string())?)?;
-    let path = folder.join(NAME);
+    let path = folder.join(output_folder::SCAN);
     save(&path, &header, columns, &end).map_err(|e| e.to_string())?;
     sha256::of_file(&path).map_err(|e| e.to_string())
 }
@@ -182,12 +181,13 @@ fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Res
 /// Whether a file is a scan that is too old, or a partial file of another process.
 fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTime) -> bool {
     let old = |limit| now.duration_since(modified).is_ok_and(|age| age > limit);
-    let half = name.strip_prefix(NAME).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
+    let half =
+        name.strip_prefix(output_folder::SCAN).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
     // `scan.e57.<process>.<random>.part`
     let half = half.map(|half| half.split_once('.').map_or(half, |(process, _)| process));
     match half {
         Some(process) => process.parse() != Ok(std::process::id()) && process.parse::<u32>().is_ok(),
-        None => name == NAME && age.is_some_and(old),
+        None => name == output_folder::SCAN && age.is_some_and(old),
     }
 }
 

@@ -18,9 +18,9 @@ use platen_history::{Archive, Filter, History, Stroke};
 use platen_model::Verdict;
 use platen_plant::PlantFile;
 use platen_plant::plant::{ScanStore, StoredScans};
+use platen_report::output_folder;
 use sha2::{Digest as _, Sha256};
 
-use super::scan_retention::NAME;
 use crate::sha256;
 
 /// Strokes that are looked at after a scan; at the start all are.
@@ -85,7 +85,7 @@ impl Copier {
         };
         for stroke in wanted(&strokes, &self.rule) {
             let run = format!("run-{:06}", stroke.run_id);
-            let scan = self.results.join(&run).join(NAME);
+            let scan = self.results.join(&run).join(output_folder::SCAN);
             if !scan.is_file() {
                 continue;
             }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use platen_history::{Archive, Filter};
 use platen_plant::PlantFile;
+use platen_report::output_folder;
 use serde::{Deserialize, Serialize};
 
 use super::{CliError, Common, open, output};
@@ -16,8 +17,6 @@ use crate::{progress, sha256};
 const SCHEMA: &str = "platen.backup/1";
 const MANIFEST: &str = "manifest.json";
 const DATABASE: &str = "history.sqlite";
-/// Raw scan in the folder of a stroke.
-const SCAN: &str = "scan.e57";
 
 #[derive(Debug, Args)]
 pub(super) struct Backup {
@@ -237,7 +236,8 @@ fn described(folder: &Path, relative: &Path) -> Result<Copied, CliError> {
 
 /// Returns whether a file of a stroke belongs into a backup: not what is still being written, under a name of its own.
 fn is_wanted(file: &OsStr, scans: bool) -> bool {
-    Path::new(file).extension().is_none_or(|extension| extension != "part") && (scans || file != SCAN)
+    Path::new(file).extension().is_none_or(|extension| extension != "part")
+        && (scans || file != output_folder::SCAN)
 }
 
 /// Documents are replaced by a rename and never changed in place, so a link keeps what it is; across file systems they are copied.

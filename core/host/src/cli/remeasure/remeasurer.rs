@@ -40,8 +40,6 @@ pub(crate) use part::{Row, table};
 const SCHEMA: &str = "platen.remeasured/1";
 /// Written last into the folder of a result, which is complete with it.
 const MARK: &str = "remeasured.json";
-/// Raw scan in the folder of a stroke.
-const SCAN: &str = "scan.e57";
 
 /// Result of a stroke that was measured again: `remeasured.json` beside the result's document.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -310,7 +308,7 @@ impl<'a> Remeasurer<'a> {
         if let Some(known) = self.scans.get(&stroke.run_id) {
             return Ok(known.clone());
         }
-        let beside = result_folder(&self.plant.output.folder, stroke.run_id).join(SCAN);
+        let beside = result_folder(&self.plant.output.folder, stroke.run_id).join(output_folder::SCAN);
         let path = [Some(beside), stroke.scan.clone()].into_iter().flatten().find(|path| path.is_file());
         let kept = path.map(|path| Ok::<_, CliError>(KeptScan { sha256: file_digest(&path)?, path }));
         let kept = kept.transpose()?;
