@@ -1,4 +1,4 @@
-//! Planner: the fewest bends, none of them backwards, with which every board passes.
+//! Planner, by non-negative least squares: the fewest bends, none of them backwards, with which every board passes.
 //!
 //! Heights of the plate over the target are linear in the angles (see [`Board`]). The angles of given lines are the non-negative least
 //! squares solution under all boards, with each board's rigid motion projected out. Over lines on a fine grid it gives the missing turn;

@@ -1,4 +1,4 @@
-//! Press capability: what the scatter of the ram leaves under a board, beside the limit.
+//! Press capability: gap under a board that the repeatability of the ram leaves, beside the limit; first order.
 //!
 //! A ram that repeats to s turns the plate by s / (w / 4) more or less in a die of opening w; under a board of chord c that is a gap of
 //! c s / w. A third of the limit is as much as a press may take of it: the rest is for places, plates and the scan.

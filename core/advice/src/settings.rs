@@ -1,6 +1,6 @@
-//! Choices of a shop.
+//! Settings of the advice, as a shop chooses them: largest bend of a stroke, order of the lines.
 
-/// Choices of a shop.
+/// Settings of the advice.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
     /// Largest bend of one stroke, radians.

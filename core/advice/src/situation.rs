@@ -1,4 +1,4 @@
-//! The plate as the planner sees it: bend lines, boards across them, and the curvature of the blank.
+//! Input of the planner: bend lines, boards across them with the heights of the plate over its target, and the curvature of the blank.
 
 use platen_model::{CannotAdvise, PlateHistory};
 use platen_shape::{Surface, TargetSurface};

@@ -1,4 +1,4 @@
-//! Sends the record of a host to databases and brokers: `platen forward`.
+//! Transactional outbox: the record of a host to databases and brokers, by `platen forward`.
 //!
 //! A process of its own reads the record beside the host and keeps a cursor for each sink. Nothing is queued twice: the record's table of changes is
 //! the outbox, and a cursor moves when its sink has acknowledged. A change that is sent twice is known by its key.

@@ -1,4 +1,4 @@
-//! One sink's task: what is new in the record is sent, and the cursor follows what was acknowledged.
+//! At-least-once delivery to one sink: new changes of the record are sent, and the cursor follows what was acknowledged.
 
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;

@@ -1,4 +1,5 @@
-//! Where the material of a rectangular blank lies on a doubly curved plate that is bent with the least stretching.
+//! Airy stress function of a shallow plate with constant Gaussian curvature: material displacements of a rectangular blank that is bent to a
+//! doubly curved plate with the least membrane energy.
 //!
 //! The plate is shallow: its Gaussian curvature K is constant and K times its area small. The membrane stresses then follow from an Airy
 //! stress function X (over Young's modulus) with del^4 X = -K and X = dX/dn = 0 at the free edges (Foeppl; Timoshenko and Woinowsky-Krieger,

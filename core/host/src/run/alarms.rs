@@ -1,4 +1,4 @@
-//! Where an alarm goes: the log, the record, `platen status`, the pages.
+//! Dispatch of alarms: to the log, the record, `platen status` and the pages.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
