@@ -143,6 +143,7 @@ class Press:
         self.results.append({"stroke": number, "session": session, "baseline": bool(extra), "words": words,
                              "accepted_ms": round((accepted - raised) * 1e3),
                              "result_ms": round((time.monotonic() - raised) * 1e3)})
+        await asyncio.sleep(self.options.read_s)
         self.control(on=ACK)
         await self.until("valid to fall", lambda: not h(2) & VALID, self.options.accept_s)
         self.control(off=ACK)
@@ -219,6 +220,7 @@ if __name__ == "__main__":
     parser.add_argument("--gap-limit", type=int, help="0.01 mm, a passed result must not exceed it")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--ram-s", type=float, default=0.05, help="time of the ram's way")
+    parser.add_argument("--read-s", type=float, default=0, help="time that a result stands before it is acknowledged")
     parser.add_argument("--ready-s", type=float, default=30)
     parser.add_argument("--accept-s", type=float, default=5)
     parser.add_argument("--result-s", type=float, default=60)

@@ -28,10 +28,12 @@ fn a_pymodbus_press_gets_twenty_right_results() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
+    // The press waits 30 s for a host; what is not built yet takes longer.
+    platen_tests::built();
     let peers = platen_tests::repository().join("tests/peers");
     let mut press = Command::new(python())
         .arg(peers.join("pymodbus_press.py"))
-        .args(["--strokes", "20", "--recipe", "9", "--press-id", "3"])
+        .args(["--strokes", "20", "--recipe", "9", "--press-id", "3", "--read-s", "0.3"])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
@@ -41,7 +43,7 @@ fn a_pymodbus_press_gets_twenty_right_results() {
     let plant = plant(folder.path(), &address, "shape = \"cylinder\"\nradius_mm = 9018.0");
     let mut host = Host::start(&plant);
 
-    // While it runs, mbpoll reads the words that stand in the press's registers for the host's newest result.
+    // While it runs, and the press leaves every result standing for 0.3 s, mbpoll reads the words that stand in the press's registers for the host's newest result.
     let words = crate::cell::until("mbpoll", || {
         let output =
             Command::new(peers.join("mbpoll_words.sh")).args([&address, "100", "64"]).output().unwrap();
