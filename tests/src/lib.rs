@@ -21,7 +21,18 @@ pub fn built() -> &'static Path {
         let test = std::env::current_exe().unwrap_or_default();
         let folder = test.ancestors().nth(2).unwrap_or(Path::new("")).to_path_buf();
         let profile = if folder.ends_with("debug") { "dev" } else { "release" };
-        let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        // What the outer cargo says of this package is not the workspace's: ring's build script would run again
+        // because of it, and all that stands on TLS would be compiled twice.
+        for (name, _) in std::env::vars_os() {
+            if name
+                .to_str()
+                .is_some_and(|name| name.starts_with("CARGO_MANIFEST_") || name.starts_with("CARGO_PKG_"))
+            {
+                cargo.env_remove(name);
+            }
+        }
+        let status = cargo
             .args(["build", "--quiet", "--workspace", "--profile", profile])
             .current_dir(repository())
             .status();
