@@ -166,7 +166,7 @@ fn limits_bite() {
     for plugin in ["harmonic", "faro-file"] {
         for fault in ["eat_memory", "eat_files"] {
             let measured = bench.with_fault(plugin, "run", fault);
-            // The plugin gives up when it gets no more: without a limit it would go on until the system's memory ends.
+            // The plugin gives up when it gets no more: without a limit it would hang.
             let ended = if plugin == "harmonic" && fault == "eat_files" { "SIGSYS" } else { "SIGABRT" };
             assert!(measured.error.contains(ended), "{plugin} {fault}: {}", measured.error);
             assert_eq!(measured.code, Some(1));
