@@ -25,7 +25,9 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let plant = PlantFile::load(&command.plant)?;
-    let needs = Needs::of(&plant);
+    // The unit's own folder of state carries the name of its plant file.
+    let state = Path::new("/var/lib/platen").join(command.plant.file_stem().unwrap_or_default());
+    let needs = Needs::of(&plant, &state);
     let text = needs.drop_in(&command.plant);
     output::either(
         common,
@@ -45,12 +47,12 @@ struct Needs {
     names: Vec<String>,
     /// Serial lines.
     devices: Vec<PathBuf>,
-    /// Folders that are written.
+    /// Folders that are written beside the unit's own folder of state.
     writes: Vec<PathBuf>,
 }
 
 impl Needs {
-    fn of(plant: &PlantFile) -> Self {
+    fn of(plant: &PlantFile, state: &Path) -> Self {
         let mut needs = Self::default();
         match plant.press.as_ref().map(|press| &press.link.transport) {
             Some(Transport::Tcp(socket) | Transport::RtuOverTcp(socket, _)) => {
@@ -78,7 +80,7 @@ impl Needs {
         let calibration = plant.calibration.as_ref().and_then(|it| it.file.parent());
         let store = plant.scan_store.as_ref().map(|store| store.folder.as_path());
         for folder in folders.into_iter().chain([calibration, store]).flatten() {
-            if !folder.starts_with("/var/lib/platen") && !needs.writes.iter().any(|it| it == folder) {
+            if !folder.starts_with(state) && !needs.writes.iter().any(|it| it == folder) {
                 needs.writes.push(folder.to_owned());
             }
         }
@@ -126,5 +128,46 @@ impl Needs {
             let _ = writeln!(text, "ReadWritePaths={}", folder.display());
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn needs(plant: &str, changes: &[(&str, &str)], state: &str) -> Needs {
+        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config");
+        let text = std::fs::read_to_string(config.join(plant)).unwrap();
+        let text = changes.iter().fold(text, |text, (old, new)| {
+            assert!(text.contains(old), "{plant} holds no {old}");
+            text.replace(old, new)
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("plant.toml");
+        std::fs::write(&file, text.replace("\"plates\"", &format!("{:?}", config.join("plates")))).unwrap();
+        Needs::of(&PlantFile::load(&file).unwrap(), Path::new(state))
+    }
+
+    #[test]
+    fn addresses_of_press_and_scanner_but_loopback() {
+        let changes =
+            [("\"127.0.0.1\"", "\"10.0.0.5\""), ("\"../platen-results\"", "\"/var/lib/platen/a/results\"")];
+        let needs = needs("sim-plant.toml", &changes, "/var/lib/platen/a");
+        assert_eq!(needs.addresses, ["10.0.0.5"]);
+        assert!(needs.names.is_empty() && needs.devices.is_empty() && needs.writes.is_empty(), "{needs:?}");
+    }
+
+    #[test]
+    fn a_folder_of_another_unit_is_told() {
+        let changes = [("\"../platen-results\"", "\"/var/lib/platen/a/results\"")];
+        let needs = needs("sim-plant.toml", &changes, "/var/lib/platen/b");
+        assert_eq!(needs.writes, [Path::new("/var/lib/platen/a/results")]);
+    }
+
+    #[test]
+    fn a_serial_line_is_a_device() {
+        let needs = needs("plant-rtu.toml", &[], "/var/lib/platen/a");
+        assert_eq!(needs.devices.len(), 1, "{needs:?}");
+        assert!(needs.drop_in(Path::new("/etc/platen/a.toml")).contains("DeviceAllow="), "{needs:?}");
     }
 }
