@@ -1,4 +1,4 @@
--- Views for the questions of a plant: how a plate was bent, and how presses and crews compare. Baselines and trials do not count as strokes.
+-- Views and functions of a time for the questions of a plant: how a plate was bent, and how presses and crews compare. Baselines and trials do not count as strokes.
 
 CREATE VIEW platen.bend_made AS
 SELECT s.site, s.press, s.owner, s.plate, s.run_id, s.accepted, b.n::int AS n, (b.of->'at_mm'->>0)::float8 AS u_mm,
@@ -18,24 +18,23 @@ SELECT b.*, EXISTS (
 ) AS rehit
 FROM platen.bend_made b;
 
--- Strokes of a plate with what came before on it.
-CREATE VIEW platen.plate_stroke AS
-SELECT s.*, coalesce(bool_or(s.verdict = 'pass') OVER (so_far ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING), false) AS passed_before,
-    bool_or(s.verdict = 'pass') OVER (PARTITION BY s.site, s.press, s.owner, s.plate) AS ever_passed
-FROM platen.stroke s
-WHERE NOT s.baseline AND NOT s.dry_run
-WINDOW so_far AS (PARTITION BY s.site, s.press, s.owner, s.plate ORDER BY s.run_id);
-
--- Course of each plate to its first pass. A plate that never passed has neither strokes_to_pass nor minutes_to_pass.
-CREATE VIEW platen.plate_course AS
-SELECT s.site, s.press, s.owner, s.plate, min(s.part_id) AS part_id, min(s.part_name) AS part_name, max(s.recipe) AS recipe,
-    CASE WHEN count(DISTINCT s.crew) = 1 THEN max(s.crew) END AS crew, min(s.accepted) AS began, max(s.accepted) AS last_stroke,
-    count(*) AS strokes, count(*) FILTER (WHERE s.verdict = 'not_measured') AS not_measured,
-    count(*) FILTER (WHERE s.verdict = 'fail' AND s.sense > 0) AS overshoots, min(s.accepted) FILTER (WHERE s.verdict = 'pass') AS passed,
-    nullif(count(*) FILTER (WHERE s.ever_passed AND NOT s.passed_before), 0) AS strokes_to_pass,
-    extract(epoch FROM min(s.accepted) FILTER (WHERE s.verdict = 'pass') - min(s.accepted))::float8 / 60 AS minutes_to_pass
-FROM platen.plate_stroke s
-GROUP BY s.site, s.press, s.owner, s.plate;
+-- Course of each plate that began in a time, to its first pass. A plate that never passed has neither strokes_to_pass nor minutes_to_pass. Strokes more
+-- than 90 days after the time are not looked for, so that the months before and after it are not read.
+CREATE FUNCTION platen.plate_courses(since timestamptz, until timestamptz)
+RETURNS TABLE (site text, press text, owner int, plate bigint, part_id bigint, part_name text, recipe int, crew int, began timestamptz,
+    last_stroke timestamptz, strokes bigint, not_measured bigint, overshoots bigint, passed timestamptz, strokes_to_pass int, minutes_to_pass float8)
+LANGUAGE sql STABLE AS $$
+    SELECT s.site, s.press, s.owner, s.plate, min(s.part_id), min(s.part_name), max(s.recipe), CASE WHEN min(s.crew) = max(s.crew) THEN max(s.crew) END,
+        min(s.accepted), max(s.accepted), count(*), count(*) FILTER (WHERE s.verdict = 'not_measured'),
+        count(*) FILTER (WHERE s.verdict = 'fail' AND s.sense > 0), min(s.accepted) FILTER (WHERE s.verdict = 'pass'),
+        array_position(array_agg(s.verdict = 'pass' ORDER BY s.run_id), true),
+        extract(epoch FROM min(s.accepted) FILTER (WHERE s.verdict = 'pass') - min(s.accepted))::float8 / 60
+    FROM platen.plate p JOIN platen.stroke s ON s.site = p.site AND s.press = p.press AND s.owner = p.owner AND s.plate = p.plate
+    WHERE p.began >= since AND p.began < until AND s.accepted >= since AND s.accepted < until + interval '90 days' AND NOT s.baseline AND NOT s.dry_run
+    GROUP BY s.site, s.press, s.owner, s.plate
+$$;
+CREATE INDEX ON platen.plate (began);
+CREATE VIEW platen.plate_course AS SELECT * FROM platen.plate_courses('-infinity', 'infinity');
 
 -- Bends and re-hits of each plate.
 CREATE VIEW platen.plate_bends AS
@@ -48,33 +47,47 @@ CREATE FUNCTION platen.interval_95(deviation float8, n bigint) RETURNS float8 LA
     SELECT CASE WHEN n >= 10 THEN (1.95996 + 2.37227 / (n - 1) + 2.82250 / (n - 1) ^ 2) * deviation / sqrt(n) END
 $$;
 
--- Plates of one recipe that passed, for each press and for each crew. Fewer than 20 plates say nothing: at the usual scatter of a quarter, 20 plates
--- tell a difference of 20 %.
-CREATE VIEW platen.compared AS
-SELECT c.site, c.of_crews, c.press, c.crew, c.recipe, c.plates, c.strokes_mean, c.strokes_mean - c.half AS strokes_low,
-    c.strokes_mean + c.half AS strokes_high, c.minutes_median, c.overshoot_share,
-    CASE WHEN c.plates < 20 THEN 'fewer than 20 plates: no comparison' END AS caveat
-FROM (
-    SELECT site, grouping(press) = 1 AS of_crews, press, crew, recipe, count(*) AS plates,
-        CASE WHEN count(*) >= 20 THEN avg(strokes_to_pass)::float8 END AS strokes_mean,
-        platen.interval_95(stddev_samp(strokes_to_pass)::float8, count(*)) AS half,
-        CASE WHEN count(*) >= 20 THEN percentile_cont(0.5) WITHIN GROUP (ORDER BY minutes_to_pass) END AS minutes_median,
-        CASE WHEN count(*) >= 20 THEN avg((overshoots > 0)::int)::float8 END AS overshoot_share
-    FROM platen.plate_course WHERE strokes_to_pass IS NOT NULL
-    GROUP BY GROUPING SETS ((site, press, recipe), (site, crew, recipe))
-) AS c;
+-- Plates of one recipe that began in a time and passed, for each press and for each crew. Fewer than 20 plates say nothing: at the usual scatter of a
+-- quarter, 20 plates tell a difference of 20 %.
+CREATE FUNCTION platen.compared(since timestamptz, until timestamptz)
+RETURNS TABLE (site text, of_crews boolean, press text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8,
+    minutes_median float8, overshoot_share float8, caveat text)
+LANGUAGE sql STABLE AS $$
+    SELECT c.site, c.of_crews, c.press, c.crew, c.recipe, c.plates, c.strokes_mean, c.strokes_mean - c.half, c.strokes_mean + c.half, c.minutes_median,
+        c.overshoot_share, CASE WHEN c.plates < 20 THEN 'fewer than 20 plates: no comparison' END
+    FROM (
+        SELECT site, grouping(press) = 1 AS of_crews, press, crew, recipe, count(*) AS plates,
+            CASE WHEN count(*) >= 20 THEN avg(strokes_to_pass)::float8 END AS strokes_mean,
+            platen.interval_95(stddev_samp(strokes_to_pass)::float8, count(*)) AS half,
+            CASE WHEN count(*) >= 20 THEN percentile_cont(0.5) WITHIN GROUP (ORDER BY minutes_to_pass) END AS minutes_median,
+            CASE WHEN count(*) >= 20 THEN avg((overshoots > 0)::int)::float8 END AS overshoot_share
+        FROM platen.plate_courses(since, until) WHERE strokes_to_pass IS NOT NULL
+        GROUP BY GROUPING SETS ((site, press, recipe), (site, crew, recipe))
+    ) AS c
+$$;
 
 -- Presses compared. Plates of one heat are alike, so that the intervals are too narrow where few heats were bent.
-CREATE VIEW platen.press_compared AS
-SELECT site, press, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
-    coalesce(caveat, 'intervals take plates as independent; plates of one heat are not') AS caveat
-FROM platen.compared WHERE NOT of_crews;
+CREATE FUNCTION platen.presses_compared(since timestamptz, until timestamptz)
+RETURNS TABLE (site text, press text, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8, minutes_median float8,
+    overshoot_share float8, caveat text)
+LANGUAGE sql STABLE AS $$
+    SELECT site, press, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
+        coalesce(caveat, 'intervals take plates as independent; plates of one heat are not')
+    FROM platen.compared(since, until) WHERE NOT of_crews
+$$;
 
 -- Crews compared, where the plant lets their codes leave the record. Plates that two crews bent are left out.
-CREATE VIEW platen.crew_compared AS
-SELECT site, crew, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
-    coalesce(caveat, 'a crew with hard plates is not a bad crew: platen history skill takes the hardness out') AS caveat
-FROM platen.compared WHERE of_crews AND crew IS NOT NULL;
+CREATE FUNCTION platen.crews_compared(since timestamptz, until timestamptz)
+RETURNS TABLE (site text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8, minutes_median float8,
+    overshoot_share float8, caveat text)
+LANGUAGE sql STABLE AS $$
+    SELECT site, crew, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
+        coalesce(caveat, 'a crew with hard plates is not a bad crew: platen history skill takes the hardness out')
+    FROM platen.compared(since, until) WHERE of_crews AND crew IS NOT NULL
+$$;
+
+-- The sign of life of each press, without reading what it sent.
+CREATE INDEX ON platen.inbox USING brin (at);
 
 GRANT SELECT ON ALL TABLES IN SCHEMA platen TO platen_reader;
-GRANT EXECUTE ON FUNCTION platen.interval_95 TO platen_reader;
+GRANT EXECUTE ON FUNCTION platen.interval_95, platen.plate_courses, platen.compared, platen.presses_compared, platen.crews_compared TO platen_reader;

@@ -548,6 +548,7 @@ def check_the_dashboards_answer(site):
 def grafana(sql):
     """A query as Grafana sends it: time filter and variables filled in."""
     sql = re.sub(r"\$__timeFilter\((.*?)\)", r"\1 BETWEEN now() - interval '40 days' AND now()", sql)
+    sql = sql.replace("$__timeFrom()", "(now() - interval '40 days')").replace("$__timeTo()", "now()")
     sql = re.sub(r"\$__timeGroup(?:Alias)?\((.*?),\s*'?(\w+)'?\)", r"date_trunc('day', \1) AS time", sql)
     return sql.replace("'$site'", f"'{SITE}'").replace("'$press'", "'press-1'").replace("${site:sqlstring}", f"'{SITE}'").replace("${press:sqlstring}", "'press-1'")
 

@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+"""A year of many presses in PostgreSQL: how fast the inbox takes changes, and how long the questions of a shift and of a fleet take.
+
+    apt-get install postgresql; pip install psycopg[binary]
+    python3 tests/peers/forward/year.py --presses 20 --days 90          (200 presses and 365 days: 29 million strokes, 40 GB, an hour)
+
+Plates of twelve strokes, 33 plates a press and day. The inbox gets the changes of real strokes of `platen demo` in batches, as `platen forward` sends them, under
+other names and numbers; the tables are then filled to the size of the year by SQL. Every question is asked twice, the second time is told.
+"""
+import argparse, json, re, sys, tempfile, time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from servers import ROOT, Authority, Postgresql
+
+STROKES, PLATES = 12, 33
+
+FILL = """
+INSERT INTO platen.stroke (site, press, owner, run_id, accepted, scanned, finished, acked, ack, session, stroke, attempt, plate, part_id, part_name, recipe, baseline,
+    dry_run, crew, verdict, gap_max_mm, gap_uncertainty_mm, sense, deviation_rms_mm, deviation_max_mm, deviation_min_mm, coverage, ram_depth_mm, force_kn,
+    stroke_to_result_s, says, figures, bends)
+SELECT 'site ' || press % 4, 'press ' || press, 1, run, at, at + interval '1 second', at + interval '2 seconds', at + interval '3 seconds', 'acked', 1, n, 0, plate,
+    plate, 'A' || plate, 1 + plate % 5, false, false, 1 + (run / 150) % 3,
+    CASE WHEN n = 12 THEN 'pass' WHEN run % 97 = 0 THEN 'not_measured' ELSE 'fail' END,
+    40.0 / n, 0.2, CASE WHEN run % 41 = 0 THEN 1 ELSE -1 END, 1.0, 2.0, -2.0, 0.99, 5.0, 900, 1.2, 'not far enough',
+    jsonb_build_object('gap.max', 0.04 / n, 'gap.uncertainty', 0.0002, 'coverage', 0.99, 'sense', -1, 'deviation.rms', 0.001),
+    jsonb_build_array(jsonb_build_object('at_mm', jsonb_build_array(200 + 250 * n, 1250), 'angle_deg', 1.9, 'direction_deg', 90, 'length_mm', 2500, 'width_mm', 180))
+FROM (SELECT press, run, run / 12 AS plate, 1 + run % 12 AS n,
+    '{day}'::timestamptz + (run % (12 * {plates})) * (interval '1 day' / (12 * {plates})) AS at
+    FROM generate_series(1, {presses}) press, generate_series({first}::bigint, {first}::bigint + 12 * {plates} - 1) run) AS one
+"""
+PLATE = """
+INSERT INTO platen.plate (site, press, owner, plate, part_id, part_name, began, ended)
+SELECT site, press, owner, plate, min(part_id), min(part_name), min(accepted), max(accepted) FROM platen.stroke GROUP BY 1, 2, 3, 4
+"""
+
+
+def fill(database, options):
+    """Strokes of the year, a day at a time, newest day last."""
+    for day in range(options.days):
+        at = database.execute("SELECT date_trunc('day', now(), 'UTC') - %s * interval '1 day'", [options.days - 1 - day]).fetchone()[0]
+        database.execute("SELECT platen.make_partition(%s)", [at])
+        first = 12 * PLATES * day + 12
+        database.execute(FILL.format(day=at, plates=PLATES, presses=options.presses, first=first))
+    database.execute(PLATE)
+    database.execute("ANALYZE platen.stroke, platen.plate")
+
+
+def changes_a_second(database, demo, count):
+    """Rate at which the inbox takes changes of real strokes, in batches of one connection."""
+    documents = json.loads(demo.read_text())
+    batch, done, began = 100, 0, time.monotonic()
+    while done < count:
+        rows = []
+        for k in range(done, done + batch):
+            document = dict(documents[k % len(documents)])
+            rows.append((document["kind"], k // 3 + 1, document["at"], f"{k:064x}", json.dumps(document)))
+        with database.cursor() as cursor:
+            cursor.execute("INSERT INTO platen.inbox (site, press, owner, kind, id, at, sha256, doc, writer, former) SELECT 'load', 'press 1', 1, kind, id, at, sha256, doc, 1, '{}' "
+                           "FROM unnest(%s::text[], %s::bigint[], %s::timestamptz[], %s::text[], %s::jsonb[]) AS c (kind, id, at, sha256, doc)",
+                           [list(column) for column in zip(*rows)])
+        done += batch
+    return count / (time.monotonic() - began)
+
+
+def questions():
+    """The queries of the dashboards, over the last day of one press or the last month of all."""
+    found = []
+    for name, span in ("press", "1 day"), ("plant", "30 days"):
+        board = json.loads((ROOT / f"config/grafana/{name}.json").read_text())
+        for panel in board["panels"]:
+            for target in panel.get("targets", []):
+                sql = target["rawSql"].replace("$site", "site 1").replace("$press", "press 1")
+                found.append((f"{name}: {panel['title']}", macros(sql, span)))
+    return found
+
+
+def macros(sql, span):
+    """Grafana's macros written out."""
+    sql = re.sub(r"\$__timeFilter\((\w+(?:\.\w+)?)\)", rf"\1 BETWEEN now() - interval '{span}' AND now()", sql)
+    sql = sql.replace("$__timeFrom()", f"(now() - interval '{span}')").replace("$__timeTo()", "now()")
+    return re.sub(r"\$__timeGroupAlias\((\w+),\s*'1(\w)'\)", lambda m: f"date_trunc('{dict(h='hour', d='day')[m[2]]}', {m[1]}) AS time", sql)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--presses", type=int, default=20)
+    parser.add_argument("--days", type=int, default=90)
+    parser.add_argument("--changes", type=int, default=0, help="changes into the inbox first, from --documents")
+    parser.add_argument("--documents", type=Path, help="JSON list of messages platen.stroke/1")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="platen-year-", dir="/var/tmp") as folder:
+        folder = Path(folder)
+        folder.chmod(0o755)
+        server = Postgresql(Authority(folder), folder / "postgresql")
+        try:
+            with server.connect() as database:
+                for file in sorted((ROOT / "core/forward/sql").glob("*.sql")):
+                    database.execute(file.read_text())
+                if options.changes:
+                    print(f"inbox: {changes_a_second(database, options.documents, options.changes):.0f} changes a second on one connection", flush=True)
+                began = time.monotonic()
+                fill(database, options)
+                strokes, = database.execute("SELECT count(*) FROM platen.stroke").fetchone()
+                print(f"{strokes} strokes of {options.presses} presses in {options.days} days, filled in {time.monotonic() - began:.0f} s", flush=True)
+                slow = 0
+                for name, sql in questions():
+                    for _ in range(2):
+                        began = time.monotonic()
+                        rows = len(database.execute(sql).fetchall())
+                        took = time.monotonic() - began
+                    slow += took > (1 if name.startswith("press:") else 10)
+                    print(f"{took:8.2f} s  {rows:6} rows  {name}", flush=True)
+        finally:
+            server.stop("immediate")
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
