@@ -18,10 +18,6 @@ ready_again() {
 figure systemd "$(systemctl --version | head -1 | cut -d' ' -f2)"
 figure debian "$(cat /etc/debian_version)"
 
-runuser -u nobody -- env HOME=/tmp sh -c 'cd /tmp && platen demo --out /tmp/demo >/tmp/demo.log 2>&1'
-figure demo_exit $?
-tail -3 /tmp/demo.log
-
 systemctl start platen-sim-press
 began=$(now)
 systemctl start platen@p1
