@@ -64,6 +64,12 @@ impl ScannerError {
         Self { correlated, systematic: None, assumption: Some(assumption) }
     }
 
+    /// Returns the correlated error of a position along the normal between two scans, one sigma, metres.
+    #[must_use]
+    pub fn correlated(&self) -> f64 {
+        self.correlated
+    }
+
     /// Logs the assumption, if there is one: a warning, unless the scanner is said to have no such error.
     pub fn log(&self) {
         match &self.assumption {
