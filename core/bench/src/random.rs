@@ -16,6 +16,7 @@ mod stated;
 use std::path::Path;
 
 use platen_engine::plugin::{Catalogue, Comparison, Flattening};
+use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::NotMeasured;
 use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
@@ -84,8 +85,10 @@ fn errors(
     let refused = |e: NotMeasured| e.to_string();
     let seen = stages::see(shot).map_err(refused)?;
     let measurement = stages::shape(shot, &seen, flattening).map_err(refused)?;
-    let mut errors = Errors::of(&measurement, &seen.outline, &shot.truth);
-    errors.stated.extend(laid_template::errors(template, scene, shot, &measurement.surface)?);
+    let surface = &measurement.surface;
+    let scanner = ScannerError::assumed(None, shot.header.range_error_m, surface);
+    let mut errors = Errors::of(&measurement, &seen.outline, &shot.truth, scanner.range());
+    errors.stated.extend(laid_template::errors(template, scene, shot, surface, &scanner)?);
     Ok(errors)
 }
 

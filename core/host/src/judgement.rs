@@ -47,7 +47,8 @@ pub(crate) fn judge(
     let Circumstances { plant, plate, calibration, scanner, stroke, supports_changed } = circumstances;
     let start = Instant::now();
     let assumed = || ScannerError::assumed(plant.range_error, scanned.header.range_error_m, surfaces.now);
-    let error = calibration.map_or_else(assumed, ScannerError::calibrated);
+    let calibrated = |calibration| ScannerError::calibrated(calibration, surfaces.now);
+    let error = calibration.map_or_else(assumed, calibrated);
     error.log();
     let task = error.task(plate, supports_changed);
     let reports = stroke::compare(pipeline, &task, surfaces);
@@ -55,6 +56,7 @@ pub(crate) fn judge(
         plate,
         task: &task,
         assumption: error.assumption.as_deref(),
+        range_error: error.range(),
         press: pipeline.press,
         stroke,
         verdict: stroke::verdict(&reports),

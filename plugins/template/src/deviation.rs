@@ -10,6 +10,7 @@ use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
 use platen_shape::{Placement, Surface, TargetSurface, Vec3};
 
 use crate::linear_program;
+use crate::scanner_sigma::ScannerSigma;
 
 /// Target in its seat on the plate.
 #[derive(Debug)]
@@ -85,8 +86,15 @@ impl Deviation {
         self.pose.placement.deviation(now, target, at) - row(target, at).dot(&self.pose.movement)
     }
 
-    /// Returns the standard deviation of the deviation at a place, from the fit's covariance there and at the contacts.
-    pub(crate) fn sigma(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
+    /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
+    /// errors there and at the contacts.
+    pub(crate) fn sigma(
+        &self,
+        now: &Surface,
+        target: &TargetSurface,
+        at: [f64; 2],
+        scanner: ScannerSigma,
+    ) -> f64 {
         let here = row(target, at);
         let rows: Vec<Vec3> = self.contacts.iter().map(|&i| row(target, self.uv[i])).collect();
         let weights: Vec<f64> = match rows[..] {
@@ -96,7 +104,8 @@ impl Deviation {
             _ => rows.iter().map(|r| here.x / r.x).collect(),
         };
         let contacts = self.contacts.iter().zip(weights).map(|(&i, weight)| (self.uv[i], -weight));
-        now.sigma_of_heights(&contacts.chain([(at, 1.0)]).collect::<Vec<_>>())
+        let terms: Vec<([f64; 2], f64)> = contacts.chain([(at, 1.0)]).collect();
+        now.sigma_of_heights(&terms).hypot(scanner.of_heights(terms.iter().map(|(_, weight)| *weight)))
     }
 }
 

@@ -4,6 +4,7 @@ use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
 use platen_shape::template_seat::Seating;
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
+use crate::scanner_sigma::ScannerSigma;
 use crate::section::{Chord, Line, Section};
 
 /// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
@@ -23,10 +24,7 @@ const SEARCH_STEP: f64 = 0.0125;
 pub(crate) struct Evaluator<'a> {
     pub(crate) now: &'a Surface,
     pub(crate) target: &'a TargetSurface,
-    /// Standard deviation of the correlated position error of a pair of scans, metres.
-    pub(crate) sigma_correlated: f64,
-    /// Standard deviation of a gap on a known artefact, metres.
-    pub(crate) sigma_true: f64,
+    pub(crate) scanner: ScannerSigma,
 }
 
 /// Finding of a template, with the figures that the finding does not contain.
@@ -166,9 +164,8 @@ impl Evaluator<'_> {
                 ([u, v], weight / seated.section.cosine(&self.now.normal(u, v)))
             })
             .collect();
-        let square: f64 = terms.iter().map(|(_, w)| w * w).sum();
-        let correlated = self.sigma_correlated * (0.5 * square).sqrt();
-        EXPANDED * self.now.sigma_of_heights(&terms).hypot(correlated).hypot(self.sigma_true)
+        let scanner = self.scanner.of_heights(terms.iter().map(|(_, weight)| *weight));
+        EXPANDED * self.now.sigma_of_heights(&terms).hypot(scanner)
     }
 
     /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests

@@ -45,9 +45,9 @@ pub(super) fn errors(
     scene: &RandomScene,
     shot: &Shot,
     measured: &Surface,
+    scanner: &ScannerError,
 ) -> Result<Vec<Stated>, String> {
-    let scanner = ScannerError::assumed(None, shot.header.range_error_m, measured);
-    let task = task(&shot.spec, scene.target, &scanner);
+    let task = task(&shot.spec, scene.target, scanner);
     let report = |now: &Surface| {
         let report = comparison.compare(&task, Surfaces { now, before: None, baseline: None });
         report.map_err(|e| e.to_string())

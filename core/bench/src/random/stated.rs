@@ -5,7 +5,7 @@ use platen_shape::evaluate::{self, Place};
 use platen_shape::inspection::{Check, ShapeChecks, corners_seen, edge_doubts};
 use platen_shape::measure::Measurement;
 use platen_shape::outline::{Corner, EdgeCurve, Outline};
-use platen_shape::{Blank, EXPANDED, Vec3};
+use platen_shape::{Blank, EXPANDED, RangeError, Vec3};
 
 use crate::accuracy::Truth;
 
@@ -97,20 +97,32 @@ const GROSS_MARKER: f64 = 1e-3;
 
 impl Errors {
     /// Compares places and dimension checks with the truth.
-    pub(super) fn of(measurement: &Measurement, outline: &Outline, truth: &Truth) -> Self {
+    pub(super) fn of(
+        measurement: &Measurement,
+        outline: &Outline,
+        truth: &Truth,
+        range_error: RangeError,
+    ) -> Self {
         let surface = &measurement.surface;
+        let location = measurement.location.clone().with_range_error(range_error);
         let mut stated = Vec::new();
         let mut distance = |kind: Kind, [u, v]: [f64; 2], at: Vec3, corner: Option<&Corner>| {
-            let Place { position, sigma, .. } = evaluate::place(surface, &measurement.location, u, v);
-            let sigma = corner.map_or(sigma, |corner| corner_sigma(corner, [u, v], sigma[2]));
+            let Place { position, sigma, .. } = evaluate::place(surface, &location, u, v);
             let (off, derivatives) = (position - at, surface.derivatives(u, v));
-            for (axis, sigma) in [derivatives.u.normalize(), derivatives.v.normalize()].iter().zip(sigma) {
+            let axes = [derivatives.u.normalize(), derivatives.v.normalize()];
+            let of_corner = |corner: &Corner| {
+                let [of_u, of_v] = corner_sigma(corner, [u, v]);
+                let moved = axes.map(|axis| range_error.along(&position, &axis));
+                [of_u.hypot(moved[0]), of_v.hypot(moved[1]), sigma[2]]
+            };
+            let sigma = corner.map_or(sigma, of_corner);
+            for (axis, sigma) in axes.iter().zip(sigma) {
                 stated.push(Stated { kind, error: off.dot(axis), sigma });
             }
             if kind == Kind::Marker {
                 stated.push(Stated {
                     kind: Kind::Normal,
-                    error: off.dot(&surface.normal(u, v)),
+                    error: off.dot(&derivatives.normal()),
                     sigma: sigma[2],
                 });
             }
@@ -127,8 +139,8 @@ impl Errors {
             .iter()
             .map(|m| distance(Kind::Marker, [metres(m.u_mm), metres(m.v_mm)], Vec3::from(m.position_m), None))
             .fold(0.0, f64::max);
-        let found = ShapeChecks::new(outline, surface);
-        let known = ShapeChecks::new(&true_outline(outline, truth), surface);
+        let found = ShapeChecks::new(outline, surface, range_error);
+        let known = ShapeChecks::new(&true_outline(outline, truth), surface, range_error);
         let mut checks = |kind: Kind, found: &[Check], known: &[Check]| {
             stated.extend(found.iter().zip(known).map(|(found, known)| Stated {
                 kind,
@@ -151,11 +163,11 @@ impl Errors {
     }
 }
 
-/// Returns the standard deviations of a corner along u, v and the normal: the outline's are along the leaving edge and the arriving one.
-fn corner_sigma(corner: &Corner, [u, v]: [f64; 2], normal: f64) -> [f64; 3] {
+/// Returns the standard deviations of a corner along u and v: the outline's are along the leaving edge and the arriving one.
+fn corner_sigma(corner: &Corner, [u, v]: [f64; 2]) -> [f64; 2] {
     let [leaving, arriving] = corner.sigma;
     // u runs along the edge that leaves the corners (0, 0) and (W, H).
-    if (u > 0.0) == (v > 0.0) { [leaving, arriving, normal] } else { [arriving, leaving, normal] }
+    if (u > 0.0) == (v > 0.0) { [leaving, arriving] } else { [arriving, leaving] }
 }
 
 /// Returns the true outline; the smoothed face of the measured one stands in for the true one, which no figure uses.
