@@ -23,6 +23,9 @@
 //!
 //! where s_fit is the fit's standard deviation of w'z, the heights z at the places that decide the gap with their weights w
 //! and covariances; s_corr the plant's correlated error of a position, its share of a single scan; s_true the scanner's error of a gap on a known artefact.
+//! U is at least the change of the gap when the profile is bent by its uncertainty as a parabola or as a cubic parabola: about to rock, or to
+//! fall on another contact, a template has either of two gaps, which w does not tell. The uncertainties of deviations hold the same for the
+//! whole target, bent along u, along v and in twist.
 //! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
 //! `gap.*` are those of the one with the largest gap relative to its limit. The uncertainties of deviations and stations hold the same errors;
 //! that of a curvature the second derivative of a correlated error whose period is 1 m of range.
@@ -142,7 +145,7 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         };
         evaluated.push(evaluator.evaluate(template, line, centre));
     }
-    let deviation = Deviation::new(now, &target, check)?;
+    let deviation = Deviation::new(now, &target, scanner, check)?;
 
     let limits = task.templates.iter().map(|t| t.limit);
     let tolerance = options.tolerance_mm.map(|mm| mm / 1000.0).or_else(|| limits.reduce(f64::min));
