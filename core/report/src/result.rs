@@ -220,6 +220,8 @@ pub struct Context<'a, E> {
     pub assumption: Option<&'a str>,
     /// Range error of the scanner, calibrated or assumed: it counts in the uncertainty of every place and length.
     pub range_error: RangeError,
+    /// Edges whose lengths are not explained.
+    pub doubts: &'a [EdgeDoubt],
     /// Origin of the press in the scanner frame, where the plant file places it.
     pub press: Option<Vec3>,
     /// Stroke, where there is one.
@@ -237,7 +239,7 @@ impl ResultRecord {
     pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
         let Measured { outline, measurement, .. } = measured;
         let checks = ShapeChecks::new(outline, &measurement.surface, context.range_error);
-        let doubts = edge_doubts(&checks, &measurement.surface, cut_lengths(measured, context.plate));
+        let doubts = context.doubts;
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
         Self {
             schema: SCHEMA.to_owned(),
@@ -274,7 +276,7 @@ impl ResultRecord {
             },
             corners_m: measurement.corners.map(Into::into),
             corners_uncertainty_mm: Some(corner_uncertainties(measured, context.range_error)),
-            corners_seen: corners_seen(outline, &doubts),
+            corners_seen: corners_seen(outline, doubts),
             shape_checks: ShapeChecksRecord::new(&checks),
             markers: markers(measured, context.plate, context.range_error),
             trim_lines: trim::record(measurement, context.plate),
@@ -327,10 +329,13 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
     says
 }
 
-/// Returns the lengths of the edges as they were cut, metres.
-fn cut_lengths(measured: &Measured, plate: &PlateFile) -> [f64; 4] {
+/// Returns the edges whose lengths differ from those that were cut by more than is explained.
+#[must_use]
+pub fn doubts(measured: &Measured, plate: &PlateFile, range_error: RangeError) -> Vec<EdgeDoubt> {
+    let surface = &measured.measurement.surface;
     let ordered = Blank::rectangle(plate.plate.width, plate.plate.height);
-    measured.blank.as_ref().unwrap_or(&ordered).edge_lengths()
+    let cut = measured.blank.as_ref().unwrap_or(&ordered).edge_lengths();
+    edge_doubts(&ShapeChecks::new(&measured.outline, surface, range_error), surface, cut)
 }
 
 fn doubt_sentence(doubt: &EdgeDoubt) -> String {
