@@ -5,7 +5,7 @@
 //! the strokes before add up without the error of slopes; a rigid motion of the plate is free, as a template seats itself.
 
 use platen_model::{Centre, Seat, Template};
-use platen_shape::template_seat::Profile;
+use platen_shape::template_seat::{Profile, Seating};
 
 use crate::bend_lines::BendLines;
 
@@ -123,8 +123,35 @@ impl Board {
         worst.unwrap_or(Gap { gap: 0.0, hollow: false, place: 0 })
     }
 
+    /// Returns the largest gap that the template bridges at any place along its line (`hollow`), or the largest that it does not.
+    pub(crate) fn largest(&self, height: &[f64], hollow: bool) -> f64 {
+        let at_place = |(profile, seating, _): (Profile, Seating, usize)| {
+            let contacts = profile.contacts(&seating);
+            let (first, last) = (contacts.first().copied(), contacts.last().copied());
+            let gaps = profile.gaps(&seating).into_iter().enumerate();
+            let on_side = gaps.filter(|(k, gap)| {
+                let bridged = first < Some(*k) && Some(*k) < last && *gap > 0.0;
+                bridged == hollow
+            });
+            on_side.fold(0.0, |largest: f64, (_, gap)| largest.max(gap.abs()))
+        };
+        self.seated(height).map(at_place).fold(0.0, f64::max)
+    }
+
     /// Returns the largest gap at each place of the template along its line.
     pub(crate) fn gaps<'a>(&'a self, height: &'a [f64]) -> impl Iterator<Item = Gap> + 'a {
+        self.seated(height).map(|(profile, seating, from)| {
+            let gaps = profile.gaps(&seating);
+            let largest =
+                (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() { k } else { best });
+            let contacts = profile.contacts(&seating);
+            let between = contacts.first() < Some(&largest) && Some(&largest) < contacts.last();
+            Gap { gap: gaps[largest].abs(), hollow: between && gaps[largest] > 0.0, place: from + largest }
+        })
+    }
+
+    /// Returns the template seated at each place along its line: profile under it, seat, index of its first point.
+    fn seated<'a>(&'a self, height: &'a [f64]) -> impl Iterator<Item = (Profile, Seating, usize)> + 'a {
         let last = self.along.len() - 1;
         let step = self.along[last] / last as f64;
         let half = ((0.5 * self.chord / step).round() as usize).min(last / 2);
@@ -138,12 +165,7 @@ impl Board {
             let x = self.along[from..=to].iter().map(|s| s - self.along[middle]).collect();
             let profile = Profile { x, d: height[from..=to].to_vec() };
             let (seating, _) = profile.seat(self.seat, self.chord);
-            let gaps = profile.gaps(&seating);
-            let largest =
-                (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() { k } else { best });
-            let contacts = profile.contacts(&seating);
-            let between = contacts.first() < Some(&largest) && Some(&largest) < contacts.last();
-            Gap { gap: gaps[largest].abs(), hollow: between && gaps[largest] > 0.0, place: from + largest }
+            (profile, seating, from)
         })
     }
 }

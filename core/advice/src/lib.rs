@@ -6,7 +6,7 @@
 //! | [`situation`] | record, surfaces -> [`Situation`] | heights under the boards by integration of the curvature |
 //! | [`bend_lines`], [`board`] | target -> lines, templates on them | parallel lines, fan of a cone; seat of a template |
 //! | [`press_law`] | angle -> depth | three-point bending with springback in closed form |
-//! | [`learner`] | told depths, measured angles -> offset and slope | Kalman filter |
+//! | [`learner`] | told depths, measured angles -> offset and slope | Gaussian process regression along the plate |
 //! | `planner`, `nnls` | heights -> fewest bends | non-negative least squares, settled lines |
 //! | `past` | strokes of the history -> bends in the plate, depth law | |
 //! | `next_bend` | plan, depth law -> [`Advice`] | guard against bending too far; intervals |

@@ -35,6 +35,8 @@ const TURN_OVER: f64 = 0.040;
 /// lines can do leaves this share of the limit over it.
 const HELPS: f64 = 0.7;
 const DISAGREES: f64 = 0.2;
+/// Standard deviation of the place of a bend without a die, metres.
+const PLACE_SIGMA: f64 = 9.2e-3;
 /// Standard deviation of an angle, share of it, on a press that does not tell its depth.
 const BY_EYE: f64 = 0.25;
 
@@ -55,7 +57,9 @@ pub fn advise(settings: &Settings, history: &PlateHistory, situation: &Situation
         Adviser::new(settings, history, situation, &past).next()
     };
     let says = [remarks::of_press(&past, history), advice.says, remarks::of_strokes(&past, history)].concat();
-    let model = advice.model.or_else(|| past.learner.as_ref().map(|it| it.model(settings.largest)));
+    let model = advice.model.or_else(|| {
+        past.learner.as_ref().map(|it| it.model(0.5 * situation.lines.length(), settings.largest))
+    });
     Advice { says, model, ..advice }
 }
 
@@ -148,7 +152,7 @@ impl<'a> Adviser<'a> {
             plan: in_order.filter_map(planned).collect(),
             too_far,
             says: flatten.into_iter().chain(re_hit).collect(),
-            model: self.past.learner.as_ref().map(|it| it.model(angle)),
+            model: self.past.learner.as_ref().map(|it| it.model(self.planner.grid[line], angle)),
             ..of(Step::Bend(bend))
         }
     }
@@ -178,7 +182,8 @@ impl<'a> Adviser<'a> {
             return cannot(CannotAdvise::BentTooFar);
         };
         let sag = self.sag(self.planner.grid[line]);
-        bend.depth = self.depth_law().map(|learner| learner.depth(-bend.angle, -sag));
+        bend.depth =
+            self.depth_law().map(|learner| learner.depth(self.planner.grid[line], -bend.angle, -sag));
         bend.depth_not_beyond = None;
         Advice { strokes_left: Some([1, 3]), ..of(Step::TurnOver(bend)) }
     }
@@ -241,9 +246,14 @@ impl<'a> Adviser<'a> {
         large.reduce(|a, b| if rank(b) < rank(a) { b } else { a }).unwrap_or(0)
     }
 
-    /// Returns the standard deviation of the angle that a stroke for `angle` leaves, radians.
-    fn sigma(&self, angle: f64) -> f64 {
-        self.depth_law().map_or(BY_EYE * angle, |learner| learner.sigma(angle))
+    /// Returns the standard deviation of the angle that a stroke for `angle` along a line leaves, radians.
+    fn sigma(&self, line: usize, angle: f64) -> f64 {
+        self.depth_law().map_or(BY_EYE * angle, |learner| learner.sigma(self.planner.grid[line], angle))
+    }
+
+    /// Returns the standard deviation of the place of a bend about its line, metres.
+    fn place_sigma(&self) -> f64 {
+        self.past.learner.as_ref().map_or(PLACE_SIGMA, Learner::place_sigma)
     }
 
     /// Returns the learned depth law where a depth can be advised: over a known die, on a press that tells its depth.
@@ -252,9 +262,12 @@ impl<'a> Adviser<'a> {
         self.past.learner.as_ref().filter(|_| self.history.tells_depth && told)
     }
 
-    /// Returns what a bend of this angle must keep from the limit, metres: its errors of place and angle under a board.
+    /// Returns what a bend of this angle must keep from the limit, metres: its errors of place and angle under a board, where the next bends
+    /// lie, beside the last one.
     fn reserve(&self, angle: f64) -> f64 {
-        RESERVE_SHARE * (angle * RESERVE[0]).hypot(RESERVE[1] * self.sigma(angle))
+        let x = self.past.last.unwrap_or(0.5 * self.situation.lines.length());
+        let sigma = self.depth_law().map_or(BY_EYE * angle, |learner| learner.sigma_beside(x, angle));
+        RESERVE_SHARE * (angle * RESERVE[0]).hypot(RESERVE[1] * sigma)
     }
 
     /// Returns the sag of the plate at x in the die, metres.
@@ -272,7 +285,7 @@ impl<'a> Adviser<'a> {
     /// Returns the bend along a line with its depth and intervals; `None` where the line to be pressed misses the plate.
     fn bend(&self, line: usize, angle: f64) -> Option<NextBend> {
         let x = self.planner.grid[line];
-        let (sigma, sag) = (self.sigma(angle.abs()), self.sag(x));
+        let (sigma, sag) = (self.sigma(line, angle.abs()), self.sag(x));
         let learner = self.depth_law();
         let [c, s] = self.situation.lines.direction(x);
         let (gap_after, board) = self.gap_after(line, angle, sigma);
@@ -282,8 +295,8 @@ impl<'a> Adviser<'a> {
             direction: s.atan2(c).rem_euclid(std::f64::consts::PI),
             angle,
             angle_95: [angle - P95 * sigma, angle + P95 * sigma],
-            depth: learner.map(|learner| learner.depth(angle.max(0.0), sag)),
-            depth_not_beyond: learner.map(|learner| learner.depth(self.deepest(line, angle), sag)),
+            depth: learner.map(|learner| learner.depth(x, angle.max(0.0), sag)),
+            depth_not_beyond: learner.map(|learner| learner.depth(x, self.deepest(line, angle), sag)),
             gap_after,
             template: board.name.clone(),
             limit: board.limit,

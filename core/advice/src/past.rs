@@ -80,7 +80,7 @@ impl Past {
             let sag = situation.sag(x, opening, &self.bends);
             // A bend backwards was made with the plate turned over: another law, as the steel remembers its first direction.
             if learns && made.is_none_or(|(_, angle, _)| angle > 0.0) {
-                learner.observe(depth, sag, made.map(|(_, angle, sigma)| (angle, sigma)));
+                learner.observe(x, depth, sag, made.map(|(_, angle, sigma)| (angle, sigma)));
             }
             if let Some(off) = wanted.and_then(|(_, wanted)| wanted.depth).map(|wanted| depth - wanted) {
                 // A stroke that stopped short says nothing of the scatter.
@@ -124,9 +124,9 @@ pub fn expected_angle(
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if learner.depth(middle, sag) < depth { low = middle } else { high = middle }
+        if learner.depth(x, middle, sag) < depth { low = middle } else { high = middle }
     }
-    Some([low, P95 * learner.sigma_told(low)])
+    Some([low, P95 * learner.sigma_told(x, low)])
 }
 
 /// Returns the depth for a bend of this angle along the line x, as [`advise`](crate::advise) would, metres; `None` where no depth can be
@@ -141,5 +141,5 @@ pub fn depth_at(
 ) -> Option<f64> {
     let past = Past::new(settings, history, situation).ok()?;
     let opening = history.die.as_ref()?.opening;
-    past.learner.as_ref().map(|learner| learner.depth(angle, situation.sag(x, opening, &past.bends)))
+    past.learner.as_ref().map(|learner| learner.depth(x, angle, situation.sag(x, opening, &past.bends)))
 }

@@ -96,6 +96,32 @@ impl<'a> Planner<'a> {
         heights + &self.ramps[line] * angle
     }
 
+    /// Returns the heights after a bend `off` metres onward of a candidate line, between the lines of the grid.
+    pub(crate) fn bent_off(&self, heights: &DVector<f64>, line: usize, off: f64, angle: f64) -> DVector<f64> {
+        let last = (self.grid.len() - 1) as f64;
+        let at = (line as f64 + off / GRID).clamp(0.0, last);
+        let (before, share) = (at.floor() as usize, at.fract());
+        let mut bent = heights.clone();
+        bent.axpy(angle * (1.0 - share), &self.ramps[before], 1.0);
+        if share > 0.0 {
+            bent.axpy(angle * share, &self.ramps[before + 1], 1.0);
+        }
+        bent
+    }
+
+    /// Returns the largest excess of a gap and its uncertainty over the limit on the side of too much bending, under any board at any
+    /// place, metres; negative where none is bent too far.
+    pub(crate) fn too_far(&self, heights: &DVector<f64>) -> f64 {
+        let mut from = 0;
+        let each = self.boards.iter().map(|board| {
+            let to = from + board.height.len();
+            let gap = board.largest(&heights.as_slice()[from..to], self.side > 0.0);
+            from = to;
+            gap + board.uncertainty - board.limit
+        });
+        each.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Returns heights with so many half waves along each board, as high as its uncertainty.
     pub(crate) fn waved(&self, heights: &DVector<f64>, waves: f64, sign: f64) -> DVector<f64> {
         let wave = self.boards.iter().flat_map(|board| {

@@ -72,7 +72,7 @@ pub(crate) fn of_strokes(past: &Past, history: &PlateHistory) -> Vec<Sentence> {
         let texts = if off > 0.0 { OFF_ONWARD } else { OFF_BACK };
         says.push(Sentence::new(texts, &[&format!("{:.0}", mm(off.abs()))]));
     }
-    let strokes = learner.model(0.0).strokes_learned;
+    let strokes = learner.model(0.0, 0.0).strokes_learned;
     if strokes < FEW && history.like.is_none_or(|like| like.plates < FEW) {
         let plates = history.like.map_or(0, |like| like.plates).to_string();
         says.push(Sentence::new(LEARNED, &[&plates, &strokes.to_string()]));

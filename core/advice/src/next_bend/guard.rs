@@ -1,6 +1,6 @@
 //! Guard against bending too far: a bend backwards costs turning the plate over, so that a bend is made smaller while it could end there.
 
-use super::{Adviser, LEAST_BEND};
+use super::{Adviser, LEAST_BEND, P95};
 use crate::learner::LEAST_ANGLE;
 
 /// Standard deviations up to which a bend may come out larger than intended, 99.5 % of them.
@@ -22,7 +22,7 @@ impl Adviser<'_> {
         if !self.settings.guard {
             return (line, angle.max(LEAST_BEND));
         }
-        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(angle));
+        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(line, angle));
         while angle > LEAST_BEND {
             if finishes(angle) {
                 return (line, angle);
@@ -35,21 +35,21 @@ impl Adviser<'_> {
         }
     }
 
-    /// Returns the smallest bend that lowers the largest gap and, if it came out larger than intended, bends the plate too far by the least;
-    /// `None` where no such bend helps.
+    /// Returns the smallest bend that lowers the largest gap and, if it came out larger than intended and beside its line, bends the plate too
+    /// far under any board by the least; `None` where no such bend helps.
     fn least_hazard(&self) -> Option<(usize, f64)> {
         let now = self.planner.worst(&self.heights)?.excess;
         // Deeper after each stroke in a row that left no bend.
         let idle = self.history.strokes.iter().rev().take_while(|stroke| stroke.bends.is_empty()).count();
         let small = LEAST_ANGLE * (1.0 + 0.4 * idle as f64);
-        let large = small + GUARD * self.sigma(small);
-        let excess =
-            |line: usize, angle: f64| self.planner.worst(&self.planner.bent(&self.heights, line, angle));
+        let large = |line| small + GUARD * self.sigma(line, small);
+        let places = [-P95, 0.0, P95].map(|off| off * self.place_sigma());
         let hazard = |line: usize| {
-            let expected = excess(line, small)?.excess;
-            let large = excess(line, large)?;
-            let far = if self.is_too_far(&large.gap) { large.excess.max(0.0) } else { 0.0 };
-            (expected < now).then_some(expected + far)
+            let expected = self.planner.worst(&self.planner.bent(&self.heights, line, small))?.excess;
+            let far = places.map(|off| {
+                self.planner.too_far(&self.planner.bent_off(&self.heights, line, off, large(line)))
+            });
+            (expected < now).then_some(expected + far.into_iter().fold(0.0, f64::max))
         };
         let least = |anywhere: bool| {
             let lines = (0..self.planner.grid.len()).filter(|line| anywhere || !self.is_old(*line));
@@ -67,7 +67,7 @@ impl Adviser<'_> {
 
     /// Returns the largest angle to intend whose 99 % value still lets the plate be finished.
     pub(super) fn deepest(&self, line: usize, angle: f64) -> f64 {
-        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(angle));
+        let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(line, angle));
         let (mut low, mut high) = (angle, 2.0 * angle + 0.02);
         if finishes(high) {
             return high;
