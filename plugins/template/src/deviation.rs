@@ -118,8 +118,9 @@ impl Deviation {
             let sigma = mode.sigma(now, scanner);
             for by in [-EXPANDED * sigma, EXPANDED * sigma] {
                 let raised = places.iter().zip(&heights).map(|(at, height)| height + by * mode.at(*at, now));
-                let (movement, ..) = seat(&rows, &raised.collect::<Vec<_>>(), &places, size)?;
-                bent.push(BentSeat { mode, by, movement });
+                // Without a seat there is nothing to compare with; the plate itself has one.
+                let seat = seat(&rows, &raised.collect::<Vec<_>>(), &places, size);
+                bent.extend(seat.map(|(movement, ..)| BentSeat { mode, by, movement }));
             }
         }
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&pose.movement)).collect();

@@ -167,9 +167,10 @@ impl Evaluator<'_> {
         self.now.sigma_of_heights(&terms).hypot(scanner)
     }
 
-    /// Returns by how much the largest gap changes when the profile is bent by its 95 % uncertainty, to either side: as a parabola, and as
-    /// a cubic parabola. Where the template keeps its seat that is what its weights say. Where it is about to rock, or to fall on another
-    /// contact, the gap jumps, and weights say nothing of the other side.
+    /// Returns by how much the largest gap changes when the profile is bent by its 95 % uncertainty, to either side, as a parabola and as
+    /// a cubic parabola, and when the correlated error is a wave over the range, in four phases. Where the template keeps its seat
+    /// that is what its weights say. Where it is about to rock, or to fall on another contact, the gap jumps, and weights say
+    /// nothing of the other side.
     fn change_of_seat(&self, line: &Line, template: &Template, seated: &Seated) -> f64 {
         let Profile { x, d } = &seated.section.profile;
         let last = x.len() - 1;
@@ -178,17 +179,27 @@ impl Evaluator<'_> {
         let parabola = [(0, 0.5), (last / 2, -1.0), (last, 0.5)];
         let cubic =
             [(0, -1.0), (last / 3, 3.0), (2 * last / 3, -3.0), (last, 1.0)].map(|(k, w)| (k, w * 9.0 / 16.0));
-        let sigmas = [self.sigma(line, seated, &parabola), self.sigma(line, seated, &cubic)];
-        let changes = sigmas.iter().zip([2, 3]).flat_map(|(sigma, power)| {
-            [-EXPANDED * sigma, EXPANDED * sigma].map(|by| {
-                let bent = d.iter().zip(x).map(|(d, x)| d + by * (x / half).powi(power)).collect();
-                let bent = Profile { x: x.clone(), d: bent };
-                let (seating, _) = bent.seat(template.seat, template.chord);
-                let gaps = bent.gaps(&seating);
-                (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
-            })
+        let curves = [(&parabola[..], 2), (&cubic[..], 3)].map(|(coefficient, power)| {
+            let by = EXPANDED * self.sigma(line, seated, coefficient);
+            x.iter().map(|x| by * (x / half).powi(power)).collect::<Vec<f64>>()
         });
-        changes.fold(0.0, f64::max)
+        let wave = |quarter: f64| -> Vec<f64> {
+            let height = |s: &f64| {
+                let [u, v] = line.at(*s);
+                let cosine = seated.section.cosine(&self.now.normal(u, v));
+                self.scanner.wave(self.now.face(u, v).norm(), quarter) / cosine
+            };
+            seated.section.along.iter().map(height).collect()
+        };
+        let change = |raised: &[f64], sign: f64| {
+            let bent = d.iter().zip(raised).map(|(d, raised)| d + sign * raised).collect();
+            let bent = Profile { x: x.clone(), d: bent };
+            let (seating, _) = bent.seat(template.seat, template.chord);
+            let gaps = bent.gaps(&seating);
+            (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
+        };
+        let modes = curves.into_iter().chain([0.0, 1.0].map(wave));
+        modes.flat_map(|raised| [-1.0, 1.0].map(|sign| change(&raised, sign))).fold(0.0, f64::max)
     }
 
     /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests

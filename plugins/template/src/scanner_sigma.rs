@@ -31,6 +31,11 @@ impl ScannerSigma {
         (self.position * square.sqrt()).hypot(self.gap)
     }
 
+    /// Returns the correlated error along the normal as a wave over the range, in a phase given in quarter turns, metres.
+    pub(crate) fn wave(&self, range: f64, quarter: f64) -> f64 {
+        SQRT_2 * self.position * (TAU * (range / PERIOD + 0.25 * quarter)).sin()
+    }
+
     /// Returns the standard deviation of a curvature along a unit direction (u, v), of the steepest one without it, 1/m.
     ///
     /// An error a sin(2 pi r / L) of the range r has along the plate the second derivative of a wave: per metre the range changes by
