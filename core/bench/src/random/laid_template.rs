@@ -25,9 +25,11 @@ const LIMIT: Duration = Duration::from_secs(60);
 const CHORD: f64 = 0.6;
 /// Places of the stations in shares of the sides.
 const STATIONS: [[f64; 2]; 5] = [[0.5, 0.5], [0.2, 0.3], [0.8, 0.3], [0.8, 0.7], [0.2, 0.7]];
-/// Penalty of the third derivatives of the true surface against the squares of its errors, m^3: nothing, but determines the
-/// spline between the outermost places.
-const PENALTY: f64 = 1e-9;
+/// Weight of a true place, 1/m^2: known to a micrometre.
+const WEIGHT: f64 = 1e12;
+/// Penalty of the third derivatives of the true surface, m^3, relative to that weight: nothing, but determines the spline between
+/// the outermost places.
+const PENALTY: f64 = 1e-9 * WEIGHT;
 
 /// Loads the comparison, without its search over the whole plate.
 pub(super) fn load(catalogue: &Catalogue) -> Result<Comparison, CliError> {
@@ -130,7 +132,7 @@ fn true_surface(face: &TrueFace, spec: &PlateSpec) -> Result<Surface, String> {
         let mut fit = SplineFit::<3>::new(axis(width, face.nu), axis(height, face.nv));
         for k in 0..face.nu * face.nv {
             let [u, v] = at(k);
-            fit.add(u, v, place(k).into(), 1.0);
+            fit.add(u, v, place(k).into(), WEIGHT);
         }
         let fitted = fit.solve_with(Penalty { u: PENALTY, v: PENALTY }).map_err(|e| e.to_string())?;
         let mask = Mask::from_cells(width, height, [1, 1], vec![true]).ok_or("no mask")?;
