@@ -337,7 +337,6 @@ mod tests {
         }
         for x in [0.4, 1.5, 2.6] {
             let off = learner.depth(x, 0.03, 0.0) - law.depth(0.03) - offset(x);
-            // Found: 0.02 mm.
             assert!(off.abs() < 0.05e-3, "{x} m: {off}");
         }
         assert!(learner.sigma(1.5, 0.03) < 0.8 * learner.sigma(6.0, 0.03));
