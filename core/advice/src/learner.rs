@@ -24,9 +24,9 @@ const ANGLE_NOISE: f64 = 0.4e-3;
 /// Angle by which a small bend comes out larger than by the closed form, radians, and the angles from which that falls to none: steel yields
 /// rounder than the closed form, whose offset is learned from large bends. Found with fibre steel: 3.2 mrad where 2.5 were wanted, 1 at 6 to 8.
 const ROUND_KNEE: (f64, [f64; 2]) = (3.2e-3, [5.7e-3, 9e-3]);
-/// What of it differs from bend to bend, radians, one standard deviation. Found with fibre steel: 1.4 mrad.
+/// Scatter of that angle from bend to bend, radians, one standard deviation. Found with fibre steel: 1.4 mrad.
 const KNEE: f64 = 1.4e-3;
-/// Strokes that the assumption of the filter's own scatter counts for.
+/// Strokes that the assumed scatter counts for beside the observed one.
 const SPREAD: f64 = 3.0;
 /// Scatter of the ram before any is known, metres, and the strokes that this assumption counts for.
 const RAM: (f64, f64) = (0.1e-3, 4.0);

@@ -52,7 +52,7 @@ impl Default for Limits {
     }
 }
 
-/// What a worker is kept from, once its plugin is created.
+/// Sandbox of a worker, in force once its plugin is created.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Confinement {
     /// No file can be opened (landlock).

@@ -38,7 +38,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a plant needs of its machine.
+/// Resources that a plant file needs beyond those of the unit: addresses, devices, folders.
 #[derive(Debug, Default)]
 struct Needs {
     /// Addresses; `any` where the host listens for all.

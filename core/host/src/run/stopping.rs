@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// Time without a stroke after which a plate counts as done, for presses that signal no end of part.
 const QUIET: Duration = Duration::from_secs(600);
 
-/// What a request asks for.
+/// Kind of a stop request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopRequest {
     /// Stop now.

@@ -341,7 +341,7 @@ impl Drop for Link {
     }
 }
 
-/// What a job sends.
+/// Event of a running job: a frame, or its end.
 #[derive(Debug)]
 pub(in crate::plugin) enum JobEvent {
     Frame { format: String, buffer: AlignedBuffer },

@@ -22,7 +22,7 @@ const FEED_MM: f64 = 250.0;
 const REACH_MM: [f64; 2] = [250.0, 2750.0];
 const DEPTH_MM: [f64; 2] = [4.5, 3.6];
 
-/// What the operator does with the advice.
+/// Behaviour of the simulated operator: follows the advice, or ignores it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Operator {
     /// Presses as the screen says

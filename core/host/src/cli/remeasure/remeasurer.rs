@@ -56,7 +56,7 @@ pub(crate) struct Remeasured {
     pub(crate) figures: BTreeMap<String, f64>,
 }
 
-/// What became of a stroke.
+/// Outcome of measuring a stroke again.
 #[derive(Debug)]
 pub(crate) enum Outcome {
     /// Measured now.

@@ -25,7 +25,7 @@ use super::{Event, MeasuredStroke};
 /// Strokes of the strip, the newest: a snapshot stays small however long a plate takes.
 const STRIP: usize = 32;
 
-/// What dispatcher and worker have told.
+/// State of the host as dispatcher and worker last reported it.
 #[derive(Debug)]
 pub(super) struct Facts {
     boot: String,
