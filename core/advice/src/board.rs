@@ -126,13 +126,9 @@ impl Board {
     /// Returns the largest gap that the template bridges at any place along its line (`hollow`), or the largest that it does not.
     pub(crate) fn largest(&self, height: &[f64], hollow: bool) -> f64 {
         let at_place = |(profile, seating, _): (Profile, Seating, usize)| {
-            let contacts = profile.contacts(&seating);
-            let (first, last) = (contacts.first().copied(), contacts.last().copied());
+            let bridged = bridged(&profile, &seating);
             let gaps = profile.gaps(&seating).into_iter().enumerate();
-            let on_side = gaps.filter(|(k, gap)| {
-                let bridged = first < Some(*k) && Some(*k) < last && *gap > 0.0;
-                bridged == hollow
-            });
+            let on_side = gaps.filter(|(k, gap)| bridged(*k, *gap) == hollow);
             on_side.fold(0.0, |largest: f64, (_, gap)| largest.max(gap.abs()))
         };
         self.seated(height).map(at_place).fold(0.0, f64::max)
@@ -144,9 +140,8 @@ impl Board {
             let gaps = profile.gaps(&seating);
             let largest =
                 (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() { k } else { best });
-            let contacts = profile.contacts(&seating);
-            let between = contacts.first() < Some(&largest) && Some(&largest) < contacts.last();
-            Gap { gap: gaps[largest].abs(), hollow: between && gaps[largest] > 0.0, place: from + largest }
+            let hollow = bridged(&profile, &seating)(largest, gaps[largest]);
+            Gap { gap: gaps[largest].abs(), hollow, place: from + largest }
         })
     }
 
@@ -168,4 +163,11 @@ impl Board {
             (profile, seating, from)
         })
     }
+}
+
+/// Returns whether the gap at a point of a seated template is one that it bridges, between its outermost contacts.
+fn bridged(profile: &Profile, seating: &Seating) -> impl Fn(usize, f64) -> bool {
+    let contacts = profile.contacts(seating);
+    let (first, last) = (contacts.first().copied(), contacts.last().copied());
+    move |point, gap| first < Some(point) && Some(point) < last && gap > 0.0
 }

@@ -31,7 +31,7 @@ const SPREAD: f64 = 3.0;
 /// Scatter of the ram before any is known, metres, and the strokes that this assumption counts for.
 const RAM: (f64, f64) = (0.1e-3, 4.0);
 /// Scatter of the place of a bend before any is known, metres, and the strokes that this assumption counts for.
-const PLACE: (f64, f64) = (9.2e-3, 4.0);
+pub(crate) const PLACE: (f64, f64) = (9.2e-3, 4.0);
 /// Angle that is no bend, radians: as much as the surfaces on both sides of a stroke can hide.
 pub const LEAST_ANGLE: f64 = 2.5e-3;
 /// Half width of a 99 % interval, standard deviations.
@@ -194,8 +194,8 @@ impl Learner {
         if !self.observed.is_empty() {
             return self.sigma(x, angle);
         }
-        let unlike = 1.0 - (-2.0 * FEED / DEPARTURE.1).exp();
-        let variance = self.expected(x, angle).1 - DEPARTURE.0.powi(2) * (1.0 - unlike);
+        let by_neighbour = DEPARTURE.0.powi(2) * (-2.0 * FEED / DEPARTURE.1).exp();
+        let variance = self.expected(x, angle).1 - by_neighbour;
         self.angle_sigma(variance, angle).hypot(self.ram_sigma() / self.slope())
     }
 
@@ -211,7 +211,7 @@ impl Learner {
         ((variance * self.spread()).sqrt() / self.slope()).hypot(ANGLE_NOISE).hypot(KNEE * at_knee(angle))
     }
 
-    /// Returns by how much the strokes so far scattered more than the filter expects, variances; 1 while little is known.
+    /// Returns by how much the strokes so far scattered more than expected, variances; 1 while little is known.
     fn spread(&self) -> f64 {
         let square: f64 = self.surprises.iter().map(|it| it * it).sum();
         ((SPREAD + square) / (SPREAD + self.surprises.len() as f64)).max(1.0)

@@ -13,7 +13,7 @@ use platen_model::units::mm;
 use platen_model::{Advice, CannotAdvise, NextBend, PlannedBend, PlateHistory, Sentence, Step, Verdict};
 
 use crate::board::{Board, Gap};
-use crate::learner::{LEAST_ANGLE, Learner};
+use crate::learner::{LEAST_ANGLE, Learner, PLACE};
 use crate::past::Past;
 use crate::planner::{Plan, Planner, Worst};
 use crate::remarks;
@@ -35,8 +35,6 @@ const TURN_OVER: f64 = 0.040;
 /// lines can do leaves this share of the limit over it.
 const HELPS: f64 = 0.7;
 const DISAGREES: f64 = 0.2;
-/// Standard deviation of the place of a bend without a die, metres.
-const PLACE_SIGMA: f64 = 9.2e-3;
 /// Standard deviation of an angle, share of it, on a press that does not tell its depth.
 const BY_EYE: f64 = 0.25;
 
@@ -253,7 +251,7 @@ impl<'a> Adviser<'a> {
 
     /// Returns the standard deviation of the place of a bend about its line, metres.
     fn place_sigma(&self) -> f64 {
-        self.past.learner.as_ref().map_or(PLACE_SIGMA, Learner::place_sigma)
+        self.past.learner.as_ref().map_or(PLACE.0, Learner::place_sigma)
     }
 
     /// Returns the learned depth law where a depth can be advised: over a known die, on a press that tells its depth.
