@@ -36,58 +36,40 @@ $$;
 CREATE INDEX ON platen.plate (began);
 CREATE VIEW platen.plate_course AS SELECT * FROM platen.plate_courses('-infinity', 'infinity');
 
--- Bends and re-hits of each plate.
-CREATE VIEW platen.plate_bends AS
-SELECT b.site, b.press, b.owner, b.plate, count(*) AS bends, count(*) FILTER (WHERE b.rehit) AS rehits
-FROM platen.bend b GROUP BY b.site, b.press, b.owner, b.plate;
-
 -- Half the width of a 95 % interval of a mean of n values with this standard deviation. Quantile of Student's t by the expansion of Cornish and
 -- Fisher, to 0.002 from n = 10 on (Abramowitz and Stegun, 26.7.5).
 CREATE FUNCTION platen.interval_95(deviation float8, n bigint) RETURNS float8 LANGUAGE sql IMMUTABLE AS $$
     SELECT CASE WHEN n >= 10 THEN (1.95996 + 2.37227 / (n - 1) + 2.82250 / (n - 1) ^ 2) * deviation / sqrt(n) END
 $$;
 
--- Plates of one recipe that began in a time and passed, for each press and for each crew. Fewer than 20 plates say nothing: at the usual scatter of a
--- quarter, 20 plates tell a difference of 20 %.
-CREATE FUNCTION platen.compared(since timestamptz, until timestamptz)
-RETURNS TABLE (site text, of_crews boolean, press text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8,
+-- Plates of one recipe that began in a time and passed, for each press, or for each crew where the plant lets their codes leave the record; plates that two
+-- crews bent are left out there. Fewer than 20 plates say nothing: at the usual scatter of a quarter, 20 plates tell a difference of 20 %. Plates of one
+-- heat are alike, so that the intervals are too narrow where few heats were bent.
+CREATE FUNCTION platen.compared(since timestamptz, until timestamptz, of_crews boolean)
+RETURNS TABLE (site text, press text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8,
     minutes_median float8, overshoot_share float8, caveat text)
 LANGUAGE sql STABLE AS $$
-    SELECT c.site, c.of_crews, c.press, c.crew, c.recipe, c.plates, c.strokes_mean, c.strokes_mean - c.half, c.strokes_mean + c.half, c.minutes_median,
-        c.overshoot_share, CASE WHEN c.plates < 20 THEN 'fewer than 20 plates: no comparison' END
+    SELECT c.site, c.press, c.crew, c.recipe, c.plates, c.strokes_mean, c.strokes_mean - c.half, c.strokes_mean + c.half, c.minutes_median,
+        c.overshoot_share,
+        CASE
+            WHEN c.plates < 20 THEN 'fewer than 20 plates: no comparison'
+            WHEN of_crews THEN 'a crew with hard plates is not a bad crew: platen history skill takes the hardness out'
+            ELSE 'intervals take plates as independent; plates of one heat are not'
+        END
     FROM (
-        SELECT site, grouping(press) = 1 AS of_crews, press, crew, recipe, count(*) AS plates,
-            CASE WHEN count(*) >= 20 THEN avg(strokes_to_pass)::float8 END AS strokes_mean,
-            platen.interval_95(stddev_samp(strokes_to_pass)::float8, count(*)) AS half,
-            CASE WHEN count(*) >= 20 THEN percentile_cont(0.5) WITHIN GROUP (ORDER BY minutes_to_pass) END AS minutes_median,
-            CASE WHEN count(*) >= 20 THEN avg((overshoots > 0)::int)::float8 END AS overshoot_share
-        FROM platen.plate_courses(since, until) WHERE strokes_to_pass IS NOT NULL
-        GROUP BY GROUPING SETS ((site, press, recipe), (site, crew, recipe))
+        SELECT plate.site, CASE WHEN NOT of_crews THEN plate.press END AS press, CASE WHEN of_crews THEN plate.crew END AS crew, plate.recipe, count(*) AS plates,
+            CASE WHEN count(*) >= 20 THEN avg(plate.strokes_to_pass)::float8 END AS strokes_mean,
+            platen.interval_95(stddev_samp(plate.strokes_to_pass)::float8, count(*)) AS half,
+            CASE WHEN count(*) >= 20 THEN percentile_cont(0.5) WITHIN GROUP (ORDER BY plate.minutes_to_pass) END AS minutes_median,
+            CASE WHEN count(*) >= 20 THEN avg((plate.overshoots > 0)::int)::float8 END AS overshoot_share
+        FROM platen.plate_courses(since, until) plate
+        WHERE plate.strokes_to_pass IS NOT NULL AND (NOT of_crews OR plate.crew IS NOT NULL)
+        GROUP BY 1, 2, 3, 4
     ) AS c
-$$;
-
--- Presses compared. Plates of one heat are alike, so that the intervals are too narrow where few heats were bent.
-CREATE FUNCTION platen.presses_compared(since timestamptz, until timestamptz)
-RETURNS TABLE (site text, press text, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8, minutes_median float8,
-    overshoot_share float8, caveat text)
-LANGUAGE sql STABLE AS $$
-    SELECT site, press, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
-        coalesce(caveat, 'intervals take plates as independent; plates of one heat are not')
-    FROM platen.compared(since, until) WHERE NOT of_crews
-$$;
-
--- Crews compared, where the plant lets their codes leave the record. Plates that two crews bent are left out.
-CREATE FUNCTION platen.crews_compared(since timestamptz, until timestamptz)
-RETURNS TABLE (site text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8, minutes_median float8,
-    overshoot_share float8, caveat text)
-LANGUAGE sql STABLE AS $$
-    SELECT site, crew, recipe, plates, strokes_mean, strokes_low, strokes_high, minutes_median, overshoot_share,
-        coalesce(caveat, 'a crew with hard plates is not a bad crew: platen history skill takes the hardness out')
-    FROM platen.compared(since, until) WHERE of_crews AND crew IS NOT NULL
 $$;
 
 -- The sign of life of each press, without reading what it sent.
 CREATE INDEX ON platen.inbox USING brin (at);
 
 GRANT SELECT ON ALL TABLES IN SCHEMA platen TO platen_reader;
-GRANT EXECUTE ON FUNCTION platen.interval_95, platen.plate_courses, platen.compared, platen.presses_compared, platen.crews_compared TO platen_reader;
+GRANT EXECUTE ON FUNCTION platen.interval_95, platen.plate_courses, platen.compared TO platen_reader;

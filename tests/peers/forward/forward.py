@@ -9,7 +9,8 @@ from pathlib import Path
 import jsonschema
 import paho.mqtt.client as paho
 
-from servers import BIN, OWNER, PLATEN, ROOT, Authority, Mosquitto, Plant, Postgresql, multiply, run, wait
+import dashboards
+from servers import OWNER, ROOT, Authority, Mosquitto, Plant, Postgresql, multiply, run, wait
 
 arguments = None
 SITE = "kure"
@@ -530,27 +531,18 @@ def check_the_dashboards_answer(site):
     import psycopg
     count = 0
     with psycopg.connect(host="127.0.0.1", port=site.postgresql.port, dbname="platen", user="viewer", password="secret", autocommit=True) as reader:
-        for file in sorted((ROOT / "config/grafana").glob("*.json")):
-            for panel in json.loads(file.read_text())["panels"]:
-                for target in panel.get("targets", []):
-                    sql = grafana(target["rawSql"])
-                    rows = reader.execute(sql).fetchall()
-                    assert rows or panel.get("description", "").startswith("Empty"), (panel["title"], sql)
-                    count += 1
+        for file in dashboards.FILES:
+            for panel, sql in dashboards.panels(file):
+                sql = dashboards.written_out(sql, "40 days", SITE, "press-1")
+                rows = reader.execute(sql).fetchall()
+                assert rows or panel.get("description", "").startswith("Empty"), (panel["title"], sql)
+                count += 1
         try:
             reader.execute("INSERT INTO platen.inbox SELECT * FROM platen.inbox")
             raise AssertionError("a reader may write")
         except psycopg.errors.InsufficientPrivilege:
             pass
-    said(f"{count} queries of {len(list((ROOT / 'config/grafana').glob('*.json')))} dashboards")
-
-
-def grafana(sql):
-    """A query as Grafana sends it: time filter and variables filled in."""
-    sql = re.sub(r"\$__timeFilter\((.*?)\)", r"\1 BETWEEN now() - interval '40 days' AND now()", sql)
-    sql = sql.replace("$__timeFrom()", "(now() - interval '40 days')").replace("$__timeTo()", "now()")
-    sql = re.sub(r"\$__timeGroup(?:Alias)?\((.*?),\s*'?(\w+)'?\)", r"date_trunc('day', \1) AS time", sql)
-    return sql.replace("'$site'", f"'{SITE}'").replace("'$press'", "'press-1'").replace("${site:sqlstring}", f"'{SITE}'").replace("${press:sqlstring}", "'press-1'")
+    said(f"{count} queries of {len(dashboards.FILES)} dashboards")
 
 
 def main():

@@ -1,5 +1,5 @@
 """Debian's PostgreSQL and mosquitto with TLS, presses with hosts and forwarders, each in a folder of its own, on free ports of loopback."""
-import json, os, re, shutil, signal, socket, sqlite3, subprocess, tempfile, time
+import json, os, shutil, signal, socket, sqlite3, subprocess, time
 from pathlib import Path
 
 import psycopg
