@@ -58,8 +58,8 @@ TimeoutStartSec=600
 WantedBy=multi-user.target
 """
 
-# Name of a figure -> what it must be, with the reason in words. Times are those of an emulated processor, some ten times those of a real one: they are
-# there to be read, and only what never ends fails.
+# Name of a figure -> what it must be, with the reason in words. Times are those of an emulated processor: they are there to be read,
+# and only what never ends fails.
 WANTED = {
     "start_exit": (lambda v: v == "0", "systemctl start waits for READY"),
     "ready_s": (lambda v: float(v) < 20, "from start to READY"),
