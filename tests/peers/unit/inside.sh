@@ -68,14 +68,14 @@ ip address add 10.9.8.7/32 dev lo
 sed 's/host = "127.0.0.1"/host = "10.9.8.7"/; s/p1/p2/' /etc/platen/p1.toml > /etc/platen/p2.toml
 systemctl start platen@p2
 sleep 8
-figure link_without_drop_in "$(state p2 link_error)"
+figure state_without_drop_in "$(state p2 state)"
 systemctl stop platen@p2
 mkdir -p /etc/systemd/system/platen@p2.service.d
 platen systemd /etc/platen/p2.toml > /etc/systemd/system/platen@p2.service.d/plant.conf
 systemctl daemon-reload
 systemctl start platen@p2
 sleep 8
-figure link_with_drop_in "$(state p2 link_error)"
+figure state_with_drop_in "$(state p2 state)"
 
 figure exposure "$(systemd-analyze security --no-pager platen@p2.service | sed -n 's/.*exposure level for [^:]*: \([0-9.]*\).*/\1/p')"
 figure owner "$(stat -c %U:%a /var/lib/platen/p1)"

@@ -10,6 +10,7 @@ runs in it and prints figures; they are judged here. Needs root, for mmdebstrap.
 
 import argparse
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -75,8 +76,8 @@ WANTED = {
     "bad_lines": (lambda v: v == "1", "one line in the journal"),
     "bad_says": (lambda v: "bad.toml:9:" in v, "with file and line"),
     "stop_result": (lambda v: v == "success", "systemctl stop ends the host in order"),
-    "link_without_drop_in": (lambda v: v.startswith('"'), "an address that no drop-in allows is out of reach"),
-    "link_with_drop_in": (lambda v: v == "null", "`platen systemd` allows the plant's own"),
+    "state_without_drop_in": (lambda v: v == '"offline"', "an address that no drop-in allows is out of reach"),
+    "state_with_drop_in": (lambda v: v not in ("", '"offline"'), "`platen systemd` allows the plant's own"),
     "exposure": (lambda v: float(v) <= 1.6, "systemd-analyze security"),
     "owner": (lambda v: v == "platen:750", "owner and mode of the record's folder"),
     "purge_exit": (lambda v: v == "0", "dpkg --purge"),
@@ -146,10 +147,8 @@ def main():
     with tempfile.TemporaryDirectory(prefix="platen-unit-", dir="/var/tmp") as folder:
         output = boot(*machine(options.suite, pathlib.Path(folder)))
     figures = {}
-    for line in output.splitlines():
-        words = line.strip().split(" ", 2)
-        if words[0] == "figure":
-            figures[words[1]] = words[2] if len(words) > 2 else ""
+    for name, value in re.findall(r"figure (\w+) ?(.*)", output):
+        figures[name] = value.strip()
     wrong = 0
     print(f"Debian {figures.get('debian')}, systemd {figures.get('systemd')}")
     for name, (holds, reason) in WANTED.items():
