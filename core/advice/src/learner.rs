@@ -37,7 +37,7 @@ pub const LEAST_ANGLE: f64 = 2.5e-3;
 /// Half width of a 99 % interval, standard deviations.
 const P99: f64 = 2.576;
 
-/// Observation of offset and slope by a stroke.
+/// Observation of offset and slope by one stroke.
 #[derive(Debug, Clone, Copy)]
 struct Observed {
     /// Coordinate of the bend, metres.
@@ -63,7 +63,7 @@ pub struct Learner {
     ram_weight: f64,
     /// Sum, sum of squares and number of the distances of bends from their advised lines.
     marks: [f64; 3],
-    /// Normalised surprise of each stroke with a told depth, standard deviations; positive when it bent more than expected.
+    /// Normalised innovation of each stroke with a told depth, standard deviations; positive when it bent more than expected.
     pub(crate) surprises: Vec<f64>,
 }
 
