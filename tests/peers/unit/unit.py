@@ -5,7 +5,7 @@
     bash .ci/package && python3 tests/peers/unit/unit.py            (--suite trixie for Debian 13)
 
 The machine is Debian's minimal base, its cloud kernel and our packages with what they depend on, all in memory: no disk, no network. `inside.sh`
-runs in it and prints figures; they are judged here. Needs root, for mmdebstrap. The processor is emulated, so that it runs anywhere: 6 minutes.
+runs in it and prints figures; they are judged here. Needs root, for mmdebstrap. The processor is emulated, so that it runs anywhere: 3 minutes on two idle cores.
 """
 
 import argparse
