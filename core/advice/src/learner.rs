@@ -304,7 +304,7 @@ mod tests {
     use platen_model::{Die, Steel};
 
     fn law() -> PressLaw {
-        let die = Die { id: 1, opening: 0.36, edge: 0.2 };
+        let die = Die { id: 1, opening: 0.36, edge: 0.2, punch_radius: None };
         PressLaw::new(&die, &Steel { grade: None, yield_strength: 440e6, heat: None }, 0.036)
     }
 

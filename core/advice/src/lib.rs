@@ -12,6 +12,7 @@
 //! | `next_bend` | plan, depth law -> [`Advice`] | guard against bending too far; intervals |
 //! | `remarks` | what the strokes say of press and plate file -> sentences | |
 //! | [`press_capability`] | scatter of the ram -> gap under a board | first order |
+//! | [`strain`] | angles of bends -> strain of the face | width of a bend by thickness and punch |
 //! | `place` | double curvature -> place and direction | largest mean missing curvature |
 //!
 //! Metres and radians; angles are positive the way the target bends. Pure and deterministic: no clock, no files, no randomness.
@@ -29,8 +30,9 @@ pub mod press_law;
 mod remarks;
 mod settings;
 pub mod situation;
+pub mod strain;
 
-pub use next_bend::advise;
+pub use next_bend::{advise, too_late};
 pub use past::{depth_at, expected_angle};
 pub use platen_model::Advice;
 pub use settings::{Order, Settings};

@@ -19,6 +19,7 @@ use crate::planner::{Plan, Planner, Worst};
 use crate::remarks;
 use crate::settings::{Order, Settings};
 use crate::situation::Situation;
+use crate::strain::angle_of_strain;
 
 /// Half width of a 95 % interval, standard deviations.
 const P95: f64 = 1.96;
@@ -78,6 +79,12 @@ pub(crate) fn cannot(reason: CannotAdvise) -> Advice {
     of(Step::Cannot { reason })
 }
 
+/// Returns the record of an advice that was not ready at the next stroke.
+#[must_use]
+pub fn too_late() -> Advice {
+    cannot(CannotAdvise::TooLate)
+}
+
 /// Planner and press of one plate.
 struct Adviser<'a> {
     settings: &'a Settings,
@@ -123,17 +130,18 @@ impl<'a> Adviser<'a> {
                 let single = |free: &dyn Fn(usize) -> bool| {
                     self.planner.single(&self.heights, LEAST_BEND, self.settings.largest, free)
                 };
-                single(&|line| !self.is_old(line)).or_else(|| single(&|_| true))
+                single(&|line| self.is_free(line)).or_else(|| single(&|line| self.may_bend(line)))
             }
         };
         let Some(plan) = plan else {
             return match self.is_too_far(&worst.gap) {
                 true => Advice { too_far, ..self.turn_over() },
-                false => Advice { too_far, ..cannot(CannotAdvise::EdgeOutOfReach) },
+                false => Advice { too_far, ..cannot(self.nowhere()) },
             };
         };
         let next = self.choose(&plan);
         let (line, angle) = self.safe(plan.bends[next]);
+        let angle = angle.min(self.angle_left(line));
         let Some(bend) = self.bend(line, angle) else { return cannot(CannotAdvise::EdgeOutOfReach) };
         let n = u32::try_from(plan.bends.len()).unwrap_or(u32::MAX);
         let in_order = plan.bends[next..].iter().chain(&plan.bends[..next]);
@@ -214,15 +222,40 @@ impl<'a> Adviser<'a> {
         self.past.bends.iter().any(|(x, _)| (x - self.planner.grid[line]).abs() < FROM_OLD)
     }
 
+    /// Returns the angle that the face along a line can still take, radians.
+    fn angle_left(&self, line: usize) -> f64 {
+        let (x, thickness) = (self.planner.grid[line], self.history.task.thickness);
+        let beside = self.past.bends.iter().filter(|(at, _)| (at - x).abs() < thickness);
+        let bent: f64 = beside.map(|(_, angle)| angle.abs()).sum();
+        let radius = self.history.die.as_ref().and_then(|die| die.punch_radius);
+        angle_of_strain(thickness, radius.unwrap_or(0.0), self.settings.strain) - bent
+    }
+
+    /// Returns whether the face along a line can take another bend.
+    fn may_bend(&self, line: usize) -> bool {
+        self.angle_left(line) >= LEAST_BEND
+    }
+
+    /// Returns whether a line can be bent and lies on no old bend.
+    fn is_free(&self, line: usize) -> bool {
+        !self.is_old(line) && self.may_bend(line)
+    }
+
+    /// Returns why no line can be bent.
+    fn nowhere(&self) -> CannotAdvise {
+        let any = self.planner.single(&self.heights, LEAST_BEND, self.settings.largest, &|_| true);
+        if any.is_some() { CannotAdvise::StrainReached } else { CannotAdvise::EdgeOutOfReach }
+    }
+
     /// Returns the plan with the fewest bends, on old bends only where no other reaches the limit.
     fn plan(&self) -> Plan {
         let reserve = |angle: f64| self.reserve(angle);
         let largest = self.settings.largest;
-        let plan = self.planner.plan(&self.heights, largest, reserve, |line| !self.is_old(line));
+        let plan = self.planner.plan(&self.heights, largest, reserve, |line| self.is_free(line));
         if plan.excess <= 0.0 {
             return plan;
         }
-        let anywhere = self.planner.plan(&self.heights, largest, reserve, |_| true);
+        let anywhere = self.planner.plan(&self.heights, largest, reserve, |line| self.may_bend(line));
         if anywhere.excess < plan.excess { anywhere } else { plan }
     }
 
@@ -293,6 +326,7 @@ impl<'a> Adviser<'a> {
             direction: s.atan2(c).rem_euclid(std::f64::consts::PI),
             angle,
             angle_95: [angle - P95 * sigma, angle + P95 * sigma],
+            place_95: Some(P95 * self.place_sigma()),
             depth: learner.map(|learner| learner.depth(x, angle.max(0.0), sag)),
             depth_not_beyond: learner.map(|learner| learner.depth(x, self.deepest(line, angle), sag)),
             gap_after,

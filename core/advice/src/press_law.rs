@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn law(opening: f64) -> PressLaw {
-        let die = Die { id: 1, opening, edge: 0.2 };
+        let die = Die { id: 1, opening, edge: 0.2, punch_radius: None };
         let steel = Steel { grade: None, yield_strength: 440e6, heat: None };
         PressLaw::new(&die, &steel, 0.036)
     }

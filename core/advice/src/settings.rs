@@ -5,6 +5,8 @@
 pub struct Settings {
     /// Largest bend of one stroke, radians.
     pub largest: f64,
+    /// Largest strain of the face under the bends.
+    pub strain: f64,
     /// Order of the lines.
     pub order: Order,
     /// The guard against bending too far is on; off for the study of what it is worth.

@@ -4,8 +4,8 @@
 mod cases;
 
 use cases::{Case, bends, stroke};
-use platen_advice::Advice;
-use platen_model::{CannotAdvise, Language, LikePlates, NextBend, PressedStroke, Step, WantedBend};
+use platen_advice::{Advice, Settings};
+use platen_model::{CannotAdvise, Die, Language, LikePlates, NextBend, PressedStroke, Step, WantedBend};
 
 fn reason(advice: &Advice) -> CannotAdvise {
     match advice.step {
@@ -28,7 +28,7 @@ fn says(advice: &Advice, en: &str) {
     assert!(!says.ja.is_empty() && !says.ja.is_ascii(), "{says:?}");
 }
 
-const REASONS: [CannotAdvise; 9] = [
+const REASONS: [CannotAdvise; 11] = [
     CannotAdvise::NoTarget,
     CannotAdvise::NoTemplate,
     CannotAdvise::Unseen,
@@ -38,6 +38,8 @@ const REASONS: [CannotAdvise; 9] = [
     CannotAdvise::PressUnlikeRecord,
     CannotAdvise::BentTooFar,
     CannotAdvise::SupportsChanged,
+    CannotAdvise::StrainReached,
+    CannotAdvise::TooLate,
 ];
 
 #[test]
@@ -102,7 +104,7 @@ fn what_is_learned_from_few_plates_and_strokes_is_said() {
 /// The last 600 mm are flat, and the die reaches to 700 mm from the end: bends beside it help, until no other does.
 #[test]
 fn what_lies_beyond_the_reach_of_the_die_is_said() {
-    let die = platen_model::Die { id: 1, opening: 0.36, edge: 0.7 };
+    let die = Die { id: 1, opening: 0.36, edge: 0.7, punch_radius: None };
     let case = Case { die: Some(die), ..Case::default() };
     let mut made: Vec<[f64; 2]> = Vec::new();
     for _ in 0..10 {
@@ -129,6 +131,28 @@ fn a_press_unlike_its_record_ends_the_advice() {
     let bent: Vec<[f64; 2]> = strokes.iter().map(|it| [it.bends[0].at[0], it.bends[0].angle]).collect();
     let case = Case { strokes, like: Some(sure), ..Case::default() };
     assert_eq!(reason(&case.advice(bends(&bent))), CannotAdvise::PressUnlikeRecord);
+}
+
+/// A plate that was bent by 33 mrad every 50 mm: more would strain its face beyond the limit.
+#[test]
+fn a_face_strained_to_the_limit_is_not_bent_again() {
+    let strokes: Vec<PressedStroke> = (0..60).map(|k| stroke(0.05 * f64::from(k), 0.033, 5e-3)).collect();
+    let strained = |strain: f64, punch_radius: Option<f64>| {
+        let case = Case { strokes: strokes.clone(), ..Case::default() };
+        let settings = Settings { strain, guard: false, ..case.settings };
+        let die = Die { punch_radius, ..case.die.clone().unwrap() };
+        // Flattened between them.
+        Case { settings, die: Some(die), ..case }.advice(|_, _| 0.4 / 9.0)
+    };
+    assert_eq!(reason(&strained(0.018, None)), CannotAdvise::StrainReached);
+    let within = strained(0.05, None);
+    let angle = bend(&within).angle;
+    assert!(angle > 0.011, "{angle}");
+    // A punch of 300 mm spreads the bends: the same limit is farther away.
+    bend(&strained(0.018, Some(0.3)));
+    // The last bend is no larger than the limit leaves: 0.022 allows 44 mrad in all.
+    let last = strained(0.022, None);
+    assert!(bend(&last).angle <= 0.044 - 0.033 + 1e-9, "{}", bend(&last).angle);
 }
 
 #[test]

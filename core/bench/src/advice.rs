@@ -8,6 +8,8 @@
 #[cfg(test)]
 mod crews;
 mod hidden_plate;
+#[cfg(test)]
+mod strain;
 mod strategies;
 
 use platen_advice::learner::like_plates;

@@ -103,7 +103,7 @@ pub(crate) fn history(strokes: usize) -> PlateHistory {
     PlateHistory {
         task: Task { reference_lines: vec![line], templates: vec![template], ..task(true) },
         templates: Vec::new(),
-        die: Some(Die { id: 1, opening: 0.36, edge: 0.2 }),
+        die: Some(Die { id: 1, opening: 0.36, edge: 0.2, punch_radius: None }),
         steel: Some(Steel { grade: None, yield_strength: 440e6, heat: None }),
         strokes: (0..strokes).map(stroke).collect(),
         like: None,

@@ -7,8 +7,8 @@ use platen_advice::press_law::PressLaw;
 use platen_advice::{Order, Settings, Situation, expected_angle};
 use platen_history::{Archive, Filter, Stroke};
 use platen_model::{
-    Bend, Die, LikePlates, NextBend, PlateHistory, PressModel, PressedStroke, Report, Steel, Step,
-    StrokeData, StrokeKey, Target, TargetShape, Task, TemplateFinding, Verdict, WantedBend,
+    Bend, CannotAdvise, Die, LikePlates, NextBend, PlateHistory, PressModel, PressedStroke, Report, Steel,
+    Step, StrokeData, StrokeKey, Target, TargetShape, Task, TemplateFinding, Verdict, WantedBend,
 };
 use platen_plant::press::Input;
 use platen_plant::{AdviceUse, PlantFile, PlateFile};
@@ -153,6 +153,7 @@ pub(crate) fn gather(
         advice: None,
         failed: None,
         score,
+        unadvised: earlier.as_ref().and_then(unadvised),
         elapsed_ms: 0.0,
     })
 }
@@ -218,6 +219,13 @@ fn next_bend(record: &AdviceRecord) -> Option<&NextBend> {
     }
 }
 
+fn unadvised(record: &AdviceRecord) -> Option<CannotAdvise> {
+    match record.advice.as_ref()?.step {
+        Step::Cannot { reason } => Some(reason),
+        _ => None,
+    }
+}
+
 fn middle(next: &NextBend) -> [f64; 2] {
     [0, 1].map(|k| 0.5 * (next.line[0][k] + next.line[1][k]))
 }
@@ -264,7 +272,13 @@ fn scored(
         let blank = origin(archive, measured.run_id)?;
         let situation = Situation::of_surfaces(&earlier.history, &blank, Some(&blank)).ok()?;
         let curvature = target(task)?.curvature(0.0, 0.0).strongest().abs();
-        let settings = Settings { largest: curvature * 0.3, order: Order::Onward, guard: true, learns: true };
+        let settings = Settings {
+            largest: curvature * 0.3,
+            strain: f64::INFINITY,
+            order: Order::Onward,
+            guard: true,
+            learns: true,
+        };
         expected_angle(&settings, &earlier.history, &situation, x, depth)
     });
     let gap = measured.templates.iter().map(|found| found.max_gap.abs()).reduce(f64::max);
@@ -273,6 +287,7 @@ fn scored(
         made,
         off_line,
         advised_angle: next.angle,
+        advised_95: Some(next.angle_95),
         expected_angle: expected.map(|it| it[0]),
         expected_to: expected.map(|it| it[1].hypot(platen_shape::EXPANDED * made.sigma)),
         foretold_gap: next.gap_after,

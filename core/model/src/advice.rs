@@ -59,6 +59,9 @@ pub struct NextBend {
     pub angle: f64,
     /// Interval of the angle that will remain.
     pub angle_95: [f64; 2],
+    /// Half width of the interval of the bend's place about the line, metres; `None` where none can be told.
+    #[serde(default)]
+    pub place_95: Option<f64>,
     /// Depth of the ram below its touch on a flat plate of nominal thickness, metres; `None` without a die opening, or on a press that
     /// does not tell its depth.
     pub depth: Option<f64>,
@@ -127,6 +130,10 @@ pub enum CannotAdvise {
     BentTooFar,
     /// The plate lies on other supports than at the scan before, so that its own weight bends it otherwise.
     SupportsChanged,
+    /// The bends on record have strained the face, wherever more are needed, to the largest strain allowed.
+    StrainReached,
+    /// The next stroke was made, or the plate taken away, before the advice was ready. The host says this of an advisor, never an advisor itself.
+    TooLate,
 }
 
 texts! { pub(crate),
@@ -139,6 +146,8 @@ texts! { pub(crate),
     UNLIKE "the press does not do what the record says: check die, zero and steel" "プレスの動作が記録と一致しません: 金型、原点、鋼種を確認してください"
     TOO_FAR "the plate is bent too far: flatten it; this press may not turn it over" "曲げ過ぎです: 平らに戻してください (裏返し不可)"
     SUPPORTS "the plate lies on other supports than at the scan before: its weight bends it otherwise; lay it as before, or judge the next stroke yourself" "支持が前回と異なり、自重によるたわみが変わっています: 支持を元に戻すか、次の曲げは作業者が判断してください"
+    STRAIN "the bends have strained the face of the plate as far as is allowed (strain_max_percent): ask the engineer before you bend there again" "曲げによる板表面のひずみが許容値 (strain_max_percent) に達しています: 再度曲げる前に技術者に確認してください"
+    TOO_LATE "the next stroke was made, or the plate taken away, before the advice was ready" "助言の準備ができる前に次のストロークまたは板の搬出が行われました"
 }
 
 impl CannotAdvise {
@@ -155,6 +164,8 @@ impl CannotAdvise {
             Self::PressUnlikeRecord => 7,
             Self::BentTooFar => 8,
             Self::SupportsChanged => 9,
+            Self::StrainReached => 10,
+            Self::TooLate => 11,
         }
     }
 
@@ -171,6 +182,8 @@ impl CannotAdvise {
             Self::PressUnlikeRecord => UNLIKE,
             Self::BentTooFar => TOO_FAR,
             Self::SupportsChanged => SUPPORTS,
+            Self::StrainReached => STRAIN,
+            Self::TooLate => TOO_LATE,
         }
     }
 }

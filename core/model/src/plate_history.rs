@@ -42,6 +42,9 @@ pub struct Die {
     pub opening: f64,
     /// Nearest distance of a bend line from an edge of the plate, metres.
     pub edge: f64,
+    /// Radius of the punch, metres; `None` where the plant file names none.
+    #[serde(default)]
+    pub punch_radius: Option<f64>,
 }
 
 /// Steel of a plate.

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use platen_model::units::mm;
-use platen_model::{Advice, Bend, Language, NextBend, PlateHistory, Step, StrokeKey};
+use platen_model::{Advice, Bend, CannotAdvise, Language, NextBend, PlateHistory, Step, StrokeKey};
 use serde::{Deserialize, Serialize};
 
 /// Version of the document.
@@ -35,6 +35,9 @@ pub struct AdviceRecord {
     pub failed: Option<String>,
     /// The stroke that it follows, against the advice before it; null without one, and where the stroke made no bend.
     pub score: Option<Score>,
+    /// Why nothing was advised before that stroke; null where something was.
+    #[serde(default)]
+    pub unadvised: Option<CannotAdvise>,
     /// From the result to the advice, milliseconds.
     pub elapsed_ms: f64,
 }
@@ -81,6 +84,9 @@ pub struct Score {
     pub off_line: f64,
     /// The advised angle.
     pub advised_angle: f64,
+    /// Its 95 % interval of a stroke as advised; null in records of before this was kept.
+    #[serde(default)]
+    pub advised_95: Option<[f64; 2]>,
     /// Angle that was to be expected of the told depth at that place; null without a told depth.
     pub expected_angle: Option<f64>,
     /// Half width of its 95 % interval, radians.

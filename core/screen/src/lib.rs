@@ -25,8 +25,8 @@ use std::time::Duration;
 
 pub use server::{Access, Listener, Server, ServerError, Token, TokenError};
 pub use snapshot::{
-    AdvicePart, AdvisedBend, AdvisedStep, HostPart, PlatePart, PressPart, RecordPart, ResultPart, SCHEMA,
-    ScannerPart, ScannerState, ShownAlarm, Snapshot, Stage, StripPart, StrokePart, Worst,
+    AdvicePart, AdvisedBend, AdvisedStep, HostPart, LastAdvice, PlatePart, PressPart, RecordPart, ResultPart,
+    SCHEMA, ScannerPart, ScannerState, ShownAlarm, Snapshot, Stage, StripPart, StrokePart, Worst,
 };
 pub use source::{
     Beat, Engineer, FILES, PlateRow, PluginRow, RegisterRow, Source, SourceError, StrokeRow, TimelineRow,

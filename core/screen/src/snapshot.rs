@@ -9,7 +9,7 @@ use platen_model::{Audience, Code, Severity, Texts, Verdict};
 use platen_report::result::Next;
 use serde::Serialize;
 
-pub use advice::{AdvicePart, AdvisedBend, AdvisedStep};
+pub use advice::{AdvicePart, AdvisedBend, AdvisedStep, LastAdvice};
 
 /// Version of the document.
 pub const SCHEMA: &str = "platen.screen/1";

@@ -11,9 +11,9 @@ use platen_model::{CannotAdvise, Code, Field, Sentence, Verdict};
 use platen_report::result::ResultRecord;
 use platen_report::sequence::Sequence;
 use platen_screen::{
-    Access, AdvicePart, AdvisedBend, AdvisedStep, Engineer, HostPart, Listener, PlatePart, PlateRow,
-    PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState, Server, ShownAlarm, Snapshot,
-    Source, SourceError, Stage, StrokePart, StrokeRow, Token, Worst,
+    Access, AdvicePart, AdvisedBend, AdvisedStep, Engineer, HostPart, LastAdvice, Listener, PlatePart,
+    PlateRow, PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState, Server, ShownAlarm,
+    Snapshot, Source, SourceError, Stage, StrokePart, StrokeRow, Token, Worst,
 };
 use tokio::sync::watch;
 
@@ -441,6 +441,7 @@ fn bend(line_mm: [[f64; 2]; 2]) -> AdvicePart {
     let bend = AdvisedBend {
         line_mm,
         angle_deg: 1.5,
+        place_95_mm: Some(20.0),
         depth_mm: Some(4.81),
         depth_not_beyond_mm: Some(5.34),
         gap_after_mm: [9.0, 12.0, 15.2],
@@ -450,6 +451,7 @@ fn bend(line_mm: [[f64; 2]; 2]) -> AdvicePart {
         bend: Some(bend),
         why: None,
         strokes_left: Some([5, 7]),
+        last: Some(LastAdvice::Made { advised_deg: 1.9, advised_95_deg: Some([1.66, 2.14]), made_deg: 1.84 }),
         says: vec![Sentence { en: EVIL.into(), ja: "金型を確認".into() }],
     }
 }
@@ -467,14 +469,22 @@ fn advice_is_a_line_a_depth_and_what_comes_of_it() {
         ">from the left<",
         ">4.8 mm<",
         ">deep<",
+        ">Last stroke: advised 1.9 deg (1.7 to 2.1), made 1.8 deg<",
         "not beyond 5.3 mm; then 12.0 mm open (9.0 to 15.2); 5 to 7 strokes left",
     ] {
         assert!(page.contains(text), "{text}: {page}");
     }
     assert!(!page.contains("<script>alert"), "sentences of a plugin are text");
     let (_, _, page) = site.get("/?lang=ja&units=in");
-    for text in ["線に沿って押す", ">65.0 in<", "左から", ">0.19 in<", "残り 5 ~ 7 回", "金型を確認"]
-    {
+    for text in [
+        "線に沿って押す",
+        ">65.0 in<",
+        "左から",
+        ">0.19 in<",
+        "残り 5 ~ 7 回",
+        "金型を確認",
+        ">直前: 助言 1.9° (1.7 ~ 2.1)、実際 1.8°<",
+    ] {
         assert!(page.contains(text), "{text}");
     }
     // Across, and oblique: from the press, with both ends.
@@ -487,8 +497,12 @@ fn advice_is_a_line_a_depth_and_what_comes_of_it() {
         why: Some(CannotAdvise::EdgeOutOfReach.texts()),
         strokes_left: None,
         says: Vec::new(),
+        last: Some(LastAdvice::TooLate),
     };
     show(cannot);
     assert!(site.get("/").2.contains("No advice: what is missing lies nearer to an edge"));
     assert!(site.get("/?lang=ja").2.contains("助言なし: 端部"));
+    // The stroke before it had no advice in time.
+    assert!(site.get("/").2.contains(">Last stroke: made before the advice was ready<"));
+    assert!(site.get("/?lang=ja").2.contains(">直前: 助言の準備前に押されました<"));
 }

@@ -26,6 +26,7 @@
 //! | key | unit | default | range | meaning |
 //! |---|---|---|---|---|
 //! | `angle_max_deg` | deg | target's curvature x 300 mm, at most 3 | 0.2 to 20 | largest bend of one stroke |
+//! | `strain_max_percent` | % | 5 | 0.5 to 30 | largest strain of the face under the bends on record, by the thickness and the die's `punch_radius_mm`; beyond it no bend is advised there |
 //! | `order` | | `onward` | `onward`, `ends_in` | from the last bend onward, or from both ends to the middle |
 //! | `depth` | | `true` | | tell a depth; needs the die's opening and a press that tells its depth (`ram_depth`) |
 //!
@@ -43,6 +44,8 @@ platen_sdk::options! {
     pub struct Options {
         /// Largest bend of one stroke; default: the target's curvature over 300 mm, at most 3 degrees.
         angle_max_deg: Option<f64>, min 0.2, max 20.0;
+        /// Largest strain of the face under the bends at one place, percent: beyond 5 codes of pressure vessels ask for a heat treatment.
+        strain_max_percent: f64 = 5.0, unit "%", min 0.5, max 30.0;
         /// Order of the lines.
         order: String = "onward", choices ["onward", "ends_in"];
         /// Whether a depth is told.
@@ -80,6 +83,7 @@ impl Advisor for LineBends {
         let by_feed = (FEED * curvature.unwrap_or(0.0)).clamp(0.005, LARGEST);
         let settings = Settings {
             largest: self.0.angle_max_deg.map_or(by_feed, f64::to_radians),
+            strain: 0.01 * self.0.strain_max_percent,
             order: if self.0.order == "ends_in" { Order::EndsIn } else { Order::Onward },
             guard: true,
             learns: true,

@@ -17,7 +17,7 @@ fn plant_with_pages(folder: &Path, press: &Press) -> std::path::PathBuf {
 }
 
 /// Address of a host's pages: `127.0.0.1:PORT`.
-fn address(host: &Host) -> String {
+pub(crate) fn address(host: &Host) -> String {
     until("the address of the pages", || {
         let status = host.status()?;
         let pages = status["status"]["pages"].as_str()?;
@@ -25,7 +25,7 @@ fn address(host: &Host) -> String {
     })
 }
 
-fn get(address: &str, path: &str) -> String {
+pub(crate) fn get(address: &str, path: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
     let mut text = Vec::new();
@@ -36,7 +36,7 @@ fn get(address: &str, path: &str) -> String {
     body.to_owned()
 }
 
-fn state(address: &str) -> Json {
+pub(crate) fn state(address: &str) -> Json {
     serde_json::from_str(&get(address, "/api/v1/state")).unwrap()
 }
 

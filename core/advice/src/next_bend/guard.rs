@@ -52,7 +52,8 @@ impl Adviser<'_> {
             (expected < now).then_some(expected + far.into_iter().fold(0.0, f64::max))
         };
         let least = |anywhere: bool| {
-            let lines = (0..self.planner.grid.len()).filter(|line| anywhere || !self.is_old(*line));
+            let lines = (0..self.planner.grid.len())
+                .filter(|line| self.may_bend(*line) && (anywhere || !self.is_old(*line)));
             lines.filter_map(|line| Some((line, hazard(line)?))).min_by(|a, b| a.1.total_cmp(&b.1))
         };
         least(false).or_else(|| least(true)).map(|(line, _)| (line, small))

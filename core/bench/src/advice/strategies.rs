@@ -143,7 +143,7 @@ pub(super) fn law() -> PressLaw {
 }
 
 fn die() -> Die {
-    Die { id: 1, opening: OPENING, edge: 0.2 }
+    Die { id: 1, opening: OPENING, edge: 0.2, punch_radius: None }
 }
 
 /// Bends one plate.
@@ -390,6 +390,8 @@ impl Job<'_> {
 pub(super) fn settings(order: &Order, advised: &Advised) -> Settings {
     Settings {
         largest: (order.curvature() * advised.feed).min(3.0_f64.to_radians()),
+        // The default of `line-bends`.
+        strain: 0.05,
         order: Onward::Onward,
         guard: advised.guard,
         learns: advised.learns,

@@ -9,6 +9,7 @@ use std::time::Instant;
 use platen_engine::pipeline;
 use platen_engine::plugin::{Advisor, CancelToken, Catalogue};
 use platen_history::Archive;
+use platen_model::{Advice, CannotAdvise, Language, Step};
 use platen_plant::press::Mode;
 use platen_plant::{AdviceUse, PlantFile, Show};
 use platen_press::{AdviceImage, Answer};
@@ -28,6 +29,14 @@ pub(super) struct AdviceJob {
     pub(super) folder: PathBuf,
     /// Time of the result.
     pub(super) since: Instant,
+    /// Cancelled by the next stroke, also before the advisor has begun.
+    token: CancelToken,
+}
+
+impl AdviceJob {
+    pub(super) fn new(measured: MeasuredPlate, surface: Surface, folder: PathBuf) -> Self {
+        Self { measured, surface, folder, since: Instant::now(), token: CancelToken::default() }
+    }
 }
 
 /// Way to the advisor's thread. Does nothing where the plant file has no `[advice]`.
@@ -37,8 +46,8 @@ pub(super) struct AdviceDesk(Option<Arc<Desk>>);
 #[derive(Debug)]
 struct Desk {
     jobs: Mutex<Sender<AdviceJob>>,
-    /// Token of the job in progress.
-    running: Mutex<CancelToken>,
+    /// Token of the newest job.
+    newest: Mutex<CancelToken>,
 }
 
 impl AdviceDesk {
@@ -54,14 +63,13 @@ impl AdviceDesk {
     ) -> std::io::Result<Self> {
         let Some(wanted) = plant.advice.clone() else { return Ok(Self::default()) };
         let (jobs, inbox) = channel();
-        let desk = Arc::new(Desk { jobs: Mutex::new(jobs), running: Mutex::default() });
+        let desk = Arc::new(Desk { jobs: Mutex::new(jobs), newest: Mutex::default() });
         let thread = Thread {
             plant: plant.clone(),
             wanted,
             catalogue: catalogue.clone(),
             screen,
             answers,
-            desk: Arc::downgrade(&desk),
             advisor: None,
         };
         std::thread::Builder::new().name("advice".into()).spawn(move || thread.serve(&inbox))?;
@@ -76,15 +84,16 @@ impl AdviceDesk {
     /// Hands over a result.
     pub(super) fn ask(&self, job: AdviceJob) {
         if let Some(desk) = &self.0 {
+            *desk.newest.lock().unwrap_or_else(PoisonError::into_inner) = job.token.clone();
             // The thread ends with the host.
             let _ = desk.jobs.lock().unwrap_or_else(PoisonError::into_inner).send(job);
         }
     }
 
-    /// Ends the advice in progress: the next stroke has been made.
+    /// Ends the advice that waits or is in progress: the next stroke has been made, or the plate has gone.
     pub(super) fn cancel(&self) {
         if let Some(desk) = &self.0 {
-            desk.running.lock().unwrap_or_else(PoisonError::into_inner).cancel();
+            desk.newest.lock().unwrap_or_else(PoisonError::into_inner).cancel();
         }
     }
 }
@@ -95,42 +104,41 @@ struct Thread {
     catalogue: Catalogue,
     screen: Teller,
     answers: UnboundedSender<Answer>,
-    desk: std::sync::Weak<Desk>,
     /// The plugin, once it could be created.
     advisor: Option<Advisor>,
 }
 
 impl Thread {
     fn serve(mut self, inbox: &Receiver<AdviceJob>) {
+        // The first stroke does not wait for the plugin's start; what is wrong with it is said then.
+        let _ = self.advisor();
         while let Ok(job) = inbox.recv() {
-            let Some(desk) = self.desk.upgrade() else { return };
-            let token = CancelToken::default();
-            *desk.running.lock().unwrap_or_else(PoisonError::into_inner) = token.clone();
-            drop(desk);
             let run_id = job.measured.run_id;
-            match self.advise(&job, token) {
+            match self.advise(&job) {
                 Ok(record) => self.keep(&job.folder, record),
                 Err(why) => tracing::warn!(run_id, "no advice: {why}"),
             }
         }
     }
 
-    fn advise(&mut self, job: &AdviceJob, token: CancelToken) -> Result<AdviceRecord, String> {
+    fn advise(&mut self, job: &AdviceJob) -> Result<AdviceRecord, String> {
         let archive = Archive::open(&self.plant.output.history).map_err(|e| e.to_string())?;
         let mut record = plate_history::gather(&archive, &self.plant, &self.wanted, &job.measured)?;
         let origin = plate_history::origin(&archive, job.measured.run_id);
-        let advice = self
-            .advisor()
-            .and_then(|advisor| {
-                advisor
-                    .advise(&record.history, &job.surface, origin.as_ref(), token)
-                    .map_err(|e| e.to_string())
-            })
-            .inspect_err(|why| tracing::warn!(run_id = job.measured.run_id, "no advice: {why}"));
+        let advice = self.advisor().and_then(|advisor| {
+            advisor
+                .advise(&record.history, &job.surface, origin.as_ref(), job.token.clone())
+                .map_err(|e| e.to_string())
+        });
+        // Also an advice that was ready a moment later: nobody has seen it.
+        let advice = if job.token.is_cancelled() { Ok(platen_advice::too_late()) } else { advice };
         (record.advice, record.failed) = match advice {
             Ok(advice) => (Some(advice), None),
             Err(why) => (None, Some(why)),
         };
+        if let Some(why) = record.failed.as_deref().or(late(record.advice.as_ref())) {
+            tracing::warn!(run_id = job.measured.run_id, "no advice: {why}");
+        }
         record.elapsed_ms = 1e3 * job.since.elapsed().as_secs_f64();
         Ok(record)
     }
@@ -148,12 +156,13 @@ impl Thread {
         Ok(self.advisor.insert(advisor))
     }
 
+    /// Writes the advice, and passes it on to registers and pages. Of one that came too late they hear with the next.
     fn keep(&self, folder: &Path, record: AdviceRecord) {
         if let Err(why) = record.write(folder) {
             tracing::warn!(run_id = record.run_id, "the advice is not on record: {why}");
         }
         tracing::info!(run_id = record.run_id, ms = record.elapsed_ms, "advice");
-        if self.wanted.show == Show::Shadow {
+        if self.wanted.show == Show::Shadow || late(record.advice.as_ref()).is_some() {
             return;
         }
         let press = self.plant.press.as_ref();
@@ -166,4 +175,10 @@ impl Thread {
         }
         self.screen.tell(Event::Advised(Box::new(record)));
     }
+}
+
+/// Returns the sentence of an advice that came too late.
+fn late(advice: Option<&Advice>) -> Option<&'static str> {
+    let late = matches!(advice?.step, Step::Cannot { reason: CannotAdvise::TooLate });
+    late.then(|| CannotAdvise::TooLate.texts().of(Language::En))
 }

@@ -429,8 +429,7 @@ impl MeasurementWorker {
         let sound: Vec<&Report> = reports.iter().flatten().collect();
         let measured =
             MeasuredPlate::new((stroke.run_id, stroke.key), &stroke.data, &stroke.plate, task, &sound);
-        let (surface, folder, since) = (surface.clone(), folder.to_owned(), Instant::now());
-        self.receivers.advice.ask(AdviceJob { measured, surface, folder, since });
+        self.receivers.advice.ask(AdviceJob::new(measured, surface.clone(), folder.to_owned()));
     }
 
     fn folder(&self, run_id: u32) -> PathBuf {

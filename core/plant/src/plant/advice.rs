@@ -21,6 +21,8 @@ const LIKE_PLATES: i64 = 20;
 const DEADLINE_MS: i64 = 2000;
 /// Range of die openings, millimetres.
 const OPENING_MM: std::ops::RangeInclusive<f64> = 20.0..=5000.0;
+/// Range of punch radii, millimetres.
+const PUNCH_RADIUS_MM: std::ops::RangeInclusive<f64> = 1.0..=2000.0;
 
 /// Where advice is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -131,9 +133,10 @@ pub(super) fn read_die(mut table: TomlTable<'_>) -> Result<Die, Reported> {
     let id = table.integer("id").in_range(1..=i64::from(u16::MAX)).required();
     let opening = table.number("opening_mm").in_range(OPENING_MM).map(metres).required();
     let edge = table.number("edge_mm").at_least(0.0).map(metres).optional();
+    let punch_radius = table.number("punch_radius_mm").in_range(PUNCH_RADIUS_MM).map(metres).optional();
     table.finish();
     let opening = opening?;
     // Both shoulders under the plate, and a little.
     let edge = edge?.unwrap_or(0.5 * opening + 0.02);
-    Ok(Die { id: u16::try_from(id?).unwrap_or(u16::MAX), opening, edge })
+    Ok(Die { id: u16::try_from(id?).unwrap_or(u16::MAX), opening, edge, punch_radius: punch_radius? })
 }

@@ -152,6 +152,7 @@ mod tests {
             direction: std::f64::consts::FRAC_PI_2,
             angle: 0.033,
             angle_95: [0.03, 0.036],
+            place_95: Some(0.02),
             depth: Some(4.8e-3),
             depth_not_beyond: Some(5.3e-3),
             gap_after: [9e-3, 12e-3, 15e-3],

@@ -16,8 +16,8 @@ pub(super) use layout::{Layout, Look, SQUARE};
 pub enum Mark<'a> {
     /// Place of the next hit: framed.
     Place(&'a NextPlace),
-    /// Advised bend line, its ends (u, v), millimetres.
-    Line([[f64; 2]; 2]),
+    /// Advised bend line: its ends (u, v), and how far from it the bend may come to lie, millimetres: outlined.
+    Line([[f64; 2]; 2], Option<f64>),
 }
 
 impl<'a> Mark<'a> {

@@ -44,6 +44,7 @@ pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
                 p.figure { (cells.span("left")) " " (cells.span("left-words")) }
                 p.figure { (cells.span("near")) " " (cells.span("near-words")) }
                 (cells.p("advice"))
+                (cells.p("advised-before"))
                 h2 { (cells.span("gap-title")) " " (cells.span("limit")) }
                 p.figure { (cells.span("gap")) " " (cells.span("gap-more")) }
                 svg.bar viewBox=(view_box(BAR_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::GAP)) {

@@ -249,7 +249,7 @@ async fn stroke_picture(
         let record = source.result(run)?;
         let values = source.field(run, field)?;
         let line = advised_line(source, run);
-        let mark = line.map(Mark::Line).or_else(|| Mark::of(record.next.as_ref()));
+        let mark = line.map(|(line, to)| Mark::Line(line, to)).or_else(|| Mark::of(record.next.as_ref()));
         let map = picture::screen_map(&values, &record.plate_file, view.picture(), mark);
         let map = map.map_err(|e| SourceError::Unreadable(e.to_string()))?;
         match ending {
@@ -261,12 +261,12 @@ async fn stroke_picture(
     finished(answer.await)
 }
 
-/// Returns the advised bend line after a stroke, while its result is shown.
-fn advised_line(source: &dyn Source, run: u32) -> Option<[[f64; 2]; 2]> {
+/// Returns the advised bend line after a stroke and the interval of its place, while its result is shown.
+fn advised_line(source: &dyn Source, run: u32) -> Option<([[f64; 2]; 2], Option<f64>)> {
     let snapshots = source.snapshots();
     let snapshot = snapshots.borrow();
     let result = snapshot.result.as_ref().filter(|result| result.run == run)?;
-    result.advice.as_ref()?.bend.map(|bend| bend.line_mm)
+    result.advice.as_ref()?.bend.map(|bend| (bend.line_mm, bend.place_95_mm))
 }
 
 /// Returns the mesh: number of nodes of a side, then x, y, z, seen of each node as 32-bit floats, little endian.

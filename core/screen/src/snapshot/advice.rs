@@ -1,7 +1,8 @@
 //! Advice for the next stroke, as the pages show it: millimetres and sentences of what an advisor said.
 
 use platen_model::units::mm;
-use platen_model::{Advice, NextBend, Sentence, Step, Texts};
+use platen_model::{Advice, CannotAdvise, NextBend, Sentence, Step, Texts};
+use platen_report::advice::AdviceRecord;
 use serde::Serialize;
 
 /// Advice for the next stroke.
@@ -17,6 +18,42 @@ pub struct AdvicePart {
     pub strokes_left: Option<[u32; 2]>,
     /// Sentences of the advisor, most important first.
     pub says: Vec<Sentence>,
+    /// What came of the advice before; null without one.
+    pub last: Option<LastAdvice>,
+}
+
+/// The last stroke against the advice before it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum LastAdvice {
+    /// An angle was advised.
+    Made {
+        /// The advised angle.
+        advised_deg: f64,
+        /// Its 95 % interval.
+        advised_95_deg: Option<[f64; 2]>,
+        /// The angle that the stroke made.
+        made_deg: f64,
+    },
+    /// The stroke was made before the advice was ready.
+    TooLate,
+}
+
+impl LastAdvice {
+    /// Returns what came of the advice before the stroke that this one follows.
+    #[must_use]
+    pub fn of(record: &AdviceRecord) -> Option<Self> {
+        if record.unadvised == Some(CannotAdvise::TooLate) {
+            return Some(Self::TooLate);
+        }
+        let score = record.score?;
+        // The angle of a bend is positive towards the scanner, an advised one the way the target bends.
+        Some(Self::Made {
+            advised_deg: score.advised_angle.to_degrees(),
+            advised_95_deg: score.advised_95.map(|it| it.map(f64::to_degrees)),
+            made_deg: score.made.angle.abs().to_degrees(),
+        })
+    }
 }
 
 /// What to do with the plate.
@@ -42,6 +79,8 @@ pub struct AdvisedBend {
     pub line_mm: [[f64; 2]; 2],
     /// Angle that should remain.
     pub angle_deg: f64,
+    /// Half width of the interval of the bend's place about the line; null where none can be told.
+    pub place_95_mm: Option<f64>,
     /// Depth of the ram; null where none can be told.
     pub depth_mm: Option<f64>,
     /// Depth beyond which the plate could no longer be finished from one side.
@@ -55,6 +94,7 @@ impl From<&NextBend> for AdvisedBend {
         Self {
             line_mm: bend.line.map(|end| end.map(mm)),
             angle_deg: bend.angle.to_degrees(),
+            place_95_mm: bend.place_95.map(mm),
             depth_mm: bend.depth.map(mm),
             depth_not_beyond_mm: bend.depth_not_beyond.map(mm),
             gap_after_mm: bend.gap_after.map(mm),
@@ -71,6 +111,6 @@ impl From<&Advice> for AdvicePart {
             Step::Done => (AdvisedStep::Done, None, None),
             Step::Cannot { reason } => (AdvisedStep::Cannot, None, Some(reason.texts())),
         };
-        Self { step, bend, why, strokes_left: advice.strokes_left, says: advice.says.clone() }
+        Self { step, bend, why, strokes_left: advice.strokes_left, says: advice.says.clone(), last: None }
     }
 }

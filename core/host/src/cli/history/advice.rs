@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use platen_advice::press_capability::{LEAST_STROKES, PressCapability, ram_scatter};
 use platen_history::{Filter, Stroke};
+use platen_model::CannotAdvise;
 use platen_model::units::mm;
 use platen_report::advice::{AdviceRecord, Score};
 use platen_report::history_view;
@@ -29,11 +30,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let filter = Filter { plate: command.plate, newest: Some(command.newest), ..Filter::default() };
     let mut scored = Vec::new();
     let mut rams = BTreeMap::new();
+    let mut too_late = 0_usize;
     for stroke in archive.strokes(&filter)? {
         let Some(document) = &stroke.document else { continue };
         match AdviceRecord::beside(document) {
             Ok(Some(record)) => {
                 Ram::add(&mut rams, &record);
+                too_late += usize::from(record.unadvised == Some(CannotAdvise::TooLate));
                 scored.extend(record.score.map(|score| (stroke, record.show, score)));
             }
             Ok(None) => {}
@@ -52,7 +55,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
             "strokes": strokes,
             "angle_inside": shares.angle.share(), "angles": shares.angle.all,
             "gap_inside": shares.gap.share(), "gaps": shares.gap.all,
-            "followed": shares.followed.share(),
+            "followed": shares.followed.share(), "too_late": too_late,
             "rams": rams.iter().map(|(die, ram)| ram.document(*die)).collect::<Vec<_>>(),
         }));
     }
@@ -61,7 +64,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
         scored.iter().map(|(stroke, show, score)| row(stroke, show, score)),
     )?;
     output::line(&format!(
-        "angle of the told depth inside its 95 % interval: {}; gap inside: {}; advice followed: {}",
+        "angle of the told depth inside its 95 % interval: {}; gap inside: {}; advice followed: {}; strokes made before their advice was ready: {too_late}",
         shares.angle.words(),
         shares.gap.words(),
         shares.followed.words()

@@ -16,8 +16,8 @@ use platen_press::{LinkState, PressImage, Status, Work};
 use platen_report::advice::AdviceRecord;
 use platen_report::history_view::worst_template;
 use platen_screen::{
-    AdvicePart, HostPart, PlatePart, PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart, ScannerState,
-    ShownAlarm, Snapshot, Stage, StripPart, StrokePart, Worst,
+    AdvicePart, HostPart, LastAdvice, PlatePart, PressPart, RecordPart, ResultPart, SCHEMA, ScannerPart,
+    ScannerState, ShownAlarm, Snapshot, Stage, StripPart, StrokePart, Worst,
 };
 
 use super::{Event, MeasuredStroke};
@@ -216,7 +216,8 @@ impl Facts {
 
     fn advice_of(&self, run_id: u32) -> Option<AdvicePart> {
         let record = self.advice.as_ref().filter(|record| record.run_id == run_id)?;
-        record.advice.as_ref().map(AdvicePart::from)
+        let advice = record.advice.as_ref().map(AdvicePart::from)?;
+        Some(AdvicePart { last: LastAdvice::of(record), ..advice })
     }
 
     fn record_of(&self, run_id: u32) -> Option<&MeasuredStroke> {

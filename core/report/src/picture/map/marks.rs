@@ -43,12 +43,31 @@ pub(super) fn next(
     match mark.filter(|_| field.name == CURVATURE_DEFICIT) {
         None => Ok(()),
         Some(Mark::Place(place)) => frame(place, field, layout, canvas),
-        Some(Mark::Line(ends)) => {
+        Some(Mark::Line(ends, to)) => {
+            to.map_or(Ok(()), |to| outline(ends, to, layout, canvas))?;
             let ends = ends.map(|[u, v]| layout.at(u, v));
             canvas.line(&ends, PAPER, 12)?;
             canvas.line(&ends, INK, 6)
         }
     }
+}
+
+/// Outlines the interval of the place of a bend, on either side of its line, with dashes.
+fn outline(
+    [[u1, v1], [u2, v2]]: [[f64; 2]; 2],
+    to: f64,
+    layout: &Layout<'_>,
+    canvas: &Canvas<'_>,
+) -> Result<(), PictureError> {
+    let length = (u2 - u1).hypot(v2 - v1).max(f64::MIN_POSITIVE);
+    let (u, v) = (to * (v1 - v2) / length, to * (u2 - u1) / length);
+    let [a, b, c, d] = [(u1 + u, v1 + v), (u2 + u, v2 + v), (u2 - u, v2 - v), (u1 - u, v1 - v)]
+        .map(|(u, v)| layout.at(u, v));
+    for (from, to) in [(a, b), (b, c), (c, d), (d, a)] {
+        canvas.line(&[from, to], PAPER, 5)?;
+        canvas.dashed(from, to, INK, 3)?;
+    }
+    Ok(())
 }
 
 /// Frames the place of the next hit, and names it inside the frame, away from the means.

@@ -6,7 +6,7 @@ use platen_report::picture::SeenPlate;
 use super::clean;
 use crate::cells::Cells;
 use crate::view::View;
-use crate::{AdvicePart, AdvisedBend, AdvisedStep, Snapshot, words};
+use crate::{AdvicePart, AdvisedBend, AdvisedStep, LastAdvice, Snapshot, words};
 
 /// A line whose ends lie within this is said by one number, millimetres.
 const STRAIGHT: f64 = 5.0;
@@ -16,6 +16,10 @@ pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let advice = snapshot.result.as_ref().and_then(|result| result.advice.as_ref());
     let text = |texts: Texts| texts.of(view.language);
     cells.text("advice", advice.map_or(String::new(), |advice| sentence(advice, view)));
+    cells.text(
+        "advised-before",
+        advice.and_then(|it| it.last).map_or(String::new(), |last| before(last, view)),
+    );
     let seen = snapshot.plate.as_ref().and_then(|it| Some(view.turn.of(it.size_mm?, it.press_side)));
     let Some((advice, (bend, seen))) = advice.and_then(|it| Some((it, it.bend.as_ref().zip(seen)?))) else {
         return;
@@ -34,6 +38,22 @@ pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     );
     cells.text("near", bend.depth_mm.map_or(String::new(), |depth| view.length(depth)));
     cells.text("near-words", if bend.depth_mm.is_some() { text(words::DEPTH) } else { "" });
+}
+
+/// Returns the last stroke's advised angle beside the one that it made.
+fn before(last: LastAdvice, view: View) -> String {
+    let text = |texts: Texts| texts.of(view.language);
+    let number = |deg: f64| format!("{deg:.1}");
+    match last {
+        LastAdvice::TooLate => text(words::LAST_TOO_LATE).to_owned(),
+        LastAdvice::Made { advised_deg, advised_95_deg, made_deg } => {
+            let advised = match advised_95_deg.map(|it| it.map(number)) {
+                Some([low, high]) => fill(text(words::RANGE), &[&number(advised_deg), &low, &high]),
+                None => fill(text(words::DEGREES), &[&number(advised_deg)]),
+            };
+            fill(text(words::LAST_STROKE), &[&advised, &fill(text(words::DEGREES), &[&number(made_deg)])])
+        }
+    }
 }
 
 /// Returns the edge from which a line is measured, and the distances of its ends, the nearer to the operator (or to the left) first,
