@@ -136,6 +136,24 @@ mod tests {
         svg.lines().filter(|line| line.starts_with("<rect")).map(of).collect()
     }
 
+    /// A line along v at u 1.5 m, to 20 mm and to 200 mm: the dashes lie so far to both sides.
+    #[test]
+    fn the_advised_line_lies_within_the_interval_of_its_place() {
+        let field = rainbow();
+        let dashes = |to: Option<f64>| {
+            let mark = Some(Mark::Line([[1500.0, 0.0], [1500.0, 2000.0]], to));
+            let svg = screen_map(&field, &plate(None), View::default(), mark).unwrap().svg;
+            svg.lines()
+                .filter(|line| line.starts_with("<polyline") && line.contains("stroke-width=\"16\""))
+                .count()
+        };
+        let others = dashes(None);
+        let [narrow, wide] = [20.0, 200.0].map(|to| dashes(Some(to)));
+        println!("{others} {narrow} {wide}");
+        // Both sides all along, and the ends the longer the wider.
+        assert!(narrow > others + 20 && wide > narrow, "{others} {narrow} {wide}");
+    }
+
     #[test]
     fn the_colours_of_the_pixels_are_those_of_the_legend_and_of_the_map_in_the_files() {
         let field = rainbow();

@@ -44,10 +44,14 @@ pub(super) fn next(
         None => Ok(()),
         Some(Mark::Place(place)) => frame(place, field, layout, canvas),
         Some(Mark::Line(ends, to)) => {
-            to.map_or(Ok(()), |to| outline(ends, to, layout, canvas))?;
-            let ends = ends.map(|[u, v]| layout.at(u, v));
-            canvas.line(&ends, PAPER, 12)?;
-            canvas.line(&ends, INK, 6)
+            let line = ends.map(|[u, v]| layout.at(u, v));
+            let Some(to) = to else {
+                canvas.line(&line, PAPER, 12)?;
+                return canvas.line(&line, INK, 6);
+            };
+            // Within its interval: a narrower line, else it would lie over the outline.
+            outline(ends, to, layout, canvas)?;
+            canvas.line(&line, INK, 3)
         }
     }
 }
@@ -63,11 +67,11 @@ fn outline(
     let (u, v) = (to * (v1 - v2) / length, to * (u2 - u1) / length);
     let [a, b, c, d] = [(u1 + u, v1 + v), (u2 + u, v2 + v), (u2 - u, v2 - v), (u1 - u, v1 - v)]
         .map(|(u, v)| layout.at(u, v));
+    canvas.area(&[a, b, c, d], PAPER)?;
     for (from, to) in [(a, b), (b, c), (c, d), (d, a)] {
-        canvas.line(&[from, to], PAPER, 5)?;
-        canvas.dashed(from, to, INK, 3)?;
+        canvas.line(&[from, to], PAPER, 6)?;
     }
-    Ok(())
+    [(a, b), (b, c), (c, d), (d, a)].into_iter().try_for_each(|(from, to)| canvas.dashed(from, to, INK, 2))
 }
 
 /// Frames the place of the next hit, and names it inside the frame, away from the means.
