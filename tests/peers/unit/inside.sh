@@ -6,10 +6,14 @@ main_pid() { systemctl show -p MainPID --value platen@p1; }
 now() { cut -d' ' -f1 /proc/uptime; }
 since() { awk -v a="$1" -v b="$(now)" 'BEGIN { printf "%.2f", b - a }'; }
 
-# Waits until the host is READY under another process number than the one given.
+# Waits until the host is READY under another process number than the one given. State and number are asked for at once: between two questions a host
+# that was active can have died, and no number is none of another host.
 ready_again() {
   for _ in $(seq 1200); do
-    if [ "$(systemctl show -p ActiveState --value platen@p1)" = active ] && [ "$(main_pid)" != "$1" ]; then return 0; fi
+    case "$(systemctl show -p ActiveState -p MainPID platen@p1 | sort | tr '\n' ' ')" in
+      "ActiveState=active MainPID=0 " | "ActiveState=active MainPID=$1 ") ;;
+      "ActiveState=active "*) return 0 ;;
+    esac
     sleep 0.05
   done
   return 1
