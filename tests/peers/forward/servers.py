@@ -66,7 +66,7 @@ class Authority:
 class Postgresql:
     """A PostgreSQL server; `folder` may lie on a small disk."""
 
-    def __init__(self, authority, folder):
+    def __init__(self, authority, folder, settings="shared_buffers=64MB\nmax_wal_size=64MB\nmin_wal_size=32MB\n"):
         self.port, self.folder, self.data = free_port(), folder, folder / "data"
         folder.mkdir(exist_ok=True)
         shutil.chown(folder, "postgres")
@@ -79,7 +79,7 @@ class Postgresql:
             os.chmod(self.data / name, 0o600)
         with open(self.data / "postgresql.conf", "a") as file:
             file.write(f"port={self.port}\nlisten_addresses='127.0.0.1'\nunix_socket_directories='{folder}'\nssl=on\n"
-                       "ssl_cert_file='server.pem'\nssl_key_file='server.key'\nshared_buffers=64MB\nmax_wal_size=64MB\nmin_wal_size=32MB\n")
+                       f"ssl_cert_file='server.pem'\nssl_key_file='server.key'\n{settings}")
         self.start()
         with self.connect("postgres") as database:
             database.execute("CREATE DATABASE platen")
