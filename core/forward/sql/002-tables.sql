@@ -53,7 +53,7 @@ CREATE TABLE platen.stroke (
 ) PARTITION BY RANGE (accepted);
 COMMENT ON COLUMN platen.stroke.figures IS 'all figures of the record, in metres, radians, seconds and fractions';
 COMMENT ON COLUMN platen.stroke.bends IS 'bends that the stroke made, as the comparison curvature found them; millimetres and degrees';
-CREATE INDEX ON platen.stroke USING brin (accepted);
+CREATE INDEX ON platen.stroke USING brin (accepted) WITH (autosummarize = on);
 CREATE INDEX ON platen.stroke (site, press, owner, plate);
 
 CREATE TABLE platen.alarm (
@@ -68,7 +68,7 @@ CREATE TABLE platen.alarm (
     run_id bigint,
     PRIMARY KEY (site, press, owner, event)
 );
-CREATE INDEX ON platen.alarm USING brin (at);
+CREATE INDEX ON platen.alarm USING brin (at) WITH (autosummarize = on);
 
 -- Every figure of a stroke as a row.
 CREATE VIEW platen.figure AS

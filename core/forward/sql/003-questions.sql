@@ -23,7 +23,7 @@ FROM platen.bend_made b;
 CREATE FUNCTION platen.plate_courses(since timestamptz, until timestamptz)
 RETURNS TABLE (site text, press text, owner int, plate bigint, part_id bigint, part_name text, recipe int, crew int, began timestamptz,
     last_stroke timestamptz, strokes bigint, not_measured bigint, overshoots bigint, passed timestamptz, strokes_to_pass int, minutes_to_pass float8)
-LANGUAGE sql STABLE AS $$
+LANGUAGE sql STABLE PARALLEL SAFE AS $$
     SELECT s.site, s.press, s.owner, s.plate, min(s.part_id), min(s.part_name), max(s.recipe), CASE WHEN min(s.crew) = max(s.crew) THEN max(s.crew) END,
         min(s.accepted), max(s.accepted), count(*), count(*) FILTER (WHERE s.verdict = 'not_measured'),
         count(*) FILTER (WHERE s.verdict = 'fail' AND s.sense > 0), min(s.accepted) FILTER (WHERE s.verdict = 'pass'),
@@ -38,7 +38,7 @@ CREATE VIEW platen.plate_course AS SELECT * FROM platen.plate_courses('-infinity
 
 -- Half the width of a 95 % interval of a mean of n values with this standard deviation. Quantile of Student's t by the expansion of Cornish and
 -- Fisher, to 0.002 from n = 10 on (Abramowitz and Stegun, 26.7.5).
-CREATE FUNCTION platen.interval_95(deviation float8, n bigint) RETURNS float8 LANGUAGE sql IMMUTABLE AS $$
+CREATE FUNCTION platen.interval_95(deviation float8, n bigint) RETURNS float8 LANGUAGE sql IMMUTABLE PARALLEL SAFE AS $$
     SELECT CASE WHEN n >= 10 THEN (1.95996 + 2.37227 / (n - 1) + 2.82250 / (n - 1) ^ 2) * deviation / sqrt(n) END
 $$;
 
@@ -48,7 +48,7 @@ $$;
 CREATE FUNCTION platen.compared(since timestamptz, until timestamptz, of_crews boolean)
 RETURNS TABLE (site text, press text, crew int, recipe int, plates bigint, strokes_mean float8, strokes_low float8, strokes_high float8,
     minutes_median float8, overshoot_share float8, caveat text)
-LANGUAGE sql STABLE AS $$
+LANGUAGE sql STABLE PARALLEL SAFE AS $$
     SELECT c.site, c.press, c.crew, c.recipe, c.plates, c.strokes_mean, c.strokes_mean - c.half, c.strokes_mean + c.half, c.minutes_median,
         c.overshoot_share,
         CASE
@@ -69,7 +69,7 @@ LANGUAGE sql STABLE AS $$
 $$;
 
 -- The sign of life of each press, without reading what it sent.
-CREATE INDEX ON platen.inbox USING brin (at);
+CREATE INDEX ON platen.inbox USING brin (at) WITH (autosummarize = on);
 
 GRANT SELECT ON ALL TABLES IN SCHEMA platen TO platen_reader;
 GRANT EXECUTE ON FUNCTION platen.interval_95, platen.plate_courses, platen.compared TO platen_reader;
