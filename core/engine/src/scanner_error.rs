@@ -1,26 +1,36 @@
-//! Correlated error of the scanner in the uncertainties of the comparisons: that of its calibration, and until there is one
-//! that of the instrument's data sheet.
+//! Correlated error of the scanner in every stated uncertainty: that of its calibration, and until there is one that of the
+//! instrument's data sheet.
 //!
 //! A data sheet states the accuracy of a range: an error that neighbouring cells share, which no fit averages out. The plant file
 //! has precedence over the driver; where neither states one, that of common phase scanners is assumed. A range error moves a place
 //! along the beam, thus along the normal by its cosine of incidence. Two scans differ by the errors of both, hence the factor of
 //! sqrt 2, as in a calibration by pairs of scans.
 //!
+//! Places, lengths and angles are uncertain by the range error itself ([`RangeError`]): assumed, or as the calibration shows it. Of the
+//! calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is z1 / 2 - z2 + z3 / 2,
+//! its error that of a place times the square root of 3 / 2. Both divided by the cosine of incidence are errors of a range.
+//!
 //! Limits: one figure for the whole plate, without a wavelength; what is equal in both scans of a pair cancels, and counts here all
-//! the same.
+//! the same. A calibration without an artefact does not know what repeats in every scan, and then no uncertainty holds it.
 
 use std::f64::consts::SQRT_2;
 
 use platen_model::Task;
 use platen_model::units::mm;
 use platen_plant::PlateFile;
-use platen_shape::Surface;
+use platen_shape::{RangeError, Surface};
 
 use crate::calibration::Calibration;
 
 /// Range error where neither the plant file nor the driver states one, one sigma, metres: the data sheets of phase scanners for
 /// buildings and plants state 1 to 3 mm (FARO Focus3D S120: 2 mm at 10 m and 25 m).
 const UNSTATED: f64 = 2e-3;
+
+/// Sum of the squared weights of the heights in the gap of a balanced template: 1/4 + 1 + 1/4.
+const GAP_SQUARES: f64 = 1.5;
+
+/// Smallest cosine of incidence by which an error along the normal is divided: 85 degrees.
+const LEAST_COSINE: f64 = 0.09;
 
 /// Places along each side at which the incidence is taken.
 const PLACES: usize = 21;
@@ -32,14 +42,19 @@ pub struct ScannerError {
     correlated: f64,
     /// Systematic error of a gap, one sigma, metres; known only from an artefact.
     systematic: Option<f64>,
+    /// Range error that neighbouring cells share.
+    range: RangeError,
     /// Sentence that names the assumed range error; `None` with a calibration.
     pub assumption: Option<String>,
 }
 
 impl ScannerError {
-    /// Returns the errors of a calibration.
-    pub fn calibrated(calibration: &Calibration) -> Self {
+    /// Returns the errors of a calibration, at this plate.
+    pub fn calibrated(calibration: &Calibration, surface: &Surface) -> Self {
+        let systematic = calibration.sigma_true.unwrap_or(0.0) / GAP_SQUARES.sqrt();
+        let place = (calibration.sigma_correlated / SQRT_2).hypot(systematic);
         Self {
+            range: RangeError::new(place / rms_cosine(surface).max(LEAST_COSINE)),
             correlated: calibration.sigma_correlated,
             systematic: calibration.sigma_true,
             assumption: None,
@@ -61,7 +76,19 @@ impl ScannerError {
             mm(error)
         );
         let correlated = SQRT_2 * error * rms_cosine(surface);
-        Self { correlated, systematic: None, assumption: Some(assumption) }
+        Self { correlated, systematic: None, range: RangeError::new(error), assumption: Some(assumption) }
+    }
+
+    /// Returns the correlated error of a position along the normal between two scans, one sigma, metres.
+    #[must_use]
+    pub fn correlated(&self) -> f64 {
+        self.correlated
+    }
+
+    /// Returns the range error that neighbouring cells share.
+    #[must_use]
+    pub fn range(&self) -> RangeError {
+        self.range
     }
 
     /// Logs the assumption, if there is one: a warning, unless the scanner is said to have no such error.

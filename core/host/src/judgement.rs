@@ -3,13 +3,14 @@
 use std::time::Instant;
 
 use platen_engine::calibration::Calibration;
+use platen_engine::doubtful_edge;
 use platen_engine::pipeline::Pipeline;
 use platen_engine::plugin::{Instance, PluginError, Surfaces};
 use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke;
 use platen_model::{Report, Task};
 use platen_plant::{PlantFile, PlateFile};
-use platen_report::result::{Context, ResultRecord};
+use platen_report::result::{self, Context, ResultRecord};
 use platen_shape::{Measured, Scanned};
 
 use crate::plugin_records;
@@ -47,14 +48,19 @@ pub(crate) fn judge(
     let Circumstances { plant, plate, calibration, scanner, stroke, supports_changed } = circumstances;
     let start = Instant::now();
     let assumed = || ScannerError::assumed(plant.range_error, scanned.header.range_error_m, surfaces.now);
-    let error = calibration.map_or_else(assumed, ScannerError::calibrated);
+    let calibrated = |calibration| ScannerError::calibrated(calibration, surfaces.now);
+    let error = calibration.map_or_else(assumed, calibrated);
     error.log();
     let task = error.task(plate, supports_changed);
-    let reports = stroke::compare(pipeline, &task, surfaces);
+    let mut reports = stroke::compare(pipeline, &task, surfaces);
+    let doubts = result::doubts(measured, plate);
+    doubtful_edge::withdraw_verdicts(pipeline, &task, surfaces, &doubts, &mut reports);
     let context = Context {
         plate,
         task: &task,
         assumption: error.assumption.as_deref(),
+        range_error: error.range(),
+        doubts: &doubts,
         press: pipeline.press,
         stroke,
         verdict: stroke::verdict(&reports),

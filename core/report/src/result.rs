@@ -36,7 +36,7 @@ use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
 use platen_shape::{
-    Blank, EXPANDED, EdgeDoubt, Measured, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
+    Blank, EXPANDED, EdgeDoubt, Measured, RangeError, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
 };
 
 /// Version of the document.
@@ -218,6 +218,10 @@ pub struct Context<'a, E> {
     pub task: &'a Task,
     /// Range error that stands in for a calibration, as a sentence.
     pub assumption: Option<&'a str>,
+    /// Range error of the scanner, calibrated or assumed: it counts in the uncertainty of every place and length.
+    pub range_error: RangeError,
+    /// Edges whose lengths are not explained.
+    pub doubts: &'a [EdgeDoubt],
     /// Origin of the press in the scanner frame, where the plant file places it.
     pub press: Option<Vec3>,
     /// Stroke, where there is one.
@@ -234,8 +238,8 @@ impl ResultRecord {
     /// Assembles the document of a measurement.
     pub fn new<E: Display>(scanned: &Scanned, measured: &Measured, context: Context<'_, E>) -> Self {
         let Measured { outline, measurement, .. } = measured;
-        let checks = ShapeChecks::new(outline, &measurement.surface);
-        let doubts = edge_doubts(&checks, &measurement.surface, cut_lengths(measured, context.plate));
+        let checks = ShapeChecks::new(outline, &measurement.surface, context.range_error);
+        let doubts = context.doubts;
         let sound: Vec<&Report> = context.reports.iter().filter_map(|report| report.as_ref().ok()).collect();
         Self {
             schema: SCHEMA.to_owned(),
@@ -271,10 +275,10 @@ impl ResultRecord {
                 notes: scanned.header.notes.clone(),
             },
             corners_m: measurement.corners.map(Into::into),
-            corners_uncertainty_mm: Some(corner_uncertainties(measured)),
-            corners_seen: corners_seen(outline, &doubts),
+            corners_uncertainty_mm: Some(corner_uncertainties(measured, context.range_error)),
+            corners_seen: corners_seen(outline, doubts),
             shape_checks: ShapeChecksRecord::new(&checks),
-            markers: markers(measured, context.plate),
+            markers: markers(measured, context.plate, context.range_error),
             trim_lines: trim::record(measurement, context.plate),
             reference_lines: lines::record(measurement, context.plate, &sound),
             grid: GridRecord::new(measurement, &sound),
@@ -325,10 +329,14 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
     says
 }
 
-/// Returns the lengths of the edges as they were cut, metres.
-fn cut_lengths(measured: &Measured, plate: &PlateFile) -> [f64; 4] {
+/// Returns the edges whose lengths differ from those that were cut by more than is explained. Their intervals hold how well the edges were
+/// located, and not the scanner's range error: a doubt is about the one, and an assumed range error would hide it.
+#[must_use]
+pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
+    let surface = &measured.measurement.surface;
     let ordered = Blank::rectangle(plate.plate.width, plate.plate.height);
-    measured.blank.as_ref().unwrap_or(&ordered).edge_lengths()
+    let cut = measured.blank.as_ref().unwrap_or(&ordered).edge_lengths();
+    edge_doubts(&ShapeChecks::new(&measured.outline, surface, RangeError::default()), surface, cut)
 }
 
 fn doubt_sentence(doubt: &EdgeDoubt) -> String {
@@ -343,26 +351,25 @@ fn doubt_sentence(doubt: &EdgeDoubt) -> String {
     )
 }
 
-/// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the surface.
-fn corner_uncertainties(measured: &Measured) -> [f64; 4] {
+/// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the surface, along
+/// the beam from the scanner.
+fn corner_uncertainties(measured: &Measured, range_error: RangeError) -> [f64; 4] {
     let surface = &measured.measurement.surface;
     let (w, h) = (surface.width(), surface.height());
     let places = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
     std::array::from_fn(|k| {
         let [u, v] = places[k];
         let [leaving, arriving] = measured.outline.corners[k].sigma;
-        mm(EXPANDED * leaving.hypot(arriving).hypot(surface.sigma_point(u, v)))
+        let edges = leaving.hypot(arriving);
+        mm(EXPANDED * edges.hypot(surface.sigma_point(u, v)).hypot(range_error.sigma()))
     })
 }
 
-fn markers(measured: &Measured, plate: &PlateFile) -> Vec<MarkerRecord> {
+fn markers(measured: &Measured, plate: &PlateFile, range_error: RangeError) -> Vec<MarkerRecord> {
+    let location = measured.measurement.location.clone().with_range_error(range_error);
     let record = |marker: &platen_model::Marker| {
-        let Place { u, v, position, sigma, seen } = evaluate::place(
-            &measured.measurement.surface,
-            &measured.measurement.location,
-            marker.at[0],
-            marker.at[1],
-        );
+        let Place { u, v, position, sigma, seen } =
+            evaluate::place(&measured.measurement.surface, &location, marker.at[0], marker.at[1]);
         let all = sigma.iter().map(|s| s * s).sum::<f64>().sqrt();
         MarkerRecord {
             name: marker.name.clone(),

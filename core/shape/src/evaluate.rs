@@ -5,6 +5,7 @@
 //! (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
 
 use crate::flatten::Misplacement;
+use crate::range_error::RangeError;
 use crate::surface::{Curvature, Surface};
 use crate::{Chart, DiskMesh, Vec3};
 
@@ -16,7 +17,7 @@ pub const GRID: [usize; 2] = [21, 21];
 /// Uncertainty of material points within the surface.
 ///
 /// A point's u follows from the edges u = 0 and u = W, each with its own standard deviation, and from the flattening's
-/// own uncertainty; likewise v.
+/// own uncertainty; likewise v. The scanner's range error moves the edges in the surface, and the surface itself along the normal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Location {
     width: f64,
@@ -24,6 +25,7 @@ pub struct Location {
     edge_sigma: [f64; 4],
     /// Cells of the rectangle with the flattening's largest standard deviations of u and v among their vertices.
     cells: Vec<[f64; 2]>,
+    range_error: RangeError,
 }
 
 /// A material point on the scanned face.
@@ -78,19 +80,39 @@ impl Location {
             let cell = &mut cells[cell(*u, mesh.width) + CELLS * cell(*v, mesh.height)];
             *cell = [cell[0].max(sigma[0]), cell[1].max(sigma[1])];
         }
-        Self { width: mesh.width, height: mesh.height, edge_sigma: mesh.edge_sigma, cells }
+        Self {
+            width: mesh.width,
+            height: mesh.height,
+            edge_sigma: mesh.edge_sigma,
+            cells,
+            range_error: RangeError::default(),
+        }
     }
 
-    /// Returns the standard deviations of u and of v at a place, metres.
+    /// Adds the scanner's range error, which is not in the covariance of a fit.
     #[must_use]
-    pub fn sigma(&self, u: f64, v: f64) -> [f64; 2] {
+    pub fn with_range_error(self, range_error: RangeError) -> Self {
+        Self { range_error, ..self }
+    }
+
+    /// Returns the standard deviations of u and of v and along the normal at a place of `surface`, metres.
+    #[must_use]
+    pub fn sigma(&self, surface: &Surface, u: f64, v: f64) -> [f64; 3] {
         let (x, y) = ((u / self.width).clamp(0.0, 1.0), (v / self.height).clamp(0.0, 1.0));
         let [bottom, right, top, left] = self.edge_sigma;
         let flattening = self.cells[cell(u, self.width) + CELLS * cell(v, self.height)];
-        let total = |from: f64, to: f64, f: f64, own: f64| {
-            (((1.0 - f) * from).powi(2) + (f * to).powi(2) + own * own).sqrt()
+        // An edge, `at` a place on it, across the direction `along`, with its share in the place.
+        let edge = |share: f64, sigma: f64, at: [f64; 2], along: &Vec3| {
+            let moved = self.range_error.along(&surface.face(at[0], at[1]), along);
+            (share * sigma).hypot(share * moved)
         };
-        [total(left, right, x, flattening[0]), total(bottom, top, y, flattening[1])]
+        let derivatives = surface.derivatives(u, v);
+        let [along_u, along_v] = [derivatives.u, derivatives.v].map(|along| along.normalize());
+        let of_u = edge(1.0 - x, left, [0.0, v], &along_u).hypot(edge(x, right, [self.width, v], &along_u));
+        let of_v = edge(1.0 - y, bottom, [u, 0.0], &along_v).hypot(edge(y, top, [u, self.height], &along_v));
+        let normal = surface.sigma_point(u, v);
+        let moved = self.range_error.along(&surface.face(u, v), &derivatives.normal());
+        [of_u.hypot(flattening[0]), of_v.hypot(flattening[1]), normal.hypot(moved)]
     }
 }
 
@@ -101,8 +123,7 @@ fn cell(x: f64, length: f64) -> usize {
 /// Evaluates the material point (u, v) on the scanned face.
 #[must_use]
 pub fn place(surface: &Surface, location: &Location, u: f64, v: f64) -> Place {
-    let [su, sv] = location.sigma(u, v);
-    let sigma = [su, sv, surface.sigma_point(u, v)];
+    let sigma = location.sigma(surface, u, v);
     Place { u, v, position: surface.face(u, v), sigma, seen: surface.mask().seen(u, v) }
 }
 

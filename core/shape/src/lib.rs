@@ -12,6 +12,7 @@
 //! | [`mesh`] | patch, outline -> [`DiskMesh`] | Coons patch, mid-surface, Delaunay triangulation |
 //! | [`flatten`] | mesh -> [`Chart`] | interface of the flattening plugins; harmonic map and free-boundary development |
 //! | [`surface`] | patch, chart -> [`Surface`] | bicubic spline S(u, v), smoothing by restricted maximum likelihood |
+//! | [`range_error`] | range error of the scanner -> standard deviation of a place | propagation along the beam |
 //! | [`evaluate`] | surface -> places, lines, grid | positions and curvatures with their standard deviations |
 //! | [`measure`](mod@measure) | patch, outline -> [`Measurement`] | the stages from mesh to surface in one call |
 //! | [`target_surface`] | target shape -> [`TargetSurface`] | closed forms; rigid registration (Kabsch) |
@@ -41,6 +42,8 @@ pub mod mesh;
 #[cfg(feature = "measure")]
 pub mod outline;
 pub mod plate;
+#[cfg(feature = "measure")]
+pub mod range_error;
 pub mod surface;
 pub mod target_surface;
 pub mod template_seat;
@@ -60,6 +63,8 @@ pub use mesh::{DiskMesh, DiskParts, MeshError};
 #[cfg(feature = "measure")]
 pub use outline::{Corner, EdgeCurve, HeightField, Outline, OutlineError};
 pub use plate::{Blank, PlateSpec, RegionOfInterest};
+#[cfg(feature = "measure")]
+pub use range_error::RangeError;
 
 pub use surface::{Surface, SurfaceParts};
 pub use target_surface::{Placement, TargetError, TargetSurface};

@@ -92,13 +92,13 @@ impl Profile {
         self.x.iter().zip(&self.d).map(|(x, d)| seating.offset + seating.tilt * x - d).collect()
     }
 
-    /// Returns the gap at place `k` as a weighted sum of heights of the plate: (place, weight). The gap is smallest at the
+    /// Returns the gap at place `k` as a weighted sum of heights of the plate: (place, weight), each place once. The gap is smallest at the
     /// contacts, so it does not change to first order when they move.
     #[must_use]
     pub fn functional(&self, seating: &Seating, k: usize) -> Vec<(usize, f64)> {
         let share = |i: usize, j: usize, m: usize| (self.x[k] - self.x[m]) / (self.x[j] - self.x[i]);
         let (first, last) = (0, self.last());
-        match seating.support {
+        let terms = match seating.support {
             Support::OnTwo([i, j]) => {
                 let f = share(i, j, i);
                 vec![(i, 1.0 - f), (j, f), (k, -1.0)]
@@ -111,7 +111,15 @@ impl Profile {
                 let f = share(first, last, first);
                 vec![(first, 1.0 - f), (last, f), (k, -1.0)]
             }
+        };
+        let mut functional: Vec<(usize, f64)> = Vec::with_capacity(terms.len());
+        for (place, weight) in terms {
+            match functional.iter_mut().find(|(known, _)| *known == place) {
+                Some((_, sum)) => *sum += weight,
+                None => functional.push((place, weight)),
+            }
         }
+        functional
     }
 
     /// Returns the places where the template touches.
@@ -235,6 +243,15 @@ mod tests {
             assert!((ends[0] - ends[200]).abs() < 1e-12);
             assert!(largest(&ends) >= 0.0);
         }
+    }
+
+    #[test]
+    fn the_gap_at_an_end_of_a_balanced_template_is_half_a_second_difference() {
+        let p = profile(|x| -0.004 * x * x);
+        let functional = p.functional(&p.balanced(), 200);
+        let weight = |k: usize| functional.iter().find(|(place, _)| *place == k).map(|(_, weight)| *weight);
+        assert_eq!([weight(0), weight(100), weight(200)], [Some(-0.5), Some(1.0), Some(-0.5)]);
+        assert_eq!(functional.len(), 3);
     }
 
     #[test]

@@ -7,9 +7,10 @@
 
 use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
-use platen_shape::{Placement, Surface, TargetSurface, Vec3};
+use platen_shape::{EXPANDED, Placement, Surface, TargetSurface, Vec3};
 
 use crate::linear_program;
+use crate::scanner_sigma::ScannerSigma;
 
 /// Target in its seat on the plate.
 #[derive(Debug)]
@@ -27,6 +28,51 @@ pub(crate) struct Deviation {
     pub(crate) rocks: bool,
     contacts: Vec<usize>,
     pose: Pose,
+    /// Seats on the plate bent by its uncertainty.
+    bent: Vec<BentSeat>,
+}
+
+/// Bending mode of the plate as a whole.
+#[derive(Debug)]
+struct Mode {
+    /// Height at (x, y), each from -1 to 1 over the plate.
+    height: fn(f64, f64) -> f64,
+    /// Heights, at places in shares of the sides, whose weighted sum is the mode's coefficient.
+    coefficient: &'static [([f64; 2], f64)],
+}
+
+/// Hollow along u, hollow along v, twist.
+const MODES: [Mode; 3] = [
+    Mode { height: |x, _| x * x, coefficient: &[([0.0, 0.5], 0.5), ([0.5, 0.5], -1.0), ([1.0, 0.5], 0.5)] },
+    Mode { height: |_, y| y * y, coefficient: &[([0.5, 0.0], 0.5), ([0.5, 0.5], -1.0), ([0.5, 1.0], 0.5)] },
+    Mode {
+        height: |x, y| x * y,
+        coefficient: &[([0.0, 0.0], 0.25), ([1.0, 0.0], -0.25), ([1.0, 1.0], 0.25), ([0.0, 1.0], -0.25)],
+    },
+];
+
+impl Mode {
+    /// Returns the mode's height at (u, v).
+    fn at(&self, [u, v]: [f64; 2], now: &Surface) -> f64 {
+        (self.height)(2.0 * u / now.width() - 1.0, 2.0 * v / now.height() - 1.0)
+    }
+
+    /// Returns the standard deviation of its coefficient, metres.
+    fn sigma(&self, now: &Surface, scanner: ScannerSigma) -> f64 {
+        let place = |[x, y]: [f64; 2]| [x * now.width(), y * now.height()];
+        let terms: Vec<([f64; 2], f64)> =
+            self.coefficient.iter().map(|(at, weight)| (place(*at), *weight)).collect();
+        now.sigma_of_heights(&terms).hypot(scanner.of_heights(terms.iter().map(|(_, weight)| *weight)))
+    }
+}
+
+/// Seat of the target on a plate that is bent in a mode by its 95 % uncertainty.
+#[derive(Debug)]
+struct BentSeat {
+    mode: &'static Mode,
+    /// Metres.
+    by: f64,
+    movement: Vec3,
 }
 
 /// Pose of the target: the rigid fit, and the small movement from there to the seat.
@@ -42,7 +88,12 @@ impl Deviation {
     ///
     /// # Errors
     /// [`ErrorKind::BadData`] when the visible part of the plate does not support the target; the error of `check`.
-    pub(crate) fn new(now: &Surface, target: &TargetSurface, check: &dyn Fn() -> Result<()>) -> Result<Self> {
+    pub(crate) fn new(
+        now: &Surface,
+        target: &TargetSurface,
+        scanner: ScannerSigma,
+        check: &dyn Fn() -> Result<()>,
+    ) -> Result<Self> {
         let uv = PlateGrid::new(now).map(|u, v| [u, v]);
         let seen: Vec<bool> = uv.iter().map(|&[u, v]| now.mask().seen(u, v)).collect();
         let of_seen = uv.iter().zip(&seen).filter(|(_, seen)| **seen).map(|(at, _)| *at);
@@ -57,27 +108,24 @@ impl Deviation {
             index.push(i);
         }
         check()?;
-        let reach = 1e3 * (now.width() + now.height());
-        let vertex = linear_program::minimum(&rows, &heights, reach).ok_or_else(|| {
-            Error::new(
-                ErrorKind::BadData,
-                "the target finds no seat: the plate was seen on one side of its middle only",
-            )
-            .hint("scan again with the whole plate in view")
-        })?;
-        let shorter = now.width().min(now.height());
-        let rocks = narrowest(vertex.active.map(|i| uv[index[i]])) < 0.25 * shorter;
-        let active;
-        (pose.movement, active) = if rocks {
-            let rise = |i: usize| heights[i] / rows[i].x;
-            let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
-            (Vec3::x() * rise(top), vec![top])
-        } else {
-            (vertex.q, vertex.active.to_vec())
-        };
+        let size = [now.width(), now.height()];
+        let places: Vec<[f64; 2]> = index.iter().map(|&i| uv[i]).collect();
+        let (movement, active, rocks) = seat(&rows, &heights, &places, size)?;
+        pose.movement = movement;
+        let mut bent = Vec::new();
+        for mode in &MODES {
+            check()?;
+            let sigma = mode.sigma(now, scanner);
+            for by in [-EXPANDED * sigma, EXPANDED * sigma] {
+                let raised = places.iter().zip(&heights).map(|(at, height)| height + by * mode.at(*at, now));
+                // Without a seat there is nothing to compare with; the plate itself has one.
+                let seat = seat(&rows, &raised.collect::<Vec<_>>(), &places, size);
+                bent.extend(seat.map(|(movement, ..)| BentSeat { mode, by, movement }));
+            }
+        }
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&pose.movement)).collect();
         let contacts = active.into_iter().map(|i| index[i]).collect();
-        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose })
+        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent })
     }
 
     /// Returns measured minus target at one place, in the seat.
@@ -85,8 +133,15 @@ impl Deviation {
         self.pose.placement.deviation(now, target, at) - row(target, at).dot(&self.pose.movement)
     }
 
-    /// Returns the standard deviation of the deviation at a place, from the fit's covariance there and at the contacts.
-    pub(crate) fn sigma(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
+    /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
+    /// errors there and at the contacts; at least what the seats on the bent plate make of it.
+    pub(crate) fn sigma(
+        &self,
+        now: &Surface,
+        target: &TargetSurface,
+        at: [f64; 2],
+        scanner: ScannerSigma,
+    ) -> f64 {
         let here = row(target, at);
         let rows: Vec<Vec3> = self.contacts.iter().map(|&i| row(target, self.uv[i])).collect();
         let weights: Vec<f64> = match rows[..] {
@@ -96,9 +151,41 @@ impl Deviation {
             _ => rows.iter().map(|r| here.x / r.x).collect(),
         };
         let contacts = self.contacts.iter().zip(weights).map(|(&i, weight)| (self.uv[i], -weight));
-        now.sigma_of_heights(&contacts.chain([(at, 1.0)]).collect::<Vec<_>>())
+        let terms: Vec<([f64; 2], f64)> = contacts.chain([(at, 1.0)]).collect();
+        let of_weights =
+            now.sigma_of_heights(&terms).hypot(scanner.of_heights(terms.iter().map(|(_, weight)| *weight)));
+        let change = |seat: &BentSeat| {
+            let moved = here.dot(&(seat.movement - self.pose.movement));
+            (seat.by * seat.mode.at(at, now) - moved).abs() / EXPANDED
+        };
+        self.bent.iter().map(change).fold(of_weights, f64::max)
     }
 }
+
+/// Returns the movement from the fit to the seat over these heights, the contacts, and whether the target rocks.
+fn seat(
+    rows: &[Vec3],
+    heights: &[f64],
+    places: &[[f64; 2]],
+    [width, height]: [f64; 2],
+) -> Result<(Vec3, Vec<usize>, bool)> {
+    let vertex = linear_program::minimum(rows, heights, 1e3 * (width + height)).ok_or_else(|| {
+        Error::new(
+            ErrorKind::BadData,
+            "the target finds no seat: the plate was seen on one side of its middle only",
+        )
+        .hint("scan again with the whole plate in view")
+    })?;
+    if narrowest(vertex.active.map(|i| places[i])) >= ROCKS * width.min(height) {
+        return Ok((vertex.q, vertex.active.to_vec(), false));
+    }
+    let rise = |i: usize| heights[i] / rows[i].x;
+    let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
+    Ok((Vec3::x() * rise(top), vec![top], true))
+}
+
+/// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
+const ROCKS: f64 = 0.25;
 
 /// Returns the derivative of the deviation at a place by the target's rise and tilts, with its sign reversed.
 fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {

@@ -1,9 +1,10 @@
 //! Evaluation of one template: gap, uncertainty, verdict and sentence.
 
 use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
-use platen_shape::template_seat::Seating;
+use platen_shape::template_seat::{Profile, Seating};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
+use crate::scanner_sigma::ScannerSigma;
 use crate::section::{Chord, Line, Section};
 
 /// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
@@ -23,10 +24,7 @@ const SEARCH_STEP: f64 = 0.0125;
 pub(crate) struct Evaluator<'a> {
     pub(crate) now: &'a Surface,
     pub(crate) target: &'a TargetSurface,
-    /// Standard deviation of the correlated position error of a pair of scans, metres.
-    pub(crate) sigma_correlated: f64,
-    /// Standard deviation of a gap on a known artefact, metres.
-    pub(crate) sigma_true: f64,
+    pub(crate) scanner: ScannerSigma,
 }
 
 /// Finding of a template, with the figures that the finding does not contain.
@@ -75,7 +73,7 @@ impl Evaluator<'_> {
             .collect();
         let max_gap = seated.gaps[seated.largest];
         let max_gap_at = place(seated.largest);
-        let uncertainty = self.uncertainty(line, &seated);
+        let uncertainty = self.uncertainty(line, &seated).max(self.change_of_seat(line, template, &seated));
 
         let hidden = contacts.iter().find(|c| !c.seen).map(|c| ("the board touches", c.at));
         let hidden = hidden.or_else(|| (!seen(max_gap_at)).then_some(("the gap is largest", max_gap_at)));
@@ -148,27 +146,60 @@ impl Evaluator<'_> {
         let profile = &section.profile;
         let (seating, rocks) = profile.seat(seat, chord.length);
         let gaps = profile.gaps(&seating);
-        let largest =
-            (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() + TIE { k } else { best });
-        Seated { seating, rocks, gaps, largest, section }
+        Seated { seating, rocks, largest: largest(&gaps), gaps, section }
     }
 
     /// Returns the 95 % uncertainty of the largest gap: the fit's covariance at the places that decide the gap, the correlated
     /// error of a single scan, taken as independent between those places, and the scanner's bias.
     fn uncertainty(&self, line: &Line, seated: &Seated) -> f64 {
-        let terms: Vec<([f64; 2], f64)> = seated
-            .section
-            .profile
-            .functional(&seated.seating, seated.largest)
-            .into_iter()
-            .map(|(k, weight)| {
-                let [u, v] = line.at(seated.section.along[k]);
-                ([u, v], weight / seated.section.cosine(&self.now.normal(u, v)))
-            })
-            .collect();
-        let square: f64 = terms.iter().map(|(_, w)| w * w).sum();
-        let correlated = self.sigma_correlated * (0.5 * square).sqrt();
-        EXPANDED * self.now.sigma_of_heights(&terms).hypot(correlated).hypot(self.sigma_true)
+        EXPANDED
+            * self.sigma(line, seated, &seated.section.profile.functional(&seated.seating, seated.largest))
+    }
+
+    /// Returns the standard deviation of a weighted sum of heights of the profile.
+    fn sigma(&self, line: &Line, seated: &Seated, functional: &[(usize, f64)]) -> f64 {
+        let term = |(k, weight): &(usize, f64)| {
+            let [u, v] = line.at(seated.section.along[*k]);
+            ([u, v], weight / seated.section.cosine(&self.now.normal(u, v)))
+        };
+        let terms: Vec<([f64; 2], f64)> = functional.iter().map(term).collect();
+        let scanner = self.scanner.of_heights(terms.iter().map(|(_, weight)| *weight));
+        self.now.sigma_of_heights(&terms).hypot(scanner)
+    }
+
+    /// Returns by how much the largest gap changes when the profile is bent by its 95 % uncertainty, to either side, as a parabola and as
+    /// a cubic parabola, and when the correlated error is a wave over the range, in four phases. Where the template keeps its seat
+    /// that is what its weights say. Where it is about to rock, or to fall on another contact, the gap jumps, and weights say
+    /// nothing of the other side.
+    fn change_of_seat(&self, line: &Line, template: &Template, seated: &Seated) -> f64 {
+        let Profile { x, d } = &seated.section.profile;
+        let last = x.len() - 1;
+        let half = 0.5 * (x[last] - x[0]);
+        // Coefficient of (x / half)^2 by the second difference, of (x / half)^3 by the third.
+        let parabola = [(0, 0.5), (last / 2, -1.0), (last, 0.5)];
+        let cubic =
+            [(0, -1.0), (last / 3, 3.0), (2 * last / 3, -3.0), (last, 1.0)].map(|(k, w)| (k, w * 9.0 / 16.0));
+        let curves = [(&parabola[..], 2), (&cubic[..], 3)].map(|(coefficient, power)| {
+            let by = EXPANDED * self.sigma(line, seated, coefficient);
+            x.iter().map(|x| by * (x / half).powi(power)).collect::<Vec<f64>>()
+        });
+        let wave = |quarter: f64| -> Vec<f64> {
+            let height = |s: &f64| {
+                let [u, v] = line.at(*s);
+                let cosine = seated.section.cosine(&self.now.normal(u, v));
+                self.scanner.wave(self.now.face(u, v).norm(), quarter) / cosine
+            };
+            seated.section.along.iter().map(height).collect()
+        };
+        let change = |raised: &[f64], sign: f64| {
+            let bent = d.iter().zip(raised).map(|(d, raised)| d + sign * raised).collect();
+            let bent = Profile { x: x.clone(), d: bent };
+            let (seating, _) = bent.seat(template.seat, template.chord);
+            let gaps = bent.gaps(&seating);
+            (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
+        };
+        let modes = curves.into_iter().chain([0.0, 1.0].map(wave));
+        modes.flat_map(|raised| [-1.0, 1.0].map(|sign| change(&raised, sign))).fold(0.0, f64::max)
     }
 
     /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests
@@ -185,6 +216,10 @@ impl Evaluator<'_> {
 
 /// Gaps that differ by less than this are equal, metres: of equal gaps the first counts, independent of rounding.
 const TIE: f64 = 1e-9;
+
+fn largest(gaps: &[f64]) -> usize {
+    (0..gaps.len()).fold(0, |best, k| if gaps[k].abs() > gaps[best].abs() + TIE { k } else { best })
+}
 
 impl Seated {
     fn open(&self) -> Opening {

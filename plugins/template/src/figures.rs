@@ -5,6 +5,7 @@ use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::deviation::Deviation;
 use crate::evaluation::Evaluated;
+use crate::scanner_sigma::ScannerSigma;
 
 /// Nodes along each side for the mean curvature, those of the result's grid.
 const GRID: usize = 21;
@@ -15,6 +16,7 @@ pub(crate) fn of_deviation(
     deviation: &Deviation,
     now: &Surface,
     target: &TargetSurface,
+    scanner: ScannerSigma,
     tolerance: Option<f64>,
 ) -> Vec<Figure> {
     let seen: Vec<usize> = (0..deviation.uv.len()).filter(|&i| deviation.seen[i]).collect();
@@ -37,7 +39,8 @@ pub(crate) fn of_deviation(
     let placed = |name: &str, i: usize| {
         let [u, v] = deviation.uv[i];
         let figure = Figure::new(name, deviation.fitted[i], "m");
-        figure.uncertainty(EXPANDED * now.sigma_point(u, v)).at([u, v])
+        let sigma = now.sigma_point(u, v).hypot(scanner.of_heights([1.0]));
+        figure.uncertainty(EXPANDED * sigma).at([u, v])
     };
     let mut figures = vec![
         placed("deviation.max", max),
@@ -49,7 +52,7 @@ pub(crate) fn of_deviation(
         Figure::new("deviation.min_u", deviation.uv[min][0], "m"),
         Figure::new("deviation.min_v", deviation.uv[min][1], "m"),
         Figure::new("deviation.gap", -deviation.value[deepest], "m")
-            .uncertainty(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest]))
+            .uncertainty(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest], scanner))
             .at(deviation.uv[deepest]),
         Figure::new("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
     ];
@@ -110,6 +113,7 @@ pub(crate) fn of_stations(
     now: &Surface,
     target: &TargetSurface,
     deviation: &Deviation,
+    scanner: ScannerSigma,
     evaluated: &[Evaluated],
 ) -> Vec<Figure> {
     let mut figures = Vec::new();
@@ -128,14 +132,16 @@ pub(crate) fn of_stations(
             Quantity::Deviation => figures.push(figure(
                 deviation.at(now, target, station.at),
                 "m",
-                deviation.sigma(now, target, station.at),
+                deviation.sigma(now, target, station.at, scanner),
             )),
             Quantity::CurvatureDeficit => {
                 let sigma = now.sigma_curvature(u, v);
-                let sigma = match target.bending(u, v) {
+                let direction = target.bending(u, v);
+                let fit = match direction {
                     Some([x, y]) => (x * x * sigma[0]).hypot(2.0 * x * y * sigma[2]).hypot(y * y * sigma[1]),
                     None => sigma[0].max(sigma[1]),
                 };
+                let sigma = fit.hypot(scanner.of_curvature(now, station.at, direction));
                 figures.push(figure(target.deficit(&now.curvature(u, v), u, v), "1/m", sigma));
             }
         }

@@ -22,9 +22,14 @@
 //! ```
 //!
 //! where s_fit is the fit's standard deviation of w'z, the heights z at the places that decide the gap with their weights w
-//! and covariances; s_corr the plant's correlated error of a position; s_true the scanner's error of a gap on a known artefact.
+//! and covariances; s_corr the plant's correlated error of a position, its share of a single scan; s_true the scanner's error of a gap on a known artefact.
+//! U is at least the change of the gap when the profile is bent by its uncertainty as a parabola or as a cubic parabola, and under a wave of
+//! s_corr over the range, whose period is 1 m: about to rock, or to fall on another contact, a template has either of two gaps, which w does
+//! not tell. The uncertainties of deviations hold the same for the whole target, bent along u, along v and in twist; that of the places
+//! (u, v) themselves is not in them.
 //! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
-//! `gap.*` are those of the one with the largest gap relative to its limit.
+//! `gap.*` are those of the one with the largest gap relative to its limit. The uncertainties of deviations and stations hold the same errors;
+//! that of a curvature the second derivative of a correlated error whose period is 1 m of range.
 //!
 //! *Seat of the target.* The whole target is laid on the plate as a rigid surface, from the scanner's side. Its direction
 //! follows the least-squares rigid fit of all material points; its height and tilts solve the linear program "lowest over the
@@ -74,6 +79,7 @@ mod deviation;
 mod evaluation;
 mod figures;
 mod linear_program;
+mod scanner_sigma;
 mod section;
 
 use platen_model::{Centre, Figure, Findings, NodeState, Report, Task, Template, Verdict};
@@ -82,6 +88,7 @@ use platen_shape::TargetSurface;
 
 use deviation::Deviation;
 use evaluation::{Evaluated, Evaluator, FEW_PLACES, PLACES};
+use scanner_sigma::ScannerSigma;
 use section::Line;
 
 platen_sdk::options! {
@@ -127,12 +134,8 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     };
     let target = TargetSurface::new(target, task.width, task.height, task.thickness)
         .map_err(|e| Error::new(ErrorKind::Config, e.to_string()))?;
-    let evaluator = Evaluator {
-        now,
-        target: &target,
-        sigma_correlated: task.sigma_correlated,
-        sigma_true: task.sigma_true.unwrap_or(0.0),
-    };
+    let scanner = ScannerSigma::of(task);
+    let evaluator = Evaluator { now, target: &target, scanner };
     let lines = task.templates.iter().map(|t| on_line(task, t)).collect::<Result<Vec<_>>>()?;
     let mut evaluated = Vec::new();
     for (template, (line, centre)) in task.templates.iter().zip(&lines) {
@@ -143,14 +146,14 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
         };
         evaluated.push(evaluator.evaluate(template, line, centre));
     }
-    let deviation = Deviation::new(now, &target, check)?;
+    let deviation = Deviation::new(now, &target, scanner, check)?;
 
     let limits = task.templates.iter().map(|t| t.limit);
     let tolerance = options.tolerance_mm.map(|mm| mm / 1000.0).or_else(|| limits.reduce(f64::min));
-    let mut found = figures::of_deviation(&deviation, now, &target, tolerance);
+    let mut found = figures::of_deviation(&deviation, now, &target, scanner, tolerance);
     found.extend(figures::of_templates(&evaluated));
     found.extend(figures::of_curvature(now, &target));
-    found.extend(figures::of_stations(task, now, &target, &deviation, &evaluated));
+    found.extend(figures::of_stations(task, now, &target, &deviation, scanner, &evaluated));
     let mut says = says(&evaluated);
     if let (true, Some(template)) = (options.search, task.templates.first()) {
         let (anywhere, sentence) = search(&evaluator, task, template, check)?;

@@ -2,9 +2,10 @@
 //!
 //! From the measured outline, not from the rectangle it is mapped to: they show by how many millimetres a cut blank differs
 //! from its order. Standard deviations follow from those of the corners, in the surface from the
-//! outline and across it from the fit; errors of different corners count as independent.
+//! outline, across it from the fit, and along the beam from the scanner's range error; errors of different corners count as independent.
 
 use crate::outline::{Corner, EdgeCurve};
+use crate::range_error::{RangeError, beam};
 use crate::{Outline, Surface, Vec3};
 
 /// Length of a square's arm, metres, or half the edge where that is shorter: corner angles are those between the lines
@@ -50,12 +51,12 @@ pub struct EdgeCheck {
 }
 
 impl ShapeChecks {
-    /// Computes the figures of an outline; the surface gives normals and thickness.
+    /// Computes the figures of an outline; the surface gives normals and thickness, `range_error` is the scanner's own.
     #[must_use]
-    pub fn new(outline: &Outline, surface: &Surface) -> Self {
+    pub fn new(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
         let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
         let sigma = |u: f64, v: f64| surface.sigma_point(u * surface.width(), v * surface.height());
-        Self::with(&outline.corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma)
+        Self::with(&outline.corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma, range_error)
     }
 
     /// `normal` and `sigma`, the standard deviation along it, at shares of the plate's sides.
@@ -65,10 +66,12 @@ impl ShapeChecks {
         half_thickness: f64,
         normal: &dyn Fn(f64, f64) -> Vec3,
         sigma: &dyn Fn(f64, f64) -> f64,
+        range_error: RangeError,
     ) -> Self {
         let corners = [0, 1, 2, 3].map(|k| {
             let [u, v] = CORNERS[k];
-            Known::new(&outlined[k], [&curves[k], &curves[(k + 3) % 4]], normal(u, v), sigma(u, v))
+            let edges = [&curves[k], &curves[(k + 3) % 4]];
+            Known::new(&outlined[k], edges, normal(u, v), sigma(u, v), range_error)
         });
         let straight = |from: usize, to: usize| {
             let way = corners[to].at - corners[from].at;
@@ -108,10 +111,10 @@ const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 /// A corner with the uncertainty of its place.
 struct Known {
     at: Vec3,
-    /// Unit directions of the leaving edge, of the arriving edge, of the normal.
-    axes: [Vec3; 3],
+    /// Unit directions of the leaving edge, of the arriving edge, of the normal, of the beam.
+    axes: [Vec3; 4],
     /// Standard deviations along them.
-    sigma: [f64; 3],
+    sigma: [f64; 4],
     /// Standard deviations of the two edges' directions, radians.
     tilt: [f64; 2],
     seen: bool,
@@ -119,17 +122,25 @@ struct Known {
 
 impl Known {
     /// A corner with the edges that leave it and arrive at it.
-    fn new(corner: &Corner, edges: [&EdgeCurve; 2], normal: Vec3, sigma: f64) -> Self {
+    fn new(
+        corner: &Corner,
+        edges: [&EdgeCurve; 2],
+        normal: Vec3,
+        sigma: f64,
+        range_error: RangeError,
+    ) -> Self {
         let Corner { point, sigma: [leaving, arriving], seen } = *corner;
-        let arms = [Arm::new(edges[0], false, point, normal), Arm::new(edges[1], true, point, normal)];
-        let axes = [arms[0].direction, arms[1].direction, normal];
-        Self { at: point, axes, sigma: [leaving, arriving, sigma], tilt: arms.map(|arm| arm.tilt), seen }
+        let arm = |edge: &EdgeCurve, from_end: bool| Arm::new(edge, from_end, point, normal, range_error);
+        let arms = [arm(edges[0], false), arm(edges[1], true)];
+        let axes = [arms[0].direction, arms[1].direction, normal, beam(&point)];
+        let sigma = [leaving, arriving, sigma, range_error.sigma()];
+        Self { at: point, axes, sigma, tilt: arms.map(|arm| arm.tilt), seen }
     }
 
     /// Variance of the place along a direction of any length.
     fn variance(&self, way: Vec3) -> f64 {
         let unit = way / way.norm().max(f64::MIN_POSITIVE);
-        (0..3).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
+        (0..4).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
     }
 }
 
@@ -150,12 +161,12 @@ struct Arm {
     /// The line of least squares through the edge's points within a square's arm; zero where there are none.
     direction: Vec3,
     /// Standard deviation of that direction, radians: both ends of the arm may be off, in opposite senses, by as much as the
-    /// edge is uncertain and its points scatter about the line.
+    /// edge is uncertain, its points scatter about the line, and a range error moves it aside.
     tilt: f64,
 }
 
 impl Arm {
-    fn new(curve: &EdgeCurve, from_end: bool, corner: Vec3, normal: Vec3) -> Self {
+    fn new(curve: &EdgeCurve, from_end: bool, corner: Vec3, normal: Vec3, range_error: RangeError) -> Self {
         let n = curve.points.len();
         let point = |i: usize| curve.points[if from_end { n - 1 - i } else { i }];
         let reach = ARM.min(0.5 * (curve.points[n - 1] - curve.points[0]).norm());
@@ -171,13 +182,14 @@ impl Arm {
         let direction = if sum.norm() > 0.0 { sum.normalize() } else { Vec3::zeros() };
         let aside = |p: &Vec3| (p - mean).cross(&direction).norm_squared();
         let scatter = near.iter().map(aside).sum::<f64>() / count;
-        Self { direction, tilt: (2.0 * (curve.sigma.powi(2) + scatter)).sqrt() / reach }
+        let moved = range_error.along(&corner, &normal.cross(&direction));
+        Self { direction, tilt: (2.0 * (curve.sigma.powi(2) + scatter + moved * moved)).sqrt() / reach }
     }
 }
 
 /// Angle between the edges of a corner.
 fn angle(corner: &Known) -> Check {
-    let ([leaving, arriving, _], [a, b]) = (corner.axes, corner.tilt);
+    let ([leaving, arriving, ..], [a, b]) = (corner.axes, corner.tilt);
     check(leaving.angle(&arriving), a * a + b * b, &[corner])
 }
 
@@ -210,6 +222,10 @@ mod tests {
 
     /// The outline of a face over shares of the sides, and its normals by differences.
     fn checks(face: impl Fn(f64, f64) -> Vec3, sigma: f64) -> ShapeChecks {
+        checks_with(face, sigma, RangeError::default())
+    }
+
+    fn checks_with(face: impl Fn(f64, f64) -> Vec3, sigma: f64, range_error: RangeError) -> ShapeChecks {
         let corner = |k: usize| Corner {
             point: face(CORNERS[k][0], CORNERS[k][1]),
             sigma: [sigma, 2.0 * sigma],
@@ -229,7 +245,7 @@ mod tests {
             along_u.cross(&along_v).normalize()
         };
         let (corners, edges) = ([0, 1, 2, 3].map(corner), [0, 1, 2, 3].map(edge));
-        ShapeChecks::with(&corners, &edges, HALF, &normal, &|_, _| 3.0 * sigma)
+        ShapeChecks::with(&corners, &edges, HALF, &normal, &|_, _| 3.0 * sigma, range_error)
     }
 
     fn near(found: f64, expected: f64, within: f64) {
@@ -265,6 +281,23 @@ mod tests {
         near(flat.angles[0].sigma, 1e-4 * 2.0 / ARM, 1e-9);
         assert!(flat.edges[3].chord.seen && !flat.edges[1].chord.seen && !flat.diagonals[0].seen);
         assert!(flat.diagonals[1].seen && !flat.twist[0].seen);
+    }
+
+    /// A plate far below the scanner is moved along its normal: its twist is uncertain, its lengths are not. Far aside the beam
+    /// runs along u, and the lengths along u are.
+    #[test]
+    fn a_range_error_counts_along_the_beam() {
+        let range_error = RangeError::new(1e-3);
+        let below = checks_with(|u, v| Vec3::new(u * W, v * H, -1e6), 0.0, range_error);
+        near(below.twist[0].sigma, 2e-3 / H, 1e-8);
+        near(below.twist[1].sigma, 2e-3 / W, 1e-8);
+        assert!(below.edges.iter().all(|edge| edge.chord.sigma < 1e-8));
+        assert!(below.angles.iter().all(|angle| angle.sigma < 1e-8));
+        let aside = checks_with(|u, v| Vec3::new(1e6 + u * W, v * H, 0.0), 0.0, range_error);
+        near(aside.edges[0].mid.sigma, 2.0_f64.sqrt() * 1e-3, 1e-8);
+        assert!(aside.edges[1].mid.sigma < 1e-8 && aside.twist[0].sigma < 1e-8);
+        // The edges along v are moved across at both ends of their arms.
+        near(aside.angles[0].sigma, 2.0_f64.sqrt() * 1e-3 / ARM, 1e-8);
     }
 
     #[test]

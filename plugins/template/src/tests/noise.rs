@@ -39,3 +39,34 @@ fn gaps_lie_within_their_stated_uncertainty() {
     let rms = (errors.iter().map(|(e, _)| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     assert!(errors[0].1 < 4.0 * rms, "stated {} for an rms error of {rms}", errors[0].1);
 }
+
+/// Bent to the target's radius up to the middle, straight beyond: along the bend the template lies close everywhere, so that noise
+/// decides where it touches.
+fn half_bent(u: f64, v: f64) -> (Vec3, Vec3) {
+    let radius = 8.0;
+    let (sin, cos) = (u.min(1.5) / radius).sin_cos();
+    let beyond = (u - 1.5).max(0.0);
+    let point = Vec3::new(radius * sin + beyond * cos, v, radius * (1.0 - cos) + beyond * sin);
+    (point, Vec3::new(-sin, 0.0, cos))
+}
+
+#[test]
+fn a_gap_whose_seat_noise_decides_states_the_other_seat() {
+    let task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
+    let of = |report: &Report, name: &str| {
+        let figure = report.findings.figures.iter().find(|figure| figure.name == name).expect("a figure");
+        (figure.value, figure.uncertainty.expect("stated"))
+    };
+    let known = run(&surface(20_000, 1e-6, 1, half_bent), &task).expect("sound");
+    for name in ["gap.max", "deviation.gap"] {
+        let mut within = 0;
+        for seed in 300..320 {
+            let found = run(&surface(6_000, 0.3e-3, seed, half_bent), &task).expect("sound");
+            let ((gap, uncertainty), (truth, _)) = (of(&found, name), of(&known, name));
+            println!("{name}: {:.3} +- {:.3}, true {:.3} mm", gap * 1e3, uncertainty * 1e3, truth * 1e3);
+            within += usize::from((gap - truth).abs() <= uncertainty);
+        }
+        // 19 expected; fewer than 16 of 20 has a chance of 1 in 300.
+        assert!(within >= 16, "{name}: {within} of 20");
+    }
+}

@@ -55,7 +55,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     // The calibration in force today, whatever the age of the record.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
     let assumed = || ScannerError::assumed(plant.range_error, document.range_error(), &now);
-    let scanner = calibration.as_ref().map_or_else(assumed, ScannerError::calibrated);
+    let scanner =
+        calibration.as_ref().map_or_else(assumed, |calibration| ScannerError::calibrated(calibration, &now));
     scanner.log();
     let task = scanner.task(&plate, history_view::supports_changed(earlier.supports.as_deref(), &plate));
     let mut reports = Vec::new();
