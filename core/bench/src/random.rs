@@ -22,7 +22,7 @@ use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
 use platen_model::units::mm;
-use platen_shape::EXPANDED;
+use platen_shape::{EXPANDED, RangeError};
 
 use crate::accuracy::rms;
 use crate::scene::Shot;
@@ -86,7 +86,9 @@ fn errors(
     let seen = stages::see(shot).map_err(refused)?;
     let measurement = stages::shape(shot, &seen, flattening).map_err(refused)?;
     let surface = &measurement.surface;
-    let scanner = ScannerError::assumed(None, shot.header.range_error_m, surface);
+    // The instrument's own figure, as a calibration finds it.
+    let range_error = RangeError::new(shot.header.range_error_m.unwrap_or(0.0));
+    let scanner = ScannerError::known(range_error, surface);
     let mut errors = Errors::of(&measurement, &seen.outline, &shot.truth, scanner.range());
     errors.stated.extend(laid_template::errors(template, scene, shot, surface, &scanner)?);
     Ok(errors)

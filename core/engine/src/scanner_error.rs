@@ -1,4 +1,4 @@
-//! Correlated error of the scanner in every stated uncertainty: that of its calibration, and until there is one that of the
+//! Correlated error of the scanner in the stated uncertainties: that of its calibration, and until there is one that of the
 //! instrument's data sheet.
 //!
 //! A data sheet states the accuracy of a range: an error that neighbouring cells share, which no fit averages out. The plant file
@@ -6,8 +6,10 @@
 //! along the beam, thus along the normal by its cosine of incidence. Two scans differ by the errors of both, hence the factor of
 //! sqrt 2, as in a calibration by pairs of scans.
 //!
-//! Places, lengths and angles are uncertain by the range error itself ([`RangeError`]): assumed, or as the calibration shows it. Of the
-//! calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is z1 / 2 - z2 + z3 / 2,
+//! Levels of detection, templates and stations hold the error, calibrated or assumed. Places, lengths and angles hold it once it is
+//! calibrated ([`RangeError`]): a data sheet bounds an error and does not say over which ranges it changes, and two ends of an
+//! edge that were off by all of it independently would make each length uncertain by millimetres. The assumption says that they are
+//! stated without it. Of the calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is z1 / 2 - z2 + z3 / 2,
 //! its error that of a place times the square root of 3 / 2. Both divided by the cosine of incidence are errors of a range.
 //!
 //! Limits: one figure for the whole plate, without a wavelength; what is equal in both scans of a pair cancels, and counts here all
@@ -42,7 +44,7 @@ pub struct ScannerError {
     correlated: f64,
     /// Systematic error of a gap, one sigma, metres; known only from an artefact.
     systematic: Option<f64>,
-    /// Range error that neighbouring cells share.
+    /// Range error in places, lengths and angles; none unless calibrated.
     range: RangeError,
     /// Sentence that names the assumed range error; `None` with a calibration.
     pub assumption: Option<String>,
@@ -71,12 +73,19 @@ impl ScannerError {
                 (UNSTATED, "as neither its driver nor range_error_mm of the plant file states one")
             }
         };
+        let without = if error > 0.0 { "; places and lengths are stated without it" } else { "" };
         let assumption = format!(
-            "the scanner is not calibrated: a range error of {:.2} mm (one sigma) is assumed, {source}",
+            "the scanner is not calibrated: a range error of {:.2} mm (one sigma) is assumed, {source}{without}",
             mm(error)
         );
-        let correlated = SQRT_2 * error * rms_cosine(surface);
-        Self { correlated, systematic: None, range: RangeError::new(error), assumption: Some(assumption) }
+        let range = RangeError::default();
+        Self { range, assumption: Some(assumption), ..Self::known(RangeError::new(error), surface) }
+    }
+
+    /// Returns the errors of a scanner whose range error is known, at this plate.
+    pub fn known(range: RangeError, surface: &Surface) -> Self {
+        let correlated = SQRT_2 * range.sigma() * rms_cosine(surface);
+        Self { correlated, systematic: None, range, assumption: None }
     }
 
     /// Returns the correlated error of a position along the normal between two scans, one sigma, metres.
@@ -85,7 +94,7 @@ impl ScannerError {
         self.correlated
     }
 
-    /// Returns the range error that neighbouring cells share.
+    /// Returns the range error in places, lengths and angles; none unless it was calibrated.
     #[must_use]
     pub fn range(&self) -> RangeError {
         self.range

@@ -208,7 +208,7 @@ fn calibration(state: &CalibrationRecord) -> String {
     let null_pairs = match (&state.assumption, state.sigma_correlated_mm) {
         (Some(assumption), sigma) => {
             return format!(
-                "{assumption}; it stands for {sigma:.2} mm between two scans in every uncertainty"
+                "{assumption}; it stands for {sigma:.2} mm between two scans in levels of detection, templates and stations"
             );
         }
         (None, 0.0) => "no null pairs scanned: changes may be called real a little too often".to_owned(),

@@ -218,7 +218,7 @@ pub struct Context<'a, E> {
     pub task: &'a Task,
     /// Range error that stands in for a calibration, as a sentence.
     pub assumption: Option<&'a str>,
-    /// Range error of the scanner, calibrated or assumed: it counts in the uncertainty of every place and length.
+    /// Calibrated range error of the scanner in places and lengths; none without a calibration.
     pub range_error: RangeError,
     /// Edges whose lengths are not explained.
     pub doubts: &'a [EdgeDoubt],

@@ -1,4 +1,4 @@
-//! The scanner's own range error in the standard deviations of places: what calibration or data sheet state, beside the noise.
+//! The scanner's own range error in the standard deviations of places: that of its calibration, beside the noise.
 //!
 //! A range error e moves a sample at p along its beam b = p / |p|, thus by e (b . d) along a unit direction d: a place on the plate along the
 //! normal by the cosine of incidence, and an edge, which is located by the directions of beams, across itself by the rest. Such an

@@ -174,7 +174,8 @@ fn until_a_calibration_the_range_error_of_the_class_stands_in() {
     let template = |result: &Json| result["reference_lines"][0]["templates"][0].clone();
     // The driver states its cyclic error: 0.4 mm / sqrt 2. The gap is nearer to its limit than that error allows to say.
     let (result, log) = plant.measure(&class, &scans[0], &scans[1]);
-    let sentence = "the scanner is not calibrated: a range error of 0.28 mm (one sigma) is assumed, as its driver states it";
+    let sentence = "the scanner is not calibrated: a range error of 0.28 mm (one sigma) is assumed, as its driver states it; \
+                    places and lengths are stated without it";
     assert!(
         result["says"].to_string().contains(sentence) && log.contains(sentence),
         "{} {log}",
