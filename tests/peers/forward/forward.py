@@ -4,6 +4,7 @@ Runs the release build's programs as child processes. Every check prints one lin
 As root: the servers run as their own users. `--only WORD` runs some checks, `--strokes N` sets how many each of five presses makes.
 """
 import argparse, json, os, random, re, signal, socket, subprocess, sys, tempfile, threading, time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jsonschema
@@ -319,7 +320,15 @@ def check_a_migration_while_hosts_write(site):
         plant.start_forwarder()
     wait("some strokes", lambda: site.postgresql.query("SELECT count(*) > 200 FROM platen.stroke")[0][0])
     (site.folder / "owner").write_text("owner\n")
-    applied = run("forward", "schema", "--apply", plants[0].plant, "--user", OWNER, "--password-file", site.folder / "owner").strip()
+    apply = lambda: run("forward", "schema", "--apply", plants[0].plant, "--user", OWNER, "--password-file", site.folder / "owner").strip()
+    with site.postgresql.connect() as writer, ThreadPoolExecutor(1) as beside:
+        # A writer that has the inbox and not yet the tables when the migration begins.
+        writer.execute("BEGIN; LOCK TABLE platen.inbox IN ROW EXCLUSIVE MODE")
+        migration = beside.submit(apply)
+        wait("the migration to wait", lambda: migration.done() or site.postgresql.query(
+            "SELECT count(*) > 0 FROM pg_stat_activity WHERE usename = %s AND wait_event_type = 'Lock'", OWNER)[0][0])
+        writer.execute("LOCK TABLE platen.stroke, platen.plate, platen.alarm IN ROW EXCLUSIVE MODE; COMMIT")
+        applied = migration.result()
     with site.postgresql.connect() as database:
         # As a release to come would: a column that only newer hosts fill.
         database.execute("ALTER TABLE platen.inbox ADD COLUMN later text; ALTER TABLE platen.refill ADD COLUMN later text; ALTER TABLE platen.aside ADD COLUMN later text")
