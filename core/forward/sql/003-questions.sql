@@ -1,8 +1,5 @@
 -- Views and functions of a time for the questions of a plant: how a plate was bent, and how presses and crews compare. Baselines and trials do not count as strokes.
 
--- Hosts that write take the inbox first and the tables that its triggers fill next; a migration that began with those would wait for them in a circle.
-LOCK TABLE platen.inbox IN SHARE ROW EXCLUSIVE MODE;
-
 CREATE VIEW platen.bend_made AS
 SELECT s.site, s.press, s.owner, s.plate, s.run_id, s.accepted, b.n::int AS n, (b.of->'at_mm'->>0)::float8 AS u_mm,
     (b.of->'at_mm'->>1)::float8 AS v_mm, (b.of->>'angle_deg')::float8 AS angle_deg, (b.of->>'direction_deg')::float8 AS direction_deg,

@@ -26,6 +26,10 @@ pub const MIGRATIONS: [Migration; 3] = [
     Migration { number: 3, name: "003-questions.sql", sql: include_str!("../sql/003-questions.sql") },
 ];
 
+/// Taken before a file by a database that hosts write to. A host locks the inbox first and then the tables that its triggers fill; a file that
+/// began with those would deadlock with it.
+const LOCK_INBOX: &str = "LOCK TABLE platen.inbox IN SHARE ROW EXCLUSIVE MODE;";
+
 /// Failure of a migration; the database is as before it.
 #[derive(Debug, thiserror::Error)]
 pub enum SchemaError {
@@ -90,7 +94,8 @@ async fn apply_all(client: &Client) -> Result<Vec<&'static Migration>, SchemaErr
     };
     let mut applied = Vec::new();
     for migration in MIGRATIONS.iter().filter(|it| it.number > last) {
-        let sql = format!("BEGIN;\n{}\n{}COMMIT;", migration.sql, noted(migration));
+        let lock = if migration.number > 1 { LOCK_INBOX } else { "" };
+        let sql = format!("BEGIN;\n{lock}\n{}\n{}COMMIT;", migration.sql, noted(migration));
         let failed = |e: tokio_postgres::Error| SchemaError::Migration {
             name: migration.name,
             why: postgresql::chain(&e),
