@@ -75,6 +75,7 @@
 //! impossible radius; a template on an unknown line, longer than its line, or beyond an end of it; a line that leaves the plate;
 //! a plate that was seen on one side of its middle only.
 
+mod bending_mode;
 mod deviation;
 mod evaluation;
 mod figures;
