@@ -2,6 +2,7 @@
 
 pub mod samples;
 
+use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -9,6 +10,12 @@ use std::sync::OnceLock;
 /// The repository.
 pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap_or_else(|_| "..".into())
+}
+
+/// Address at which nobody listens, over TCP or UDP. It is not 127.0.0.1, where a port that was given back may belong to the server of
+/// another test a moment later.
+pub fn unserved_address() -> std::io::Result<SocketAddr> {
+    TcpListener::bind("127.0.0.77:0")?.local_addr()
 }
 
 /// Folder of the programs and plugin libraries of this build, all of them fresh.

@@ -214,8 +214,8 @@ fn every_fault_of_the_press_is_one_sentence() {
     assert!(moving.to_string().contains("the ram is down"));
     assert_eq!(answered("HTTP/1.1 400 Bad Request\n").kind(), ErrorKind::BadData);
     assert_eq!(answered("").kind(), ErrorKind::Disconnected);
-    // A port without a listener: bound, then closed.
-    let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    // A port without a listener: bound, then closed. At an address of its own, where no other test takes it.
+    let closed = TcpListener::bind("127.0.0.77:0").unwrap().local_addr().unwrap().to_string();
     assert_eq!(refusal(&Options { cell: Some(closed), ..options() }).kind(), ErrorKind::Disconnected);
 }
 

@@ -57,10 +57,9 @@ fn each_fault_of_a_bridge_is_found() {
 
 #[test]
 fn without_a_bridge_one_test_fails_and_the_others_are_left_out() {
-    // A port that was free a moment ago.
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let nobody = platen_tests::unserved_address().unwrap();
     let start = std::time::Instant::now();
-    assert_eq!(tests(free, "", "failed"), ["hello.answered"]);
+    assert_eq!(tests(nobody, "", "failed"), ["hello.answered"]);
     assert!(start.elapsed() < Duration::from_secs(60), "it does not try each again");
 }
 
@@ -80,6 +79,5 @@ fn a_bridge_is_found_by_datagram() {
         "option": "address", "value": bridge.address().to_string(), "about": "platen simulated scanner SIM0001",
     }]);
     assert_eq!(found, expected);
-    let free = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    assert_eq!(find(&free.to_string()), (Some(1), "[]\n".to_owned()));
+    assert_eq!(find(&platen_tests::unserved_address().unwrap().to_string()), (Some(1), "[]\n".to_owned()));
 }

@@ -137,9 +137,8 @@ fn the_wrong_press_is_never_written_to() {
 #[test]
 fn a_press_that_cannot_be_reached_is_named_and_tried_again() {
     let folder = tempfile::tempdir().unwrap();
-    // A port that was free a moment ago.
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let plant = plant(folder.path(), &free.to_string(), "shape = \"flat\"");
+    let nobody = platen_tests::unserved_address().unwrap();
+    let plant = plant(folder.path(), &nobody.to_string(), "shape = \"flat\"");
     let mut host = Host::start(&plant);
     until("the fault in the status", || host.status().filter(|s| s.to_string().contains("\"101 ")));
     assert_eq!(host.stop(), Some(0), "{}", host.log());
@@ -162,9 +161,8 @@ fn a_second_host_on_the_same_record_is_refused() {
 fn a_scanner_that_fails_is_reported_to_the_press() {
     let folder = tempfile::tempdir().unwrap();
     let mut press = Press::start(folder.path(), "strokes = 1\nbaseline = false\nwait_ready = false");
-    // Nobody serves a plate on this port any more.
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{free}\""));
+    let nobody = platen_tests::unserved_address().unwrap();
+    let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{nobody}\""));
     let mut host = Host::start(&plant);
     let status =
         until("the fault in the status", || host.status().filter(|s| s.to_string().contains("\"201 ")));

@@ -348,9 +348,9 @@ fn columns_sent_after_the_scan_give_the_same_lattice() {
 
 #[test]
 fn a_missing_bridge_fails_at_the_deadline() {
-    // An address of its own: a port that is given back may serve the bridge of another test a moment later.
-    let nobody = std::net::TcpListener::bind("127.0.0.77:0").unwrap().local_addr().unwrap();
     let limit = Duration::from_secs(1);
-    let error = scan(&driver(nobody, COARSE), Some(&WINDOW), limit).unwrap_err().to_string();
+    let error = scan(&driver(platen_tests::unserved_address().unwrap(), COARSE), Some(&WINDOW), limit)
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("no scan in time: the connection broke"), "{error}");
 }

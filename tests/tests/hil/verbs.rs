@@ -50,8 +50,8 @@ fn check_needs_no_press() {
 #[test]
 fn a_press_that_is_not_there_is_a_failure_of_the_link() {
     let folder = tempfile::tempdir().unwrap();
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let plant = plant(folder.path(), &free.to_string(), "shape = \"flat\"");
+    let nobody = platen_tests::unserved_address().unwrap();
+    let plant = plant(folder.path(), &nobody.to_string(), "shape = \"flat\"");
     for name in ["ping", "dump", "scan-unit"] {
         let output = verb(name, &plant, &["--json"]);
         assert_eq!(

@@ -58,7 +58,7 @@ fn a_bridge_that_refuses_or_hangs_up_is_told_apart() {
     assert_eq!(refused.to_string(), "the bridge is busy: held by press-4");
     let silent = serve(|_, _| None);
     assert!(matches!(ask(&silent, &request(), &request().settings, &mut None), Err(Error::Broken(_))));
-    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let nobody = TcpListener::bind("127.0.0.77:0").unwrap().local_addr().unwrap().to_string();
     assert!(matches!(ask(&nobody, &request(), &request().settings, &mut None), Err(Error::Broken(_))));
 }
 
@@ -166,7 +166,7 @@ fn a_cancelled_scan_is_aborted_at_the_bridge() {
 
 #[test]
 fn nobody_there_ends_at_the_deadline_with_the_reason() {
-    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let nobody = TcpListener::bind("127.0.0.77:0").unwrap().local_addr().unwrap().to_string();
     let mut taker = Taker::new(Duration::from_millis(400));
     let late = scan(&nobody, request(), &mut taker).1.unwrap_err();
     assert!(late.to_string().starts_with("no scan in time: the connection broke: "), "{late}");
