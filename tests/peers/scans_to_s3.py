@@ -7,11 +7,17 @@ nothing is put again, an object cut short and a scan that changed are told and l
 
 The scans are random bytes in a folder as [scan_store] fills it. Each check prints a line; the first that fails ends the program with exit code 1.
 """
-import hashlib, json, os, shlex, socket, subprocess, sys, tempfile, time
+import hashlib, json, logging, os, shlex, socket, subprocess, tempfile
 from pathlib import Path
 
 import boto3
 from botocore.config import Config
+
+# Set up by anybody, in four requests; from then on each one is authorised. Read at the import.
+os.environ["INITIAL_NO_AUTH_ACTION_COUNT"] = "4"
+from moto.server import ThreadedMotoServer
+
+logging.getLogger("werkzeug").setLevel(logging.ERROR)
 
 UNIT = Path(__file__).resolve().parents[2] / "config/scans/platen-scans.service"
 BUCKET = "platen-scans"
@@ -24,21 +30,10 @@ RIGHTS = {"Version": "2012-10-17", "Statement": [{"Effect": "Allow", "Action": [
 class Store:
     """moto's server, in which the user of a plant has RIGHTS."""
 
-    def __init__(self, folder):
-        self.log = open(folder / "moto.log", "a")
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
-        self.url = f"http://127.0.0.1:{self.port}"
-        # Set up by anybody; from then on each request is authorised.
-        self.process = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(self.port)], stdout=self.log, stderr=self.log,
-                                        env=os.environ | {"INITIAL_NO_AUTH_ACTION_COUNT": "4"})
-        end = time.monotonic() + 60
-        while time.monotonic() < end:
-            with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
-                    break
-            time.sleep(0.1)
+    def __init__(self):
+        self.server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+        self.server.start()
+        self.url = "http://%s:%d" % self.server.get_host_and_port()
         anybody = dict(endpoint_url=self.url, region_name="us-east-1", aws_access_key_id="a", aws_secret_access_key="b")
         boto3.client("s3", **anybody).create_bucket(Bucket=BUCKET)
         iam = boto3.client("iam", **anybody)
@@ -55,8 +50,7 @@ class Store:
         return {it["Key"]: (it["Size"], it["LastModified"]) for it in found}
 
     def stop(self):
-        self.process.kill()
-        self.process.wait()
+        self.server.stop()
 
 
 def configure(place, url, key, secret):
@@ -87,7 +81,7 @@ def keep(place, size=300_000):
 def main():
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        store = Store(place)
+        store = Store()
         try:
             configure(place, store.url, store.key, store.secret)
             names = {keep(place) for _ in range(20)} | {keep(place, 25_000_000)}
@@ -126,8 +120,10 @@ def main():
             says = [line for line in lines if "Failed to copy: SignatureDoesNotMatch" in line]
             assert code != 0 and len(says) == 1, (code, lines)
             print(f"wrong key: {says[0]}")
-            configure(place, "http://127.0.0.1:9", store.key, store.secret)
-            code, lines = copy(place)
+            with socket.socket() as unserved:
+                unserved.bind(("127.0.0.1", 0))
+                configure(place, "http://%s:%d" % unserved.getsockname(), store.key, store.secret)
+                code, lines = copy(place)
             says = [line for line in lines if "connection refused" in line]
             assert code != 0 and says, (code, lines)
             print(f"server away: {says[-1]}")

@@ -16,7 +16,6 @@ import psycopg
 
 from forward import SITE, Site, one_stroke
 from servers import ROOT, Postgresql, multiply
-from year import SETTINGS
 
 YEAR = 29e6
 BATCH = 100
@@ -113,7 +112,7 @@ def main():
         site = Site(folder)
         try:
             site.postgresql.stop()
-            site.postgresql = Postgresql(site.authority, Path(folder) / "filled", SETTINGS)
+            site.postgresql = Postgresql(site.authority, Path(folder) / "filled", settings="")
             plant = one_stroke(site, "postgresql")
             plant.flush()
             plant.end_all()

@@ -64,7 +64,7 @@ class Authority:
 
 
 class Postgresql:
-    """A PostgreSQL server; `folder` may lie on a small disk."""
+    """A PostgreSQL server; `folder` may lie on a small disk. Without `settings` it has PostgreSQL's own."""
 
     def __init__(self, authority, folder, settings="shared_buffers=64MB\nmax_wal_size=64MB\nmin_wal_size=32MB\n"):
         self.port, self.folder, self.data = free_port(), folder, folder / "data"

@@ -14,8 +14,6 @@ import dashboards
 from servers import ROOT, Authority, Postgresql
 
 PLATES = 33
-# Those that PostgreSQL has without a word in its file; the peers of `forward.py` have less.
-SETTINGS = "shared_buffers=128MB\nmax_wal_size=1GB\nmin_wal_size=80MB\n"
 # Dashboard -> time that it is asked for, and limit of each answer, seconds.
 SPANS = {"press": ("1 day", 1), "plant": ("30 days", 10)}
 
@@ -58,7 +56,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="platen-year-", dir="/var/tmp") as folder:
         folder = Path(folder)
         folder.chmod(0o755)
-        server = Postgresql(Authority(folder), folder / "postgresql", SETTINGS)
+        server = Postgresql(Authority(folder), folder / "postgresql", settings="")
         try:
             with server.connect() as database:
                 for file in sorted((ROOT / "core/forward/sql").glob("*.sql")):
