@@ -8,9 +8,12 @@
 //!
 //! Levels of detection, templates and stations hold the error, calibrated or assumed. Places, lengths and angles hold it once it is
 //! calibrated ([`RangeError`]): a data sheet bounds an error and does not say over which ranges it changes, and two ends of an
-//! edge that were off by all of it independently would make each length uncertain by millimetres. The assumption says that they are
-//! stated without it. Of the calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is z1 / 2 - z2 + z3 / 2,
-//! its error that of a place times the square root of 3 / 2. Both divided by the cosine of incidence are errors of a range.
+//! edge that were off by all of it independently would make each length uncertain by millimetres. The assumption says that they
+//! are stated without it.
+//!
+//! Of the calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is
+//! z1 / 2 - z2 + z3 / 2, its error that of a place times the square root of 3 / 2. Both divided by the cosine of incidence are
+//! errors of a range.
 //!
 //! Limits: one figure for the whole plate, without a wavelength; what is equal in both scans of a pair cancels, and counts here all
 //! the same. A calibration without an artefact does not know what repeats in every scan, and then no uncertainty holds it.

@@ -18,11 +18,11 @@ pub struct Advice {
     pub too_far: Vec<[f64; 2]>,
     /// Sentences for the operator, most important first.
     pub says: Vec<Sentence>,
-    /// What was learned of the press.
+    /// Depth law of the press as learned.
     pub model: Option<PressModel>,
 }
 
-/// What to do with the plate.
+/// Next action on the plate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -85,7 +85,7 @@ pub struct PlannedBend {
     pub angle: f64,
 }
 
-/// What was learned of the press with this plate.
+/// Depth law of the press as learned with this plate: posterior of its offset and slope.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PressModel {

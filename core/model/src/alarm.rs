@@ -24,7 +24,7 @@ impl Severity {
     }
 }
 
-/// Who must act on an alarm.
+/// Audience of an alarm: the person who must act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Audience {

@@ -18,7 +18,7 @@ pub struct PlateHistory {
     pub steel: Option<Steel>,
     /// Strokes since the blank, the last one last.
     pub strokes: Vec<PressedStroke>,
-    /// What earlier plates of the same kind taught.
+    /// Prior of the depth law.
     pub like: Option<LikePlates>,
     /// The plate may be turned over on this press.
     pub may_turn_over: bool,
@@ -68,7 +68,7 @@ pub struct PressedStroke {
     pub run_id: i64,
     /// Number of the stroke, as the press counts.
     pub stroke: u16,
-    /// What was advised before it and followed.
+    /// Bend that was advised before it and followed.
     pub wanted: Option<WantedBend>,
     /// Deepest position of the ram below its touch on a flat plate of nominal thickness, metres.
     pub depth: Option<f64>,
@@ -82,7 +82,7 @@ pub struct PressedStroke {
     pub bends: Vec<Bend>,
 }
 
-/// What was advised before a stroke.
+/// Bend that was advised before a stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WantedBend {
@@ -108,7 +108,7 @@ pub struct Bend {
     pub sigma: f64,
 }
 
-/// What earlier plates of the same kind (die set, thickness, grade, direction of the bends) taught of the press.
+/// Prior of the depth law, from earlier plates of the same kind (die set, thickness, grade, direction of the bends).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LikePlates {

@@ -330,7 +330,7 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
 }
 
 /// Returns the edges whose lengths differ from those that were cut by more than is explained. Their intervals hold how well the edges were
-/// located, and not the scanner's range error: a doubt is about the one, and an assumed range error would hide it.
+/// located, which is what is in doubt, and not the scanner's range error.
 #[must_use]
 pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
     let surface = &measured.measurement.surface;

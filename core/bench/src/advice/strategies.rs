@@ -112,7 +112,7 @@ pub(super) struct Outcome {
     pub(super) not_advised: usize,
     pub(super) said_too_coarse: bool,
     pub(super) said_look: bool,
-    /// What was learned of the press.
+    /// Depth law of the press as learned.
     pub(super) model: Option<PressModel>,
     pub(super) advise: Duration,
 }

@@ -71,7 +71,7 @@ impl Token {
     }
 }
 
-/// Who may read.
+/// Access control of the pages: token, and names of the host.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
     /// Token, where one is required.

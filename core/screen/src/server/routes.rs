@@ -24,7 +24,7 @@ use crate::{CYCLE_LIMIT, FILES, Source, SourceError};
 
 /// Queries of the record at once.
 pub(super) const RECORD_QUERIES: usize = 2;
-/// What a page may do: show what this server gave it. Its one form asks for another page of this server.
+/// Content security policy of a page: it shows what this server gave it. Its one form asks for another page of this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
                       base-uri 'none'; form-action 'self'; frame-ancestors 'none'; require-trusted-types-for 'script'";
 /// A report is one file with its own style and pictures in it.

@@ -56,7 +56,7 @@ impl LastAdvice {
     }
 }
 
-/// What to do with the plate.
+/// Next action on the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AdvisedStep {
