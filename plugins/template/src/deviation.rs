@@ -31,6 +31,8 @@ pub(crate) struct Deviation {
     pose: Pose,
     /// Seats on the plate bent by its uncertainty.
     bent: Vec<BentSeat>,
+    /// Seat on the whole plate where a part of it was not seen: the surface continues there.
+    whole: Option<Pose>,
 }
 
 /// Seat of the target on a plate that is bent in a mode by its 95 % uncertainty.
@@ -90,18 +92,21 @@ impl Deviation {
                 bent.extend(seat.map(|(movement, ..)| BentSeat { mode, by, movement }));
             }
         }
+        check()?;
+        let whole = if seen.contains(&false) { Pose::on_whole_plate(now, target, &uv) } else { None };
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&pose.movement)).collect();
         let contacts = active.into_iter().map(|i| index[i]).collect();
-        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent })
+        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent, whole })
     }
 
     /// Returns measured minus target at one place, in the seat.
     pub(crate) fn at(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
-        self.pose.placement.deviation(now, target, at) - row(target, at).dot(&self.pose.movement)
+        self.pose.deviation(now, target, at)
     }
 
     /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
-    /// errors there and at the contacts; at least what the seats on the bent plate make of it.
+    /// errors there and at the contacts; at least what the seats on the bent plate make of it. The interval reaches as far beyond
+    /// the deviation in the seat on the whole plate.
     pub(crate) fn sigma(
         &self,
         now: &Surface,
@@ -125,7 +130,26 @@ impl Deviation {
             let moved = here.dot(&(seat.movement - self.pose.movement));
             (seat.by * seat.mode.at(at, now) - moved).abs() / EXPANDED
         };
-        self.bent.iter().map(change).fold(of_weights, f64::max)
+        let unseen = self.whole.as_ref().map_or(0.0, |whole| {
+            (whole.deviation(now, target, at) - self.at(now, target, at)).abs() / EXPANDED
+        });
+        self.bent.iter().map(change).fold(of_weights, f64::max) + unseen
+    }
+}
+
+impl Pose {
+    /// Returns the seat on the whole plate, seen or not; `None` where the target has none.
+    fn on_whole_plate(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]]) -> Option<Self> {
+        let placement = Placement::best(now, target, uv.iter().copied());
+        let heights: Vec<f64> = uv.iter().map(|&at| placement.deviation(now, target, at)).collect();
+        let rows: Vec<Vec3> = uv.iter().map(|&at| row(target, at)).collect();
+        let (movement, ..) = seat(&rows, &heights, uv, [now.width(), now.height()]).ok()?;
+        Some(Self { placement, movement })
+    }
+
+    /// Returns measured minus target at one place.
+    fn deviation(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
+        self.placement.deviation(now, target, at) - row(target, at).dot(&self.movement)
     }
 }
 

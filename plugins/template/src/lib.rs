@@ -26,7 +26,8 @@
 //! U is at least the change of the gap when the profile is bent by its uncertainty as a parabola or as a cubic parabola, and under a wave of
 //! s_corr over the range, whose period is 1 m: about to rock, or to fall on another contact, a template has either of two gaps, which w does
 //! not tell. The uncertainties of deviations hold the same for the whole target, bent along u, along v and in twist; that of the places
-//! (u, v) themselves is not in them.
+//! (u, v) themselves is not in them. Where a part of the plate was not seen, they hold what the seat on the whole surface, as the fit continues
+//! it there, would change.
 //! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
 //! `gap.*` are those of the one with the largest gap relative to its limit. The uncertainties of deviations and stations hold the same errors;
 //! that of a curvature the second derivative of a correlated error whose period is 1 m of range.

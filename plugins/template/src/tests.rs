@@ -55,6 +55,17 @@ fn plate_of(shape: TargetShape, facing: Facing) -> Surface {
     surface(20_000, 1e-6, 1, |u, v| (turn * target.point(u, v) + away, turn * target.normal(u, v)))
 }
 
+/// The plate with a strip across u that was not seen.
+fn hidden(now: &Surface, from: f64, to: f64) -> Surface {
+    let mut parts = now.to_parts();
+    let [n_u, n_v] = parts.mask_cells;
+    for k in 0..n_u * n_v {
+        let u = WIDTH * ((k % n_u) as f64 + 0.5) / n_u as f64;
+        parts.seen[k] &= !(from..to).contains(&u);
+    }
+    Surface::from_parts(parts).expect("sound")
+}
+
 /// Radii are those of the mid-surface, so that a plate and its target differ by the radius alone.
 fn goal(shape: TargetShape, scanned_face: Facing) -> TargetSurface {
     let target = Target { shape, radius_of: RadiusOf::Mid, scanned_face };

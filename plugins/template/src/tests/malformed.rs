@@ -47,17 +47,6 @@ fn nothing_passes_without_a_target_or_a_template() {
     assert_eq!(report.findings.says, ["cannot tell: the plate file names no target"]);
 }
 
-/// The plate with a strip across u that was not seen.
-fn hidden(now: &Surface, from: f64, to: f64) -> Surface {
-    let mut parts = now.to_parts();
-    let [n_u, n_v] = parts.mask_cells;
-    for k in 0..n_u * n_v {
-        let u = WIDTH * ((k % n_u) as f64 + 0.5) / n_u as f64;
-        parts.seen[k] &= !(from..to).contains(&u);
-    }
-    Surface::from_parts(parts).expect("sound")
-}
-
 #[test]
 fn a_contact_or_the_largest_gap_out_of_sight_cannot_be_judged() {
     let task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
