@@ -65,37 +65,31 @@ impl Deviation {
     ) -> Result<Self> {
         let uv = PlateGrid::new(now).map(|u, v| [u, v]);
         let seen: Vec<bool> = uv.iter().map(|&[u, v]| now.mask().seen(u, v)).collect();
-        let of_seen = uv.iter().zip(&seen).filter(|(_, seen)| **seen).map(|(at, _)| *at);
-        let mut pose = Pose { placement: Placement::best(now, target, of_seen), movement: Vec3::zeros() };
-        check()?;
-
-        let fitted: Vec<f64> = uv.iter().map(|&at| pose.placement.deviation(now, target, at)).collect();
-        let (mut rows, mut heights, mut index) = (Vec::new(), Vec::new(), Vec::new());
-        for i in (0..uv.len()).filter(|&i| seen[i]) {
-            rows.push(row(target, uv[i]));
-            heights.push(fitted[i]);
-            index.push(i);
-        }
-        check()?;
         let size = [now.width(), now.height()];
-        let places: Vec<[f64; 2]> = index.iter().map(|&i| uv[i]).collect();
-        let (movement, active, rocks) = seat(&rows, &heights, &places, size)?;
-        pose.movement = movement;
+        let support = Support::new(now, target, &uv, (0..uv.len()).filter(|&i| seen[i]).collect());
+        check()?;
+        let (movement, active, rocks) = support.seat(size, |_| 0.0)?;
         let mut bent = Vec::new();
         for mode in &MODES {
             check()?;
             let sigma = mode.sigma(now, scanner);
             for by in [-EXPANDED * sigma, EXPANDED * sigma] {
-                let raised = places.iter().zip(&heights).map(|(at, height)| height + by * mode.at(*at, now));
                 // Without a seat there is nothing to compare with; the plate itself has one.
-                let seat = seat(&rows, &raised.collect::<Vec<_>>(), &places, size);
+                let seat = support.seat(size, |at| by * mode.at(at, now));
                 bent.extend(seat.map(|(movement, ..)| BentSeat { mode, by, movement }));
             }
         }
         check()?;
-        let whole = if seen.contains(&false) { Pose::on_whole_plate(now, target, &uv) } else { None };
-        let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&pose.movement)).collect();
+        let mut whole = None;
+        if seen.contains(&false) {
+            let support = Support::new(now, target, &uv, (0..uv.len()).collect());
+            let seat = support.seat(size, |_| 0.0).ok();
+            whole = seat.map(|(movement, ..)| Pose { placement: support.placement, movement });
+        }
+        let Support { placement, fitted, index, .. } = support;
+        let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&movement)).collect();
         let contacts = active.into_iter().map(|i| index[i]).collect();
+        let pose = Pose { placement, movement };
         Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent, whole })
     }
 
@@ -138,18 +132,37 @@ impl Deviation {
 }
 
 impl Pose {
-    /// Returns the seat on the whole plate, seen or not; `None` where the target has none.
-    fn on_whole_plate(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]]) -> Option<Self> {
-        let placement = Placement::best(now, target, uv.iter().copied());
-        let heights: Vec<f64> = uv.iter().map(|&at| placement.deviation(now, target, at)).collect();
-        let rows: Vec<Vec3> = uv.iter().map(|&at| row(target, at)).collect();
-        let (movement, ..) = seat(&rows, &heights, uv, [now.width(), now.height()]).ok()?;
-        Some(Self { placement, movement })
-    }
-
     /// Returns measured minus target at one place.
     fn deviation(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
         self.placement.deviation(now, target, at) - row(target, at).dot(&self.movement)
+    }
+}
+
+/// Nodes on which the target may rest, and its rigid fit to them.
+#[derive(Debug)]
+struct Support {
+    index: Vec<usize>,
+    places: Vec<[f64; 2]>,
+    rows: Vec<Vec3>,
+    placement: Placement,
+    /// Measured minus target in the fit, at all nodes.
+    fitted: Vec<f64>,
+}
+
+impl Support {
+    fn new(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]], index: Vec<usize>) -> Self {
+        let places: Vec<[f64; 2]> = index.iter().map(|&i| uv[i]).collect();
+        let placement = Placement::best(now, target, places.iter().copied());
+        let fitted = uv.iter().map(|&at| placement.deviation(now, target, at)).collect();
+        let rows = places.iter().map(|&at| row(target, at)).collect();
+        Self { index, places, rows, placement, fitted }
+    }
+
+    /// Returns [`seat`] on the plate raised by a height at each place; contacts are positions in `index`.
+    fn seat(&self, size: [f64; 2], raised: impl Fn([f64; 2]) -> f64) -> Result<(Vec3, Vec<usize>, bool)> {
+        let places = self.index.iter().zip(&self.places);
+        let heights: Vec<f64> = places.map(|(&i, &at)| self.fitted[i] + raised(at)).collect();
+        seat(&self.rows, &heights, &self.places, size)
     }
 }
 

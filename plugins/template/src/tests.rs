@@ -110,6 +110,12 @@ fn figure(report: &Report, name: &str) -> f64 {
     report.findings.figures.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("no {name}")).value
 }
 
+/// A figure and its uncertainty.
+fn stated(report: &Report, name: &str) -> (f64, f64) {
+    let figure = report.findings.figures.iter().find(|figure| figure.name == name).expect("a figure");
+    (figure.value, figure.uncertainty.expect("stated"))
+}
+
 /// Straight lines along v.
 fn cylinder(radius: f64) -> TargetShape {
     TargetShape::Cylinder { radius, axis: std::f64::consts::FRAC_PI_2 }

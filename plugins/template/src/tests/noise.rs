@@ -53,16 +53,12 @@ fn half_bent(u: f64, v: f64) -> (Vec3, Vec3) {
 #[test]
 fn a_gap_whose_seat_noise_decides_states_the_other_seat() {
     let task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
-    let of = |report: &Report, name: &str| {
-        let figure = report.findings.figures.iter().find(|figure| figure.name == name).expect("a figure");
-        (figure.value, figure.uncertainty.expect("stated"))
-    };
     let known = run(&surface(20_000, 1e-6, 1, half_bent), &task).expect("sound");
     for name in ["gap.max", "deviation.gap"] {
         let mut within = 0;
         for seed in 300..320 {
             let found = run(&surface(6_000, 0.3e-3, seed, half_bent), &task).expect("sound");
-            let ((gap, uncertainty), (truth, _)) = (of(&found, name), of(&known, name));
+            let ((gap, uncertainty), (truth, _)) = (stated(&found, name), stated(&known, name));
             println!("{name}: {:.3} +- {:.3}, true {:.3} mm", gap * 1e3, uncertainty * 1e3, truth * 1e3);
             within += usize::from((gap - truth).abs() <= uncertainty);
         }
