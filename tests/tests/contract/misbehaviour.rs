@@ -265,7 +265,7 @@ fn a_plugin_that_writes_its_input_is_ended() {
     assert!(output.status.code() == Some(1) && error.contains("SIGSEGV"), "{error}");
 }
 
-/// What a plugin says, and the sentence that refuses it.
+/// Invalid values of a plugin: library, fault, and a part of the error that refuses it.
 const WRONG_WORDS: [(&str, &str, &str); 16] = [
     ("faro-file", "face_9", ", must be 0 or 1"),
     ("faro-file", "state_9", "state 9 in column"),

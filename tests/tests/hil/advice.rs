@@ -80,7 +80,7 @@ fn a_plate_is_bent_as_advised_until_it_passes() {
     assert_eq!(last["step"]["kind"], "done");
 }
 
-/// What the strokes left at the press and on record.
+/// Figures on record and result registers of some strokes.
 #[derive(Debug, PartialEq)]
 struct Results {
     figures: Vec<Json>,

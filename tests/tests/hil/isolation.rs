@@ -1,6 +1,6 @@
-//! Plugins that fail in every way, in the real host at a simulated press: what they cost, and that the host goes on.
+//! Isolation of plugins in worker processes: plugins that fail in every way, in the real host at a simulated press.
 //!
-//! What each fault costs one job stands in `contract::misbehaviour`.
+//! Asserted are the result of the stroke and that the host goes on; the error of each single fault is tested in `contract::misbehaviour`.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
