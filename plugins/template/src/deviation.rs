@@ -1,9 +1,10 @@
-//! Seat of the whole target on the plate, and the deviation at every node.
+//! Deviation of the plate from the whole target at every node: least-squares rigid fit, then one-sided contact by a linear program.
 //!
 //! The target's face is laid on the plate's face from the scanner's side, as a rigid surface. Its direction follows the
-//! plate's (u, v), by the least-squares rigid fit of all material points. Its height and two small tilts then solve the linear
-//! program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
-//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit.
+//! plate's (u, v), by the least-squares rigid fit of all material points that were seen. Its height and two small tilts then solve
+//! the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
+//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit. Where a part of the plate was not seen, the
+//! seat on the whole fitted surface is found, too; the uncertainty holds the difference.
 
 use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
