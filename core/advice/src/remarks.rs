@@ -16,7 +16,7 @@ const SHORT: f64 = 0.3e-3;
 
 texts! { pub(crate),
     NO_DIE "no depth: the plant file names no [[die]] of the number that the press tells" "深さなし: プレスが示す番号の [[die]] がプラントファイルにありません"
-    DEPTH_NOT_TOLD "no depth: the press does not tell the depth of its ram (ram_depth)" "深さなし: プレスからラム深さ (ram_depth) が届きません"
+    DEPTH_NOT_TOLD "no depth: the press does not tell the depth of its ram" "深さなし: プレスからラム深さが届きません"
     STEEL_ASSUMED "no [steel] in the plate file: {} MPa assumed" "板ファイルに [steel] がありません: {} MPa と仮定します"
     FIRST_MORE "the plate bent more than expected: check its thickness and steel, and the die" "予想より大きく曲がりました: 板厚、鋼種、金型を確認してください"
     FIRST_LESS "the plate bent less than expected: check its thickness and steel, and the die" "予想より曲がりませんでした: 板厚、鋼種、金型を確認してください"

@@ -116,10 +116,19 @@ fn class(verdict: Verdict, sense: i8) -> &'static str {
 /// Returns a text of a person, a press or a plugin fit for a page: without control characters and marks that turn the direction of
 /// writing, and not longer than 64 characters.
 pub(crate) fn clean(text: &str) -> String {
+    clean_to(64, text)
+}
+
+/// As [`clean`], for a sentence of a plugin: not longer than 240 characters.
+pub(crate) fn clean_sentence(text: &str) -> String {
+    clean_to(240, text)
+}
+
+fn clean_to(most: usize, text: &str) -> String {
     let is_mark = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
     let shown = |c: char| if c.is_control() || is_mark(c) { '\u{fffd}' } else { c };
-    let mut clean: String = text.chars().take(64).map(shown).collect();
-    if text.chars().nth(64).is_some() {
+    let mut clean: String = text.chars().take(most).map(shown).collect();
+    if text.chars().nth(most).is_some() {
         clean.push('\u{2026}');
     }
     clean

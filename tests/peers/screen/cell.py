@@ -25,10 +25,13 @@ def wait(what, check, limit=20.0):
 
 
 class Press:
-    """The simulated press: strokes on request, over its control port."""
+    """The simulated press: strokes on request, over its control port; with `ram`, to ordered depths into a hidden steel, after the blank."""
 
-    def __init__(self, folder, name="C9", automatic=False):
+    def __init__(self, folder, name="C9", automatic=False, ram=False):
         text = (ROOT / "config/sim-press.toml").read_text()
+        if ram:
+            automatic = True
+            text = text.replace('"closed_loop"', '"operator"') + "\n[plate.ram]\nseed = 1\n"
         text = text.replace("seed = 5\n", f"seed = 5\nautomatic = {str(automatic).lower()}\n", 1)
         text = text.replace('part_name = "C9"', f"part_name = {json.dumps(name)}")
         text = text.replace("passes = 1", "passes = 4")
@@ -103,10 +106,10 @@ class Host:
 
 
 @contextmanager
-def cell(name="C9", strokes=0, **host):
+def cell(name="C9", strokes=0, ram=False, **host):
     """A press and a host in a folder of their own, after a blank and some strokes."""
     with tempfile.TemporaryDirectory() as folder:
-        press = Press(folder, name)
+        press = Press(folder, name, ram=ram)
         host = Host(folder, press, **host)
         try:
             for k in range(strokes):

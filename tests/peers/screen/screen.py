@@ -4,6 +4,7 @@ Runs the release build's `platen run` beside `platen-sim press`, both as child p
 fails ends the program with exit code 1. `--bless` writes the screenshots of tests/golden/screen anew; `--only WORD` runs some checks.
 """
 import argparse, io, json, math, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
+from contextlib import contextmanager
 from pathlib import Path
 
 import jsonschema
@@ -18,6 +19,14 @@ GOLDEN = ROOT / "tests/golden/screen"
 RESULT = ["left", "near", "gap-title", "gap", "gap-more", "limit", "map", "overlay"]
 WORDS = {"BEND MORE", "BENT TOO FAR", "DONE", "OUT OF TOLERANCE"}
 PAGES = ["/", "/strokes", "/strokes?plate=1", "/compare?a=1&b=2", "/engineer", "/plate?run=2"]
+ADVICE = """[advice]
+plugin = "line-bends"
+show = "screen"
+deadline_ms = 30000
+[[die]]
+id = 4
+opening_mm = 360.0
+"""
 # A 10-inch panel of 1280 x 800 is 136 mm high.
 MM = 800 / 136
 arguments = None
@@ -483,31 +492,38 @@ def check_everybody_can_read_it(browser):
     said(f"to a deuteranope more and too far differ by {apart:.2f} in linear light; their shapes differ for everybody")
 
 
+def read_from_two_metres(browser, host):
+    """Returns the heights of capitals in millimetres, of the page on a full HD panel."""
+    for width, height in [(1280, 800), (1920, 1080)]:
+        resize(browser, width, height)
+        for view in ["", "?lang=ja", "?units=in"]:
+            opened(browser, host, "/" + view)
+            facts = browser.execute_script("""
+                const cap = id => { const e = document.getElementById(id); return parseFloat(getComputedStyle(e).fontSize) * 0.729; };
+                const out = [...document.querySelectorAll('span[id], p[id], img[id], nav a')].filter(e => {
+                  const r = e.getBoundingClientRect();
+                  return r.width && (r.right > innerWidth + 1 || r.bottom > innerHeight + 1 || r.left < -1 || r.top < -1);
+                }).map(e => e.id || e.textContent);
+                const boxes = ['left', 'near', 'gap', 'gap-more', 'limit', 'place-title', 'advice', 'remark', 'advised-before', 'bar-gap', 'strip-0'].map(id => document.getElementById(id).getBoundingClientRect());
+                const foot = document.querySelector('footer').getBoundingClientRect();
+                return {caps: Object.fromEntries(['verdict', 'left', 'near', 'gap', 'left-words', 'limit', 'stroke', 'press'].map(id => [id, cap(id)])), out,
+                        below: boxes.filter(b => b.bottom > foot.top + 1).length,
+                        scrolls: document.documentElement.scrollHeight > innerHeight || document.documentElement.scrollWidth > innerWidth};""")
+            assert not facts["scrolls"] and not facts["out"] and not facts["below"], (width, view, facts)
+            scale = height / 136
+            caps = {name: cap / scale for name, cap in facts["caps"].items()}
+            for name, least in [("verdict", 12), ("left", 12), ("near", 12), ("gap", 12), ("left-words", 5), ("limit", 4.5), ("stroke", 5)]:
+                assert caps[name] >= least - 0.1, (name, caps)
+    resize(browser, 1280, 800)
+    return caps
+
+
 def check_it_is_read_from_two_metres(browser):
     """Heights of capitals on a 10-inch panel, no scrolling, nothing cut off."""
-    with cell(strokes=3) as (press, host):
-        for width, height in [(1280, 800), (1920, 1080)]:
-            resize(browser, width, height)
-            for view in ["", "?lang=ja", "?units=in"]:
-                opened(browser, host, "/" + view)
-                facts = browser.execute_script("""
-                    const cap = id => { const e = document.getElementById(id); return parseFloat(getComputedStyle(e).fontSize) * 0.729; };
-                    const out = [...document.querySelectorAll('span[id], p[id], img[id], nav a')].filter(e => {
-                      const r = e.getBoundingClientRect();
-                      return r.width && (r.right > innerWidth + 1 || r.bottom > innerHeight + 1 || r.left < -1 || r.top < -1);
-                    }).map(e => e.id || e.textContent);
-                    const boxes = ['left', 'near', 'gap', 'gap-more', 'limit', 'place-title'].map(id => document.getElementById(id).getBoundingClientRect());
-                    const foot = document.querySelector('footer').getBoundingClientRect();
-                    return {caps: Object.fromEntries(['verdict', 'left', 'near', 'gap', 'left-words', 'limit', 'stroke', 'press'].map(id => [id, cap(id)])), out,
-                            below: boxes.filter(b => b.bottom > foot.top + 1).length,
-                            scrolls: document.documentElement.scrollHeight > innerHeight || document.documentElement.scrollWidth > innerWidth};""")
-                assert not facts["scrolls"] and not facts["out"] and not facts["below"], (width, view, facts)
-                scale = height / 136
-                caps = {name: cap / scale for name, cap in facts["caps"].items()}
-                for name, least in [("verdict", 12), ("left", 12), ("near", 12), ("gap", 12), ("left-words", 5), ("limit", 4.5), ("stroke", 5)]:
-                    assert caps[name] >= least - 0.1, (name, caps)
-        resize(browser, 1280, 800)
-        said("capitals in mm: " + ", ".join(f"{name} {cap:.1f}" for name, cap in caps.items()))
+    with cell(strokes=3) as (_, measured), advised() as advised_host:
+        for host in [measured, advised_host]:
+            caps = read_from_two_metres(browser, host)
+            said("capitals in mm: " + ", ".join(f"{name} {cap:.1f}" for name, cap in caps.items()))
 
 
 def compared(browser, name):
@@ -529,9 +545,33 @@ def compared(browser, name):
     return share
 
 
+def advice_of(host, run):
+    """Waits for the advice after a stroke, and returns it."""
+    def advice():
+        result = host.state()["result"]
+        return result and result["run"] == run and result["advice"]
+    return wait(f"advice after stroke {run}", advice, 60)[0]
+
+
+@contextmanager
+def advised():
+    """A host whose page shows the advice for the third stroke."""
+    with cell(ram=True, more=ADVICE) as (press, host):
+        for run in [1, 2]:
+            bend = advice_of(host, run)["bend"]
+            order = {"axis_deg": 90, "at_mm": sum(end[0] for end in bend["line_mm"]) / 2 - 1500, "depth_mm": bend["depth_mm"]}
+            wait("an order taken", lambda: press.ask({"do": {"order": order}}).get("ok"), 30)
+        advice_of(host, 3)
+        yield host
+
+
 def check_the_pictures_are_those_that_a_person_has_seen(browser):
-    """Golden screenshots: sizes, languages, units, themes, stale, alarm."""
+    """Golden screenshots: sizes, languages, units, themes, stale, alarm, advice."""
     worst = 0
+    with advised() as host:
+        for name, view in [("advice", ""), ("advice-ja", "?lang=ja&theme=dark")]:
+            opened(browser, host, "/" + view)
+            worst = max(worst, compared(browser, f"operator-{name}"))
     with cell(strokes=4) as (press, host):
         again = heading(host) == "PRESS HERE AGAIN"
         wait("again, where it is", lambda: host.state()["result"]["again"] == again)

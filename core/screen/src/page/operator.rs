@@ -34,6 +34,8 @@ pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
         main data-result="" {
             section.where {
                 div.map { (cells.img("map")) (cells.img("overlay")) }
+                (cells.p("remark"))
+                (cells.p("advised-before"))
                 svg.strip viewBox=(view_box(STRIP_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::STROKES)) {
                     (cells.rect("strip-limit"))
                     @for k in 0..STRIP { (cells.rect(&format!("strip-{k}"))) }
@@ -44,7 +46,6 @@ pub(crate) fn page(snapshot: &Snapshot, view: View) -> Markup {
                 p.figure { (cells.span("left")) " " (cells.span("left-words")) }
                 p.figure { (cells.span("near")) " " (cells.span("near-words")) }
                 (cells.p("advice"))
-                (cells.p("advised-before"))
                 h2 { (cells.span("gap-title")) " " (cells.span("limit")) }
                 p.figure { (cells.span("gap")) " " (cells.span("gap-more")) }
                 svg.bar viewBox=(view_box(BAR_SIZE)) preserveAspectRatio="none" role="img" aria-label=(text(words::GAP)) {

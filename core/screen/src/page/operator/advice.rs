@@ -3,8 +3,8 @@
 use platen_model::{Texts, fill};
 use platen_report::picture::SeenPlate;
 
-use super::clean;
 use crate::cells::Cells;
+use crate::page::clean_sentence;
 use crate::view::View;
 use crate::{AdvicePart, AdvisedBend, AdvisedStep, LastAdvice, Snapshot, words};
 
@@ -16,6 +16,8 @@ pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let advice = snapshot.result.as_ref().and_then(|result| result.advice.as_ref());
     let text = |texts: Texts| texts.of(view.language);
     cells.text("advice", advice.map_or(String::new(), |advice| sentence(advice, view)));
+    let remark = advice.and_then(|it| it.says.first());
+    cells.text("remark", remark.map_or(String::new(), |it| clean_sentence(it.of(view.language))));
     cells.text(
         "advised-before",
         advice.and_then(|it| it.last).map_or(String::new(), |last| before(last, view)),
@@ -82,7 +84,6 @@ fn sentence(advice: &AdvicePart, view: View) -> String {
         .filter(|left| left[1] > 0)
         .map(|[few, many]| fill(text(words::STROKES_LEFT), &[&few.to_string(), &many.to_string()]));
     let why = advice.why.map(|why| fill(text(words::NO_ADVICE), &[text(why)]));
-    let says = advice.says.first().map(|says| clean(says.of(view.language)));
-    let parts: Vec<String> = [why, most, then, left, says].into_iter().flatten().collect();
+    let parts: Vec<String> = [why, most, then, left].into_iter().flatten().collect();
     parts.join("; ")
 }
