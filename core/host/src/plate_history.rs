@@ -1,6 +1,8 @@
 //! The history of a plate for its advisor, gathered from the record: strokes with the press's depth and the bends they made, the die, and
 //! what like plates taught.
 
+use std::collections::BTreeSet;
+
 use platen_advice::bend_lines::BendLines;
 use platen_advice::learner::like_plates;
 use platen_advice::press_law::PressLaw;
@@ -128,7 +130,7 @@ pub(crate) fn gather(
     let mut strokes = earlier.as_ref().map_or_else(Vec::new, |earlier| earlier.history.strokes.clone());
     let mut score = None;
     if let Some(before) = &before {
-        let stroke = pressed(archive, measured, before, earlier.as_ref()).map_err(failed)?;
+        let stroke = pressed(archive, plant, measured, before, earlier.as_ref()).map_err(failed)?;
         score = earlier.as_ref().and_then(|earlier| scored(archive, earlier, measured, &stroke));
         strokes.push(stroke);
     }
@@ -181,18 +183,13 @@ fn kind(target: &Target) -> String {
 /// Returns the stroke that was just measured, as the record has it.
 fn pressed(
     archive: &Archive,
+    plant: &PlantFile,
     measured: &MeasuredPlate,
     before: &Stroke,
     earlier: Option<&AdviceRecord>,
 ) -> Result<PressedStroke, platen_history::Error> {
-    let filter = Filter { plate: Some(before.plate), ..Filter::default() };
-    // A stroke in between that was not measured left its bend among this one's: the depth then belongs to one of two.
-    let between = archive.strokes(&filter)?.into_iter().any(|stroke| {
-        (before.run_id + 1..measured.run_id).contains(&stroke.run_id)
-            && !stroke.dry_run
-            && !stroke.baseline
-            && (stroke.key.session, stroke.key.stroke) != (measured.key.session, measured.key.stroke)
-    });
+    // Another stroke in between left its bend among this one's: the depth then belongs to one of two.
+    let between = has_other_strokes_between(archive, plant, measured, before)?;
     let bends = measured.bends.clone().filter(|_| earlier.is_some());
     // On other supports the plate's own weight changes the bends.
     let told = measured.data.ram_depth.filter(|_| !between && !measured.task.supports_changed);
@@ -210,6 +207,29 @@ fn pressed(
     let wanted = advised.filter(|next| is_meant(next, &measured.task, &stroke));
     let wanted = wanted.map(|next| WantedBend { at: middle(next), angle: next.angle, depth: next.depth });
     Ok(PressedStroke { wanted, ..stroke })
+}
+
+/// Returns whether a plate was pressed between two measurements: by a stroke that was not measured, or by one that only the counter of the press
+/// knows, as while the host was away. In another session the counter tells nothing.
+fn has_other_strokes_between(
+    archive: &Archive,
+    plant: &PlantFile,
+    measured: &MeasuredPlate,
+    before: &Stroke,
+) -> Result<bool, platen_history::Error> {
+    let runs: Result<Vec<Stroke>, _> =
+        (before.run_id + 1..measured.run_id).map(|run_id| archive.stroke(run_id)).collect();
+    let (from, to) = (before.key, measured.key);
+    let mut others = runs?;
+    others.retain(|stroke| (stroke.key.session, stroke.key.stroke) != (to.session, to.stroke));
+    if others.iter().any(|stroke| stroke.plate == before.plate && !stroke.dry_run && !stroke.baseline) {
+        return Ok(true);
+    }
+    let map = plant.press.as_ref().map(|press| &press.map).filter(|map| map.counts_strokes());
+    let Some(map) = map.filter(|_| from.session == to.session) else { return Ok(false) };
+    let known: BTreeSet<u16> =
+        others.iter().map(|stroke| stroke.key.stroke).filter(|it| *it != from.stroke).collect();
+    Ok(map.counter.distance(from.stroke, to.stroke) > 1 + known.len() as u32)
 }
 
 fn next_bend(record: &AdviceRecord) -> Option<&NextBend> {

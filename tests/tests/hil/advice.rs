@@ -304,3 +304,29 @@ fn a_stroke_before_the_advice_was_ready_leaves_the_reason_and_no_old_advice() {
     assert_clean(&press.stats(), &host.log());
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
+
+/// Two strokes are made while no host runs: the press's counter alone knows of the first.
+#[test]
+fn a_stroke_that_no_host_saw_is_told_with_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false");
+    let plant = advised_plant(folder.path(), &press, "screen");
+    let mut host = Host::start(&plant);
+    stroke(&mut press, "baseline");
+    press.wait_taken(1);
+    stroke(&mut press, "stroke");
+    press.wait_taken(2);
+    let seen = until("the advice after the first stroke", || advice(&plant, 2));
+    assert_eq!(seen["history"]["strokes"][0]["missed_before"], false);
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+    for _ in 0..2 {
+        press.ask(r#"{"do":"stroke"}"#);
+    }
+    let mut host = Host::start(&plant);
+    let late = until("the advice after the next measured stroke", || advice(&plant, 3));
+    let strokes = late["history"]["strokes"].as_array().unwrap();
+    assert_eq!(strokes.last().unwrap()["missed_before"], true, "{late:#}");
+    let told = String::from_utf8(said(&["advise", plant.to_str().unwrap(), "1"])).unwrap();
+    assert!(told.contains("a stroke before the last one was not measured"), "{told}");
+    assert_eq!(host.stop(), Some(0), "{}", host.log());
+}
