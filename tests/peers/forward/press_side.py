@@ -3,7 +3,7 @@
 
     python3 tests/peers/forward/press_side.py --pairs 20 --strokes 50          (packages: those of forward.py)
 
-One press and one host run through. Blocks of strokes alternate: forwarder off, on, on, off; a block with it begins with the backlog of the block before, to PostgreSQL and
+One press and one host run through; the forwarder has the priority of its unit. Blocks of strokes alternate: forwarder off, on, on, off; a block with it begins with the backlog of the block before, to PostgreSQL and
 mosquitto. Each stroke's time is the one that the host logs. Printed: median and 99 % of both, their ratio, and its 95 % interval by drawing pairs of blocks anew, so that
 a slow drift of the machine falls out; the machine's load beside it. The figures judge nothing. Exit code 1: a stroke is missing at a sink.
 """
@@ -12,13 +12,13 @@ import argparse, os, random, re, tempfile
 from forward import SITE, Site
 from servers import wait
 
-LINE = re.compile(r"trigger_to_busy_ms=(?:Some\()?(\d+)")
+LINE = re.compile(r"trigger_to_busy_ms=(?:Some\()?([\d.]+)")
 
 
 def times(plant):
     """Trigger to BUSY of each stroke so far, milliseconds."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", (plant.folder / "host.log").read_text())
-    return [int(found) for found in LINE.findall(plain)]
+    return [float(found) for found in LINE.findall(plain)]
 
 
 def share(values, part):
@@ -34,7 +34,7 @@ def told(pairs, chance):
     for part, name in [(0.5, "median"), (0.99, "99 %")]:
         off, on = (share([it for pair in pairs for it in pair[which]], part) for which in (False, True))
         drawn = sorted(ratio(chance.choices(pairs, k=len(pairs)), part) for _ in range(2000))
-        print(f"trigger to busy, {name}: {off} ms without, {on} ms with the forwarder; ratio {on / off:.3f}, 95 %: {drawn[50]:.3f} to {drawn[1949]:.3f}")
+        print(f"trigger to busy, {name}: {off:.2f} ms without, {on:.2f} ms with the forwarder; ratio {on / off:.3f}, 95 %: {drawn[50]:.3f} to {drawn[1949]:.3f}")
 
 
 def main():

@@ -205,7 +205,8 @@ class Plant:
         wait("the host", lambda: (self.folder / "results/history.sqlite").exists())
 
     def start_forwarder(self, *arguments):
-        self.forwarder = subprocess.Popen([PLATEN, "forward", self.plant, *arguments], stdout=subprocess.DEVNULL, stderr=open(self.folder / "forward.log", "a"))
+        as_the_unit = ["nice", "-n", "10", "ionice", "-c", "3"]
+        self.forwarder = subprocess.Popen([*as_the_unit, PLATEN, "forward", self.plant, *arguments], stdout=subprocess.DEVNULL, stderr=open(self.folder / "forward.log", "a"))
 
     def end(self, what, how=signal.SIGTERM):
         process = getattr(self, what)

@@ -452,7 +452,7 @@ impl<L: Link> Runner<L> {
         }
         tracing::info!(
             stroke = %result.key, run_id = result.run_id, seq = result.seq, verdict = ?result.measurement.verdict(),
-            trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_millis()),
+            trigger_to_busy_ms = self.metrics.trigger_to_busy.last().map(|d| d.as_micros() as f64 / 1000.0),
             stroke_to_result_ms = stroke_to_result.as_millis(),
             waited_ms = self.clock.result_since.map(|since| since.elapsed().as_millis()),
             journal_failed = self.metrics.journal_failed,

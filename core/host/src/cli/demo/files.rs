@@ -12,6 +12,9 @@ const PLATE: &str = include_str!("../../../../../config/plates/plate-009.toml");
 
 /// Die of the demo's press.
 const DIE: &str = "\n[[die]]\nid = 4\nopening_mm = 360.0\nedge_mm = 200.0\n";
+/// Limits for a slow or emulated computer; a demo waits for nothing else.
+const TIMEOUTS: &str =
+    "\n[press.timeouts]    # a slow computer may take its time\nscan_ms = 120000\nevaluate_ms = 120000\n";
 
 /// Makes the demo's folder with its plate file, replacing an earlier demo only.
 pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
@@ -53,6 +56,7 @@ pub(super) fn plant_file(
         .replace("port = 15020", &format!("port = {}", modbus.port()))
         .replace("127.0.0.1:15021", &plate.to_string())
         .replace("folder = \"../platen-results\"", "folder = \"results\"");
+    text.push_str(TIMEOUTS);
     if let Some(operator) = advice {
         let show = if operator == Operator::Follow { "screen" } else { "shadow" };
         text.push_str(&format!("\n[advice]\nplugin = \"line-bends\"\nshow = \"{show}\"\ndeadline_ms = 30000    # a busy computer may take its time; 2000 by default\n{DIE}"));
