@@ -23,7 +23,7 @@ ln -sfn "$std/usr/lib/rustlib/$triple" "/usr/lib/rustlib/$triple"
 
 export RUSTC=/usr/bin/rustc CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc
 mapfile -t packages < <(bash .ci/package $triple)
-apt-get install -y -qq "${packages[@]}" >/dev/null
+apt-get install -y -qq --reinstall "${packages[@]}" >/dev/null
 file -L /usr/bin/platen
 place=$(mktemp -d) && chown nobody "$place"
 (cd "$place" && setpriv --reuid=nobody --regid=nogroup --clear-groups env HOME="$place" platen demo --out "$place/demo")
