@@ -3,8 +3,11 @@
 //! The target's face is laid on the plate's face from the scanner's side, as a rigid surface. Its direction follows the
 //! plate's (u, v), by the least-squares rigid fit of all material points that were seen. Its height and two small tilts then solve
 //! the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
-//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit. Where a part of the plate was not seen, the
-//! seat on the whole fitted surface is found, too; the uncertainty holds the difference.
+//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit.
+//!
+//! The uncertainty holds the difference to other seats: on the whole fitted surface where a part of it was not seen, and those in which the middle
+//! of the target lies higher by no more than the plate's own uncertainty. A half-bent plate has such seats, as its target lies on a ridge; the
+//! noise of the scan alone then decides whether it rocks. They are found as the lowest over places beside the middle.
 
 use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
@@ -32,6 +35,8 @@ pub(crate) struct Deviation {
     pose: Pose,
     /// Seats on the plate bent by its uncertainty.
     bent: Vec<BentSeat>,
+    /// Movements to other seats that the plate's uncertainty does not tell from this one.
+    other: Vec<Vec3>,
     /// Seat on the whole plate where a part of it was not seen: the surface continues there.
     whole: Option<Pose>,
 }
@@ -69,29 +74,43 @@ impl Deviation {
         let size = [now.width(), now.height()];
         let support = Support::new(now, target, &uv, (0..uv.len()).filter(|&i| seen[i]).collect());
         check()?;
-        let (movement, active, rocks) = support.seat(size, |_| 0.0)?;
+        let Seat { movement, contacts, rocks, lowest } = support.seat(size, Vec3::x(), |_| 0.0)?;
         let mut bent = Vec::new();
         for mode in &MODES {
             check()?;
             let sigma = mode.sigma(now, scanner);
             for by in [-EXPANDED * sigma, EXPANDED * sigma] {
                 // Without a seat there is nothing to compare with; the plate itself has one.
-                let seat = support.seat(size, |at| by * mode.at(at, now));
-                bent.extend(seat.map(|(movement, ..)| BentSeat { mode, by, movement }));
+                let seat = support.seat(size, Vec3::x(), |at| by * mode.at(at, now));
+                bent.extend(seat.map(|Seat { movement, .. }| BentSeat { mode, by, movement }));
+            }
+        }
+        let told = bent.iter().map(|seat| seat.by).fold(0.0, f64::max);
+        let mut other = Vec::new();
+        for off_middle in OFF_MIDDLE.map(|share| share * size[0].min(size[1])) {
+            check()?;
+            for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+                let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
+                let seat = support.seat(size, objective, |_| 0.0);
+                // All between two seats are seats, too: as far towards the other as the middle rises by what is not told.
+                other.extend(seat.map(|seat| {
+                    let rise = seat.lowest - lowest;
+                    movement + (seat.movement - movement) * if rise > told { told / rise } else { 1.0 }
+                }));
             }
         }
         check()?;
         let mut whole = None;
         if seen.contains(&false) {
             let support = Support::new(now, target, &uv, (0..uv.len()).collect());
-            let seat = support.seat(size, |_| 0.0).ok();
-            whole = seat.map(|(movement, ..)| Pose { placement: support.placement, movement });
+            let seat = support.seat(size, Vec3::x(), |_| 0.0).ok();
+            whole = seat.map(|Seat { movement, .. }| Pose { placement: support.placement, movement });
         }
         let Support { placement, fitted, index, .. } = support;
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&movement)).collect();
-        let contacts = active.into_iter().map(|i| index[i]).collect();
+        let contacts = contacts.into_iter().map(|i| index[i]).collect();
         let pose = Pose { placement, movement };
-        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent, whole })
+        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent, other, whole })
     }
 
     /// Returns measured minus target at one place, in the seat.
@@ -101,7 +120,7 @@ impl Deviation {
 
     /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
     /// errors there and at the contacts; at least what the seats on the bent plate make of it. The interval reaches as far beyond
-    /// the deviation in the seat on the whole plate.
+    /// the deviation in any other seat that the plate's uncertainty allows, and in the seat on the whole plate.
     pub(crate) fn sigma(
         &self,
         now: &Surface,
@@ -128,7 +147,9 @@ impl Deviation {
         let unseen = self.whole.as_ref().map_or(0.0, |whole| {
             (whole.deviation(now, target, at) - self.at(now, target, at)).abs() / EXPANDED
         });
-        self.bent.iter().map(change).fold(of_weights, f64::max) + unseen
+        let told = self.bent.iter().map(change).fold(of_weights, f64::max);
+        let to_other = |movement: &Vec3| here.dot(&(movement - self.pose.movement)).abs() / EXPANDED;
+        told + self.other.iter().map(to_other).fold(0.0, f64::max) + unseen
     }
 }
 
@@ -160,37 +181,53 @@ impl Support {
     }
 
     /// Returns [`seat`] on the plate raised by a height at each place; contacts are positions in `index`.
-    fn seat(&self, size: [f64; 2], raised: impl Fn([f64; 2]) -> f64) -> Result<(Vec3, Vec<usize>, bool)> {
+    fn seat(&self, size: [f64; 2], objective: Vec3, raised: impl Fn([f64; 2]) -> f64) -> Result<Seat> {
         let places = self.index.iter().zip(&self.places);
         let heights: Vec<f64> = places.map(|(&i, &at)| self.fitted[i] + raised(at)).collect();
-        seat(&self.rows, &heights, &self.places, size)
+        seat(objective, &self.rows, &heights, &self.places, size)
     }
 }
 
-/// Returns the movement from the fit to the seat over these heights, the contacts, and whether the target rocks.
+/// The target at rest.
+#[derive(Debug)]
+struct Seat {
+    /// Movement from the fit.
+    movement: Vec3,
+    contacts: Vec<usize>,
+    rocks: bool,
+    /// Rise of the middle of the target, metres, in the vertex of the linear program.
+    lowest: f64,
+}
+
+/// Returns the seat over these heights.
 fn seat(
+    objective: Vec3,
     rows: &[Vec3],
     heights: &[f64],
     places: &[[f64; 2]],
     [width, height]: [f64; 2],
-) -> Result<(Vec3, Vec<usize>, bool)> {
-    let vertex = linear_program::minimum(rows, heights, 1e3 * (width + height)).ok_or_else(|| {
-        Error::new(
-            ErrorKind::BadData,
-            "the target finds no seat: the plate was seen on one side of its middle only",
-        )
-        .hint("scan again with the whole plate in view")
-    })?;
+) -> Result<Seat> {
+    let vertex =
+        linear_program::minimum(objective, rows, heights, 1e3 * (width + height)).ok_or_else(|| {
+            Error::new(
+                ErrorKind::BadData,
+                "the target finds no seat: the plate was seen on one side of its middle only",
+            )
+            .hint("scan again with the whole plate in view")
+        })?;
+    let lowest = vertex.q.x;
     if narrowest(vertex.active.map(|i| places[i])) >= ROCKS * width.min(height) {
-        return Ok((vertex.q, vertex.active.to_vec(), false));
+        return Ok(Seat { movement: vertex.q, contacts: vertex.active.to_vec(), rocks: false, lowest });
     }
     let rise = |i: usize| heights[i] / rows[i].x;
     let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
-    Ok((Vec3::x() * rise(top), vec![top], true))
+    Ok(Seat { movement: Vec3::x() * rise(top), contacts: vec![top], rocks: true, lowest })
 }
 
 /// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
 const ROCKS: f64 = 0.25;
+/// How far from the middle other seats are sought as the lowest, shares of the shorter side.
+const OFF_MIDDLE: [f64; 3] = [0.001, 0.01, 0.1];
 
 /// Returns the derivative of the deviation at a place by the target's rise and tilts, with its sign reversed.
 fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {

@@ -1,6 +1,6 @@
 //! Linear program in three unknowns by the dual simplex method: the one-sided seat of a rigid surface.
 //!
-//! Minimises q_1 over q in R^3 subject to r_i . q >= d_i for all i. Three constraints form the basis and hold as equalities;
+//! Minimises c . q over q in R^3, c_1 = 1, subject to r_i . q >= d_i for all i. Three constraints form the basis and hold as equalities;
 //! the most violated constraint enters, and the one leaves that keeps the multipliers non-negative (ratio test). The objective
 //! rises in every round, so the method ends. The solution is exact; 10,000 constraints take tens of rounds.
 
@@ -25,8 +25,8 @@ const ROUNDS: usize = 1000;
 /// Returns the minimum; `None` when the program is unbounded (all constraints on one side of the middle) or has fewer than
 /// three constraints.
 ///
-/// `reach` is a length much larger than the lever arms of the constraints.
-pub(crate) fn minimum(rows: &[Vec3], d: &[f64], reach: f64) -> Option<Vertex> {
+/// `reach` is a length much larger than the lever arms of the constraints and of the objective.
+pub(crate) fn minimum(objective: Vec3, rows: &[Vec3], d: &[f64], reach: f64) -> Option<Vertex> {
     // Start: three artificial constraints far outside and far below. A bounded program drops all of them.
     let deep = -reach;
     let artificial = [0.0, 2.0, 4.0].map(|k: f64| {
@@ -46,7 +46,7 @@ pub(crate) fn minimum(rows: &[Vec3], d: &[f64], reach: f64) -> Option<Vertex> {
             return basis.iter().all(|i| *i < rows.len()).then_some(Vertex { q, active: basis });
         }
         // Multipliers of the objective and of the entering row in terms of the basis.
-        let multipliers = inverse.transpose() * Vec3::x();
+        let multipliers = inverse.transpose() * objective;
         let shares = inverse.transpose() * rows[entering];
         let leaving = (0..3)
             .filter(|&k| shares[k] > 1e-12)
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn a_hollow_is_spanned_by_its_corners() {
         let (rows, d) = over_grid(41, |x, y| 0.01 * (x * x + y * y) + 0.003 * x);
-        let vertex = minimum(&rows, &d, 1e3).expect("bounded");
+        let vertex = minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded");
         assert!((vertex.q - Vec3::new(0.02, 0.003, 0.0)).norm() < 1e-12, "{vertex:?}");
         assert!(vertex.active.iter().all(|&i| rows[i].y.abs() == 1.0 && rows[i].z.abs() == 1.0));
     }
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn a_hill_is_touched_at_its_top() {
         let (rows, d) = over_grid(41, |x, y| -0.01 * (x * x + y * y));
-        assert!(minimum(&rows, &d, 1e3).expect("bounded").q.x.abs() < 1e-12);
+        assert!(minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded").q.x.abs() < 1e-12);
     }
 
     #[test]
@@ -99,7 +99,7 @@ mod tests {
                 }
             }
         }
-        let vertex = minimum(&rows, &d, 1e3).expect("bounded");
+        let vertex = minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded");
         assert!((vertex.q.x - highest).abs() < 1e-10, "{} {highest}", vertex.q.x);
     }
 
@@ -107,6 +107,6 @@ mod tests {
     fn places_on_one_side_of_the_middle_hold_nothing() {
         let (rows, d) = over_grid(5, |_, _| 0.0);
         let (rows, d): (Vec<Vec3>, Vec<f64>) = rows.into_iter().zip(d).filter(|(r, _)| r.y > 0.1).unzip();
-        assert_eq!(minimum(&rows, &d, 1e3), None);
+        assert_eq!(minimum(Vec3::x(), &rows, &d, 1e3), None);
     }
 }

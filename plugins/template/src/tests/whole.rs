@@ -132,3 +132,32 @@ fn a_seat_that_was_not_seen_is_in_the_uncertainty() {
         );
     }
 }
+
+/// A plate that is bent to its target on one half, flat on the other: the target lies on a ridge through its middle, and the noise of the
+/// scan decides whether it rocks.
+#[test]
+fn a_seat_that_the_noise_decides_is_in_the_uncertainty() {
+    let bent = goal(cylinder(12.0), Facing::Outside);
+    let half_bent = |u: f64, v: f64| {
+        let from = u.max(0.5 * WIDTH);
+        let (p, n) = (bent.point(from, v), bent.normal(from, v));
+        let along_u = (bent.point(from, v + 1.0) - p).cross(&n);
+        (p + along_u * (u - from), n)
+    };
+    let mut task = task(cylinder(12.0), Facing::Outside, Seat::Gravity);
+    let station = |name: &str, at| Station { name: name.into(), at, quantity: Quantity::Deviation };
+    task.stations = vec![station("A", [0.3, 1.0]), station("B", [1.5, 0.4]), station("C", [2.3, 1.6])];
+    let known = run(&surface(20_000, 1e-6, 1, half_bent), &task).expect("sound");
+    let mut rocking = 0;
+    for seed in 1..=8 {
+        let found = run(&surface(20_000, 3e-4, seed, half_bent), &task).expect("sound");
+        rocking += u32::from(figure(&found, "deviation.rocks") == 1.0);
+        for name in ["station.A", "station.B", "station.C"] {
+            let [(known, _), (value, uncertainty)] = [&known, &found].map(|report| stated(report, name));
+            println!("{seed} {name}: {:.3e} m off, {uncertainty:.3e} stated", value - known);
+            assert!((value - known).abs() <= uncertainty, "{seed} {name}: {value} {uncertainty} {known}");
+        }
+    }
+    // Found: 2 of 8 rock, 2.3, 11.4 and 17.5 mm off; the others lie within 0.1 mm.
+    assert!((1..8).contains(&rocking), "{rocking}");
+}
