@@ -23,7 +23,7 @@ use crate::run::{self, HostError, Pages, StrokeReport};
 use tokio::sync::{mpsc, watch};
 
 /// Longest time of a demo that is not stuck.
-const LIMIT: Duration = Duration::from_secs(300);
+const LIMIT: Duration = Duration::from_secs(1800);
 /// Most strokes of the demo, of `config/sim-press.toml`, with the blank.
 const MOST_STROKES: u32 = 15;
 
