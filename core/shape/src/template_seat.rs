@@ -44,35 +44,15 @@ impl Profile {
     /// seat is judged.
     #[must_use]
     pub fn seat(&self, seat: Seat, chord: f64) -> (Seating, bool) {
+        let rocks = |gravity: &Seating| gravity.span(self) < ROCKS * chord - ROUNDING;
         match seat {
-            Seat::Balanced => (self.balanced(), self.rocks(&self.gravity(), chord)),
+            Seat::Balanced => (self.balanced(), rocks(&self.gravity())),
             Seat::Held => (self.held(), false),
-            Seat::Gravity => self.judged(self.gravity(), chord),
+            Seat::Gravity => {
+                let gravity = self.gravity();
+                if rocks(&gravity) { (self.balanced(), true) } else { (gravity, false) }
+            }
         }
-    }
-
-    /// Returns the seatings to judge where the profile is not known better than `by`, metres: of every edge of the upper hull that lies no more
-    /// than that higher over the middle than the gravity seat.
-    #[must_use]
-    pub fn seats_within(&self, by: f64, chord: f64) -> Vec<Seating> {
-        let most = self.gravity().offset + by;
-        let edges = self.upper_hull();
-        let edges = edges.windows(2).map(|edge| self.on_two([edge[0], edge[1]]));
-        edges.filter(|edge| edge.offset <= most).map(|edge| self.judged(edge, chord).0).collect()
-    }
-
-    /// Returns the balanced seat in place of one that rocks, and whether it does.
-    fn judged(&self, seating: Seating, chord: f64) -> (Seating, bool) {
-        if self.rocks(&seating, chord) { (self.balanced(), true) } else { (seating, false) }
-    }
-
-    fn rocks(&self, seating: &Seating, chord: f64) -> bool {
-        seating.span(self) < ROCKS * chord - ROUNDING
-    }
-
-    fn on_two(&self, [i, j]: [usize; 2]) -> Seating {
-        let tilt = self.slope(i, j);
-        Seating { offset: self.d[i] - tilt * self.x[i], tilt, support: Support::OnTwo([i, j]) }
     }
 
     /// Returns the gravity seat: the line above d that is lowest at x = 0, the edge of the upper hull of d over x = 0. A contact at x = 0
@@ -85,7 +65,9 @@ impl Profile {
         if right > 1 && self.x[hull[right - 1]] == 0.0 && length(right - 1) < length(right) {
             right -= 1;
         }
-        self.on_two([hull[right - 1], hull[right]])
+        let [i, j] = [hull[right - 1], hull[right]];
+        let tilt = self.slope(i, j);
+        Seating { offset: self.d[i] - tilt * self.x[i], tilt, support: Support::OnTwo([i, j]) }
     }
 
     /// Returns the balanced seat: equal gaps at both ends.

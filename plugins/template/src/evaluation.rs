@@ -73,8 +73,7 @@ impl Evaluator<'_> {
             .collect();
         let max_gap = seated.gaps[seated.largest];
         let max_gap_at = place(seated.largest);
-        let [bent, other] = self.changes_of_seat(line, template, &seated);
-        let uncertainty = self.uncertainty(line, &seated).max(bent) + other;
+        let uncertainty = self.uncertainty(line, &seated).max(self.change_of_seat(line, template, &seated));
 
         let hidden = contacts.iter().find(|c| !c.seen).map(|c| ("the board touches", c.at));
         let hidden = hidden.or_else(|| (!seen(max_gap_at)).then_some(("the gap is largest", max_gap_at)));
@@ -169,11 +168,10 @@ impl Evaluator<'_> {
     }
 
     /// Returns by how much the largest gap changes when the profile is bent by its 95 % uncertainty, to either side, as a parabola and as
-    /// a cubic parabola, and when the correlated error is a wave over the range, in four phases; and by how much it changes on the same
-    /// profile in another seat that lies no more than these bends higher over the middle. Where the template keeps its seat
+    /// a cubic parabola, and when the correlated error is a wave over the range, in four phases. Where the template keeps its seat
     /// that is what its weights say. Where it is about to rock, or to fall on another contact, the gap jumps, and weights say
     /// nothing of the other side.
-    fn changes_of_seat(&self, line: &Line, template: &Template, seated: &Seated) -> [f64; 2] {
+    fn change_of_seat(&self, line: &Line, template: &Template, seated: &Seated) -> f64 {
         let Profile { x, d } = &seated.section.profile;
         let last = x.len() - 1;
         let half = 0.5 * (x[last] - x[0]);
@@ -193,25 +191,15 @@ impl Evaluator<'_> {
             };
             seated.section.along.iter().map(height).collect()
         };
-        let change = |profile: &Profile, seating: &Seating| {
-            let gaps = profile.gaps(seating);
-            (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
-        };
-        let bent_change = |raised: &[f64], sign: f64| {
+        let change = |raised: &[f64], sign: f64| {
             let bent = d.iter().zip(raised).map(|(d, raised)| d + sign * raised).collect();
             let bent = Profile { x: x.clone(), d: bent };
-            change(&bent, &bent.seat(template.seat, template.chord).0)
+            let (seating, _) = bent.seat(template.seat, template.chord);
+            let gaps = bent.gaps(&seating);
+            (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
         };
-        let bends: Vec<Vec<f64>> = curves.into_iter().chain([0.0, 1.0].map(wave)).collect();
-        let bent = bends.iter().flat_map(|raised| [-1.0, 1.0].map(|sign| bent_change(raised, sign)));
-        let by = bends.iter().flatten().fold(0.0, |most: f64, raised| most.max(raised.abs()));
-        let profile = &seated.section.profile;
-        let others = match template.seat {
-            Seat::Gravity => profile.seats_within(by, template.chord),
-            Seat::Balanced | Seat::Held => Vec::new(),
-        };
-        let other = others.iter().map(|seating| change(profile, seating));
-        [bent.fold(0.0, f64::max), other.fold(0.0, f64::max)]
+        let modes = curves.into_iter().chain([0.0, 1.0].map(wave));
+        modes.flat_map(|raised| [-1.0, 1.0].map(|sign| change(&raised, sign))).fold(0.0, f64::max)
     }
 
     /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests
