@@ -111,7 +111,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         }
         let registers = cell.registers()?;
         stop.send_replace(true);
-        Ok((host.await, Some(registers)))
+        let ended = host.await;
+        // The press may have its last result before the report of it is written, as on a slow computer.
+        while let Ok(report) = strokes.try_recv() {
+            reports.push(report);
+        }
+        Ok((ended, Some(registers)))
     })?;
     ended?;
     progress::done();
