@@ -217,10 +217,15 @@ fn has_other_strokes_between(
     measured: &MeasuredPlate,
     before: &Stroke,
 ) -> Result<bool, platen_history::Error> {
-    let runs: Result<Vec<Stroke>, _> =
-        (before.run_id + 1..measured.run_id).map(|run_id| archive.stroke(run_id)).collect();
     let (from, to) = (before.key, measured.key);
-    let mut others = runs?;
+    let mut others = Vec::new();
+    for run_id in before.run_id + 1..measured.run_id {
+        match archive.stroke(run_id) {
+            Ok(stroke) => others.push(stroke),
+            Err(platen_history::Error::NoSuchRun { .. }) => {}
+            Err(why) => return Err(why),
+        }
+    }
     others.retain(|stroke| (stroke.key.session, stroke.key.stroke) != (to.session, to.stroke));
     if others.iter().any(|stroke| stroke.plate == before.plate && !stroke.dry_run && !stroke.baseline) {
         return Ok(true);
