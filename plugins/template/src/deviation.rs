@@ -85,20 +85,8 @@ impl Deviation {
                 bent.extend(seat.map(|Seat { movement, .. }| BentSeat { mode, by, movement }));
             }
         }
-        let told = bent.iter().map(|seat| seat.by).fold(0.0, f64::max);
-        let mut other = Vec::new();
-        for off_middle in OFF_MIDDLE.map(|share| share * size[0].min(size[1])) {
-            check()?;
-            for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-                let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
-                let seat = support.seat(size, objective, |_| 0.0);
-                // All between two seats are seats, too: as far towards the other as the middle rises by what is not told.
-                other.extend(seat.map(|seat| {
-                    let rise = seat.lowest - lowest;
-                    movement + (seat.movement - movement) * if rise > told { told / rise } else { 1.0 }
-                }));
-            }
-        }
+        let by = bent.iter().map(|seat| seat.by).fold(0.0, f64::max);
+        let other = support.seats_within(by, movement, lowest, size, check)?;
         check()?;
         let mut whole = None;
         if seen.contains(&false) {
@@ -185,6 +173,31 @@ impl Support {
         let places = self.index.iter().zip(&self.places);
         let heights: Vec<f64> = places.map(|(&i, &at)| self.fitted[i] + raised(at)).collect();
         seat(objective, &self.rows, &heights, &self.places, size)
+    }
+
+    /// Returns the movements to seats in which the middle of the target lies no more than `by` higher than in the lowest one.
+    fn seats_within(
+        &self,
+        by: f64,
+        movement: Vec3,
+        lowest: f64,
+        size: [f64; 2],
+        check: &dyn Fn() -> Result<()>,
+    ) -> Result<Vec<Vec3>> {
+        let mut found = Vec::new();
+        for off_middle in OFF_MIDDLE.map(|share| share * size[0].min(size[1])) {
+            check()?;
+            for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+                let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
+                let seat = self.seat(size, objective, |_| 0.0);
+                // The feasible movements are convex: a seat that is too high is approached until the middle has risen by as much.
+                found.extend(seat.map(|seat| {
+                    let rise = seat.lowest - lowest;
+                    movement + (seat.movement - movement) * if rise > by { by / rise } else { 1.0 }
+                }));
+            }
+        }
+        Ok(found)
     }
 }
 
