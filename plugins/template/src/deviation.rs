@@ -7,7 +7,8 @@
 //!
 //! The uncertainty holds the difference to other seats: on the whole fitted surface where a part of it was not seen, and those in which the middle
 //! of the target lies higher by no more than the plate's own uncertainty. A half-bent plate has such seats, as its target lies on a ridge; the
-//! noise of the scan alone then decides whether it rocks. They are found as the lowest over places beside the middle.
+//! noise of the scan alone then decides whether it rocks. They are near-optimal vertices of the linear program, found with its objective moved beside the
+//! middle.
 
 use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
