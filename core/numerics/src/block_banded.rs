@@ -79,6 +79,30 @@ impl BlockBandedFactor {
         self.forward(&columns).iter().map(|[x]| x * x).sum()
     }
 
+    /// Returns `L'^-1 Z` in the net's order, by backward substitution: columns of independent standard normal numbers become draws of
+    /// coefficients with the covariance A^-1.
+    #[must_use]
+    pub fn draws<const D: usize>(&self, mut z: Vec<[f64; D]>) -> Vec<[f64; D]> {
+        let (layout, m) = (self.layout, self.layout.block());
+        for row in (0..layout.n_rows()).rev() {
+            let (rest, known) = z.split_at_mut((row + 1) * m);
+            let target = &mut rest[row * m..];
+            for ahead in 1..=REACH.min(layout.n_rows() - 1 - row) {
+                let block = &self.blocks[layout.range(row + ahead, ahead)];
+                for (target, column) in target.iter_mut().zip(block.chunks_exact(m)) {
+                    subtract_products(target, column, &known[(ahead - 1) * m..][..m]);
+                }
+            }
+            let diagonal = &self.blocks[layout.range(row, 0)];
+            for (c, column) in diagonal.chunks_exact(m).enumerate().rev() {
+                let (target, solved) = target.split_at_mut(c + 1);
+                subtract_products(&mut target[c], &column[c + 1..], solved);
+                target[c] = target[c].map(|x| x / column[c]);
+            }
+        }
+        (0..z.len()).map(|c| z[layout.index(c)]).collect()
+    }
+
     /// L^-1 B in block order, by forward substitution.
     pub(crate) fn forward<const D: usize>(&self, b: &[[f64; D]]) -> Vec<[f64; D]> {
         let (layout, m) = (self.layout, self.layout.block());
@@ -106,6 +130,15 @@ impl BlockBandedFactor {
 /// Subtracts the products of a column and the components of `x`.
 fn subtract<const D: usize>(target: &mut [[f64; D]], column: &[f64], x: &[f64; D]) {
     for (target, factor) in target.iter_mut().zip(column) {
+        for d in 0..D {
+            target[d] -= factor * x[d];
+        }
+    }
+}
+
+/// Subtracts the products of a column with each component of `x`.
+fn subtract_products<const D: usize>(target: &mut [f64; D], column: &[f64], x: &[[f64; D]]) {
+    for (factor, x) in column.iter().zip(x) {
         for d in 0..D {
             target[d] -= factor * x[d];
         }

@@ -7,6 +7,7 @@
 
 #[cfg(feature = "measure")]
 mod fit_surface;
+mod height_draws;
 mod mask;
 mod parts;
 
@@ -14,6 +15,7 @@ mod parts;
 pub use fit_surface::Quality;
 #[cfg(feature = "measure")]
 pub(crate) use fit_surface::{FitToSamples, fit_surface};
+pub use height_draws::HeightDraws;
 pub use mask::Mask;
 pub use parts::{SurfaceError, SurfaceParts};
 #[cfg(feature = "measure")]

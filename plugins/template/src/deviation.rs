@@ -5,18 +5,18 @@
 //! the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
 //! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit.
 //!
-//! The uncertainty holds the difference to other seats: on the whole fitted surface where a part of it was not seen, and those in which the middle
-//! of the target lies higher by no more than the plate's own uncertainty. A half-bent plate has such seats, as its target lies on a ridge; the
-//! noise of the scan alone then decides whether it rocks. They are near-optimal vertices of the linear program, found with its objective moved beside the
-//! middle.
+//! The uncertainty is that of [`Trials`], each with a seat of its own. It holds the difference to other seats: on the whole fitted surface where a part
+//! of it was not seen, and those in which the middle of the target lies higher by no more than the trials' seats do. A half-bent plate has such seats, as
+//! its target lies on a ridge; more than the noise of the scan decides whether it rocks there. They are near-optimal vertices of the linear program,
+//! found with its objective moved beside the middle.
 
 use nalgebra::Matrix3;
 use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
 use platen_shape::{EXPANDED, Placement, Surface, TargetSurface, Vec3};
 
-use crate::bending_mode::{MODES, Mode};
-use crate::linear_program;
+use crate::linear_program::{self, Vertex};
 use crate::scanner_sigma::ScannerSigma;
+use crate::trials::{TRIALS, Trials, half_width};
 
 /// Target in its seat on the plate.
 #[derive(Debug)]
@@ -34,21 +34,12 @@ pub(crate) struct Deviation {
     pub(crate) rocks: bool,
     contacts: Vec<usize>,
     pose: Pose,
-    /// Seats on the plate bent by its uncertainty.
-    bent: Vec<BentSeat>,
+    /// Movement to the seat in each trial.
+    tried: [Vec3; TRIALS],
     /// Movements to other seats that the plate's uncertainty does not tell from this one.
     other: Vec<Vec3>,
     /// Seat on the whole plate where a part of it was not seen: the surface continues there.
     whole: Option<Pose>,
-}
-
-/// Seat of the target on a plate that is bent in a mode by its 95 % uncertainty.
-#[derive(Debug)]
-struct BentSeat {
-    mode: &'static Mode,
-    /// Metres.
-    by: f64,
-    movement: Vec3,
 }
 
 /// Pose of the target: the rigid fit, and the small movement from there to the seat.
@@ -67,7 +58,7 @@ impl Deviation {
     pub(crate) fn new(
         now: &Surface,
         target: &TargetSurface,
-        scanner: ScannerSigma,
+        trials: &Trials<'_>,
         check: &dyn Fn() -> Result<()>,
     ) -> Result<Self> {
         let uv = PlateGrid::new(now).map(|u, v| [u, v]);
@@ -75,31 +66,25 @@ impl Deviation {
         let size = [now.width(), now.height()];
         let support = Support::new(now, target, &uv, (0..uv.len()).filter(|&i| seen[i]).collect());
         check()?;
-        let Seat { movement, contacts, rocks, lowest } = support.seat(size, Vec3::x(), |_| 0.0)?;
-        let mut bent = Vec::new();
-        for mode in &MODES {
-            check()?;
-            let sigma = mode.sigma(now, scanner);
-            for by in [-EXPANDED * sigma, EXPANDED * sigma] {
-                // Without a seat there is nothing to compare with; the plate itself has one.
-                let seat = support.seat(size, Vec3::x(), |at| by * mode.at(at, now));
-                bent.extend(seat.map(|Seat { movement, .. }| BentSeat { mode, by, movement }));
-            }
-        }
-        let by = bent.iter().map(|seat| seat.by).fold(0.0, f64::max);
-        let other = support.seats_within(by, movement, lowest, size, check)?;
+        let seat = support.seat(size)?;
+        check()?;
+        let tried = support.seats_in(trials, &seat, size, check)?;
+        let by = half_width(tried.each_ref().map(|tried| tried.lowest - seat.lowest));
+        let other = support.seats_within(by, &seat, size, check)?;
+        let tried = tried.map(|seat| seat.movement);
+        let Seat { movement, contacts, rocks, .. } = seat;
         check()?;
         let mut whole = None;
         if seen.contains(&false) {
             let support = Support::new(now, target, &uv, (0..uv.len()).collect());
-            let seat = support.seat(size, Vec3::x(), |_| 0.0).ok();
+            let seat = support.seat(size).ok();
             whole = seat.map(|Seat { movement, .. }| Pose { placement: support.placement, movement });
         }
         let Support { placement, fitted, index, .. } = support;
         let value = (0..uv.len()).map(|i| fitted[i] - row(target, uv[i]).dot(&movement)).collect();
         let contacts = contacts.into_iter().map(|i| index[i]).collect();
         let pose = Pose { placement, movement };
-        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, bent, other, whole })
+        Ok(Self { uv, value, fitted, seen, rocks, contacts, pose, tried, other, whole })
     }
 
     /// Returns measured minus target at one place, in the seat.
@@ -108,14 +93,15 @@ impl Deviation {
     }
 
     /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
-    /// errors there and at the contacts; at least what the seats on the bent plate make of it. The interval reaches as far beyond
-    /// the deviation in any other seat that the plate's uncertainty allows, and in the seat on the whole plate.
+    /// errors there and at the contacts; at least that of the trials. The interval reaches as far beyond the deviation in any other seat
+    /// that the plate's uncertainty allows, and in the seat on the whole plate.
     pub(crate) fn sigma(
         &self,
         now: &Surface,
         target: &TargetSurface,
         at: [f64; 2],
         scanner: ScannerSigma,
+        trials: &Trials<'_>,
     ) -> f64 {
         let here = row(target, at);
         let rows: Vec<Vec3> = self.contacts.iter().map(|&i| row(target, self.uv[i])).collect();
@@ -129,16 +115,15 @@ impl Deviation {
         let terms: Vec<([f64; 2], f64)> = contacts.chain([(at, 1.0)]).collect();
         let of_weights =
             now.sigma_of_heights(&terms).hypot(scanner.of_heights(terms.iter().map(|(_, weight)| *weight)));
-        let change = |seat: &BentSeat| {
-            let moved = here.dot(&(seat.movement - self.pose.movement));
-            (seat.by * seat.mode.at(at, now) - moved).abs() / EXPANDED
-        };
+        let raised = trials.heights(at);
+        let departures = std::array::from_fn(|k| raised[k] - here.dot(&(self.tried[k] - self.pose.movement)));
+        let of_trials = (half_width(departures) / EXPANDED).hypot(scanner.of_gap());
         let unseen = self.whole.as_ref().map_or(0.0, |whole| {
             (whole.deviation(now, target, at) - self.at(now, target, at)).abs() / EXPANDED
         });
-        let told = self.bent.iter().map(change).fold(of_weights, f64::max);
         let to_other = |movement: &Vec3| here.dot(&(movement - self.pose.movement)).abs() / EXPANDED;
-        told + self.other.iter().map(to_other).fold(0.0, f64::max) + unseen
+        let in_other = of_weights + self.other.iter().map(to_other).fold(0.0, f64::max);
+        in_other.max(of_trials) + unseen
     }
 }
 
@@ -169,32 +154,55 @@ impl Support {
         Self { index, places, rows, placement, fitted }
     }
 
-    /// Returns [`seat`] on the plate raised by a height at each place; contacts are positions in `index`.
-    fn seat(&self, size: [f64; 2], objective: Vec3, raised: impl Fn([f64; 2]) -> f64) -> Result<Seat> {
-        let places = self.index.iter().zip(&self.places);
-        let heights: Vec<f64> = places.map(|(&i, &at)| self.fitted[i] + raised(at)).collect();
-        seat(objective, &self.rows, &heights, &self.places, size)
+    /// Returns the seat on the plate; contacts are positions in `index`.
+    fn seat(&self, size: [f64; 2]) -> Result<Seat> {
+        let heights: Vec<f64> = self.index.iter().map(|&i| self.fitted[i]).collect();
+        seat(Vec3::x(), &self.rows, &heights, &self.places, size, None)
     }
 
-    /// Returns the movements to seats in which the middle of the target lies no more than `by` higher than in the lowest one.
+    /// Returns the seat in each trial; that of `measured` where there is none.
+    fn seats_in(
+        &self,
+        trials: &Trials<'_>,
+        measured: &Seat,
+        size: [f64; 2],
+        check: &dyn Fn() -> Result<()>,
+    ) -> Result<[Seat; TRIALS]> {
+        let mut heights: [Vec<f64>; TRIALS] = std::array::from_fn(|_| Vec::with_capacity(self.index.len()));
+        for (&i, &at) in self.index.iter().zip(&self.places) {
+            let raised = trials.heights(at);
+            for (heights, raised) in heights.iter_mut().zip(raised) {
+                heights.push(self.fitted[i] + raised);
+            }
+        }
+        check()?;
+        let start = Some(measured.vertex);
+        Ok(std::array::from_fn(|k| {
+            seat(Vec3::x(), &self.rows, &heights[k], &self.places, size, start).unwrap_or(measured.clone())
+        }))
+    }
+
+    /// Returns the movements to seats in which the middle of the target lies no more than `by` higher than in the measured one.
     fn seats_within(
         &self,
         by: f64,
-        movement: Vec3,
-        lowest: f64,
+        measured: &Seat,
         size: [f64; 2],
         check: &dyn Fn() -> Result<()>,
     ) -> Result<Vec<Vec3>> {
+        let heights: Vec<f64> = self.index.iter().map(|&i| self.fitted[i]).collect();
         let mut found = Vec::new();
         for off_middle in OFF_MIDDLE.map(|share| share * size[0].min(size[1])) {
             check()?;
             for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
                 let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
-                let seat = self.seat(size, objective, |_| 0.0);
+                let start = Some(measured.vertex);
+                let seat = seat(objective, &self.rows, &heights, &self.places, size, start);
                 // The feasible movements are convex: a seat that is too high is approached until the middle has risen by as much.
                 found.extend(seat.map(|seat| {
-                    let rise = seat.lowest - lowest;
-                    movement + (seat.movement - movement) * if rise > by { by / rise } else { 1.0 }
+                    let rise = seat.lowest - measured.lowest;
+                    measured.movement
+                        + (seat.movement - measured.movement) * if rise > by { by / rise } else { 1.0 }
                 }));
             }
         }
@@ -203,41 +211,62 @@ impl Support {
 }
 
 /// The target at rest.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Seat {
     /// Movement from the fit.
     movement: Vec3,
     contacts: Vec<usize>,
     rocks: bool,
-    /// Rise of the middle of the target, metres, in the vertex of the linear program.
+    /// Active constraints of the linear program, and the rise of the middle of the target there, metres.
+    vertex: [usize; 3],
     lowest: f64,
 }
 
-/// Returns the seat over these heights.
+/// Returns the seat over these heights; `start` are active constraints of a plate that is alike.
 fn seat(
     objective: Vec3,
     rows: &[Vec3],
     heights: &[f64],
     places: &[[f64; 2]],
     [width, height]: [f64; 2],
+    start: Option<[usize; 3]>,
 ) -> Result<Seat> {
-    let vertex =
-        linear_program::minimum(objective, rows, heights, 1e3 * (width + height)).ok_or_else(|| {
+    let vertex = linear_program::minimum(objective, rows, heights, 1e3 * (width + height), start)
+        .ok_or_else(|| {
             Error::new(
                 ErrorKind::BadData,
                 "the target finds no seat: the plate was seen on one side of its middle only",
             )
             .hint("scan again with the whole plate in view")
         })?;
-    let lowest = vertex.q.x;
-    if narrowest(vertex.active.map(|i| places[i])) >= ROCKS * width.min(height) {
-        return Ok(Seat { movement: vertex.q, contacts: vertex.active.to_vec(), rocks: false, lowest });
+    let Vertex { q: movement, active } = vertex;
+    let touches =
+        (0..rows.len()).filter(|&i| rows[i].dot(&movement) - heights[i] <= TOUCHES).map(|i| places[i]);
+    if narrowest(&touches.collect::<Vec<_>>()) >= ROCKS * width.min(height) {
+        return Ok(Seat {
+            movement,
+            contacts: active.to_vec(),
+            rocks: false,
+            vertex: active,
+            lowest: movement.x,
+        });
     }
     let rise = |i: usize| heights[i] / rows[i].x;
     let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
-    Ok(Seat { movement: Vec3::x() * rise(top), contacts: vec![top], rocks: true, lowest })
+    Ok(Seat {
+        movement: Vec3::x() * rise(top),
+        contacts: vec![top],
+        rocks: true,
+        vertex: active,
+        lowest: movement.x,
+    })
 }
 
+/// The target touches where its gap is no larger, metres: a target that lies flush on a part of the plate touches all of it, of which the linear
+/// program names any three places.
+const TOUCHES: f64 = 10e-6;
+/// Directions in which the extent of the contacts is taken: the smallest is right to 0.5 %.
+const DIRECTIONS: usize = 32;
 /// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
 const ROCKS: f64 = 0.25;
 /// How far from the middle other seats are sought as the lowest, shares of the shorter side.
@@ -250,10 +279,12 @@ fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {
     Vec3::new(n.z, turn.x, turn.y)
 }
 
-/// Returns the smallest altitude of a triangle.
-fn narrowest([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
-    let twice_area = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
-    let longest = side(a, b).max(side(b, c)).max(side(c, a));
-    if longest > 0.0 { twice_area / longest } else { 0.0 }
+/// Returns the smallest extent of places over all directions.
+fn narrowest(places: &[[f64; 2]]) -> f64 {
+    let extent = |k: usize| {
+        let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();
+        let along = places.iter().map(|[u, v]| u * cos + v * sin);
+        along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+    };
+    (0..DIRECTIONS).map(extent).fold(f64::INFINITY, f64::min)
 }

@@ -1,11 +1,12 @@
 //! Evaluation of one template: gap, uncertainty, verdict and sentence.
 
-use platen_model::{Contact, Seat, Template, TemplateFinding, Verdict};
-use platen_shape::template_seat::{Profile, Seating};
+use platen_model::{Centre, Contact, Seat, Template, TemplateFinding, Verdict};
+use platen_shape::template_seat::Seating;
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::scanner_sigma::ScannerSigma;
 use crate::section::{Chord, Line, Section};
+use crate::trials::{TRIALS, Trials, half_width};
 
 /// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
 const STRAIGHT: f64 = 0.1e-3;
@@ -19,12 +20,17 @@ pub(crate) const FEW_PLACES: usize = 41;
 /// Step of the search as a share of the chord.
 const SEARCH_STEP: f64 = 0.0125;
 
+/// Distances from the worst place, steps of the search, at which it is sought more finely, and beside it in each trial.
+const FINE: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
+const BESIDE: [f64; 8] = [0.2, 0.4, 0.6, 0.8, 1.0, 2.0, 3.0, 4.0];
+
 /// Plate, target and the scanner's errors.
 #[derive(Debug)]
 pub(crate) struct Evaluator<'a> {
     pub(crate) now: &'a Surface,
     pub(crate) target: &'a TargetSurface,
     pub(crate) scanner: ScannerSigma,
+    pub(crate) trials: &'a Trials<'a>,
 }
 
 /// Finding of a template, with the figures that the finding does not contain.
@@ -39,9 +45,23 @@ pub(crate) struct Evaluated {
     pub(crate) sagitta: f64,
     /// Places of the gap profile.
     pub(crate) places: Vec<[f64; 2]>,
+    line: Line,
+    seated: Seated,
+    tried: [TriedGaps; TRIALS],
+}
+
+/// Gaps of a trial.
+#[derive(Debug)]
+struct TriedGaps {
+    /// Places of the gaps along the line, metres.
+    along: Vec<f64>,
+    gaps: Vec<f64>,
+    /// Size of the largest.
+    largest: f64,
 }
 
 /// A template in its seat, with its gaps.
+#[derive(Debug)]
 struct Seated {
     section: Section,
     seating: Seating,
@@ -58,9 +78,16 @@ enum Opening {
 }
 
 impl Evaluator<'_> {
-    /// Evaluates a template whose middle lies at `centre` along its line, metres.
-    pub(crate) fn evaluate(&self, template: &Template, line: &Line, centre: f64) -> Evaluated {
-        let chord = Chord { centre, length: template.chord };
+    /// Evaluates a template on its line.
+    pub(crate) fn evaluate(&self, template: &Template, line: &Line, centre: Centre) -> Evaluated {
+        let centres = match centre {
+            Centre::At(centre) => vec![centre],
+            Centre::Worst => {
+                let worst = self.worst_finely(line, template.chord, template.seat);
+                std::iter::once(worst).chain(beside(line, template.chord, worst, &BESIDE)).collect()
+            }
+        };
+        let chord = Chord { centre: centres[0], length: template.chord };
         let seated = self.seat(line, chord, template.seat, PLACES);
         let place = |k: usize| line.at(seated.section.along[k]);
         let seen = |[u, v]: [f64; 2]| self.now.mask().seen(u, v);
@@ -73,7 +100,9 @@ impl Evaluator<'_> {
             .collect();
         let max_gap = seated.gaps[seated.largest];
         let max_gap_at = place(seated.largest);
-        let uncertainty = self.uncertainty(line, &seated).max(self.change_of_seat(line, template, &seated));
+        let tried = self.try_seats(template, line, &centres);
+        let departures = std::array::from_fn(|k| tried[k].largest - max_gap.abs());
+        let uncertainty = self.uncertainty(line, &seated, seated.largest, departures);
 
         let hidden = contacts.iter().find(|c| !c.seen).map(|c| ("the board touches", c.at));
         let hidden = hidden.or_else(|| (!seen(max_gap_at)).then_some(("the gap is largest", max_gap_at)));
@@ -121,7 +150,18 @@ impl Evaluator<'_> {
             radius: seated.section.radius(),
             sagitta: seated.section.sagitta,
             places: seated.section.along.iter().map(|s| line.at(*s)).collect(),
+            line: line.clone(),
+            seated,
+            tried,
         }
+    }
+
+    /// Returns the gap at a place of the profile with its 95 % uncertainty, metres.
+    pub(crate) fn gap_at(&self, evaluated: &Evaluated, place: usize) -> [f64; 2] {
+        let Evaluated { line, seated, tried, .. } = evaluated;
+        let (gap, at) = (seated.gaps[place], seated.section.along[place]);
+        let departures = std::array::from_fn(|k| tried[k].at(at) - gap);
+        [gap, self.uncertainty(line, seated, place, departures)]
     }
 
     /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap. Where a template is
@@ -141,6 +181,20 @@ impl Evaluator<'_> {
         worst
     }
 
+    /// Returns the middle of the position with the largest gap, sought once more between the steps of [`Self::worst`]: there the gap grows until the
+    /// template falls on another contact.
+    fn worst_finely(&self, line: &Line, length: f64, seat: Seat) -> f64 {
+        let mut worst = self.worst(line, length, seat, PLACES);
+        for centre in beside(line, length, worst.0, &FINE) {
+            let seated = self.seat(line, Chord { centre, length }, seat, PLACES);
+            let gap = seated.gaps[seated.largest].abs();
+            if gap > worst.1 {
+                worst = (centre, gap);
+            }
+        }
+        worst.0
+    }
+
     fn seat(&self, line: &Line, chord: Chord, seat: Seat, n_places: usize) -> Seated {
         let section = Section::new(self.now, self.target, line, chord, n_places);
         let profile = &section.profile;
@@ -149,57 +203,52 @@ impl Evaluator<'_> {
         Seated { seating, rocks, largest: largest(&gaps), gaps, section }
     }
 
-    /// Returns the 95 % uncertainty of the largest gap: the fit's covariance at the places that decide the gap, the correlated
-    /// error of a single scan, taken as independent between those places, and the scanner's bias.
-    fn uncertainty(&self, line: &Line, seated: &Seated) -> f64 {
-        EXPANDED
-            * self.sigma(line, seated, &seated.section.profile.functional(&seated.seating, seated.largest))
-    }
-
-    /// Returns the standard deviation of a weighted sum of heights of the profile.
-    fn sigma(&self, line: &Line, seated: &Seated, functional: &[(usize, f64)]) -> f64 {
-        let term = |(k, weight): &(usize, f64)| {
-            let [u, v] = line.at(seated.section.along[*k]);
+    /// Returns the 95 % uncertainty of the gap at a place: in this seat the fit's covariance at the places that decide the gap, the correlated
+    /// error of a single scan, taken as independent between those places, and the scanner's bias; at least that of the trials, whose gaps
+    /// depart so far. Where the template is about to rock, or to fall on another contact, the gap jumps, and weights say nothing of the other side.
+    fn uncertainty(&self, line: &Line, seated: &Seated, place: usize, departures: [f64; TRIALS]) -> f64 {
+        let term = |(k, weight): (usize, f64)| {
+            let [u, v] = line.at(seated.section.along[k]);
             ([u, v], weight / seated.section.cosine(&self.now.normal(u, v)))
         };
-        let terms: Vec<([f64; 2], f64)> = functional.iter().map(term).collect();
+        let functional = seated.section.profile.functional(&seated.seating, place);
+        let terms: Vec<([f64; 2], f64)> = functional.into_iter().map(term).collect();
         let scanner = self.scanner.of_heights(terms.iter().map(|(_, weight)| *weight));
-        self.now.sigma_of_heights(&terms).hypot(scanner)
+        let in_seat = EXPANDED * self.now.sigma_of_heights(&terms).hypot(scanner);
+        in_seat.max(half_width(departures).hypot(EXPANDED * self.scanner.of_gap()))
     }
 
-    /// Returns by how much the largest gap changes when the profile is bent by its 95 % uncertainty, to either side, as a parabola and as
-    /// a cubic parabola, and when the correlated error is a wave over the range, in four phases. Where the template keeps its seat
-    /// that is what its weights say. Where it is about to rock, or to fall on another contact, the gap jumps, and weights say
-    /// nothing of the other side.
-    fn change_of_seat(&self, line: &Line, template: &Template, seated: &Seated) -> f64 {
-        let Profile { x, d } = &seated.section.profile;
-        let last = x.len() - 1;
-        let half = 0.5 * (x[last] - x[0]);
-        // Coefficient of (x / half)^2 by the second difference, of (x / half)^3 by the third.
-        let parabola = [(0, 0.5), (last / 2, -1.0), (last, 0.5)];
-        let cubic =
-            [(0, -1.0), (last / 3, 3.0), (2 * last / 3, -3.0), (last, 1.0)].map(|(k, w)| (k, w * 9.0 / 16.0));
-        let curves = [(&parabola[..], 2), (&cubic[..], 3)].map(|(coefficient, power)| {
-            let by = EXPANDED * self.sigma(line, seated, coefficient);
-            x.iter().map(|x| by * (x / half).powi(power)).collect::<Vec<f64>>()
+    /// Returns the gaps of the trials, each with the template at that of the centres where its gap is largest: a template that slides along its line
+    /// has no seat that noise could change, but another worst place.
+    fn try_seats(&self, template: &Template, line: &Line, centres: &[f64]) -> [TriedGaps; TRIALS] {
+        let mut tried = std::array::from_fn(|_| TriedGaps {
+            along: Vec::new(),
+            gaps: Vec::new(),
+            largest: f64::NEG_INFINITY,
         });
-        let wave = |quarter: f64| -> Vec<f64> {
-            let height = |s: &f64| {
+        for &centre in centres {
+            let chord = Chord { centre, length: template.chord };
+            let section = Section::new(self.now, self.target, line, chord, PLACES);
+            let raised = section.along.iter().map(|s| {
                 let [u, v] = line.at(*s);
-                let cosine = seated.section.cosine(&self.now.normal(u, v));
-                self.scanner.wave(self.now.face(u, v).norm(), quarter) / cosine
-            };
-            seated.section.along.iter().map(height).collect()
-        };
-        let change = |raised: &[f64], sign: f64| {
-            let bent = d.iter().zip(raised).map(|(d, raised)| d + sign * raised).collect();
-            let bent = Profile { x: x.clone(), d: bent };
-            let (seating, _) = bent.seat(template.seat, template.chord);
-            let gaps = bent.gaps(&seating);
-            (gaps[largest(&gaps)].abs() - seated.gaps[seated.largest].abs()).abs()
-        };
-        let modes = curves.into_iter().chain([0.0, 1.0].map(wave));
-        modes.flat_map(|raised| [-1.0, 1.0].map(|sign| change(&raised, sign))).fold(0.0, f64::max)
+                let cosine = section.cosine(&self.now.normal(u, v));
+                self.trials.heights([u, v]).map(|height| height / cosine)
+            });
+            let raised: Vec<[f64; TRIALS]> = raised.collect();
+            let mut plate = section.profile.clone();
+            for (k, tried) in tried.iter_mut().enumerate() {
+                let measured = section.profile.d.iter().zip(&raised);
+                plate.d.clear();
+                plate.d.extend(measured.map(|(height, raised)| height + raised[k]));
+                let (seating, _) = plate.seat(template.seat, template.chord);
+                let gaps = plate.gaps(&seating);
+                let largest = gaps[largest(&gaps)].abs();
+                if largest > tried.largest {
+                    *tried = TriedGaps { along: section.along.clone(), gaps, largest };
+                }
+            }
+        }
+        tried
     }
 
     /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests
@@ -212,6 +261,29 @@ impl Evaluator<'_> {
         }
         if hollow == (sagitta > 0.0) { ("bent too far", 1) } else { ("under-bent", -1) }
     }
+}
+
+impl TriedGaps {
+    /// Returns the gap at the place that is nearest to a distance along the line, metres; `NaN` on a plate of no finite heights.
+    fn at(&self, distance: f64) -> f64 {
+        let after = self.along.partition_point(|s| *s < distance);
+        let nearest = match after {
+            0 => 0,
+            _ if after == self.along.len() => after - 1,
+            _ if self.along[after] - distance < distance - self.along[after - 1] => after,
+            _ => after - 1,
+        };
+        self.gaps.get(nearest).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// Returns the centres at these distances to either side of the worst one, steps of the search.
+fn beside(line: &Line, chord: f64, worst: f64, steps: &[f64]) -> impl Iterator<Item = f64> {
+    let (first, last) = (0.5 * chord, line.length - 0.5 * chord);
+    let steps = steps.iter().flat_map(|step| [-step, *step]);
+    steps
+        .map(move |step| worst + step * SEARCH_STEP * chord)
+        .filter(move |centre| (first..=last).contains(centre))
 }
 
 /// Gaps that differ by less than this are equal, metres: of equal gaps the first counts, independent of rounding.

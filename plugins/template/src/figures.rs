@@ -4,8 +4,10 @@ use platen_model::{Figure, Quantity, Task};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
 
 use crate::deviation::Deviation;
-use crate::evaluation::Evaluated;
-use crate::scanner_sigma::ScannerSigma;
+use crate::evaluation::{Evaluated, Evaluator};
+
+/// Templates whose distances from a station differ by less than this cross there, metres: half the usual distance of places under a template.
+const CROSSING: f64 = 5e-3;
 
 /// Nodes along each side for the mean curvature, those of the result's grid.
 const GRID: usize = 21;
@@ -14,11 +16,10 @@ const GRID: usize = 21;
 /// of the shapes, and from the target in its seat.
 pub(crate) fn of_deviation(
     deviation: &Deviation,
-    now: &Surface,
-    target: &TargetSurface,
-    scanner: ScannerSigma,
+    evaluator: &Evaluator<'_>,
     tolerance: Option<f64>,
 ) -> Vec<Figure> {
+    let Evaluator { now, target, scanner, trials } = *evaluator;
     let seen: Vec<usize> = (0..deviation.uv.len()).filter(|&i| deviation.seen[i]).collect();
     let value = |i: &usize| deviation.fitted[*i];
     let extreme =
@@ -52,7 +53,7 @@ pub(crate) fn of_deviation(
         Figure::new("deviation.min_u", deviation.uv[min][0], "m"),
         Figure::new("deviation.min_v", deviation.uv[min][1], "m"),
         Figure::new("deviation.gap", -deviation.value[deepest], "m")
-            .uncertainty(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest], scanner))
+            .uncertainty(EXPANDED * deviation.sigma(now, target, deviation.uv[deepest], scanner, trials))
             .at(deviation.uv[deepest]),
         Figure::new("deviation.rocks", f64::from(u8::from(deviation.rocks)), "1"),
     ];
@@ -110,12 +111,11 @@ pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figu
 /// Returns the figures of the stations, except those that were not seen or have no template.
 pub(crate) fn of_stations(
     task: &Task,
-    now: &Surface,
-    target: &TargetSurface,
+    evaluator: &Evaluator<'_>,
     deviation: &Deviation,
-    scanner: ScannerSigma,
     evaluated: &[Evaluated],
 ) -> Vec<Figure> {
+    let Evaluator { now, target, scanner, trials } = *evaluator;
     let mut figures = Vec::new();
     for station in &task.stations {
         let [u, v] = station.at;
@@ -124,15 +124,15 @@ pub(crate) fn of_stations(
             figure.uncertainty(EXPANDED * sigma).at(station.at)
         };
         match station.quantity {
-            Quantity::Gap => figures.extend(
-                nearest_gap(station.at, evaluated)
-                    .map(|(gap, uncertainty)| figure(gap, "m", uncertainty / EXPANDED)),
-            ),
+            Quantity::Gap => figures.extend(nearest_place(station.at, evaluated).map(|(template, place)| {
+                let [gap, uncertainty] = evaluator.gap_at(template, place);
+                figure(gap, "m", uncertainty / EXPANDED)
+            })),
             _ if !now.mask().seen(u, v) => {}
             Quantity::Deviation => figures.push(figure(
                 deviation.at(now, target, station.at),
                 "m",
-                deviation.sigma(now, target, station.at, scanner),
+                deviation.sigma(now, target, station.at, scanner, trials),
             )),
             Quantity::CurvatureDeficit => {
                 let sigma = now.sigma_curvature(u, v);
@@ -160,12 +160,18 @@ fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] 
     })
 }
 
-/// Returns the gap at the place under any template that is nearest to `station`, with its uncertainty.
-fn nearest_gap(station: [f64; 2], evaluated: &[Evaluated]) -> Option<(f64, f64)> {
-    let distance = |at: &[f64; 2]| (at[0] - station[0]).hypot(at[1] - station[1]);
-    let places = evaluated.iter().flat_map(|j| {
-        j.places.iter().zip(&j.finding.gap).map(move |(at, gap)| (at, *gap, j.finding.uncertainty))
-    });
-    let nearest = places.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)))?;
-    Some((nearest.1, nearest.2))
+/// Returns the template that is nearest to `station`, the first of several that cross there, and the nearest place under it.
+fn nearest_place(station: [f64; 2], evaluated: &[Evaluated]) -> Option<(&Evaluated, usize)> {
+    let nearest = |template: &Evaluated| {
+        let distance = |k: usize| {
+            let [u, v] = template.places[k];
+            (u - station[0]).hypot(v - station[1])
+        };
+        let places = (0..template.places.len()).map(|k| (k, distance(k)));
+        places.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
+    };
+    let of_each: Vec<(usize, f64)> = evaluated.iter().map(nearest).collect();
+    let least = of_each.iter().map(|(_, distance)| *distance).reduce(f64::min)?;
+    let first = of_each.iter().position(|(_, distance)| *distance <= least + CROSSING)?;
+    Some((&evaluated[first], of_each[first].0))
 }

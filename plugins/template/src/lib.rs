@@ -23,9 +23,10 @@
 //!
 //! where s_fit is the fit's standard deviation of w'z, the heights z at the places that decide the gap with their weights w
 //! and covariances; s_corr the plant's correlated error of a position, its share of a single scan; s_true the scanner's error of a gap on a known artefact.
-//! U is at least the change of the gap when the profile is bent by its uncertainty as a parabola or as a cubic parabola, and under a wave of
-//! s_corr over the range, whose period is 1 m: about to rock, or to fall on another contact, a template has either of two gaps, which w does
-//! not tell. The uncertainties of deviations hold the same for the whole target, bent along u, along v and in twist; that of the places
+//! U is at least what a Monte Carlo method finds (JCGM 101:2008): 64 plates that differ from the measured one by drawn errors of the fit and
+//! a wave of s_corr over the range, of any phase and a period of 0.8 to 1.4 m, each with the template in its own seat; the half width
+//! that holds 95 % of their gaps. About to rock, or to fall on another contact, a template has either of two gaps, which w does not tell.
+//! The uncertainties of deviations hold the same for the whole target; that of the places
 //! (u, v) themselves is not in them. Where a part of the plate was not seen, they hold what the seat on the whole surface, as the fit continues
 //! it there, would change.
 //! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
@@ -76,22 +77,23 @@
 //! impossible radius; a template on an unknown line, longer than its line, or beyond an end of it; a line that leaves the plate;
 //! a plate that was seen on one side of its middle only.
 
-mod bending_mode;
 mod deviation;
 mod evaluation;
 mod figures;
 mod linear_program;
 mod scanner_sigma;
 mod section;
+mod trials;
 
 use platen_model::{Centre, Figure, Findings, NodeState, Report, Task, Template, Verdict};
 use platen_sdk::{Comparison, Error, ErrorKind, Info, Inputs, Job, PlateGrid, Result};
 use platen_shape::TargetSurface;
 
 use deviation::Deviation;
-use evaluation::{Evaluated, Evaluator, FEW_PLACES, PLACES};
+use evaluation::{Evaluated, Evaluator, FEW_PLACES};
 use scanner_sigma::ScannerSigma;
 use section::Line;
+use trials::Trials;
 
 platen_sdk::options! {
     /// Options of `template`.
@@ -137,25 +139,22 @@ fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -
     let target = TargetSurface::new(target, task.width, task.height, task.thickness)
         .map_err(|e| Error::new(ErrorKind::Config, e.to_string()))?;
     let scanner = ScannerSigma::of(task);
-    let evaluator = Evaluator { now, target: &target, scanner };
+    let trials = Trials::draw(now, scanner);
+    let evaluator = Evaluator { now, target: &target, scanner, trials: &trials };
     let lines = task.templates.iter().map(|t| on_line(task, t)).collect::<Result<Vec<_>>>()?;
     let mut evaluated = Vec::new();
     for (template, (line, centre)) in task.templates.iter().zip(&lines) {
         check()?;
-        let centre = match centre {
-            Centre::At(centre) => *centre,
-            Centre::Worst => evaluator.worst(line, template.chord, template.seat, PLACES).0,
-        };
-        evaluated.push(evaluator.evaluate(template, line, centre));
+        evaluated.push(evaluator.evaluate(template, line, *centre));
     }
-    let deviation = Deviation::new(now, &target, scanner, check)?;
+    let deviation = Deviation::new(now, &target, &trials, check)?;
 
     let limits = task.templates.iter().map(|t| t.limit);
     let tolerance = options.tolerance_mm.map(|mm| mm / 1000.0).or_else(|| limits.reduce(f64::min));
-    let mut found = figures::of_deviation(&deviation, now, &target, scanner, tolerance);
+    let mut found = figures::of_deviation(&deviation, &evaluator, tolerance);
     found.extend(figures::of_templates(&evaluated));
     found.extend(figures::of_curvature(now, &target));
-    found.extend(figures::of_stations(task, now, &target, &deviation, scanner, &evaluated));
+    found.extend(figures::of_stations(task, &evaluator, &deviation, &evaluated));
     let mut says = says(&evaluated);
     if let (true, Some(template)) = (options.search, task.templates.first()) {
         let (anywhere, sentence) = search(&evaluator, task, template, check)?;

@@ -19,15 +19,26 @@ pub(crate) struct Vertex {
 /// Violations below this count as rounding, metres.
 const ROUNDING: f64 = 1e-12;
 
-/// Largest number of rounds, far more than needed: with ties the method could cycle.
+/// The objective is moved off by this, metres: where a constraint lies exactly under the middle, as a contact in the middle of the plate does, two
+/// multipliers would be 0, the objective would not rise, and the method would cycle (perturbation against degeneracy; Charnes, Econometrica 20, 1952).
+const PERTURBATION: [f64; 2] = [1e-7, 0.618e-7];
+
+/// Largest number of rounds, far more than needed.
 const ROUNDS: usize = 1000;
 
 /// Returns the minimum; `None` when the program is unbounded (all constraints on one side of the middle) or has fewer than
 /// three constraints.
 ///
-/// `reach` is a length much larger than the lever arms of the constraints and of the objective.
-pub(crate) fn minimum(objective: Vec3, rows: &[Vec3], d: &[f64], reach: f64) -> Option<Vertex> {
-    // Start: three artificial constraints far outside and far below. A bounded program drops all of them.
+/// `reach` is a length much larger than the lever arms of the constraints and of the objective. The active constraints of a
+/// program that is alike are a good `start`; it counts where it is dual feasible.
+pub(crate) fn minimum(
+    objective: Vec3,
+    rows: &[Vec3],
+    d: &[f64],
+    reach: f64,
+    start: Option<[usize; 3]>,
+) -> Option<Vertex> {
+    // Without a start: three artificial constraints far outside and far below. A bounded program drops all of them.
     let deep = -reach;
     let artificial = [0.0, 2.0, 4.0].map(|k: f64| {
         let (sin, cos) = (k * std::f64::consts::PI / 3.0).sin_cos();
@@ -35,7 +46,12 @@ pub(crate) fn minimum(objective: Vec3, rows: &[Vec3], d: &[f64], reach: f64) -> 
     });
     let row = |i: usize| if i < rows.len() { rows[i] } else { artificial[i - rows.len()] };
     let height = |i: usize| if i < rows.len() { d[i] } else { deep };
-    let mut basis = [rows.len(), rows.len() + 1, rows.len() + 2];
+    let objective = objective + Vec3::new(0.0, PERTURBATION[0], PERTURBATION[1]);
+    let is_feasible = |start: &[usize; 3]| {
+        let inverse = Matrix3::from_rows(&start.map(|i| row(i).transpose())).try_inverse();
+        inverse.is_some_and(|inverse| (inverse.transpose() * objective).min() >= 0.0)
+    };
+    let mut basis = start.filter(is_feasible).unwrap_or([rows.len(), rows.len() + 1, rows.len() + 2]);
     for _ in 0..ROUNDS {
         let inverse = Matrix3::from_rows(&basis.map(|i| row(i).transpose())).try_inverse()?;
         let q = inverse * Vec3::from(basis.map(height));
@@ -70,7 +86,7 @@ mod tests {
     #[test]
     fn a_hollow_is_spanned_by_its_corners() {
         let (rows, d) = over_grid(41, |x, y| 0.01 * (x * x + y * y) + 0.003 * x);
-        let vertex = minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded");
+        let vertex = minimum(Vec3::x(), &rows, &d, 1e3, None).expect("bounded");
         assert!((vertex.q - Vec3::new(0.02, 0.003, 0.0)).norm() < 1e-12, "{vertex:?}");
         assert!(vertex.active.iter().all(|&i| rows[i].y.abs() == 1.0 && rows[i].z.abs() == 1.0));
     }
@@ -78,7 +94,7 @@ mod tests {
     #[test]
     fn a_hill_is_touched_at_its_top() {
         let (rows, d) = over_grid(41, |x, y| -0.01 * (x * x + y * y));
-        assert!(minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded").q.x.abs() < 1e-12);
+        assert!(minimum(Vec3::x(), &rows, &d, 1e3, None).expect("bounded").q.x.abs() < 1e-12);
     }
 
     #[test]
@@ -99,14 +115,44 @@ mod tests {
                 }
             }
         }
-        let vertex = minimum(Vec3::x(), &rows, &d, 1e3).expect("bounded");
+        let vertex = minimum(Vec3::x(), &rows, &d, 1e3, None).expect("bounded");
         assert!((vertex.q.x - highest).abs() < 1e-10, "{} {highest}", vertex.q.x);
+    }
+
+    #[test]
+    fn the_start_changes_the_way_and_not_the_minimum() {
+        let f = |x: f64, y: f64| 0.02 * (3.0 * x + 1.0).sin() * (2.0 * y).cos() + 0.005 * x * y;
+        let (rows, d) = over_grid(41, f);
+        let start = minimum(Vec3::x(), &rows, &d, 1e3, None).expect("bounded").active;
+        let (_, moved) = over_grid(41, |x, y| f(x, y) + 0.004 * (5.0 * x - 3.0 * y).sin());
+        let (cold, warm) =
+            [None, Some(start)].map(|start| minimum(Vec3::x(), &rows, &moved, 1e3, start)).into();
+        let [cold, warm] = [cold, warm].map(|vertex: Option<Vertex>| vertex.expect("bounded").q);
+        assert!((cold - warm).norm() < 1e-12, "{cold} {warm}");
+    }
+
+    /// Contacts of a shallow hill lie side by side about its top, so that rounding in the basis is much larger than that of a height.
+    #[test]
+    fn a_shallow_hill_has_a_minimum() {
+        let mut random = fastrand::Rng::with_seed(64);
+        for round in 0..200 {
+            let waves: Vec<[f64; 4]> = (0..3).map(|_| std::array::from_fn(|_| random.f64())).collect();
+            let wave = |[a, b, c, size]: &[f64; 4], x: f64, y: f64| {
+                1e-5 * size * (4.0 * (a * x + b * y) + 6.0 * c).sin()
+            };
+            let height = |x: f64, y: f64| {
+                1.0 - 0.02 * (x * x + y * y) + waves.iter().map(|it| wave(it, x, y)).sum::<f64>()
+            };
+            let (rows, d) = over_grid(101, height);
+            let vertex = minimum(Vec3::x(), &rows, &d, 8e3, None);
+            assert!(vertex.is_some_and(|it| (it.q.x - 1.0).abs() < 5e-5), "{round}: {vertex:?}");
+        }
     }
 
     #[test]
     fn places_on_one_side_of_the_middle_hold_nothing() {
         let (rows, d) = over_grid(5, |_, _| 0.0);
         let (rows, d): (Vec<Vec3>, Vec<f64>) = rows.into_iter().zip(d).filter(|(r, _)| r.y > 0.1).unzip();
-        assert_eq!(minimum(Vec3::x(), &rows, &d, 1e3), None);
+        assert_eq!(minimum(Vec3::x(), &rows, &d, 1e3, None), None);
     }
 }

@@ -31,9 +31,14 @@ impl ScannerSigma {
         (self.position * square.sqrt()).hypot(self.gap)
     }
 
-    /// Returns the correlated error along the normal as a wave over the range, in a phase given in quarter turns, metres.
-    pub(crate) fn wave(&self, range: f64, quarter: f64) -> f64 {
-        SQRT_2 * self.position * (TAU * (range / PERIOD + 0.25 * quarter)).sin()
+    /// Returns the standard deviation of a gap on a known artefact, metres.
+    pub(crate) fn of_gap(&self) -> f64 {
+        self.gap
+    }
+
+    /// Returns the standard deviation of a position along the normal, metres.
+    pub(crate) fn of_position(&self) -> f64 {
+        self.position
     }
 
     /// Returns the standard deviation of a curvature along a unit direction (u, v), of the steepest one without it, 1/m.

@@ -91,10 +91,9 @@ impl Section {
         let along = steps(first, last, n_places);
         let (x, z): (Vec<f64>, Vec<f64>) = along.iter().map(|&s| frame.project(&face(s))).unzip();
 
-        // The template's edge: four times as dense, so that its linear interpolation is negligible, and longer, because a
-        // plate that is bent less extends farther.
+        // The template's edge: longer, because a plate that is bent less extends farther.
         let beyond = 0.05 * chord.length;
-        let edge: Vec<(f64, f64)> = steps(first - beyond, last + beyond, 4 * n_places)
+        let edge: Vec<(f64, f64)> = steps(first - beyond, last + beyond, n_places)
             .into_iter()
             .map(|s| goal_frame.project(&goal(s)))
             .collect();
@@ -150,11 +149,16 @@ fn steps(first: f64, last: f64, n: usize) -> Vec<f64> {
     (0..n).map(|k| first + (last - first) * k as f64 / (n - 1) as f64).collect()
 }
 
-/// Returns the height of a polyline with increasing x.
-fn height_at(line: &[(f64, f64)], x: f64) -> f64 {
-    let k = line.partition_point(|(at, _)| *at < x).clamp(1, line.len() - 1);
-    let ((x0, z0), (x1, z1)) = (line[k - 1], line[k]);
-    z0 + (x - x0) / (x1 - x0) * (z1 - z0)
+/// Returns the height of a smooth curve with increasing x: the cubic parabola through the four nearest points.
+fn height_at(curve: &[(f64, f64)], x: f64) -> f64 {
+    let after = curve.partition_point(|(at, _)| *at < x);
+    let near = &curve[after.saturating_sub(2).min(curve.len().saturating_sub(4))..];
+    let near = &near[..near.len().min(4)];
+    let weight = |k: usize| {
+        let others = (0..near.len()).filter(|other| *other != k);
+        others.map(|other| (x - near[other].0) / (near[k].0 - near[other].0)).product::<f64>()
+    };
+    (0..near.len()).map(|k| weight(k) * near[k].1).sum()
 }
 
 /// Returns the height of the chord over the curve, half way between its ends.

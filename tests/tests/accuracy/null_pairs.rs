@@ -23,7 +23,7 @@ to_mm = [3000.0, 1250.0]
 [[template]]
 line = "R"
 chord_mm = 1500.0
-limit_mm = 0.7
+limit_mm = 0.75
 "#;
 
 /// Scans to calibrate on, and others to judge.

@@ -25,8 +25,9 @@ const LIMIT: Duration = Duration::from_secs(60);
 const CHORD: f64 = 0.6;
 /// Places of the stations in shares of the sides.
 const STATIONS: [[f64; 2]; 5] = [[0.5, 0.5], [0.2, 0.3], [0.8, 0.3], [0.8, 0.7], [0.2, 0.7]];
-/// Weight of a true place, 1/m^2: known to a micrometre.
-const WEIGHT: f64 = 1e12;
+/// Standard deviation of a true place, metres, and its weight, 1/m^2.
+const KNOWN_TO: f64 = 1e-6;
+const WEIGHT: f64 = 1.0 / (KNOWN_TO * KNOWN_TO);
 /// Penalty of the third derivatives of the true surface, m^3, relative to that weight: nothing, but determines the spline between
 /// the outermost places.
 const PENALTY: f64 = 1e-9 * WEIGHT;
@@ -59,7 +60,7 @@ pub(super) fn errors(
     let gaps = gaps.filter(|(found, _)| is_seen(found, measured)).map(|(found, known)| Stated {
         kind: Kind::Gap,
         error: found.max_gap - known.max_gap,
-        sigma: found.uncertainty / EXPANDED,
+        sigma: (found.uncertainty / EXPANDED).hypot(KNOWN_TO),
     });
     let stations = task.stations.iter().filter_map(|station| of_station(station, &found, &known));
     Ok(gaps.chain(stations).collect())
@@ -79,7 +80,9 @@ fn of_station(station: &Station, found: &Report, known: &Report) -> Option<State
         Quantity::Deviation => Kind::StationDeviation,
         Quantity::CurvatureDeficit => Kind::StationDeficit,
     };
-    Some(Stated { kind, error: found.value - known.value, sigma: found.uncertainty? / EXPANDED })
+    let known_to = if kind == Kind::StationDeficit { 0.0 } else { KNOWN_TO };
+    let sigma = (found.uncertainty? / EXPANDED).hypot(known_to);
+    Some(Stated { kind, error: found.value - known.value, sigma })
 }
 
 fn task(spec: &PlateSpec, target: Target, scanner: &ScannerError) -> Task {

@@ -133,10 +133,10 @@ fn a_seat_that_was_not_seen_is_in_the_uncertainty() {
     }
 }
 
-/// A plate that is bent to its target on one half, flat on the other: the target lies on a ridge through its middle, and the noise of the
-/// scan decides whether it rocks.
+/// A plate that is bent to its target on one half, flat on the other: the target lies flush on the one half, and the noise of the scan says nothing
+/// of its seat. What it may do to the other half is in the uncertainty.
 #[test]
-fn a_seat_that_the_noise_decides_is_in_the_uncertainty() {
+fn a_half_bent_plate_has_one_seat() {
     let bent = goal(cylinder(12.0), Facing::Outside);
     let half_bent = |u: f64, v: f64| {
         let from = u.max(0.5 * WIDTH);
@@ -148,16 +148,38 @@ fn a_seat_that_the_noise_decides_is_in_the_uncertainty() {
     let station = |name: &str, at| Station { name: name.into(), at, quantity: Quantity::Deviation };
     task.stations = vec![station("A", [0.3, 1.0]), station("B", [1.5, 0.4]), station("C", [2.3, 1.6])];
     let known = run(&surface(20_000, 1e-6, 1, half_bent), &task).expect("sound");
-    let mut rocking = 0;
     for seed in 1..=8 {
         let found = run(&surface(20_000, 3e-4, seed, half_bent), &task).expect("sound");
-        rocking += u32::from(figure(&found, "deviation.rocks") == 1.0);
         for name in ["station.A", "station.B", "station.C"] {
             let [(known, _), (value, uncertainty)] = [&known, &found].map(|report| stated(report, name));
-            println!("{seed} {name}: {:.3e} m off, {uncertainty:.3e} stated", value - known);
-            assert!((value - known).abs() <= uncertainty, "{seed} {name}: {value} {uncertainty} {known}");
+            let off = (value - known).abs();
+            println!("{seed} {name}: {off:.3e} m off, {uncertainty:.3e} stated");
+            // Found: 0.12 mm at most; 17 mm where three contacts of any solution of the linear program decide alone whether it rocks.
+            assert!(off <= uncertainty && off < 0.25e-3, "{seed} {name}: {value} {uncertainty} {known}");
         }
     }
-    // Found: 2 of 8 rock, 2.3, 11.4 and 17.5 mm off; the others lie within 0.1 mm.
-    assert!((1..8).contains(&rocking), "{rocking}");
+}
+
+/// Two templates cross at a station: its gap is that of the first, whichever has a place a hair nearer.
+#[test]
+fn a_station_on_two_templates_belongs_to_the_first() {
+    let mut task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
+    task.reference_lines.push(ReferenceLine { name: "R2".into(), from: [1.5, 0.0], to: [1.5, HEIGHT] });
+    let across = Template {
+        name: "T2".into(),
+        line: "R2".into(),
+        chord: 1.2,
+        centre: Centre::At(1.0),
+        ..task.templates[0].clone()
+    };
+    task.templates.push(across);
+    for at in [[1.5, 1.0], [1.502, 1.0], [1.5, 1.002]] {
+        task.stations = vec![Station { name: "G".into(), at, quantity: Quantity::Gap }];
+        let report = run(&plate_of(cylinder(7.0), Facing::Inside), &task).expect("sound");
+        let [first, second] = [0, 1].map(|k| report.findings.templates[k].max_gap);
+        assert!(
+            (figure(&report, "station.G") - first).abs() < 0.05 * first && second < 0.1 * first,
+            "{at:?}"
+        );
+    }
 }
