@@ -10,6 +10,7 @@ cd "$(dirname "$0")/../.."
 triple=aarch64-unknown-linux-gnu
 dpkg --add-architecture arm64
 apt-get update -qq
+cargo install --quiet --locked cargo-deb@3.8.0 cargo-auditable@0.7.7 auditable2cdx@0.1.0
 apt-get install -y -qq rustc-web gcc-aarch64-linux-gnu qemu-user-static libc6:arm64 libgcc-s1:arm64 >/dev/null
 
 std=$PWD/target/arm64
@@ -23,6 +24,7 @@ ln -sfn "$std/usr/lib/rustlib/$triple" "/usr/lib/rustlib/$triple"
 
 export RUSTC=/usr/bin/rustc CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc
 mapfile -t packages < <(bash .ci/package $triple)
+[ ${#packages[@]} = 3 ]
 apt-get install -y -qq --reinstall "${packages[@]}" >/dev/null
 file -L /usr/bin/platen
 place=$(mktemp -d) && chown nobody "$place"

@@ -56,20 +56,24 @@ texts! { ,
     FINE_ENOUGH "this press is fine enough for the limit: its ram repeats to {} mm, that is {} mm under a board of {} m, limit {} mm" "このプレスは許容値に対して十分です: ラムの繰返し {} mm はすき間 {} mm に当たります (型板 {} m、許容 {} mm)"
 }
 
-/// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` below [`LEAST_STROKES`].
-/// Strokes that stopped short, three robust standard deviations or more, are left out.
+/// Returns the wanted less reached depths of the strokes that did not stop short, which is three robust standard deviations or more.
 #[must_use]
-pub fn ram_scatter(offs: &[f64]) -> Option<[f64; 3]> {
+pub fn without_short(offs: &[f64]) -> Vec<f64> {
     let mut sizes: Vec<f64> = offs.iter().map(|off| off.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     // The median of |x| is 0.6745 standard deviations.
-    let robust = sizes.get(sizes.len() / 2)? / 0.6745;
-    let kept: Vec<f64> = offs.iter().copied().filter(|off| *off > -3.0 * robust).collect();
-    if kept.len() < LEAST_STROKES {
+    let robust = sizes.get(sizes.len() / 2).map_or(0.0, |median| median / 0.6745);
+    offs.iter().copied().filter(|off| *off >= -3.0 * robust).collect()
+}
+
+/// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` below [`LEAST_STROKES`].
+#[must_use]
+pub fn ram_scatter(offs: &[f64]) -> Option<[f64; 3]> {
+    if offs.len() < LEAST_STROKES {
         return None;
     }
-    let n = kept.len() as f64;
-    let sigma = (kept.iter().map(|off| off * off).sum::<f64>() / n).sqrt();
+    let n = offs.len() as f64;
+    let sigma = (offs.iter().map(|off| off * off).sum::<f64>() / n).sqrt();
     // Chi squared by Wilson and Hilferty.
     let chi = |z: f64| n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3);
     Some([sigma * (n / chi(1.96)).sqrt(), sigma, sigma * (n / chi(-1.96)).sqrt()])
@@ -92,7 +96,7 @@ mod tests {
     fn scatter_has_its_interval_and_leaves_out_what_stopped_short() {
         let mut offs: Vec<f64> = (0..20).map(|k| if k % 2 == 0 { 1e-4 } else { -1e-4 }).collect();
         offs.push(-3e-3);
-        let [low, sigma, high] = ram_scatter(&offs).unwrap_or_default();
+        let [low, sigma, high] = ram_scatter(&without_short(&offs)).unwrap_or_default();
         assert!((sigma - 1e-4).abs() < 1e-12);
         assert!((low / sigma - (20.0_f64 / 34.17).sqrt()).abs() < 2e-3, "{low}");
         assert!((high / sigma - (20.0_f64 / 9.591).sqrt()).abs() < 5e-3, "{high}");

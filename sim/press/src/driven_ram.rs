@@ -3,8 +3,10 @@
 //! The steel gives the angle that stays after unloading ([`FibreStrip`]); the plate's shape takes it as a bend band of a third of the die's opening, the
 //! reach of the plastic hinge under three-point bending.
 
+use std::f64::consts::TAU;
+
 use platen_sim_plate::{Blank, FibreSteel, FibreStrip, Press, Stroke};
-use rand_distr::{Distribution as _, Normal};
+use rand_distr::{Distribution as _, Normal, Open01};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +22,14 @@ pub struct RamConfig {
     pub yield_mpa: f64,
     /// Standard deviation of the yield strength from plate to plate, share.
     pub yield_scatter: f64,
-    /// The plate is thicker than ordered by this.
+    /// The same along a plate.
+    pub yield_within: f64,
+    /// The plates are thicker than ordered by this in the mean.
     pub thicker_mm: f64,
+    /// Standard deviation of the thickness from plate to plate.
+    pub thickness_scatter_mm: f64,
+    /// The same along a plate.
+    pub thickness_within_mm: f64,
     /// Depth at which the ram touches a flat plate of nominal thickness.
     pub zero_mm: f64,
     /// Travel of the frame under one meganewton per metre of line.
@@ -43,7 +51,10 @@ impl Default for RamConfig {
             opening_mm: 360.0,
             yield_mpa: 440.0,
             yield_scatter: 0.1,
+            yield_within: 0.03,
             thicker_mm: 0.0,
+            thickness_scatter_mm: 0.4,
+            thickness_within_mm: 0.3,
             zero_mm: 0.2,
             frame_mm: 0.2,
             ram_scatter_mm: 0.1,
@@ -91,9 +102,12 @@ impl DrivenRam {
         let length = 1e-3 * (blank.width_mm * sin.abs() + blank.height_mm * cos.abs());
         let thickness = 1e-3 * blank.thickness_mm;
         let scatter = 1.0 + config.yield_scatter * draw(1.0, &mut random);
-        let steel = FibreSteel {
-            yield_strength: 1e6 * config.yield_mpa * scatter,
-            thickness: thickness + 1e-3 * config.thicker_mm,
+        let thicker = 1e-3 * (config.thicker_mm + draw(config.thickness_scatter_mm, &mut random));
+        let yields = along_plate(config.yield_within, &mut random);
+        let thickens = along_plate(1e-3 * config.thickness_within_mm, &mut random);
+        let steel = |x: f64| FibreSteel {
+            yield_strength: 1e6 * config.yield_mpa * scatter * (1.0 + yields(x)),
+            thickness: thickness + thicker + thickens(x),
         };
         let press = Press {
             opening: 1e-3 * config.opening_mm,
@@ -101,7 +115,7 @@ impl DrivenRam {
             zero: 1e-3 * config.zero_mm,
             nominal_thickness: thickness,
         };
-        let strip = FibreStrip::new(length, |_| steel, |_| 0.0);
+        let strip = FibreStrip::new(length, steel, |_| 0.0);
         Self { config: config.clone(), strip, axis_deg, press, random, told_mm: None }
     }
 
@@ -130,6 +144,13 @@ impl DrivenRam {
             springback: 0.0,
         }
     }
+}
+
+/// Draws a variation along a plate, x in metres: two waves 2 to 6 m long, of this standard deviation together.
+fn along_plate(sigma: f64, random: &mut Pcg64) -> impl Fn(f64) -> f64 + use<> {
+    let mut share = || -> f64 { Open01.sample(random) };
+    let waves = [1.0, 2.0].map(|n| [n * (1.0 + 0.5 * share()), TAU * share()]);
+    move |x| sigma * waves.iter().map(|[number, phase]| (number * x + phase).sin()).sum::<f64>()
 }
 
 fn draw(sigma: f64, random: &mut Pcg64) -> f64 {

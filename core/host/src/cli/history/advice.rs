@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use platen_advice::press_capability::{LEAST_STROKES, PressCapability, ram_scatter};
+use platen_advice::press_capability::{LEAST_STROKES, PressCapability, ram_scatter, without_short};
 use platen_history::{Filter, Stroke};
 use platen_model::CannotAdvise;
 use platen_model::units::mm;
@@ -95,7 +95,7 @@ impl Ram {
     }
 
     fn capability(&self) -> Option<([f64; 3], PressCapability)> {
-        let scatter = ram_scatter(&self.offs)?;
+        let scatter = ram_scatter(&without_short(&self.offs))?;
         let (chord, limit) = self.board?;
         Some((scatter, PressCapability::new(scatter[1], self.opening, chord, limit)))
     }
@@ -103,14 +103,14 @@ impl Ram {
     fn document(&self, die: u16) -> serde_json::Value {
         let capability = self.capability();
         serde_json::json!({
-            "die": die, "strokes": self.offs.len(), "ram_sigma_m": capability.map(|it| it.0[1]),
+            "die": die, "strokes": without_short(&self.offs).len(), "ram_sigma_m": capability.map(|it| it.0[1]),
             "ram_sigma_95_m": capability.map(|it| [it.0[0], it.0[2]]),
             "gap_sigma_m": capability.map(|it| it.1.gap_sigma), "too_coarse": capability.map(|it| it.1.is_too_coarse()),
         })
     }
 
     fn words(&self, die: u16) -> String {
-        let n = self.offs.len();
+        let n = without_short(&self.offs).len();
         match self.capability() {
             Some(([low, _, high], press)) => {
                 format!(
@@ -121,7 +121,7 @@ impl Ram {
                 )
             }
             None => format!(
-                "die {die}: what the press can hold is not known: {n} strokes as advised and with a told depth, {LEAST_STROKES} needed"
+                "die {die}: what the press can hold is not known: {n} strokes pressed to an advised depth, {LEAST_STROKES} needed"
             ),
         }
     }
