@@ -1,21 +1,15 @@
-//! Deviation of the plate from the whole target at every node: least-squares rigid fit, then one-sided contact by a linear program.
-//!
-//! The target's face is laid on the plate's face from the scanner's side, as a rigid surface. Its direction follows the
-//! plate's (u, v), by the least-squares rigid fit of all material points that were seen. Its height and two small tilts then solve
-//! the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
-//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit.
+//! Deviation of the plate from the whole target at every node, with its uncertainty: least-squares rigid fit, then the target in its seat.
 //!
 //! The uncertainty is that of [`Trials`], each with a seat of its own. It holds the difference to other seats: on the whole fitted surface where a part
 //! of it was not seen, and those in which the middle of the target lies higher by no more than the trials' seats do. A half-bent plate has such seats, as
-//! its target lies on a ridge; more than the noise of the scan decides whether it rocks there. They are near-optimal vertices of the linear program,
-//! found with its objective moved beside the middle.
+//! its target lies on a ridge; more than the noise of the scan decides whether it rocks there.
 
 use nalgebra::Matrix3;
-use platen_sdk::{Error, ErrorKind, PlateGrid, Result};
+use platen_sdk::{PlateGrid, Result};
 use platen_shape::{EXPANDED, Placement, Surface, TargetSurface, Vec3};
 
-use crate::linear_program::{self, Vertex};
 use crate::scanner_sigma::ScannerSigma;
+use crate::target_seat::{Seat, Support, row};
 use crate::trials::{TRIALS, Trials, half_width};
 
 /// Target in its seat on the plate.
@@ -132,159 +126,4 @@ impl Pose {
     fn deviation(&self, now: &Surface, target: &TargetSurface, at: [f64; 2]) -> f64 {
         self.placement.deviation(now, target, at) - row(target, at).dot(&self.movement)
     }
-}
-
-/// Nodes on which the target may rest, and its rigid fit to them.
-#[derive(Debug)]
-struct Support {
-    index: Vec<usize>,
-    places: Vec<[f64; 2]>,
-    rows: Vec<Vec3>,
-    placement: Placement,
-    /// Measured minus target in the fit, at all nodes.
-    fitted: Vec<f64>,
-}
-
-impl Support {
-    fn new(now: &Surface, target: &TargetSurface, uv: &[[f64; 2]], index: Vec<usize>) -> Self {
-        let places: Vec<[f64; 2]> = index.iter().map(|&i| uv[i]).collect();
-        let placement = Placement::best(now, target, places.iter().copied());
-        let fitted = uv.iter().map(|&at| placement.deviation(now, target, at)).collect();
-        let rows = places.iter().map(|&at| row(target, at)).collect();
-        Self { index, places, rows, placement, fitted }
-    }
-
-    /// Returns the seat on the plate; contacts are positions in `index`.
-    fn seat(&self, size: [f64; 2]) -> Result<Seat> {
-        let heights: Vec<f64> = self.index.iter().map(|&i| self.fitted[i]).collect();
-        seat(Vec3::x(), &self.rows, &heights, &self.places, size, None)
-    }
-
-    /// Returns the seat in each trial; that of `measured` where there is none.
-    fn seats_in(
-        &self,
-        trials: &Trials<'_>,
-        measured: &Seat,
-        size: [f64; 2],
-        check: &dyn Fn() -> Result<()>,
-    ) -> Result<[Seat; TRIALS]> {
-        let mut heights: [Vec<f64>; TRIALS] = std::array::from_fn(|_| Vec::with_capacity(self.index.len()));
-        for (&i, &at) in self.index.iter().zip(&self.places) {
-            let raised = trials.heights(at);
-            for (heights, raised) in heights.iter_mut().zip(raised) {
-                heights.push(self.fitted[i] + raised);
-            }
-        }
-        check()?;
-        let start = Some(measured.vertex);
-        Ok(std::array::from_fn(|k| {
-            seat(Vec3::x(), &self.rows, &heights[k], &self.places, size, start).unwrap_or(measured.clone())
-        }))
-    }
-
-    /// Returns the movements to seats in which the middle of the target lies no more than `by` higher than in the measured one.
-    fn seats_within(
-        &self,
-        by: f64,
-        measured: &Seat,
-        size: [f64; 2],
-        check: &dyn Fn() -> Result<()>,
-    ) -> Result<Vec<Vec3>> {
-        let heights: Vec<f64> = self.index.iter().map(|&i| self.fitted[i]).collect();
-        let mut found = Vec::new();
-        for off_middle in OFF_MIDDLE.map(|share| share * size[0].min(size[1])) {
-            check()?;
-            for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-                let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
-                let start = Some(measured.vertex);
-                let seat = seat(objective, &self.rows, &heights, &self.places, size, start);
-                // The feasible movements are convex: a seat that is too high is approached until the middle has risen by as much.
-                found.extend(seat.map(|seat| {
-                    let rise = seat.lowest - measured.lowest;
-                    measured.movement
-                        + (seat.movement - measured.movement) * if rise > by { by / rise } else { 1.0 }
-                }));
-            }
-        }
-        Ok(found)
-    }
-}
-
-/// The target at rest.
-#[derive(Debug, Clone)]
-struct Seat {
-    /// Movement from the fit.
-    movement: Vec3,
-    contacts: Vec<usize>,
-    rocks: bool,
-    /// Active constraints of the linear program, and the rise of the middle of the target there, metres.
-    vertex: [usize; 3],
-    lowest: f64,
-}
-
-/// Returns the seat over these heights; `start` are active constraints of a plate that is alike.
-fn seat(
-    objective: Vec3,
-    rows: &[Vec3],
-    heights: &[f64],
-    places: &[[f64; 2]],
-    [width, height]: [f64; 2],
-    start: Option<[usize; 3]>,
-) -> Result<Seat> {
-    let vertex = linear_program::minimum(objective, rows, heights, 1e3 * (width + height), start)
-        .ok_or_else(|| {
-            Error::new(
-                ErrorKind::BadData,
-                "the target finds no seat: the plate was seen on one side of its middle only",
-            )
-            .hint("scan again with the whole plate in view")
-        })?;
-    let Vertex { q: movement, active } = vertex;
-    let touches =
-        (0..rows.len()).filter(|&i| rows[i].dot(&movement) - heights[i] <= TOUCHES).map(|i| places[i]);
-    if narrowest(&touches.collect::<Vec<_>>()) >= ROCKS * width.min(height) {
-        return Ok(Seat {
-            movement,
-            contacts: active.to_vec(),
-            rocks: false,
-            vertex: active,
-            lowest: movement.x,
-        });
-    }
-    let rise = |i: usize| heights[i] / rows[i].x;
-    let top = (0..rows.len()).fold(0, |best, i| if rise(i) > rise(best) { i } else { best });
-    Ok(Seat {
-        movement: Vec3::x() * rise(top),
-        contacts: vec![top],
-        rocks: true,
-        vertex: active,
-        lowest: movement.x,
-    })
-}
-
-/// The target touches where its gap is no larger, metres: a target that lies flush on a part of the plate touches all of it, of which the linear
-/// program names any three places.
-const TOUCHES: f64 = 10e-6;
-/// Directions in which the extent of the contacts is taken: the smallest is right to 0.5 %.
-const DIRECTIONS: usize = 32;
-/// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
-const ROCKS: f64 = 0.25;
-/// How far from the middle other seats are sought as the lowest, shares of the shorter side.
-const OFF_MIDDLE: [f64; 3] = [0.001, 0.01, 0.1];
-
-/// Returns the derivative of the deviation at a place by the target's rise and tilts, with its sign reversed.
-fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {
-    let (p, n) = (target.face(u, v), target.normal(u, v));
-    let turn = p.cross(&n);
-    Vec3::new(n.z, turn.x, turn.y)
-}
-
-/// Returns the smallest extent of places over all directions.
-fn narrowest(places: &[[f64; 2]]) -> f64 {
-    let extent = |k: usize| {
-        let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();
-        let along = places.iter().map(|[u, v]| u * cos + v * sin);
-        along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
-    };
-    (0..DIRECTIONS).map(extent).fold(f64::INFINITY, f64::min)
 }

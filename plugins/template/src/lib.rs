@@ -83,6 +83,7 @@ mod figures;
 mod linear_program;
 mod scanner_sigma;
 mod section;
+mod target_seat;
 mod trials;
 
 use platen_model::{Centre, Figure, Findings, NodeState, Report, Task, Template, Verdict};
