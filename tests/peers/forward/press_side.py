@@ -3,11 +3,12 @@
 
     python3 tests/peers/forward/press_side.py --pairs 20 --strokes 50          (packages: those of forward.py)
 
-One press and one host run through; the forwarder has the priority of its unit. Blocks of strokes alternate: forwarder off, on, on, off; a block with it begins with the backlog of the block before, to PostgreSQL and
-mosquitto. Each stroke's time is the one that the host logs. Printed: median and 99 % of both, their ratio, and its 95 % interval by drawing pairs of blocks anew, so that
+One press and one host run through; the forwarder has the priority of its unit. The servers stand for other computers and get what time is left. Blocks of strokes alternate: forwarder off, on, on, off; a block with it begins with the backlog of the block before, to PostgreSQL and
+mosquitto. Each stroke's time is the one that the host logs. Printed: median, 95 % and 99 % of both, their ratio, and its 95 % interval by drawing pairs of blocks anew, so that
 a slow drift of the machine falls out; the machine's load beside it. The figures judge nothing. Exit code 1: a stroke is missing at a sink.
 """
 import argparse, os, random, re, tempfile
+from pathlib import Path
 
 from forward import SITE, Site
 from servers import wait
@@ -21,6 +22,14 @@ def times(plant):
     return [float(found) for found in LINE.findall(plain)]
 
 
+def give_way(process):
+    """The process and its children to come get the time that nobody else needs; so does its session, where it has one of its own."""
+    os.setpriority(os.PRIO_PROCESS, process, 19)
+    group = Path(f"/proc/{process}/autogroup")
+    if group.exists() and os.getsid(process) != os.getsid(0):
+        group.write_text("19")
+
+
 def share(values, part):
     return sorted(values)[min(len(values) - 1, int(part * len(values)))]
 
@@ -31,7 +40,7 @@ def ratio(pairs, part):
 
 
 def told(pairs, chance):
-    for part, name in [(0.5, "median"), (0.99, "99 %")]:
+    for part, name in [(0.5, "median"), (0.95, "95 %"), (0.99, "99 %")]:
         off, on = (share([it for pair in pairs for it in pair[which]], part) for which in (False, True))
         drawn = sorted(ratio(chance.choices(pairs, k=len(pairs)), part) for _ in range(2000))
         print(f"trigger to busy, {name}: {off:.2f} ms without, {on:.2f} ms with the forwarder; ratio {on / off:.3f}, 95 %: {drawn[50]:.3f} to {drawn[1949]:.3f}")
@@ -51,6 +60,8 @@ def main():
         try:
             plant = site.press("press-1", "postgresql", "mqtt", strokes=wanted + 20)
             site.prepare()
+            give_way(int((site.postgresql.data / "postmaster.pid").read_text().split()[0]))
+            give_way(site.mosquitto.process.pid)
             plant.start_press()
             plant.start_host()
             wait("the first strokes", lambda: len(times(plant)) >= 5, 120)
