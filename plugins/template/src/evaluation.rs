@@ -169,30 +169,32 @@ impl Evaluator<'_> {
     pub(crate) fn worst(&self, line: &Line, chord: f64, seat: Seat, n_places: usize) -> (f64, f64) {
         let (first, last) = (0.5 * chord, (line.length - 0.5 * chord).max(0.5 * chord));
         let n_steps = ((last - first) / (SEARCH_STEP * chord)).ceil() as usize;
-        let mut worst = (first, f64::NEG_INFINITY);
-        for k in 0..=n_steps {
-            let centre = first + (last - first) * k as f64 / n_steps.max(1) as f64;
-            let seated = self.seat(line, Chord { centre, length: chord }, seat, n_places);
-            let gap = seated.gaps[seated.largest].abs();
-            if gap > worst.1 {
-                worst = (centre, gap);
-            }
-        }
-        worst
+        let centres = (0..=n_steps).map(|k| first + (last - first) * k as f64 / n_steps.max(1) as f64);
+        self.worst_of(centres, line, chord, seat, n_places, (first, f64::NEG_INFINITY))
     }
 
     /// Returns the middle of the position with the largest gap, sought once more between the steps of [`Self::worst`]: there the gap grows until the
     /// template falls on another contact.
-    fn worst_finely(&self, line: &Line, length: f64, seat: Seat) -> f64 {
-        let mut worst = self.worst(line, length, seat, PLACES);
-        for centre in beside(line, length, worst.0, &FINE) {
-            let seated = self.seat(line, Chord { centre, length }, seat, PLACES);
-            let gap = seated.gaps[seated.largest].abs();
-            if gap > worst.1 {
-                worst = (centre, gap);
-            }
-        }
-        worst.0
+    fn worst_finely(&self, line: &Line, chord: f64, seat: Seat) -> f64 {
+        let worst = self.worst(line, chord, seat, PLACES);
+        self.worst_of(beside(line, chord, worst.0, &FINE), line, chord, seat, PLACES, worst).0
+    }
+
+    /// Returns that of the centres with the largest gap, and the gap; `worst` where none has a larger one.
+    fn worst_of(
+        &self,
+        centres: impl Iterator<Item = f64>,
+        line: &Line,
+        length: f64,
+        seat: Seat,
+        n_places: usize,
+        worst: (f64, f64),
+    ) -> (f64, f64) {
+        let gaps = centres.map(|centre| {
+            let seated = self.seat(line, Chord { centre, length }, seat, n_places);
+            (centre, seated.gaps[seated.largest].abs())
+        });
+        gaps.fold(worst, |worst, next| if next.1 > worst.1 { next } else { worst })
     }
 
     fn seat(&self, line: &Line, chord: Chord, seat: Seat, n_places: usize) -> Seated {

@@ -131,7 +131,7 @@ mod tests {
         assert!((cold - warm).norm() < 1e-12, "{cold} {warm}");
     }
 
-    /// Contacts of a shallow hill lie side by side about its top, so that rounding in the basis is much larger than that of a height.
+    /// A shallow hill is touched exactly under the middle, where the program is dual degenerate: without the perturbation it cycles.
     #[test]
     fn a_shallow_hill_has_a_minimum() {
         let mut random = fastrand::Rng::with_seed(64);

@@ -149,7 +149,7 @@ fn steps(first: f64, last: f64, n: usize) -> Vec<f64> {
     (0..n).map(|k| first + (last - first) * k as f64 / (n - 1) as f64).collect()
 }
 
-/// Returns the height of a smooth curve with increasing x: the cubic parabola through the four nearest points.
+/// Returns the height of a smooth curve with increasing x, by cubic Lagrange interpolation of the four nearest points.
 fn height_at(curve: &[(f64, f64)], x: f64) -> f64 {
     let after = curve.partition_point(|(at, _)| *at < x);
     let near = &curve[after.saturating_sub(2).min(curve.len().saturating_sub(4))..];
