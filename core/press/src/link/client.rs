@@ -161,7 +161,8 @@ impl<L: Link> Client<L> {
 
     /// Transfers one request and its answer within the time limit. Any other outcome drops the connection.
     async fn exchange(&mut self, request: &Request) -> Result<Response, LinkError> {
-        if let Some(moment) = self.not_before {
+        // A moment that has passed is not slept for: the timer would wait for its next whole millisecond.
+        if let Some(moment) = self.not_before.filter(|&moment| moment > Instant::now()) {
             sleep_until(moment).await;
         }
         self.counts.requests += 1;
