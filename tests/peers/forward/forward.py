@@ -22,23 +22,23 @@ def said(text):
 
 
 class Site:
-    """The servers of a check, the presses' sinks, and a reader that takes everything from the broker."""
+    """The servers of a check, the presses' sinks, and a reader that takes everything from the broker. `servers`: their folder, where they have another disk."""
 
-    def __init__(self, folder):
-        self.folder = Path(folder)
+    def __init__(self, folder, servers=None):
+        self.folder, servers = Path(folder), Path(servers or folder)
         os.chmod(folder, 0o755)
         self.authority = Authority(self.folder)
         self.presses, self.reader, self.received = [], None, []
-        self.postgresql = Postgresql(self.authority, self.folder / "postgresql")
-        self.mosquitto = Mosquitto(self.authority, self.folder / "mosquitto")
+        self.postgresql = Postgresql(self.authority, servers / "postgresql")
+        self.mosquitto = Mosquitto(self.authority, servers / "mosquitto")
 
     def sinks(self, *kinds, more=""):
         port = {"postgresql": self.postgresql.port, "mqtt": self.mosquitto.port, "sparkplug": self.mosquitto.port}
         return "".join(f'[[forward.sink]]\ntype = "{kind}"\nhost = "localhost"\nport = {port[kind]}\nca_file = "{self.authority.file}"\n'
                        f'password_file = "password"\n{more if kind == "sparkplug" else ""}' for kind in kinds)
 
-    def press(self, name, *kinds, strokes=0, more="", sinks=None):
-        plant = Plant(self.folder / f"plant-{len(self.presses)}", name, self.sinks(*kinds, more=more) if sinks is None else sinks, SITE, strokes)
+    def press(self, name, *kinds, strokes=0, more="", sinks=None, **press):
+        plant = Plant(self.folder / f"plant-{len(self.presses)}", name, self.sinks(*kinds, more=more) if sinks is None else sinks, SITE, strokes, **press)
         self.presses.append(plant)
         return plant
 

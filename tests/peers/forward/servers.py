@@ -156,14 +156,14 @@ class Mosquitto:
 class Plant:
     """A press with its host and forwarder. `sinks` are lines of TOML."""
 
-    def __init__(self, folder, name, sinks, site="kure", strokes=0):
+    def __init__(self, folder, name, sinks, site="kure", strokes=0, parts=1, between_ms=10):
         self.folder, self.name, self.site = folder, name, site
         folder.mkdir()
         self.user = f"{site}/{name}"
         (folder / "password").write_text("secret\n")
         (folder / "press.toml").write_text(
-            f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 14)}\nbaseline = false\n"
-            "[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\nhost_ms = 60000\n"
+            f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 14)}\nparts = {parts}\nbaseline = false\n"
+            f"[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = {between_ms}\nhost_ms = 60000\n"
             f"[plate.plan]\nstrokes_per_pass = {max(strokes, 14)}\npasses = 1\n"
             "[plate]\ntarget = { shape = \"cylinder\", radius_mm = 9018.0, axis_deg = 90.0 }\n"
             "[plate.blank]\nwidth_mm = 3000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n")
