@@ -17,12 +17,14 @@ mod fit;
 mod intensity;
 mod near_angle;
 mod occupancy;
+mod polar;
 mod restore;
 mod survey;
 
 pub use apply::Columns;
 pub(crate) use decide::Plan;
 use decide::Unit;
+pub(crate) use polar::{PolarCell, ToPolar};
 pub(crate) use survey::Survey;
 
 use platen_scan::{Direction, State};
@@ -35,13 +37,20 @@ pub(crate) struct RawCell {
     /// Column number in the file.
     pub(crate) column: u32,
     /// Position in the file's own unit and frame; any point on the beam when only its direction is known.
-    pub(crate) xyz: [f64; 3],
-    /// The same position as range and direction, where the file stores these: they are kept to the last bit.
-    pub(crate) beam: Option<(f64, Direction)>,
+    pub(crate) position: Position,
     /// Intensity in the scale of the file.
     pub(crate) intensity: f64,
     /// State in the file. A valid cell at the origin or without finite numbers counts as missing.
     pub(crate) state: State,
+}
+
+/// Position of a cell as stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Position {
+    /// x, y, z.
+    Cartesian([f64; 3]),
+    /// Range and direction.
+    Spherical(f64, Direction),
 }
 
 /// Direction of columns by increasing index, seen from above.
@@ -156,21 +165,6 @@ impl Turn {
             Self::CounterClockwise => "counter-clockwise",
         }
     }
-}
-
-/// Range below which a cell flagged valid holds no measurement, in the file's unit: writers that have no flag
-/// store missing cells at the origin, some of them through a transform that leaves rounding noise.
-const NO_RANGE: f64 = 1e-6;
-
-/// Range above which a number is no measurement in any unit.
-const NO_NUMBER: f64 = 1e12;
-
-/// Returns the state of a cell by its numbers.
-fn true_state(cell: &RawCell) -> State {
-    let [x, y, z] = cell.xyz;
-    let range2 = x * x + y * y + z * z;
-    let measured = (NO_RANGE * NO_RANGE..NO_NUMBER * NO_NUMBER).contains(&range2);
-    if measured { cell.state } else { State::NoReturn }
 }
 
 #[cfg(test)]

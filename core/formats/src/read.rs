@@ -1,14 +1,14 @@
 //! Two passes over the cells of a scan file, of any format.
 //!
 //! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
-//! the CRC-32C of all cells. The second ([`ScanReader::columns`]) delivers every column once, as soon as the file has
-//! completed it. Up to 2.6 million cells (126 MB, spherical ones 210) are kept from the first pass; a larger file is decoded twice, so that
+//! the CRC-32C of all cells, which a thread of its own decodes. The second ([`ScanReader::columns`]) delivers every column once, as soon
+//! as the file has completed it. Up to 2.6 million cells (126 MB) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
+mod decode_ahead;
 mod detect;
 pub(crate) mod e57;
 mod error;
-mod kept_cells;
 mod lines;
 mod ptx;
 mod scan_order;
@@ -20,14 +20,13 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use platen_scan::ScanHeader;
+use platen_scan::{Direction, ScanHeader};
 
 use crate::Format;
-use crate::orient::{Columns, Expected, Mirror, Plan, RawCell, Survey};
+use crate::orient::{Columns, Expected, Mirror, Plan, PolarCell, RawCell, Survey, ToPolar};
 
 pub use error::ReadError;
 use error::Result;
-use kept_cells::KeptCells;
 
 #[cfg(test)]
 pub(crate) use detect::format;
@@ -54,10 +53,13 @@ struct About {
 }
 
 /// Cells in the order of the file. Nothing follows an error.
-pub(crate) type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + 'a>;
+pub(crate) type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + Send + 'a>;
+
+/// The same as ranges and directions.
+pub(crate) type PolarCells<'a> = Box<dyn Iterator<Item = Result<PolarCell>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
-trait Source {
+trait Source: Send {
     /// Returns the declared properties.
     fn about(&self) -> &About;
     /// Starts at the first cell.
@@ -68,10 +70,10 @@ trait Source {
 pub struct ScanReader<'a> {
     source: Box<dyn Source + 'a>,
     /// All cells, after a first pass over a small file.
-    kept: KeptCells,
+    kept: Vec<PolarCell>,
 }
 
-/// Largest number of cells that are kept, 126 MB, of spherical ones 210.
+/// Largest number of cells that are kept, 126 MB.
 const MAX_KEPT: u64 = 5 << 19;
 /// Cells between two reports of progress.
 const PROGRESS_EVERY: u64 = 1 << 16;
@@ -84,7 +86,7 @@ impl<'a> ScanReader<'a> {
     ///
     /// # Errors
     /// Every variant of [`ReadError`] but [`ReadError::Orient`].
-    pub fn open(path: &Path, cloud: Option<usize>, alive: &'a dyn Fn() -> bool) -> Result<Self> {
+    pub fn open(path: &Path, cloud: Option<usize>, alive: &'a (dyn Fn() -> bool + Sync)) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let data = std::fs::metadata(path).map_err(ReadError::io("looking for the scan"))?;
         if data.is_dir() {
@@ -103,14 +105,14 @@ impl<'a> ScanReader<'a> {
     ///
     /// # Errors
     /// As [`ScanReader::open`].
-    pub fn new(file: impl Read + Seek + 'a, format: Format, cloud: Option<usize>) -> Result<Self> {
+    pub fn new(file: impl Read + Seek + Send + 'a, format: Format, cloud: Option<usize>) -> Result<Self> {
         let source: Box<dyn Source> = match format {
             Format::E57 => Box::new(e57::E57::open(file, cloud)?),
             Format::Ptx => Box::new(ptx::Ptx::open(file, cloud)?),
             Format::Xyz => Box::new(xyz::Xyz::open(file)?),
             Format::Xyb => Box::new(xyb::Xyb::open(file)?),
         };
-        Ok(Self { source, kept: KeptCells::default() })
+        Ok(Self { source, kept: Vec::new() })
     }
 
     /// First pass: decides the orientation of the lattice. `known` is what the plant declares about the scanner;
@@ -127,21 +129,22 @@ impl<'a> ScanReader<'a> {
         let (mut survey, mut checksum) = (Survey::default(), 0);
         // The declared number saves memory; the real one is decisive.
         let mut fits = about.cells <= MAX_KEPT;
-        self.kept = KeptCells::with_capacity(if fits { about.cells as usize } else { 0 });
-        for cell in self.source.cells()? {
-            let cell = cell?;
-            fits &= (self.kept.len() as u64) < MAX_KEPT;
+        let kept = &mut self.kept;
+        *kept = Vec::with_capacity(if fits { about.cells as usize } else { 0 });
+        decode_ahead::for_each(self.source.cells()?, |(cell, parts)| {
+            fits &= (kept.len() as u64) < MAX_KEPT;
             if fits {
-                self.kept.push(&cell);
+                kept.push(*cell);
             }
-            survey.add(&cell).map_err(ReadError::from)?;
-            checksum = add_to_checksum(checksum, &cell);
+            survey.add(cell, *parts).map_err(ReadError::from)?;
+            checksum = add_to_checksum(checksum, cell);
             if survey.cells().is_multiple_of(PROGRESS_EVERY) {
                 progress((survey.cells() as f64 / about.cells.max(1) as f64).min(1.0))?;
             }
-        }
+            Ok::<(), E>(())
+        })?;
         if !fits {
-            self.kept = KeptCells::default();
+            *kept = Vec::new();
         }
         let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
         let expected = Expected { intensity: about.intensity, mirror, ..*known };
@@ -161,8 +164,12 @@ impl<'a> ScanReader<'a> {
     /// # Errors
     /// When the file cannot be read from its start again.
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
-        let cells =
-            if self.kept.len() == 0 { self.source.cells()? } else { Box::new(self.kept.iter().map(Ok)) };
+        let cells: PolarCells<'s> = if self.kept.is_empty() {
+            let mut to_polar = ToPolar::default();
+            Box::new(self.source.cells()?.map(move |cell| Ok(to_polar.convert(&cell?).0)))
+        } else {
+            Box::new(self.kept.iter().copied().map(Ok))
+        };
         Ok(Columns::new(&oriented.plan, cells))
     }
 }
@@ -186,11 +193,11 @@ impl Oriented {
     }
 }
 
-/// Continues a CRC-32C over position, intensity, row and column of a cell.
-fn add_to_checksum(checksum: u32, cell: &RawCell) -> u32 {
+/// Continues a CRC-32C over range, direction, intensity, row and column of a cell.
+fn add_to_checksum(checksum: u32, cell: &PolarCell) -> u32 {
     let mut bytes = [0; 40];
-    let [x, y, z] = cell.xyz;
-    for (slot, number) in bytes.chunks_exact_mut(8).zip([x, y, z, cell.intensity]) {
+    let Direction { azimuth, elevation } = cell.direction;
+    for (slot, number) in bytes.chunks_exact_mut(8).zip([cell.range, azimuth, elevation, cell.intensity]) {
         slot.copy_from_slice(&number.to_le_bytes());
     }
     bytes[32..36].copy_from_slice(&cell.row.to_le_bytes());

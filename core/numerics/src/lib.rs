@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`simd`], `vector_registers` | dispatch to wide vector registers; clean-up after the dense kernels |
 //! | [`union_find`], [`random`], [`normal_distribution`] | disjoint sets, SplitMix64, the error function |
+//! | [`join`] | two computations at the same time |
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
 //! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
 //! | [`uniform_knots`], [`penalised_curve`], [`tensor_spline`] | uniform cubic B-splines: basis, smoothing curve, surface |
@@ -13,13 +14,14 @@
 //! | [`block_banded_cholesky`] | Cholesky factor of a tensor spline's normal matrix, and the band of its inverse |
 //! | [`reml`], `normal_equations`, [`spline_fit`] | penalised least squares on scattered points, smoothing by restricted maximum likelihood |
 //!
-//! Every routine runs on one thread and its results are the same to the last bit in each run, whatever the load of the
+//! Every routine but [`join`] runs on one thread and its results are the same to the last bit in each run, whatever the load of the
 //! machine. Lengths have no unit here. No clock, no files, no randomness but from a given seed.
 
 pub mod adaptive_metropolis;
 pub mod block_banded;
 #[cfg(feature = "solvers")]
 pub mod block_banded_cholesky;
+pub mod join;
 pub mod normal_distribution;
 #[cfg(feature = "solvers")]
 mod normal_equations;

@@ -20,6 +20,9 @@ pub struct Job<'a> {
     pub(crate) waker: &'a Waker,
 }
 
+// SAFETY: every function of the host's table may be called from any thread, and nothing changes a job during its call.
+unsafe impl Sync for Job<'_> {}
+
 impl std::fmt::Debug for Job<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Job").field("id", &self.raw.job_id).finish_non_exhaustive()

@@ -79,8 +79,8 @@ pub struct Extractor {
     regions: Components,
     columns: ColumnStore,
     warm_up_columns: u32,
-    /// ColumnStore up to here have come without a gap, and in order.
-    in_order: u32,
+    /// Columns that have come in order and without a gap from the first on, and from the last on.
+    in_order: [u32; 2],
     /// Components of about the plate's size that no later column can reach, by their roots.
     closed: BTreeMap<u32, Completed>,
 }
@@ -97,7 +97,7 @@ impl Extractor {
             regions: Components::default(),
             columns: ColumnStore::default(),
             warm_up_columns: 0,
-            in_order: 0,
+            in_order: [0; 2],
             closed: BTreeMap::new(),
         }
     }

@@ -22,7 +22,7 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// Opens and checks a file.
-    pub(crate) fn open<'a>(&self, path: &Path, alive: &'a dyn Fn() -> bool) -> Result<ScanReader<'a>> {
+    pub(crate) fn open<'a>(&self, path: &Path, alive: &'a (dyn Fn() -> bool + Sync)) -> Result<ScanReader<'a>> {
         Ok(ScanReader::open(path, self.cloud, alive)?)
     }
 
@@ -112,7 +112,7 @@ impl Folder {
         pattern: glob::Pattern,
         progress: &mut Progress<'_>,
         pause: &mut dyn FnMut(String) -> Result<()>,
-        alive: &'a dyn Fn() -> bool,
+        alive: &'a (dyn Fn() -> bool + Sync),
     ) -> platen_sdk::Result<(PathBuf, ScanReader<'a>, Oriented)> {
         let mut watch = Watch::new(pattern, self.stable_polls, self.before.take());
         loop {

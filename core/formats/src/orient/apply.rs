@@ -1,12 +1,11 @@
 //! Second pass: columns of the normalised lattice.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::PI;
 
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
-use super::near_angle::NearAngle;
-use super::{Mirror, OrientError, Plan, RawCell, Unit, true_state};
-use crate::read::{Cells, ReadError};
+use super::{Mirror, OrientError, Plan, PolarCell, Unit};
+use crate::read::{PolarCells, ReadError};
 
 /// A normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
@@ -23,11 +22,10 @@ struct Sample {
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
 pub struct Columns<'a> {
     plan: &'a Plan,
-    cells: Cells<'a>,
+    cells: PolarCells<'a>,
     waiting: Vec<Vec<Sample>>,
     /// Room of the last column delivered, for the next that begins.
     spare: Vec<Sample>,
-    near: NearDirection,
     seen: u64,
     points: u64,
     /// First column not yet examined for having no stored cell.
@@ -36,13 +34,12 @@ pub struct Columns<'a> {
 
 impl<'a> Columns<'a> {
     /// Starts the second pass over the cells.
-    pub(crate) fn new(plan: &'a Plan, cells: Cells<'a>) -> Self {
+    pub(crate) fn new(plan: &'a Plan, cells: PolarCells<'a>) -> Self {
         Self {
             plan,
             cells,
             waiting: vec![Vec::new(); plan.cells.len()],
             spare: Vec::new(),
-            near: NearDirection::default(),
             seen: 0,
             points: 0,
             rest: 0,
@@ -86,7 +83,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Adds a cell; returns the column that it completes.
-    fn add(&mut self, cell: &RawCell) -> Result<Option<Column>, OrientError> {
+    fn add(&mut self, cell: &PolarCell) -> Result<Option<Column>, OrientError> {
         self.seen += 1;
         let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
         let samples = &mut self.waiting[column as usize];
@@ -98,7 +95,7 @@ impl<'a> Columns<'a> {
         if samples.len() == expected {
             return Err(self.changed());
         }
-        samples.push(self.plan.sample(cell, row, &mut self.near));
+        samples.push(self.plan.sample(cell, row));
         if samples.len() < expected {
             return Ok(None);
         }
@@ -130,24 +127,9 @@ impl Iterator for Columns<'_> {
     }
 }
 
-/// Directions of successive positions.
-#[derive(Debug, Default)]
-struct NearDirection {
-    azimuth: NearAngle,
-    elevation: NearAngle,
-}
-
-impl NearDirection {
-    #[inline]
-    fn of(&mut self, [x, y, z]: [f64; 3]) -> Direction {
-        let azimuth = self.azimuth.of(y, x);
-        Direction { azimuth: wrap_azimuth(azimuth), elevation: self.elevation.of(z, (x * x + y * y).sqrt()) }
-    }
-}
-
 impl Plan {
     /// Returns normalised column and row of a stored cell, `None` outside of the lattice decided.
-    pub(crate) fn place(&self, cell: &RawCell) -> Option<(u32, u32)> {
+    pub(crate) fn place(&self, cell: &PolarCell) -> Option<(u32, u32)> {
         let (row, column) = if self.swapped { (cell.column, cell.row) } else { (cell.row, cell.column) };
         let (n_rows, n_columns) = (self.header.n_rows, self.header.n_columns);
         let row = row.checked_sub(self.first_row).filter(|row| *row < n_rows)?;
@@ -157,40 +139,21 @@ impl Plan {
         Some(((column + n_columns - self.cut) % n_columns, row))
     }
 
-    /// Returns the position of a stored cell: right-handed, metres.
-    pub(crate) fn position(&self, cell: &RawCell) -> [f64; 3] {
-        let metres = match self.unit {
-            Unit::Metre => cell.xyz,
-            Unit::Millimetre => cell.xyz.map(|c| c / 1000.0),
-        };
-        let [x, y, z] = metres;
-        match self.mirror {
-            Mirror::None => metres,
-            Mirror::X => [-x, y, z],
-            Mirror::Y => [x, -y, z],
-        }
-    }
-
-    /// Returns range and direction of a cell stored so, in metres; not beyond the zenith, where the azimuth is another.
-    fn beam(&self, cell: &RawCell) -> Option<(f64, Direction)> {
-        let plain = self.mirror == Mirror::None && self.unit == Unit::Metre;
-        let (range, direction) = cell.beam.filter(|_| plain)?;
-        let up_to_zenith = (-FRAC_PI_2..=FRAC_PI_2).contains(&direction.elevation);
-        up_to_zenith.then(|| (range, Direction { azimuth: wrap_azimuth(direction.azimuth), ..direction }))
-    }
-
+    /// Returns a cell of the normalised lattice: right-handed, metres.
     #[inline]
-    fn sample(&self, cell: &RawCell, row: u32, near: &mut NearDirection) -> Sample {
-        let (range_m, direction) = self.beam(cell).unwrap_or_else(|| {
-            let position = self.position(cell);
-            (position.iter().map(|c| c * c).sum::<f64>().sqrt(), near.of(position))
-        });
+    fn sample(&self, cell: &PolarCell, row: u32) -> Sample {
+        let Direction { azimuth, elevation } = cell.direction;
+        let azimuth = match self.mirror {
+            Mirror::None => azimuth,
+            Mirror::X => wrap_azimuth(PI - azimuth),
+            Mirror::Y => wrap_azimuth(-azimuth),
+        };
         Sample {
             row,
-            range_m,
-            direction,
+            range_m: if self.unit == Unit::Millimetre { cell.range / 1000.0 } else { cell.range },
+            direction: Direction { azimuth, elevation },
             intensity: self.intensity.apply(cell.intensity),
-            state: true_state(cell),
+            state: cell.true_state(),
         }
     }
 }

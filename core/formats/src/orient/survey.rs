@@ -2,9 +2,9 @@
 
 use platen_scan::State;
 
-use super::near_angle::NearAngle;
 use super::occupancy::{Inserted, Occupancy};
-use super::{NO_NUMBER, OrientError, RawCell, fit::Line, true_state};
+use super::polar::{NO_NUMBER, PolarCell};
+use super::{OrientError, fit::Line};
 
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
 pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;
@@ -24,7 +24,6 @@ pub(crate) struct Survey {
     pub(super) rows: Vec<Line>,
     pub(super) columns: Vec<Line>,
     occupancy: Occupancy,
-    elevation: NearAngle,
     pub(super) cells: u64,
     pub(super) valid: u64,
     pub(super) unflagged: u64,
@@ -36,11 +35,11 @@ pub(crate) struct Survey {
 }
 
 impl Survey {
-    /// Adds a cell.
+    /// Adds a cell, with the parts of its direction's unit vector to the east, to the north and horizontal.
     ///
     /// # Errors
     /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
-    pub(crate) fn add(&mut self, cell: &RawCell) -> Result<(), OrientError> {
+    pub(crate) fn add(&mut self, cell: &PolarCell, parts: [f64; 3]) -> Result<(), OrientError> {
         let (row, column) = (cell.row, cell.column);
         if row.max(column) > MAX_INDEX {
             return Err(OrientError::IndexOutOfRange { row, column, max: MAX_INDEX + 1 });
@@ -55,23 +54,17 @@ impl Survey {
         let column = line(&mut self.columns, column);
         row.cells += 1;
         column.cells += 1;
-        if true_state(cell) == State::Valid {
-            let [x, y, z] = cell.xyz;
-            let across = x * x + y * y;
-            let range = (across + z * z).sqrt();
-            let horizontal = across.sqrt();
-            let elevation = self.elevation.of(z, horizontal);
-            let per_range = 1.0 / range;
-            let beam = [x, y, horizontal].map(|c| c * per_range);
-            row.add(beam, elevation);
-            column.add(beam, elevation);
+        if cell.true_state() == State::Valid {
+            let PolarCell { range, direction, .. } = *cell;
+            row.add(parts, direction.elevation);
+            column.add(parts, direction.elevation);
             self.valid += 1;
             self.above_far += u64::from(range > FAR);
             self.above_far_mm += u64::from(range > FAR * 1000.0);
             self.below_near += u64::from(range < NEAR);
             self.intensity.add(cell.intensity);
         } else if cell.state == State::Valid {
-            let finite = cell.xyz.iter().all(|c| c.abs() < NO_NUMBER);
+            let finite = cell.range < NO_NUMBER;
             self.not_finite += u64::from(!finite);
             self.unflagged += u64::from(finite);
         }

@@ -73,7 +73,7 @@ fn cells(stored: Stored) -> Vec<RawCell> {
         };
         let intensity = f64::from(row * 50);
         let (row, column) = (r + stored.offset.0, c + stored.offset.1);
-        cells.push(RawCell { row, column, xyz, beam: None, intensity, state: State::Valid });
+        cells.push(RawCell { row, column, position: Position::Cartesian(xyz), intensity, state: State::Valid });
     };
     if stored.row_by_row {
         (0..ROWS).for_each(|row| (0..COLUMNS).for_each(|column| store(row, column)));
@@ -83,15 +83,27 @@ fn cells(stored: Stored) -> Vec<RawCell> {
     cells
 }
 
+fn xyz(cell: &RawCell) -> [f64; 3] {
+    match cell.position {
+        Position::Cartesian(xyz) => xyz,
+        Position::Spherical(range, direction) => direction.unit().map(|c| c * range),
+    }
+}
+
 fn plan(cells: &[RawCell], expected: &Expected) -> Result<Plan, OrientError> {
-    let mut survey = Survey::default();
-    cells.iter().try_for_each(|cell| survey.add(cell))?;
+    let (mut survey, mut to_polar) = (Survey::default(), ToPolar::default());
+    cells.iter().try_for_each(|cell| {
+        let (cell, parts) = to_polar.convert(cell);
+        survey.add(&cell, parts)
+    })?;
     survey.decide(expected)
 }
 
 fn assemble(plan: &Plan, cells: &[RawCell]) -> Result<Lattice, ReadError> {
     let mut lattice = Lattice::new(plan.header.clone());
-    let mut columns = Columns::new(plan, Box::new(cells.iter().copied().map(Ok)));
+    let mut to_polar = ToPolar::default();
+    let cells = cells.iter().map(move |cell| Ok(to_polar.convert(cell).0));
+    let mut columns = Columns::new(plan, Box::new(cells));
     let mut n_columns = 0;
     for column in &mut columns {
         lattice.push(&column?).unwrap();
@@ -201,8 +213,7 @@ fn a_full_circle_is_cut_where_asked() {
             RawCell {
                 row,
                 column,
-                xyz: direction.unit().map(|c| c * 5.0),
-                beam: None,
+                position: Position::Cartesian(direction.unit().map(|c| c * 5.0)),
                 intensity: 0.5,
                 state: State::Valid,
             }
@@ -234,7 +245,7 @@ fn what_is_no_lattice_is_refused() {
     );
     assert!(matches!(refuse(&|_, cell| cell.row = 1 << 20), OrientError::IndexOutOfRange { .. }));
     assert!(matches!(
-        refuse(&|_, cell| cell.xyz = [1.0, 0.0, 0.0].map(|c| c * f64::from(cell.row + 1))),
+        refuse(&|_, cell| cell.position = Position::Cartesian([f64::from(cell.row + 1), 0.0, 0.0])),
         OrientError::NotALattice { .. }
     ));
     assert!(matches!(
@@ -246,16 +257,19 @@ fn what_is_no_lattice_is_refused() {
         OrientError::TooSmall { valid: 0, .. }
     ));
     // A registered cloud: the points are seen from elsewhere.
-    let registered = refuse(&|_, cell| cell.xyz = [cell.xyz[0] + 30.0, cell.xyz[1] - 200.0, cell.xyz[2]]);
+    let registered = refuse(&|_, cell| {
+        let [x, y, z] = xyz(cell);
+        cell.position = Position::Cartesian([x + 30.0, y - 200.0, z]);
+    });
     assert!(matches!(registered, OrientError::NotALattice { .. }), "{registered}");
 }
 
 #[test]
 fn missing_cells_are_missing_however_they_are_written() {
     let mut cells = cells(PLAIN);
-    let zeros = cells.iter().filter(|cell| cell.xyz == [0.0; 3]).count();
-    cells[1].xyz = [f64::NAN, 1.0, 1.0];
-    cells[2].xyz[0] = f64::INFINITY;
+    let zeros = cells.iter().filter(|cell| xyz(cell) == [0.0; 3]).count();
+    cells[1].position = Position::Cartesian([f64::NAN, 1.0, 1.0]);
+    cells[2].position = Position::Cartesian([f64::INFINITY, 1.0, 1.0]);
     cells[3].state = State::DirectionOnly;
     let plan = plan(&cells, &Expected::default()).unwrap();
     let notes = plan.header.notes.join("\n");
@@ -273,7 +287,7 @@ fn missing_cells_are_missing_however_they_are_written() {
 fn columns_without_any_measurement_are_said() {
     let mut cells = cells(PLAIN);
     let half = cells.len() / 2;
-    cells[half..].iter_mut().for_each(|cell| cell.xyz = [0.0; 3]);
+    cells[half..].iter_mut().for_each(|cell| cell.position = Position::Cartesian([0.0; 3]));
     let plan = plan(&cells, &Expected::default()).unwrap();
     assert_eq!(plan.header.n_columns, COLUMNS);
     let notes = plan.header.notes.join("\n");

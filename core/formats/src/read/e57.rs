@@ -16,7 +16,7 @@ use platen_scan::{Direction, State};
 use super::error::{ReadError, Result};
 use super::{About, Cells, Source};
 use crate::header_text;
-use crate::orient::RawCell;
+use crate::orient::{Position, RawCell};
 use compressed_vector::{CompressedVector, Points};
 
 const FORMAT: &str = "E57";
@@ -51,7 +51,7 @@ impl<R: Read + Seek> E57<R> {
     }
 }
 
-impl<R: Read + Seek> Source for E57<R> {
+impl<R: Read + Seek + Send> Source for E57<R> {
     fn about(&self) -> &About {
         &self.about
     }
@@ -321,10 +321,9 @@ impl Fields {
             Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
         };
         let [a, b, c] = self.position.each_ref().map(number);
-        let beam = self.spherical.then(|| beam(a, b, c, state));
-        let xyz = beam.map_or([a, b, c], |(range, direction)| direction.unit().map(|c| c * range));
+        let position = if self.spherical { beam(a, b, c, state) } else { Position::Cartesian([a, b, c]) };
         let intensity = self.intensity.as_ref().map_or(0.0, number);
-        Ok(Some(RawCell { row, column, xyz, beam, intensity, state }))
+        Ok(Some(RawCell { row, column, position, intensity, state }))
     }
 }
 
@@ -336,10 +335,10 @@ fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
     declared.map_or([any, any], |b| [or_any(b.row_min, b.row_max), or_any(b.column_min, b.column_max)])
 }
 
-/// Returns range and direction. A range that is not positive becomes 0, no measurement; without a range it is 1 m.
-fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> (f64, Direction) {
+/// Returns a position by range and direction. A range that is not positive becomes 0, no measurement; without a range it is 1 m.
+fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> Position {
     let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
-    (range, Direction { azimuth, elevation })
+    Position::Spherical(range, Direction { azimuth, elevation })
 }
 
 #[cfg(test)]

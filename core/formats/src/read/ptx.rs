@@ -11,7 +11,7 @@ use platen_scan::State;
 use super::error::{ReadError, Result};
 use super::lines::{self, Lines};
 use super::{About, Cells, Source};
-use crate::orient::{Mirror, RawCell};
+use crate::orient::{Mirror, Position, RawCell};
 
 const FORMAT: &str = "PTX";
 const HEADER_LINES: u64 = 10;
@@ -62,7 +62,7 @@ impl<R: Read + Seek> Ptx<R> {
     }
 }
 
-impl<R: Read + Seek> Source for Ptx<R> {
+impl<R: Read + Seek + Send> Source for Ptx<R> {
     fn about(&self) -> &About {
         &self.about
     }
@@ -76,7 +76,7 @@ impl<R: Read + Seek> Source for Ptx<R> {
         Ok(Box::new(places.map(move |(row, column)| {
             let (xyz, intensity) = cell(next(&mut lines)?)
                 .ok_or_else(|| unsound(lines.number, "4, 7 or 10 numbers of a cell"))?;
-            Ok(RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
+            Ok(RawCell { row, column, position: Position::Cartesian(xyz), intensity, state: State::Valid })
         })))
     }
 }

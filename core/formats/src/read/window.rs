@@ -11,7 +11,7 @@ const WINDOW: usize = 1 << 18;
 /// refill: on a slow share that is the only place where a cancelled job can be noticed.
 pub(super) struct Window<'a, R> {
     file: R,
-    alive: &'a dyn Fn() -> bool,
+    alive: &'a (dyn Fn() -> bool + Sync),
     held: Vec<u8>,
     /// Place of the first held byte in the file.
     start: u64,
@@ -21,7 +21,7 @@ pub(super) struct Window<'a, R> {
 
 impl<'a, R: Read + Seek> Window<'a, R> {
     /// Starts at the beginning of `file`.
-    pub(super) fn new(file: R, alive: &'a dyn Fn() -> bool) -> Self {
+    pub(super) fn new(file: R, alive: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { file, alive, held: Vec::new(), start: 0, position: 0 }
     }
 

@@ -12,7 +12,7 @@ use platen_scan::{Direction, State};
 use super::error::{ReadError, Result};
 use super::scan_order::{self, Placed, Placer, Steps};
 use super::{About, Cells, Source};
-use crate::orient::{Expected, RawCell, Survey};
+use crate::orient::{Expected, Position, RawCell, Survey, ToPolar};
 
 const FORMAT: &str = "XYB";
 /// First line, without its version.
@@ -49,7 +49,7 @@ struct Header {
     columns: u32,
 }
 
-impl<R: Read + Seek> Xyb<R> {
+impl<R: Read + Seek + Send> Xyb<R> {
     /// Reads the header, checks the length and determines the mapping of records to cells.
     pub(crate) fn open(mut file: R) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
@@ -85,9 +85,10 @@ impl<R: Read + Seek> Xyb<R> {
         let mut first_error = None;
         for in_a_line in [rows, columns] {
             self.order = Order::Lines(in_a_line);
-            let mut survey = Survey::default();
+            let (mut survey, mut to_polar) = (Survey::default(), ToPolar::default());
             for cell in self.cells()? {
-                survey.add(&cell?)?;
+                let (cell, parts) = to_polar.convert(&cell?);
+                survey.add(&cell, parts)?;
             }
             match survey.decide(&Expected::default()) {
                 Ok(_) => return Ok(()),
@@ -116,7 +117,7 @@ impl<R: Read + Seek> Xyb<R> {
     }
 }
 
-impl<R: Read + Seek> Source for Xyb<R> {
+impl<R: Read + Seek + Send> Source for Xyb<R> {
     fn about(&self) -> &About {
         &self.about
     }
@@ -161,7 +162,7 @@ impl<R: Read + Seek> Source for Xyb<R> {
 type Point = ([f64; 3], f64);
 
 fn cell((row, column): (u32, u32), (xyz, intensity): Point) -> RawCell {
-    RawCell { row, column, xyz, beam: None, intensity, state: State::Valid }
+    RawCell { row, column, position: Position::Cartesian(xyz), intensity, state: State::Valid }
 }
 
 fn is_hit(xyz: [f64; 3]) -> bool {

@@ -11,7 +11,7 @@ use platen_scan::State;
 use super::error::{ReadError, Result};
 use super::lines::{self, Lines};
 use super::{About, Cells, Source};
-use crate::orient::RawCell;
+use crate::orient::{Position, RawCell};
 
 const FORMAT: &str = "XYZ";
 /// Buffer for reading.
@@ -37,7 +37,7 @@ impl<R: Read + Seek> Xyz<R> {
 /// Bytes of a line, for the estimate.
 const TYPICAL_LINE: u64 = 40;
 
-impl<R: Read + Seek> Source for Xyz<R> {
+impl<R: Read + Seek + Send> Source for Xyz<R> {
     fn about(&self) -> &About {
         &self.about
     }
@@ -112,7 +112,7 @@ fn cell(fields: &[&[u8]; lines::MAX_FIELDS], n: usize) -> Option<RawCell> {
     let (row, column) = (lines::whole(fields[0])?, lines::whole(fields[1])?);
     let xyz = [lines::number(fields[2])?, lines::number(fields[3])?, lines::number(fields[4])?];
     let intensity = intensity.map_or(Some(0.0), |k| lines::number(fields[k]))?;
-    Some(RawCell { row, column, xyz, beam: None, intensity, state: State::Valid })
+    Some(RawCell { row, column, position: Position::Cartesian(xyz), intensity, state: State::Valid })
 }
 
 fn cut<R>(lines: &Lines<R>, what: &str) -> ReadError {

@@ -28,19 +28,30 @@ pub(super) struct Completed {
 
 impl Extractor {
     /// Evaluates the components that ended so many columns before `newest` that nothing more joins them: most of the
-    /// work on the plate is done before the last column comes, as long as columns come in order.
+    /// work on the plate is done before the last column comes, as long as columns come in order, of either sense.
     pub(super) fn look_at_closed(&mut self, newest: u32) {
-        if newest != self.in_order || self.check().is_err() {
+        let first = self.header.n_columns.saturating_sub(1);
+        let sense = match [newest, first.wrapping_sub(newest)] {
+            [from_first, _] if from_first == self.in_order[0] => 0,
+            [_, from_last] if from_last == self.in_order[1] => 1,
+            _ => return,
+        };
+        if self.check().is_err() {
             return;
         }
-        self.in_order += 1;
-        let Some(last) = newest.checked_sub(MARGIN + 1) else { return };
+        self.in_order[sense] += 1;
+        let last = match sense {
+            0 => newest.checked_sub(MARGIN + 1),
+            _ => Some(newest + MARGIN + 1).filter(|last| *last <= first),
+        };
+        let Some(last) = last else { return };
         let runs = self.columns.get(last).map_or(0..0, |column| column.runs.clone());
         let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
         for root in roots {
             let extent = self.regions.extent(root);
+            let end = [extent.columns.1, extent.columns.0][sense];
             let large = extent.area_mm2 >= self.plate_mm2(CLOSED_PART);
-            if extent.columns.1 == last && large && self.is_near_size(root) {
+            if end == last && large && self.is_near_size(root) {
                 let surface = self.surface(&[root]);
                 let plate = self.plate_of(&surface);
                 self.closed.insert(root, Completed { surface, plate });
