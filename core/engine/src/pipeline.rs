@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use platen_numerics::join::join;
 use platen_plant::plant::RigidTransform;
 use platen_plant::{
     Error as PlantError, Faults, OptionValue, PlantFile, PlateFile, PluginUse, Value, Worker, check_options,
@@ -97,16 +98,20 @@ impl Pipeline {
     /// The first plugin that cannot be used.
     pub fn of(plant: &PlantFile, catalogue: &Catalogue) -> Result<Self, PipelineError> {
         let limit = plant.press.as_ref().map_or(EVALUATION_LIMIT, |press| press.timeouts.evaluate);
-        let (library, values) = load(catalogue, &plant.flattening)?;
-        let flattening = Flattening::create(&library, &values, limit)?;
-        let comparisons = plant.comparisons.iter().map(|wanted| {
+        let flattening = || {
+            let (library, values) = load(catalogue, &plant.flattening)?;
+            Ok::<_, PipelineError>(Flattening::create(&library, &values, limit)?)
+        };
+        let comparison = |wanted: &PluginUse| {
             let (library, values) = load(catalogue, wanted)?;
-            Ok(Comparison::create(&library, &values, limit)?)
-        });
-        let comparisons = comparisons.collect::<Result<_, PipelineError>>()?;
+            Ok::<_, PipelineError>(Comparison::create(&library, &values, limit)?)
+        };
+        // Two processes start at a time.
+        let (flattening, comparisons) =
+            join(flattening, || plant.comparisons.iter().map(comparison).collect::<Result<_, _>>());
         Ok(Self {
-            flattening,
-            comparisons,
+            flattening: flattening?,
+            comparisons: comparisons?,
             register_source: plant.register_source,
             u_axis: plant.frame.u_axis.map(Vec3::from),
             press: press_origin(&plant.frame.press_from_scanner),

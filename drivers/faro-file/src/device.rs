@@ -22,7 +22,11 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// Opens and checks a file.
-    pub(crate) fn open<'a>(&self, path: &Path, alive: &'a (dyn Fn() -> bool + Sync)) -> Result<ScanReader<'a>> {
+    pub(crate) fn open<'a>(
+        &self,
+        path: &Path,
+        alive: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<ScanReader<'a>> {
         Ok(ScanReader::open(path, self.cloud, alive)?)
     }
 

@@ -45,7 +45,8 @@ impl NearAngle {
         if by.abs() < NEAR {
             let square = by * by;
             let sin = by * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
-            let cos = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
+            let cos =
+                1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)));
             return (self.sin * cos + self.cos * sin, self.cos * cos - self.sin * sin);
         }
         self.angle = angle;

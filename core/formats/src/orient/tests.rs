@@ -73,7 +73,13 @@ fn cells(stored: Stored) -> Vec<RawCell> {
         };
         let intensity = f64::from(row * 50);
         let (row, column) = (r + stored.offset.0, c + stored.offset.1);
-        cells.push(RawCell { row, column, position: Position::Cartesian(xyz), intensity, state: State::Valid });
+        cells.push(RawCell {
+            row,
+            column,
+            position: Position::Cartesian(xyz),
+            intensity,
+            state: State::Valid,
+        });
     };
     if stored.row_by_row {
         (0..ROWS).for_each(|row| (0..COLUMNS).for_each(|column| store(row, column)));

@@ -7,7 +7,6 @@
 //! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn.
 
 use nalgebra::{Cholesky, Dyn, Vector2};
-use platen_numerics::join::join;
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
 use platen_numerics::uniform_knots::UniformKnots;
 
@@ -19,7 +18,7 @@ use super::footprint;
 use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
-use super::{OutlineError, Sampling};
+use super::{OutlineError, Sampling, of_each};
 use crate::Vec3;
 
 /// Span of the curve, metres.
@@ -99,12 +98,6 @@ pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge;
     let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
     let [a, b, c, d] = of_each(|k| fitted[k].clone().map_or_else(|| fit(k, common), Ok));
     Ok([a?, b?, c?, d?])
-}
-
-/// Evaluates `of` for the four edges, opposite ones on different threads: they are alike. For speed only: benchmark `outline_of_the_face`.
-fn of_each<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 4] {
-    let ([a, b], [c, d]) = join(|| [0, 1].map(&of), || [2, 3].map(&of));
-    [a, b, c, d]
 }
 
 /// Returns true when the edge, about at `base`, crosses so many columns and rows of the lattice that its place between them
