@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reading speed of one scan as E57, PTX and XYZ beside pye57 (libE57Format) and numpy, where they read the format.
+"""Reading speed of one scan as E57, PTX and XYZ beside pye57 (libE57Format), numpy and CloudCompare, where they read the format.
 
     cargo build --release && taskset -c 2,3 python3 tests/peers/read_speed.py SCAN [--runs N]
 
@@ -11,6 +11,7 @@ import argparse
 import importlib.util
 import json
 import os
+import re
 import shutil
 import statistics
 import subprocess
@@ -62,11 +63,20 @@ def readers(extension, path):
     if extension != "e57":
         head, position = ("10", "0") if extension == "ptx" else ("0", "2")
         yield "numpy loadtxt", [*python, NUMPY, path, head, position], [*python, NUMPY]
+    if extension != "e57" and shutil.which("CloudCompare"):
+        cloudcompare = ["env", "QT_QPA_PLATFORM=offscreen", "CloudCompare", "-SILENT", "-NO_TIMESTAMP"]
+        yield "CloudCompare", [*cloudcompare, "-O", path], cloudcompare
 
 
 def valid(name, out):
     """Valid cells that a reader counted."""
-    return json.loads(out)["valid"] if name == "platen" else int(out)
+    match name:
+        case "platen":
+            return json.loads(out)["valid"]
+        case "CloudCompare":
+            return int(re.search(r"with (\d+) points", out)[1])
+        case _:
+            return int(out)
 
 
 def main():

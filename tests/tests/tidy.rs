@@ -16,9 +16,16 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
         (_, "platen-advice") => &["platen-model", "platen-shape"],
         (_, "platen-sdk") => &["platen-abi", "platen-model", "platen-scan", "platen-shape"],
         (_, "platen-press") => &["platen-model", "platen-plant"],
-        (_, "platen-engine") => {
-            &["platen-abi", "platen-model", "platen-plant", "platen-scan", "platen-sdk", "platen-shape"]
-        }
+        (_, "platen-engine") => &[
+            "platen-abi",
+            "platen-model",
+            // Two plugins start at a time.
+            "platen-numerics",
+            "platen-plant",
+            "platen-scan",
+            "platen-sdk",
+            "platen-shape",
+        ],
         (_, "platen-conformance") => {
             &["platen-engine", "platen-model", "platen-plant", "platen-scan", "platen-shape"]
         }
