@@ -55,7 +55,7 @@ impl Machine {
     pub(super) fn words(&self) -> String {
         let load = self.load.map(|load| format!(", load {load:.1}")).unwrap_or_default();
         format!(
-            "{}, {} cores{load}; times: CPU ms of one measurement on one thread, medians",
+            "{}, {} cores{load}; times: CPU ms of one measurement, medians",
             self.processor, self.cores
         )
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use platen_engine::pipeline;
-use platen_engine::plugin::{Catalogue, Flattening};
+use platen_engine::plugin::{Catalogue, Flattening, Isolation};
 use platen_engine::stroke::NotMeasured;
 use platen_host::cli::CliError;
 use platen_plant::PluginUse;
@@ -92,8 +92,10 @@ pub(super) fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// Loads the flattening plugins of these names with their default options.
+/// Loads the flattening plugins of these names with their default options, in threads of this process: their time and memory are part of
+/// its own.
 pub(crate) fn flattenings(catalogue: &Catalogue, names: &[String]) -> Result<Vec<Flattening>, CliError> {
+    let catalogue = &catalogue.clone().isolated(Isolation::InProcess);
     let load = |name: &String| {
         let (library, values) = pipeline::load(catalogue, &PluginUse::by_default(name))?;
         Ok(Flattening::create(&library, &values, FLATTENING_LIMIT)?)
