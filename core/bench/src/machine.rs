@@ -54,9 +54,6 @@ impl Machine {
 
     pub(super) fn words(&self) -> String {
         let load = self.load.map(|load| format!(", load {load:.1}")).unwrap_or_default();
-        format!(
-            "{}, {} cores{load}; times: CPU ms of one measurement, medians",
-            self.processor, self.cores
-        )
+        format!("{}, {} cores{load}; times: CPU ms of one measurement, medians", self.processor, self.cores)
     }
 }
