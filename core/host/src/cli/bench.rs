@@ -58,7 +58,7 @@ pub enum Cells {
                         platen bench --json | jq .tables.table_2\n  platen bench accuracy --seeds 50 --noise-mm 0.5,2 --threads 2\n  \
                         platen bench accuracy --random 40 --flattening harmonic --threads 2\n  platen bench advice --plates 100 --threads 2\n  platen bench scale --cells dome\n\n\
                         Scans come from the `simulated` driver library; the true shape is written beside them into --out. \
-                        A measurement runs on one thread by design: times are processor time of one measurement, whatever --threads is.")]
+                        Times are processor time of one measurement, of both its threads, whatever --threads is.")]
 pub struct BenchArguments {
     /// Parts to run
     #[arg(value_enum, default_value = "tables")]

@@ -25,7 +25,7 @@ use remeasurer::{Difference, Outcome, Remeasured, Remeasurer, Row, result_folder
                         platen remeasure config/plant-north.toml --out again --list strokes.parquet --compare\n  \
                         seq 3 | parallel --joblog J --resume-failed --retries 2 platen remeasure config/plant-north.toml --out again --shard {}/3\n  \
                         sbatch --array=1-200 --wrap 'platen remeasure config/plant-north.toml --out again --shard $SLURM_ARRAY_TASK_ID/200'\n\n\
-                        Every stroke whose raw scan is kept is measured as platen measure does, one after the other on one thread. DIR gets a folder a \
+                        Every stroke whose raw scan is kept is measured as platen measure does, one after the other. DIR gets a folder a \
                         stroke and one Parquet file a shard. A shard has whole plates. Started again it goes on: a result with the same scan, plate \
                         file, plugins, options and program is not made again. Lengths in the table are metres.\n\
                         The exit code is 1 when a file or a plugin failed; the others are measured all the same. A stroke that cannot be measured is a row with \
