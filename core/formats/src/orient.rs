@@ -17,14 +17,14 @@ mod fit;
 mod intensity;
 mod near_angle;
 mod occupancy;
-mod polar;
 mod restore;
+mod spherical;
 mod survey;
 
 pub use apply::Columns;
 pub(crate) use decide::Plan;
 use decide::Unit;
-pub(crate) use polar::{PolarCell, ToPolar};
+pub(crate) use spherical::{SphericalCell, ToSpherical};
 pub(crate) use survey::Survey;
 
 use platen_scan::{Direction, State};

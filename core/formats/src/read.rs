@@ -23,7 +23,7 @@ use std::path::Path;
 use platen_scan::{Direction, ScanHeader};
 
 use crate::Format;
-use crate::orient::{Columns, Expected, Mirror, Plan, PolarCell, RawCell, Survey, ToPolar};
+use crate::orient::{Columns, Expected, Mirror, Plan, RawCell, SphericalCell, Survey, ToSpherical};
 
 pub use error::ReadError;
 use error::Result;
@@ -56,7 +56,7 @@ struct About {
 pub(crate) type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + Send + 'a>;
 
 /// The same as ranges and directions.
-pub(crate) type PolarCells<'a> = Box<dyn Iterator<Item = Result<PolarCell>> + 'a>;
+pub(crate) type SphericalCells<'a> = Box<dyn Iterator<Item = Result<SphericalCell>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
 trait Source: Send {
@@ -70,7 +70,7 @@ trait Source: Send {
 pub struct ScanReader<'a> {
     source: Box<dyn Source + 'a>,
     /// All cells, after a first pass over a small file.
-    kept: Vec<PolarCell>,
+    kept: Vec<SphericalCell>,
 }
 
 /// Largest number of cells that are kept, 126 MB.
@@ -164,9 +164,9 @@ impl<'a> ScanReader<'a> {
     /// # Errors
     /// When the file cannot be read from its start again.
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
-        let cells: PolarCells<'s> = if self.kept.is_empty() {
-            let mut to_polar = ToPolar::default();
-            Box::new(self.source.cells()?.map(move |cell| Ok(to_polar.convert(&cell?).0)))
+        let cells: SphericalCells<'s> = if self.kept.is_empty() {
+            let mut to_spherical = ToSpherical::default();
+            Box::new(self.source.cells()?.map(move |cell| Ok(to_spherical.convert(&cell?).0)))
         } else {
             Box::new(self.kept.iter().copied().map(Ok))
         };
@@ -194,7 +194,7 @@ impl Oriented {
 }
 
 /// Continues a CRC-32C over range, direction, intensity, row and column of a cell.
-fn add_to_checksum(checksum: u32, cell: &PolarCell) -> u32 {
+fn add_to_checksum(checksum: u32, cell: &SphericalCell) -> u32 {
     let mut bytes = [0; 40];
     let Direction { azimuth, elevation } = cell.direction;
     for (slot, number) in bytes.chunks_exact_mut(8).zip([cell.range, azimuth, elevation, cell.intensity]) {

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
-use super::{Mirror, OrientError, Plan, PolarCell, Unit};
-use crate::read::{PolarCells, ReadError};
+use super::{Mirror, OrientError, Plan, SphericalCell, Unit};
+use crate::read::{ReadError, SphericalCells};
 
 /// A normalised cell that waits for the rest of its column.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +22,7 @@ struct Sample {
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
 pub struct Columns<'a> {
     plan: &'a Plan,
-    cells: PolarCells<'a>,
+    cells: SphericalCells<'a>,
     waiting: Vec<Vec<Sample>>,
     /// Room of the last column delivered, for the next that begins.
     spare: Vec<Sample>,
@@ -34,7 +34,7 @@ pub struct Columns<'a> {
 
 impl<'a> Columns<'a> {
     /// Starts the second pass over the cells.
-    pub(crate) fn new(plan: &'a Plan, cells: PolarCells<'a>) -> Self {
+    pub(crate) fn new(plan: &'a Plan, cells: SphericalCells<'a>) -> Self {
         Self {
             plan,
             cells,
@@ -83,7 +83,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Adds a cell; returns the column that it completes.
-    fn add(&mut self, cell: &PolarCell) -> Result<Option<Column>, OrientError> {
+    fn add(&mut self, cell: &SphericalCell) -> Result<Option<Column>, OrientError> {
         self.seen += 1;
         let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
         let samples = &mut self.waiting[column as usize];
@@ -129,7 +129,7 @@ impl Iterator for Columns<'_> {
 
 impl Plan {
     /// Returns normalised column and row of a stored cell, `None` outside of the lattice decided.
-    pub(crate) fn place(&self, cell: &PolarCell) -> Option<(u32, u32)> {
+    pub(crate) fn place(&self, cell: &SphericalCell) -> Option<(u32, u32)> {
         let (row, column) = if self.swapped { (cell.column, cell.row) } else { (cell.row, cell.column) };
         let (n_rows, n_columns) = (self.header.n_rows, self.header.n_columns);
         let row = row.checked_sub(self.first_row).filter(|row| *row < n_rows)?;
@@ -141,7 +141,7 @@ impl Plan {
 
     /// Returns a cell of the normalised lattice: right-handed, metres.
     #[inline]
-    fn sample(&self, cell: &PolarCell, row: u32) -> Sample {
+    fn sample(&self, cell: &SphericalCell, row: u32) -> Sample {
         let Direction { azimuth, elevation } = cell.direction;
         let azimuth = match self.mirror {
             Mirror::None => azimuth,

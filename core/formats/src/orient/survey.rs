@@ -3,7 +3,7 @@
 use platen_scan::State;
 
 use super::occupancy::{Inserted, Occupancy};
-use super::polar::{NO_NUMBER, PolarCell};
+use super::spherical::{NO_NUMBER, SphericalCell};
 use super::{OrientError, fit::Line};
 
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
@@ -39,7 +39,7 @@ impl Survey {
     ///
     /// # Errors
     /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
-    pub(crate) fn add(&mut self, cell: &PolarCell, parts: [f64; 3]) -> Result<(), OrientError> {
+    pub(crate) fn add(&mut self, cell: &SphericalCell, parts: [f64; 3]) -> Result<(), OrientError> {
         let (row, column) = (cell.row, cell.column);
         if row.max(column) > MAX_INDEX {
             return Err(OrientError::IndexOutOfRange { row, column, max: MAX_INDEX + 1 });
@@ -55,7 +55,7 @@ impl Survey {
         row.cells += 1;
         column.cells += 1;
         if cell.true_state() == State::Valid {
-            let PolarCell { range, direction, .. } = *cell;
+            let SphericalCell { range, direction, .. } = *cell;
             row.add(parts, direction.elevation);
             column.add(parts, direction.elevation);
             self.valid += 1;

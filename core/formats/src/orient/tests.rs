@@ -97,9 +97,9 @@ fn xyz(cell: &RawCell) -> [f64; 3] {
 }
 
 fn plan(cells: &[RawCell], expected: &Expected) -> Result<Plan, OrientError> {
-    let (mut survey, mut to_polar) = (Survey::default(), ToPolar::default());
+    let (mut survey, mut to_spherical) = (Survey::default(), ToSpherical::default());
     cells.iter().try_for_each(|cell| {
-        let (cell, parts) = to_polar.convert(cell);
+        let (cell, parts) = to_spherical.convert(cell);
         survey.add(&cell, parts)
     })?;
     survey.decide(expected)
@@ -107,8 +107,8 @@ fn plan(cells: &[RawCell], expected: &Expected) -> Result<Plan, OrientError> {
 
 fn assemble(plan: &Plan, cells: &[RawCell]) -> Result<Lattice, ReadError> {
     let mut lattice = Lattice::new(plan.header.clone());
-    let mut to_polar = ToPolar::default();
-    let cells = cells.iter().map(move |cell| Ok(to_polar.convert(cell).0));
+    let mut to_spherical = ToSpherical::default();
+    let cells = cells.iter().map(move |cell| Ok(to_spherical.convert(cell).0));
     let mut columns = Columns::new(plan, Box::new(cells));
     let mut n_columns = 0;
     for column in &mut columns {

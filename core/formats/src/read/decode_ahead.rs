@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
 use super::error::{ReadError, Result};
-use super::{Cells, PolarCell, ToPolar};
+use super::{Cells, SphericalCell, ToSpherical};
 
 /// Cells handed over at once.
 const BATCH: usize = 1 << 12;
@@ -13,7 +13,7 @@ const BATCH: usize = 1 << 12;
 const AHEAD: usize = 4;
 
 /// A cell, and the parts of its direction's unit vector to the east, to the north and horizontal.
-type Converted = (PolarCell, [f64; 3]);
+type Converted = (SphericalCell, [f64; 3]);
 
 /// Calls `take` with every cell, in the order of the file; an error from it ends the pass.
 ///
@@ -41,11 +41,11 @@ pub(super) fn for_each<E: From<ReadError>>(
 
 /// Sends the cells in batches until the end or an error, or until nobody takes them.
 fn decode(cells: Cells<'_>, filled: &SyncSender<Result<Vec<Converted>>>, spare: &Receiver<Vec<Converted>>) {
-    let mut to_polar = ToPolar::default();
+    let mut to_spherical = ToSpherical::default();
     let mut batch = Vec::with_capacity(BATCH);
     for cell in cells {
         match cell {
-            Ok(cell) => batch.push(to_polar.convert(&cell)),
+            Ok(cell) => batch.push(to_spherical.convert(&cell)),
             Err(error) => {
                 // Nobody may be left to take either.
                 let _ = filled.send(Ok(batch)).and_then(|()| filled.send(Err(error)));

@@ -321,7 +321,8 @@ impl Fields {
             Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
         };
         let [a, b, c] = self.position.each_ref().map(number);
-        let position = if self.spherical { beam(a, b, c, state) } else { Position::Cartesian([a, b, c]) };
+        let position =
+            if self.spherical { spherical(a, b, c, state) } else { Position::Cartesian([a, b, c]) };
         let intensity = self.intensity.as_ref().map_or(0.0, number);
         Ok(Some(RawCell { row, column, position, intensity, state }))
     }
@@ -336,7 +337,7 @@ fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
 }
 
 /// Returns a position by range and direction. A range that is not positive becomes 0, no measurement; without a range it is 1 m.
-fn beam(range: f64, azimuth: f64, elevation: f64, state: State) -> Position {
+fn spherical(range: f64, azimuth: f64, elevation: f64, state: State) -> Position {
     let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
     Position::Spherical(range, Direction { azimuth, elevation })
 }

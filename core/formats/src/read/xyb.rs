@@ -12,7 +12,7 @@ use platen_scan::{Direction, State};
 use super::error::{ReadError, Result};
 use super::scan_order::{self, Placed, Placer, Steps};
 use super::{About, Cells, Source};
-use crate::orient::{Expected, Position, RawCell, Survey, ToPolar};
+use crate::orient::{Expected, Position, RawCell, Survey, ToSpherical};
 
 const FORMAT: &str = "XYB";
 /// First line, without its version.
@@ -85,9 +85,9 @@ impl<R: Read + Seek + Send> Xyb<R> {
         let mut first_error = None;
         for in_a_line in [rows, columns] {
             self.order = Order::Lines(in_a_line);
-            let (mut survey, mut to_polar) = (Survey::default(), ToPolar::default());
+            let (mut survey, mut to_spherical) = (Survey::default(), ToSpherical::default());
             for cell in self.cells()? {
-                let (cell, parts) = to_polar.convert(&cell?);
+                let (cell, parts) = to_spherical.convert(&cell?);
                 survey.add(&cell, parts)?;
             }
             match survey.decide(&Expected::default()) {

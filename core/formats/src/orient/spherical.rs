@@ -1,4 +1,4 @@
-//! Cells as range and direction, the form in which both passes use them.
+//! Spherical coordinates (range, azimuth, elevation) of stored cells, the form in which both passes use them.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -16,7 +16,7 @@ pub(super) const NO_NUMBER: f64 = 1e12;
 
 /// A cell as range and direction, in the unit and frame of its file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PolarCell {
+pub(crate) struct SphericalCell {
     /// Row number in the file.
     pub(crate) row: u32,
     /// Column number in the file.
@@ -27,11 +27,11 @@ pub(crate) struct PolarCell {
     pub(crate) direction: Direction,
     /// Intensity in the scale of the file.
     pub(crate) intensity: f64,
-    /// State as stored; see [`PolarCell::true_state`].
+    /// State as stored; see [`SphericalCell::true_state`].
     pub(crate) state: State,
 }
 
-impl PolarCell {
+impl SphericalCell {
     /// Returns the state by the numbers of the cell.
     pub(super) fn true_state(&self) -> State {
         if (NO_RANGE..NO_NUMBER).contains(&self.range) { self.state } else { State::NoReturn }
@@ -40,21 +40,21 @@ impl PolarCell {
 
 /// Conversion of successive cells, whose directions are near to each other.
 #[derive(Debug, Default)]
-pub(crate) struct ToPolar {
+pub(crate) struct ToSpherical {
     azimuth: NearAngle,
     elevation: NearAngle,
 }
 
-impl ToPolar {
+impl ToSpherical {
     /// Returns the cell as range and direction, and the parts of the direction's unit vector to the east, to the north and horizontal.
     #[inline]
-    pub(crate) fn convert(&mut self, cell: &RawCell) -> (PolarCell, [f64; 3]) {
+    pub(crate) fn convert(&mut self, cell: &RawCell) -> (SphericalCell, [f64; 3]) {
         let (range, direction, parts) = match cell.position {
             Position::Cartesian(xyz) => self.of_cartesian(xyz),
             Position::Spherical(range, direction) => self.of_spherical(range, direction),
         };
         let RawCell { row, column, intensity, state, .. } = *cell;
-        (PolarCell { row, column, range, direction, intensity, state }, parts)
+        (SphericalCell { row, column, range, direction, intensity, state }, parts)
     }
 
     #[inline]
@@ -84,9 +84,9 @@ impl ToPolar {
 mod tests {
     use super::*;
 
-    fn convert(position: Position) -> (PolarCell, [f64; 3]) {
+    fn convert(position: Position) -> (SphericalCell, [f64; 3]) {
         let cell = RawCell { row: 3, column: 4, position, intensity: 0.5, state: State::Valid };
-        ToPolar::default().convert(&cell)
+        ToSpherical::default().convert(&cell)
     }
 
     #[test]
