@@ -3,7 +3,7 @@
 mod support;
 
 use platen_shape::Vec3;
-use platen_shape::extract::Refusal;
+use platen_shape::extract::{Extractor, Refusal};
 use platen_tests::samples;
 
 /// The mixed pixels that the truth counts are no loss, and a few samples of the side face no harm.
@@ -35,6 +35,24 @@ fn the_order_of_arrival_does_not_matter() {
         assert_ne!(n % 397, 0);
         assert_eq!(forwards, support::extract(&sample, (0..n).map(|i| i * 397 % n)).unwrap());
     }
+}
+
+/// An evaluated component is held beside the columns: as many cells whichever way they came. Of the plate that the project ships, the
+/// first one, no cell is dropped.
+#[test]
+fn a_plate_is_evaluated_before_the_last_column_in_either_order() {
+    let sample = support::read(&samples::each("plates/p1_cylinder")[0]);
+    let held = |order: &mut dyn Iterator<Item = usize>| {
+        let mut extractor = Extractor::new(&sample.header, &sample.spec);
+        order.for_each(|i| extractor.push(&sample.columns[i]).unwrap());
+        extractor.cells_held()
+    };
+    let n = sample.columns.len();
+    let (forwards, backwards) = (held(&mut (0..n)), held(&mut (0..n).rev()));
+    assert_ne!(n % 397, 0);
+    let mixed = held(&mut (0..n).map(|i| i * 397 % n));
+    println!("{forwards} cells held, {backwards} in reverse, {mixed} in no order");
+    assert!(forwards == backwards && backwards > mixed);
 }
 
 #[test]

@@ -31,20 +31,18 @@ impl Extractor {
     /// work on the plate is done before the last column comes, as long as columns come in order, of either sense.
     pub(super) fn look_at_closed(&mut self, newest: u32) {
         let first = self.header.n_columns.saturating_sub(1);
-        let sense = match [newest, first.wrapping_sub(newest)] {
-            [from_first, _] if from_first == self.in_order[0] => 0,
-            [_, from_last] if from_last == self.in_order[1] => 1,
-            _ => return,
+        let before = [Some(newest), first.checked_sub(newest)];
+        let Some(sense) = [0, 1].into_iter().find(|&sense| before[sense] == Some(self.in_order[sense]))
+        else {
+            return;
         };
         if self.check().is_err() {
             return;
         }
         self.in_order[sense] += 1;
-        let last = match sense {
-            0 => newest.checked_sub(MARGIN + 1),
-            _ => Some(newest + MARGIN + 1).filter(|last| *last <= first),
-        };
-        let Some(last) = last else { return };
+        let ended =
+            [newest.checked_sub(MARGIN + 1), newest.checked_add(MARGIN + 1).filter(|last| *last <= first)];
+        let Some(last) = ended[sense] else { return };
         let runs = self.columns.get(last).map_or(0..0, |column| column.runs.clone());
         let roots: BTreeSet<u32> = runs.map(|number| self.regions.root(number)).collect();
         for root in roots {
