@@ -6,8 +6,9 @@
 //! The truth is the simulator's; lengths and angles of the true outline follow the definitions of
 //! [`ShapeChecks`], so that a figure is compared with the same figure.
 //!
-//! Three families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
-//! of the scenes with a root face of up to 6 mm; a share of wide range errors. Limits: one scan a scene.
+//! Families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
+//! of the scenes with a root face of up to 6 mm; a share of wide range errors; a table that shows in one to two rows beyond the far edges;
+//! a person before the nearest corner. Limits: one scan a scene.
 
 mod laid_template;
 mod plate_scene;
@@ -15,6 +16,7 @@ mod stated;
 
 use std::path::Path;
 
+use platen_engine::calibration::Calibration;
 use platen_engine::plugin::{Catalogue, Comparison, Flattening};
 use platen_engine::scanner_error::ScannerError;
 use platen_engine::stroke::NotMeasured;
@@ -57,12 +59,15 @@ pub(super) fn random(
         let flattenings = stages::flattenings(catalogue, &arguments.flattening[..1])?;
         Ok((flattenings, laid_template::load(catalogue)?))
     };
+    let calibration = arguments.calibration.as_deref().map(Calibration::load).transpose()?;
     let outcomes = shared(&seeds, arguments.threads, load, |(flattenings, template), seed| {
         progress::phase(&format!("random scene {seed}"));
-        let scene = RandomScene::of(arguments.family, *seed);
+        let scene = RandomScene::of(arguments.family, arguments.cyclic_mm, *seed);
         let shot = scene.scan(catalogue, folder)?;
         let flattening = flattenings.first_mut();
-        let result = flattening.map_or(Err("no flattening".into()), |f| errors(&scene, &shot, f, template));
+        let result = flattening.map_or(Err("no flattening".into()), |f| {
+            errors(&scene, &shot, calibration.as_ref(), f, template)
+        });
         let spacing = widest_spacing(&shot.truth, scene.setting.step_deg.to_radians());
         Ok(Outcome { seed: *seed, scene: scene.words(), cyclic_mm: scene.cyclic_mm, spacing, result })
     })?;
@@ -79,6 +84,7 @@ pub(super) fn random(
 fn errors(
     scene: &RandomScene,
     shot: &Shot,
+    calibration: Option<&Calibration>,
     flattening: &mut Flattening,
     template: &Comparison,
 ) -> Result<Errors, String> {
@@ -86,9 +92,9 @@ fn errors(
     let seen = stages::see(shot).map_err(refused)?;
     let measurement = stages::shape(shot, &seen, flattening).map_err(refused)?;
     let surface = &measurement.surface;
-    // The instrument's own figure, as a calibration finds it.
-    let range_error = RangeError::new(shot.header.range_error_m.unwrap_or(0.0));
-    let scanner = ScannerError::known(range_error, surface);
+    // Without a calibration the instrument's own figure.
+    let own = || ScannerError::known(RangeError::new(shot.header.range_error_m.unwrap_or(0.0)), surface);
+    let scanner = calibration.map_or_else(own, |of| ScannerError::calibrated(of, surface));
     let mut errors = Errors::of(&measurement, &seen.outline, &shot.truth, scanner.range());
     errors.stated.extend(laid_template::errors(template, scene, shot, surface, &scanner)?);
     Ok(errors)

@@ -22,8 +22,10 @@ use crate::status::{ForwardStatus, SinkStatus};
 
 /// File of the cursors, beside the record.
 const CURSORS: &str = "forward.sqlite";
-/// Time between two states on the disk.
+/// Time between two looks for a new state.
 const STATE: Duration = Duration::from_secs(1);
+/// Looks after which a state that is still the same is written again: its time tells that the forwarder runs.
+const SAME: u32 = 5;
 
 /// Where the sinks begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,16 +148,21 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
     Ok(())
 }
 
-/// Writes the state to the output folder, at most once a second.
+/// Writes the state to the output folder when it has changed, at most once a second: a file that is replaced makes the host's next sync of its record wait.
 async fn keep(shared: Arc<Shared>, folder: std::path::PathBuf) {
     let mut reported = false;
-    let write = |folder: &Path| shared.status().write(folder);
+    let (mut written, mut looks) = (None, 0);
     loop {
-        if let Err(error) = write(&folder)
-            && !std::mem::replace(&mut reported, true)
-        {
-            tracing::warn!("{}: {error}; `platen status` will be out of date", folder.display());
+        let status = shared.status();
+        if looks % SAME == 0 || written.as_ref() != Some(&status.sinks) {
+            if let Err(error) = status.write(&folder)
+                && !std::mem::replace(&mut reported, true)
+            {
+                tracing::warn!("{}: {error}; `platen status` will be out of date", folder.display());
+            }
+            (written, looks) = (Some(status.sinks), 0);
         }
+        looks += 1;
         tokio::time::sleep(STATE).await;
     }
 }

@@ -189,7 +189,9 @@ fn surroundings(options: &Options, plate: Option<&Plate>) -> Surroundings {
         floor: all.floor - height,
         wall: corners.map(|x| x + BEHIND_PLATE).fold(all.wall, f64::max),
         person_in_front: hides("person"),
+        person_at_corner: options.hidden_by == "person at corner",
         chain: hides("chain"),
+        strip: (options.strip_deg > 0.0).then(|| options.strip_deg.to_radians()),
         ..all
     }
 }

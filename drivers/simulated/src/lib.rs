@@ -32,6 +32,7 @@
 //! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
 //! | `warm_up_columns` | columns measured before the laser is warm |
 //! | `hidden_by` | object in front of the plate |
+//! | `strip_deg` | angle by which the table shows beyond the plate's far edges |
 //! | `seed` | seed of all random numbers |
 //! | `time_scale`, `rate_kpts` | duration of a scan relative to a real scanner, and the measuring rate it follows from |
 //! | `threads` | number of threads; 0: one per core |
@@ -99,7 +100,9 @@ options! {
         /// Columns measured before the laser is warm.
         warm_up_columns: i64 = 10, min 0, max 1000;
         /// Object between scanner and plate.
-        hidden_by: String = "nothing", choices ["nothing", "person", "chain", "both"];
+        hidden_by: String = "nothing", choices ["nothing", "person", "person at corner", "chain", "both"];
+        /// Angle by which the table shows beyond the plate's far edges; 0: it is as wide as the shop has it.
+        strip_deg: f64 = 0.0, unit "deg", min 0.0, max 5.0;
         /// Seed of all random numbers.
         seed: i64 = 1, min 0;
         /// Duration of a scan relative to a real scanner; 0: as fast as the computer allows.

@@ -35,6 +35,7 @@ fn options() -> Options {
         collimation_urad: 0.0,
         warm_up_columns: 0,
         hidden_by: "nothing".into(),
+        strip_deg: 0.0,
         seed: 1,
         time_scale: 0.0,
         rate_kpts: "122".into(),

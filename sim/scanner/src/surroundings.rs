@@ -17,13 +17,26 @@ pub struct Surroundings {
     pub bystander: bool,
     /// A person stands in front of the plate and hides part of its near edge.
     pub person_in_front: bool,
+    /// A person stands in front of the plate's nearest corner and hides it.
+    pub person_at_corner: bool,
     /// The chain of a crane hangs in front of the plate and hides a strip.
     pub chain: bool,
+    /// The table ends so close behind the plate that it shows beyond the far edges by this angle, radians.
+    pub strip: Option<f64>,
 }
 
 impl Default for Surroundings {
     fn default() -> Self {
-        Self { floor: -4.5, wall: 12.0, press: true, bystander: true, person_in_front: false, chain: false }
+        Self {
+            floor: -4.5,
+            wall: 12.0,
+            press: true,
+            bystander: true,
+            person_in_front: false,
+            person_at_corner: false,
+            chain: false,
+            strip: None,
+        }
     }
 }
 
@@ -52,7 +65,8 @@ pub(crate) fn solids(plate: Option<&Plate>, around: &Surroundings) -> Vec<(Label
     let mut solids = vec![(Label::Floor, slab(around.floor))];
     solids.extend(walls(around).map(|wall| (Label::Wall, wall)));
     solids.push((Label::Cabinet, place.upright(2.5, reach + 2.5, 2.0, [0.6, 1.2, 2.0])));
-    solids.push((Label::Table, place.table()));
+    let narrow = plate.zip(around.strip).map(|(plate, strip)| place.narrow_table(plate, strip));
+    solids.push((Label::Table, narrow.unwrap_or_else(|| place.table())));
     if let Some(plate) = plate {
         solids.extend(dies(plate, table_top).map(|die| (Label::Die, die)));
     }
@@ -64,6 +78,10 @@ pub(crate) fn solids(plate: Option<&Plate>, around: &Surroundings) -> Vec<(Label
     }
     if around.person_in_front {
         solids.extend(place.person(-(reach + 0.3), 0.35).map(|limb| (Label::Person, limb)));
+    }
+    if let Some(plate) = plate.filter(|_| around.person_at_corner) {
+        let [away, left] = place.before_nearest_corner(plate);
+        solids.extend(place.person(away, left).map(|limb| (Label::Person, limb)));
     }
     if around.chain {
         solids.extend(place.chain().map(|link| (Label::Chain, link)));
@@ -125,6 +143,45 @@ impl Place {
         let height = self.table_top - self.floor;
         let edge = 1.6 * self.reach;
         self.upright(0.0, 0.0, height, [edge, edge, height])
+    }
+
+    /// Returns a table parallel to the plate of which `strip`, an angle, shows beyond those edges whose surroundings are seen over the plate; it
+    /// stands out from under the other edges.
+    fn narrow_table(&self, plate: &Plate, strip: f64) -> Solid {
+        /// What stands out, metres.
+        const BESIDE: f64 = 0.3;
+        let corners = plate.corners();
+        let along = corners[1] - corners[0];
+        let yaw = along.y.atan2(along.x);
+        let axes = [Vec3::new(yaw.cos(), yaw.sin(), 0.0), Vec3::new(-yaw.sin(), yaw.cos(), 0.0)];
+        // Ends of the table along each axis, about the middle of the plate.
+        let mut ends = [[0.0; 2]; 2];
+        for (edge, (axis, sign)) in [(1, -1.0), (0, 1.0), (1, 1.0), (0, -1.0)].into_iter().enumerate() {
+            let outward = axes[axis] * sign;
+            let middle = 0.5 * (corners[edge] + corners[(edge + 1) % 4]);
+            let across = middle.xy().norm();
+            // Beams over the edge, raised by the strip, meet the table's plane this far away.
+            let behind = |raised: f64| self.table_top / (middle.z.atan2(across) + raised).tan();
+            let seen = middle.xy() * (behind(strip) / across);
+            let beyond = (Vec3::new(seen.x, seen.y, 0.0) - self.centre).dot(&outward);
+            let under = (middle - self.centre).dot(&outward) + BESIDE;
+            ends[axis][usize::from(sign > 0.0)] =
+                sign * if middle.dot(&outward) > 0.0 { beyond } else { under };
+        }
+        let middle =
+            [0, 1].map(|k| axes[k] * (0.5 * (ends[k][0] + ends[k][1]))).iter().sum::<Vec3>() + self.centre;
+        let height = self.table_top - self.floor;
+        let edges = Vec3::new(ends[0][1] - ends[0][0], ends[1][1] - ends[1][0], height);
+        Solid::upright(Vec3::new(middle.x, middle.y, self.floor + height / 2.0), edges, yaw)
+    }
+
+    /// Returns where a person stands that hides the plate's nearest corner: distances away from the middle and to the left.
+    fn before_nearest_corner(&self, plate: &Plate) -> [f64; 2] {
+        /// Of the way from the scanner to the corner.
+        const SHARE: f64 = 0.97;
+        let nearest = plate.corners().into_iter().min_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let off = nearest.unwrap_or(self.centre) * SHARE - self.centre;
+        [off.dot(&self.away), off.dot(&self.left)]
     }
 
     /// Returns two columns, a beam and the ram behind the plate.

@@ -11,14 +11,14 @@ POSTGRESQL = sorted(Path("/usr/lib/postgresql").glob("*/bin"))[-1]
 OWNER = "platen_owner"
 
 
-def wait(what, check, limit=30.0):
+def wait(what, check, limit=30.0, every=0.02):
     """Waits until `check` returns something true, and returns it."""
     end = time.monotonic() + limit
     while time.monotonic() < end:
         found = check()
         if found:
             return found
-        time.sleep(0.02)
+        time.sleep(every)
     raise AssertionError(f"not within {limit} s: {what}")
 
 
@@ -156,10 +156,10 @@ class Mosquitto:
 class Plant:
     """A press with its host and forwarder. `sinks` are lines of TOML."""
 
-    def __init__(self, folder, name, sinks, site="kure", strokes=0, parts=1, between_ms=10):
+    def __init__(self, folder, name, sinks, site="kure", strokes=0, parts=1, between_ms=10, step_deg=0.12):
         self.folder, self.name, self.site = folder, name, site
         folder.mkdir()
-        self.user = f"{site}/{name}"
+        self.user, self.step_deg = f"{site}/{name}", step_deg
         (folder / "password").write_text("secret\n")
         (folder / "press.toml").write_text(
             f"press_id = 3\nrecipe_id = 9\npart_name = \"{name}\"\nautomatic = {str(strokes > 0).lower()}\nstrokes = {max(strokes, 14)}\nparts = {parts}\nbaseline = false\n"
@@ -176,7 +176,7 @@ class Plant:
         forward = f'[forward]\nsite = "{self.site}"\npress = "{self.name}"\n{self.sinks}' if self.sinks else ""
         self.plant.write_text(
             f'[plant]\nname = "{self.name}"\n[press]\nname = "{self.name}"\npress_id = 3\n[press.link]\ntype = "tcp"\nhost = "127.0.0.1"\n'
-            f'port = {modbus.rsplit(":", 1)[1]}\nunit = 1\n[scanner]\nplugin = "simulated"\n[scanner.options]\nstep_deg = 0.12\ncell = "{plate}"\n'
+            f'port = {modbus.rsplit(":", 1)[1]}\nunit = 1\n[scanner]\nplugin = "simulated"\n[scanner.options]\nstep_deg = {self.step_deg}\ncell = "{plate}"\n'
             f'[frame]\nu_axis = [1.0, 0.0, 0.0]\n[plates]\nfolder = "{ROOT / "config/plates"}"\n[flattening]\nplugin = "harmonic"\n'
             f'[[comparison]]\nplugin = "template"\n[output]\nfolder = "results"\nkeep_scans = 0\n{forward}')
 
@@ -205,7 +205,7 @@ class Plant:
         wait("the host", lambda: (self.folder / "results/history.sqlite").exists())
 
     def start_forwarder(self, *arguments):
-        as_the_unit = ["nice", "-n", "10", "ionice", "-c", "3"]
+        as_the_unit = ["chrt", "--idle", "0", "ionice", "-c", "3"]
         self.forwarder = subprocess.Popen([*as_the_unit, PLATEN, "forward", self.plant, *arguments], stdout=subprocess.DEVNULL, stderr=open(self.folder / "forward.log", "a"))
 
     def end(self, what, how=signal.SIGTERM):

@@ -29,6 +29,8 @@ pub(super) struct RandomScene {
     pub(super) target: Target,
     /// Share of wide range errors and their factor.
     tails: [f64; 2],
+    /// Angle by which the table shows beyond the far edges, degrees; 0: a wide table.
+    strip_deg: f64,
     pub(super) setting: Setting,
     /// Height of the scanner over that of the simulator's shop, metres.
     scanner_m: f64,
@@ -37,8 +39,9 @@ pub(super) struct RandomScene {
 }
 
 impl RandomScene {
-    /// Draws the scene of a seed. The same seed gives the same scene in every family but for edges and errors.
-    pub(super) fn of(family: Family, seed: u64) -> Self {
+    /// Draws the scene of a seed. The same seed gives the same scene in every family but for edges, errors and what hides the plate.
+    /// `cyclic_mm` is the amplitude of the cyclic range error, drawn where it is not given.
+    pub(super) fn of(family: Family, cyclic_mm: Option<f64>, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x7363_656e_6573);
         let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
         let size_mm = [between(2000.0, 5000.0), between(1500.0, 4000.0), between(25.0, 50.0)].map(f64::round);
@@ -115,12 +118,15 @@ impl RandomScene {
         let hidden_by = *random
             .choice(&["nothing", "nothing", "person", "chain", "nothing", "both"])
             .unwrap_or(&"nothing");
-        let cyclic_mm = if random.u32(0..3) == 0 { cyclic } else { 0.0 };
+        let drawn_mm = if random.u32(0..3) == 0 { cyclic } else { 0.0 };
+        let cyclic_mm = cyclic_mm.unwrap_or(drawn_mm);
         let setting = Setting { step_deg, noise_mm, ..Setting::of_accuracy(noise_mm, seed) };
         let bevel_mm = if family == Family::Bevel { bevel(&mut random, size_mm[2]) } else { [0.0; 2] };
         let tails = if family == Family::Tails { TAILS } else { [0.0, 1.0] };
+        let strip_deg = if family == Family::Strip { step_deg * (1.0 + random.f64()) } else { 0.0 };
+        let hidden_by = if family == Family::Hidden { "person at corner" } else { hidden_by };
         let scene = Scene { name: name.into(), size_mm, shape, centre_mm, bevel_mm, yaw_deg };
-        Self { scene, target, tails, setting, scanner_m, cyclic_mm, hidden_by }
+        Self { scene, target, tails, strip_deg, setting, scanner_m, cyclic_mm, hidden_by }
     }
 
     /// Scans the scene.
@@ -130,6 +136,7 @@ impl RandomScene {
             ("cyclic_mm", Value::Float(self.cyclic_mm)),
             ("wide_share", Value::Float(self.tails[0])),
             ("wide_factor", Value::Float(self.tails[1])),
+            ("strip_deg", Value::Float(self.strip_deg)),
             ("hidden_by", Value::String(self.hidden_by.to_owned())),
         ];
         self.scene.scan(catalogue, folder, self.setting, &more)
@@ -139,12 +146,14 @@ impl RandomScene {
     pub(super) fn words(&self) -> String {
         let [w, h, t] = self.scene.size_mm;
         let [x, ..] = self.scene.centre_mm;
+        let strip =
+            if self.strip_deg > 0.0 { format!(", strip {:.3} deg", self.strip_deg) } else { String::new() };
         let edges = match self.scene.bevel_mm {
             [0.0, _] => String::new(),
             [inset, root] => format!(", face inset {inset}, root face {root}"),
         };
         format!(
-            "{} {w:.0} x {h:.0} x {t:.0}{edges}, {:.1} m away, {:.1} m high, yaw {:.0}, {:.3} deg, noise {:.1}, cyclic {:.2}, hidden by {}",
+            "{} {w:.0} x {h:.0} x {t:.0}{edges}, {:.1} m away, {:.1} m high, yaw {:.0}, {:.3} deg, noise {:.1}, cyclic {:.2}, hidden by {}{strip}",
             self.scene.name,
             0.001 * x,
             self.scanner_m - 0.001 * PLATE_MM,
@@ -194,15 +203,15 @@ mod tests {
     fn a_scene_follows_from_its_seed_and_lies_in_the_family() {
         for seed in 0..500 {
             let RandomScene { scene, setting, scanner_m, cyclic_mm, .. } =
-                RandomScene::of(Family::Square, seed);
+                RandomScene::of(Family::Square, None, seed);
             assert!((-0.2..=1.8).contains(&scanner_m), "{seed}");
             let [w, h, t] = scene.size_mm;
             assert!((2000.0..=5000.0).contains(&w) && (1500.0..=4000.0).contains(&h), "{seed}");
             assert!((25.0..=50.0).contains(&t) && (0.03..=0.055).contains(&setting.step_deg), "{seed}");
             assert!((0.3..=1.5).contains(&setting.noise_mm) && (0.0..=0.3).contains(&cyclic_mm), "{seed}");
             assert_eq!(
-                RandomScene::of(Family::Square, seed).words(),
-                RandomScene::of(Family::Square, seed).words()
+                RandomScene::of(Family::Square, None, seed).words(),
+                RandomScene::of(Family::Square, None, seed).words()
             );
         }
     }

@@ -39,6 +39,10 @@ pub enum Family {
     Bevel,
     /// 5 % of the ranges with errors of four times the standard deviation of the others
     Tails,
+    /// A table shows in one to two rows beyond the far edges
+    Strip,
+    /// A person stands before the nearest corner
+    Hidden,
 }
 
 /// A lattice of the part `scale`.
@@ -81,6 +85,12 @@ pub struct BenchArguments {
     /// Family of the random scenes: edges of the plate and errors of the scanner
     #[arg(long, value_enum, default_value_t, requires = "random")]
     pub family: Family,
+    /// Amplitude of the cyclic range error in every random scene, millimetres, instead of up to 0.3 mm in a third of them
+    #[arg(long, value_name = "MM", requires = "random")]
+    pub cyclic_mm: Option<f64>,
+    /// File of `platen calibrate`: the scanner's error in the stated uncertainties, instead of the simulated instrument's own figure
+    #[arg(long, value_name = "FILE", requires = "random")]
+    pub calibration: Option<PathBuf>,
     /// Plates of `advice`, two fifths of them where a part or a press is varied; seeds count up from --seed
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub plates: u64,

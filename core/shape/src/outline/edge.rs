@@ -81,22 +81,29 @@ impl EdgeData {
 }
 
 /// Fits the four edges. Half the angle that a beam sees is first counted from the mixed pixels, then estimated at each edge that shows
-/// it, and their mean taken for those that do not.
+/// it, and their mean taken for those that do not. It is the scanner's, not the edge's: cells of a narrow background that pass for mixed pixels
+/// make one edge show far more than the others, and that edge takes theirs.
 ///
 /// # Errors
 /// [`OutlineError::Edge`] when too little of one is seen.
 pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
     // Along an edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
     let any = edges.iter().any(|edge| edge.dithered);
-    let lines = edges.iter().filter(|edge| edge.dithered || !any).flat_map(|edge| &edge.lines);
-    let counted = footprint::by_number(lines, sampling.angle);
+    let counting: Vec<&[LatticeLine]> =
+        edges.iter().filter(|edge| edge.dithered || !any).map(|edge| edge.lines.as_slice()).collect();
+    let counted = footprint::counted(&counting, sampling.angle);
     let telling = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
-    let fit = |k: usize, footprint| Edge::fit(edges[k].clone(), footprint, sampling);
-    let [a, b, c, d] = of_each(|k| telling[k].then(|| fit(k, counted)).transpose());
-    let fitted = [a?, b?, c?, d?];
+    let fit = |k: usize, footprint, own| Edge::fit(edges[k].clone(), footprint, own, sampling);
+    let [a, b, c, d] = of_each(|k| telling[k].then(|| fit(k, counted, true)).transpose());
+    let mut fitted = [a?, b?, c?, d?];
     let found: Vec<f64> = fitted.iter().flatten().map(|edge| edge.footprint).collect();
-    let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
-    let [a, b, c, d] = of_each(|k| fitted[k].clone().map_or_else(|| fit(k, common), Ok));
+    let most = footprint::most_of_an_edge(&found);
+    let (usual, apart): (Vec<f64>, Vec<f64>) = found.into_iter().partition(|footprint| *footprint <= most);
+    let common = if usual.is_empty() { counted } else { usual.iter().sum::<f64>() / usual.len() as f64 };
+    for edge in &mut fitted {
+        edge.take_if(|edge| apart.contains(&edge.footprint));
+    }
+    let [a, b, c, d] = of_each(|k| fitted[k].clone().map_or_else(|| fit(k, common, !telling[k]), Ok));
     Ok([a?, b?, c?, d?])
 }
 
@@ -125,11 +132,16 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians.
+    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians; with `own` that of this edge is estimated from it.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
-    pub(super) fn fit(data: EdgeData, footprint: f64, sampling: Sampling) -> Result<Self, OutlineError> {
+    pub(super) fn fit(
+        data: EdgeData,
+        footprint: f64,
+        own: bool,
+        sampling: Sampling,
+    ) -> Result<Self, OutlineError> {
         let Sampling { step, noise, .. } = sampling;
         let EdgeData { strip, side_face, lines, dithered, from, to } = data;
         let (start, end) = strip.span();
@@ -145,7 +157,7 @@ impl Edge {
         let (mut used, mut curve, mut precision) = fit(beam).ok_or_else(too_few)?;
         for _ in 0..FOOTPRINT_ROUNDS {
             let last = beam.footprint;
-            if footprint > 0.0 {
+            if own && footprint > 0.0 {
                 beam.footprint = footprint::at_edge(&lines, |along| curve.at(along), footprint);
             }
             // The same footprint gives the same curve, and that one the same footprint.

@@ -16,9 +16,25 @@ pub(super) fn is_shown(lines: &[LatticeLine]) -> bool {
     lines.iter().filter(|line| line.shows_footprint()).count() >= LEAST_LINES
 }
 
-/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels on all edges; 0 where
-/// too few lines show it. `angle` is that between beams.
-pub(super) fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f64 {
+/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels: the median of the edges that show it, of two
+/// the lesser one; of all together where none does. 0 where too few lines show it. `angle` is that between beams.
+pub(super) fn counted(edges: &[&[LatticeLine]], angle: f64) -> f64 {
+    let each: Vec<f64> =
+        edges.iter().map(|lines| by_number(lines.iter(), angle)).filter(|one| *one > 0.0).collect();
+    median(each).unwrap_or_else(|| by_number(edges.iter().copied().flatten(), angle))
+}
+
+/// Returns the largest footprint that an edge may show beside those of the others.
+pub(super) fn most_of_an_edge(found: &[f64]) -> f64 {
+    median(found.to_vec()).map_or(0.0, |median| median * (1.0 + 3.0 * FOOTPRINT_SPREAD))
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len().saturating_sub(1) / 2).copied()
+}
+
+fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f64 {
     /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
     const MOST_CELLS: f64 = 3.0;
     let (mut n, mut mixed, mut expected) = (0, 0.0, 0.0);
@@ -60,4 +76,29 @@ pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64
         let trials = trials.map(|footprint| (fits(footprint), footprint));
         trials.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, footprint)| footprint)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lattice_line::tests::open_line;
+    use super::*;
+
+    /// Lines of an edge in the open of which every second has so many mixed pixels.
+    fn edge(mixed: f64) -> Vec<LatticeLine> {
+        let per_step = open_line(None).per_step;
+        let of = |k: usize| k.is_multiple_of(2).then_some((0.0, (mixed - 1.0) * per_step));
+        (0..200).map(|k| open_line(of(k))).collect()
+    }
+
+    #[test]
+    fn an_edge_of_false_mixed_pixels_does_not_make_the_footprint_wider() {
+        let [narrow, wide] = [1.0, 4.0].map(edge);
+        let of = |edges: &[&[LatticeLine]]| counted(edges, 6e-4);
+        let alone = of(&[&narrow]);
+        assert!(alone > 0.0 && of(&[&wide]) > 3.9 * alone);
+        assert_eq!(of(&[&narrow, &wide]), alone);
+        assert_eq!(of(&[&wide, &narrow, &narrow]), alone);
+        let found = [1.0, 1.1, 4.0].map(|times| times * alone);
+        assert!((found[1]..found[2]).contains(&most_of_an_edge(&found)));
+    }
 }

@@ -33,6 +33,9 @@ const FACE_NOISE: f64 = 0.03;
 const SIDE_SLACK: f64 = 1.1;
 const SIDE_SLOPE: f64 = 0.1;
 
+/// Standard deviations of its range by which the last cell of the face may lie farther out on the side face.
+const LAST_BOUND: f64 = 4.0;
+
 /// Properties of the beams.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BeamModel {
@@ -159,9 +162,10 @@ impl LatticeLine {
             return of([EdgeObservation::At(self.off + on_side).within(soft), last]);
         }
         let mut above = Bound { sure: self.low, likely: self.low };
-        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that.
-        let mut below =
-            Bound { sure: self.high + self.side.min(seen), likely: self.high - (seen - self.side).max(0.0) };
+        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that. The last cell of the face lies on
+        // the side face as far out as its range falls behind.
+        let outside = (self.behind.max(0.0) + LAST_BOUND * cell_noise).min(self.side).min(seen);
+        let mut below = Bound { sure: self.high + outside, likely: self.high - (seen - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
             above.sure += self.side;
             above.likely += self.side + seen;
@@ -191,4 +195,51 @@ pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64
 /// Returns the length of (a, b) without the range checks of `hypot`.
 fn norm(a: f64, b: f64) -> f64 {
     (a * a + b * b).sqrt()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A line without mixed pixels at a side face that shows 1.35 mm beside the edge and falls 50 mm behind per millimetre; a beam sees 1.6 mm.
+    fn line(behind: f64) -> LatticeLine {
+        LatticeLine {
+            along: 0.0,
+            place: [0; 2],
+            low: -4e-3,
+            high: 1.7e-3,
+            mixed: None,
+            complete: true,
+            beyond: Beyond::Behind,
+            per_radian: 10.0,
+            per_angle: 6e-3,
+            per_step: 5.7e-3,
+            side: 1.35e-3,
+            per_range: 0.02,
+            off: -4e-3,
+            on_side: 0.05,
+            off_per_range: 0.02,
+            cell: 1.7e-3,
+            behind,
+            cell_per_range: 0.02,
+        }
+    }
+
+    /// The same where the side face is hidden, with these mixed pixels.
+    pub(crate) fn open_line(mixed: Option<(f64, f64)>) -> LatticeLine {
+        LatticeLine { side: 0.0, mixed, ..line(0.0) }
+    }
+
+    /// Likelihood of an edge so far inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
+    fn inside(line: &LatticeLine, far: f64) -> f64 {
+        let of = line.likelihood(BeamModel::of(1.6e-4), 7e-4);
+        of.value(line.high + far) / of.value(line.high)
+    }
+
+    #[test]
+    fn a_last_cell_whose_range_is_that_of_the_face_is_not_on_the_side_face() {
+        assert!(inside(&line(0.0), 1e-3) < 0.1, "{}", inside(&line(0.0), 1e-3));
+        // One that falls behind by as much as the side face does may be.
+        assert!(inside(&line(1.2e-3), 1e-3) > 0.3, "{}", inside(&line(1.2e-3), 1e-3));
+    }
 }
