@@ -198,3 +198,36 @@ fn the_shop_shows_all_it_has_and_hides_what_it_should() {
     let share = share_seen(hidden);
     assert!((0.8..0.99).contains(&share), "{share}");
 }
+
+#[test]
+fn a_person_hides_the_nearest_corner() {
+    let plate = plate(Shape::Flat);
+    let hidden = Surroundings { person_at_corner: true, ..Surroundings::default() };
+    let scene = Scene::new(Some(plate.clone()), &hidden);
+    let mut corners = plate.corners();
+    corners.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    // The farthest one may lie behind the person's head.
+    assert_eq!([0, 1, 2].map(|k| scene.sees(corners[k])), [false, true, true]);
+}
+
+#[test]
+fn a_strip_of_the_table_shows_beyond_the_far_edges() {
+    let (plate, strip) = (plate(Shape::Flat), 1e-3);
+    let narrow = Surroundings { strip: Some(strip), ..Surroundings::default() };
+    let scene = Scene::new(Some(plate.clone()), &narrow);
+    let (corners, centre) = (plate.corners(), plate.scanner_from_plate().translation.vector);
+    let middles = [0, 1, 2, 3].map(|edge| 0.5 * (corners[edge] + corners[(edge + 1) % 4]));
+    let far: Vec<Vec3> = middles.into_iter().filter(|middle| middle.norm() > centre.norm()).collect();
+    assert_eq!(far.len(), 2);
+    for middle in far {
+        let raised = |angle: f64| {
+            let across = middle.xy().norm();
+            let elevation = middle.z.atan2(across) + angle;
+            let beam = Vec3::new(middle.x, middle.y, across * elevation.tan());
+            scene.cast(&towards(beam), 100.0).unwrap().label
+        };
+        // The plate leans by a degree: its edges are not level.
+        assert_eq!([raised(-0.3 * strip), raised(0.3 * strip)], [Label::PlateTop, Label::Table]);
+        assert_ne!(raised(1.5 * strip), Label::Table);
+    }
+}

@@ -76,7 +76,7 @@ def main():
         os.chmod(memory, 0o755)
         site = Site(folder, servers=memory)
         try:
-            plant = site.press("press-1", "postgresql", "mqtt", strokes=14, parts=wanted // 14 + 3, between_ms=100, step_deg=0.15)
+            plant = site.press("press-1", "postgresql", "mqtt", strokes=14, parts=wanted // 5, between_ms=100, step_deg=0.15)
             site.prepare()
             postmaster = int((site.postgresql.data / "postmaster.pid").read_text().split()[0])
             give_way(postmaster, site.mosquitto.process.pid)

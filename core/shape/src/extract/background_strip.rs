@@ -1,11 +1,17 @@
 //! Mixed pixels that are none: cells of a strip of background one or two cells wide, told by the range of the background.
 //!
 //! A table that shows beside the plate, or the foot of a wall, has cells with neighbours of another range on both sides, as a
-//! mixed pixel has. Where the background is wide enough its cells are sound; a plane in inverse range through those nearby
-//! predicts it, and a cell that it predicts belongs to it. A beam that is mixed along an edge parallel to a row passes through
-//! all ranges as smoothly, but not through those of the plane. Own.
+//! mixed pixel has. Two planes in inverse range tell them:
+//!
+//! - Where the background is wide enough its cells are sound; a plane through those nearby predicts it, and a cell that it predicts belongs to
+//!   it. A beam that is mixed along an edge parallel to a row passes through all ranges as smoothly, but not through those of the plane.
+//! - Where it is nowhere wide, the strip's own cells lie on a plane (RANSAC, Fischler and Bolles 1981) that no incidence makes too steep; mixed
+//!   pixels along an edge pass from the plate's range to that behind it within a footprint. A strip within one row or column stays mixed: it has no plane.
+//!
+//! Own.
 
 use nalgebra::{Matrix3, Vector3};
+use platen_numerics::random::Random;
 
 use super::mixed_pixels::Pixel;
 use super::range_noise::Noise;
@@ -17,6 +23,12 @@ const LEAST_CELLS: usize = 8;
 
 /// Steepest surface, metres of range per metre across the beam: that of an incidence of 76 degrees.
 const STEEPEST: f32 = 4.0;
+
+/// The same of a plane through mixed pixels: reach, fewest of them, incidence of 83 degrees; pairs that are tried.
+const STRIP_REACH: usize = 12;
+const STRIP_CELLS: usize = 12;
+const STRIP_STEEPEST: f32 = 8.0;
+const TRIALS: usize = 32;
 
 /// Largest departure from the plane, in standard deviations, and largest variance of the plane there, in that of a cell.
 const BOUND: f64 = 5.0;
@@ -31,9 +43,17 @@ const ROUNDS: usize = 8;
 /// Marks the mixed pixels that continue a surface off the component as sound.
 pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     let mut mixed: Vec<usize> = (0..pixels.len()).filter(|index| pixels[*index] == Pixel::Mixed).collect();
+    let mut near = Vec::new();
+    for &index in &mixed {
+        if pixels[index] == Pixel::Mixed && lies_on_a_strip(window, noise, pixels, index, &mut near) {
+            pixels[index] = Pixel::Sound;
+            near.iter().for_each(|cell| pixels[cell.index] = Pixel::Sound);
+        }
+    }
+    mixed.retain(|index| pixels[*index] == Pixel::Mixed);
     for _ in 0..ROUNDS {
         let (strip, rest): (Vec<usize>, Vec<usize>) =
-            mixed.iter().partition(|index| continues_a_plane(window, noise, pixels, **index));
+            mixed.iter().partition(|index| continues_a_plane(window, noise, pixels, **index, &mut near));
         if strip.is_empty() {
             break;
         }
@@ -43,47 +63,130 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
 }
 
 /// Returns true when the plane through the sound cells around a cell, of about its range, predicts it.
-fn continues_a_plane(window: &Window, noise: &Noise, pixels: &[Pixel], index: usize) -> bool {
-    let n_rows = window.n_rows;
-    let (column, row) = (index / n_rows, index % n_rows);
+fn continues_a_plane(
+    window: &Window,
+    noise: &Noise,
+    pixels: &[Pixel],
+    index: usize,
+    near: &mut Vec<Beside>,
+) -> bool {
     // A sound cell amid a row or a column of mixed ones, at an edge parallel to it, tells too little.
     let is_mixed = |at: usize| pixels[at] == Pixel::Mixed;
-    if [1, n_rows].iter().any(|step| is_mixed(index - step) && is_mixed(index + step)) {
+    if [1, window.n_rows].iter().any(|step| is_mixed(index - step) && is_mixed(index + step)) {
         return false;
     }
+    collect(window, pixels, index, (Pixel::Sound, REACH, STEEPEST), near);
+    near.len() >= LEAST_CELLS && is_predicted(near, expected(window, noise, index))
+}
+
+/// Returns true when a cell lies on a plane with other mixed pixels nearby; leaves those in `near`.
+fn lies_on_a_strip(
+    window: &Window,
+    noise: &Noise,
+    pixels: &[Pixel],
+    index: usize,
+    near: &mut Vec<Beside>,
+) -> bool {
+    collect(window, pixels, index, (Pixel::Mixed, 1, STRIP_STEEPEST), near);
+    if near.is_empty() {
+        return false;
+    }
+    collect(window, pixels, index, (Pixel::Mixed, STRIP_REACH, STRIP_STEEPEST), near);
+    if near.len() < STRIP_CELLS {
+        return false;
+    }
+    let expected = expected(window, noise, index);
+    // Inverse range per cell on the steepest surface.
+    let (across, down) = (window.header.azimuth_step, window.header.elevation_step);
+    let steepest = f64::from(STRIP_STEEPEST) * f64::from(window.inverse[index]);
+    let mut random = Random::new(index as u64);
+    let mut best: Option<(usize, [f64; 2])> = None;
+    for _ in 0..TRIALS {
+        let (a, b) = (&near[random.below(near.len())], &near[random.below(near.len())]);
+        let area = a.x * b.y - a.y * b.x;
+        if area == 0.0 {
+            continue;
+        }
+        let slope = [(a.off * b.y - b.off * a.y) / area, (a.x * b.off - b.x * a.off) / area];
+        if (slope[0] / across).hypot(slope[1] / down) > steepest {
+            continue;
+        }
+        let count = near.iter().filter(|cell| cell.is_on(slope, expected)).count();
+        if best.is_none_or(|(known, _)| count > known) {
+            best = Some((count, slope));
+        }
+    }
+    let Some((_, slope)) = best.filter(|(count, _)| *count >= STRIP_CELLS) else { return false };
+    near.retain(|cell| cell.is_on(slope, expected));
+    is_predicted(near, expected)
+}
+
+/// Standard deviation of the inverse range of a cell.
+fn expected(window: &Window, noise: &Noise, index: usize) -> f64 {
+    f64::from(noise.at(index)) * f64::from(window.inverse[index]).powi(2)
+}
+
+/// A cell beside another one.
+#[derive(Debug, Clone, Copy)]
+struct Beside {
+    index: usize,
+    /// Columns and rows to it.
+    x: f64,
+    y: f64,
+    /// Its inverse range minus that of the other.
+    off: f64,
+}
+
+impl Beside {
+    /// Returns true when the plane of this slope through the other cell predicts this one.
+    fn is_on(&self, [x, y]: [f64; 2], expected: f64) -> bool {
+        (self.off - x * self.x - y * self.y).abs() <= BOUND * expected
+    }
+}
+
+/// Collects the cells of a class around a cell, up to `reach` columns and rows off, that one surface no steeper than `steepest` may hold with it.
+fn collect(
+    window: &Window,
+    pixels: &[Pixel],
+    index: usize,
+    (class, reach, steepest): (Pixel, usize, f32),
+    near: &mut Vec<Beside>,
+) {
+    near.clear();
+    let n_rows = window.n_rows;
+    let (column, row) = (index / n_rows, index % n_rows);
     let range = window.cells[index].range_m;
     let (across, down) = (window.header.azimuth_step as f32, window.header.elevation_step as f32);
-    let farthest = (STEEPEST * range).powi(2);
-    let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(window.n_columns);
-    let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(n_rows);
-    let (mut moments, mut rhs, mut square, mut n) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0);
-    for c in columns {
+    let farthest = (steepest * range).powi(2);
+    let rows = row.saturating_sub(reach)..(row + reach + 1).min(n_rows);
+    for c in column.saturating_sub(reach)..(column + reach + 1).min(window.n_columns) {
         for r in rows.clone() {
             let at = c * n_rows + r;
             let (x, y) = (c as f32 - column as f32, r as f32 - row as f32);
             let apart = x * across * x * across + y * down * y * down;
             let deeper = window.cells[at].range_m - range;
-            if pixels[at] != Pixel::Sound || window.own[at] || deeper * deeper > farthest * apart {
-                continue;
+            if pixels[at] == class && at != index && !window.own[at] && deeper * deeper <= farthest * apart {
+                let off = f64::from(window.inverse[at] - window.inverse[index]);
+                near.push(Beside { index: at, x: x.into(), y: y.into(), off });
             }
-            // Departures from the cell's own inverse range: the plane at the cell is the error of the prediction.
-            let basis = Vector3::new(1.0, f64::from(x), f64::from(y));
-            let off = f64::from(window.inverse[at] - window.inverse[index]);
-            moments += basis * basis.transpose();
-            rhs += basis * off;
-            square += off * off;
-            n += 1;
         }
     }
-    if n < LEAST_CELLS {
-        return false;
+}
+
+/// Returns true when the least-squares plane through the cells around a cell predicts that one; `expected` is its standard deviation.
+fn is_predicted(near: &[Beside], expected: f64) -> bool {
+    let (mut moments, mut rhs, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    for cell in near {
+        // Departures from the cell's own inverse range: the plane at the cell is the error of the prediction.
+        let basis = Vector3::new(1.0, cell.x, cell.y);
+        moments += basis * basis.transpose();
+        rhs += basis * cell.off;
+        square += cell.off * cell.off;
     }
     let Some(factor) = moments.cholesky() else { return false };
     let plane = factor.solve(&rhs);
     let leverage = factor.inverse()[(0, 0)];
-    let residual = ((square - plane.dot(&rhs)).max(0.0) / (n - 3) as f64).sqrt();
-    let inverse = f64::from(window.inverse[index]);
-    let expected = f64::from(noise.at(index)) * inverse * inverse;
+    let residual = ((square - plane.dot(&rhs)).max(0.0) / (near.len() - 3) as f64).sqrt();
     let sigma = residual.max(expected);
     residual <= MOST_NOISE * expected
         && leverage <= MOST_LEVERAGE
@@ -164,6 +267,15 @@ mod tests {
     fn a_strip_that_narrows_is_background() {
         // The table's strip is 8 cells wide at the bottom and ends at the top.
         let (window, kinds) = scene(0.25, |row| [40.0 - 0.62 * row + 25.0, 40.0 - 0.72 * row + 25.0]);
+        let [[strip, of], [sound, mixed]] = wrong(&window, &kinds);
+        println!("background taken for mixed: {strip} of {of}; mixed taken for sound: {sound} of {mixed}");
+        assert!(strip * 100 < of && sound * 20 < mixed);
+    }
+
+    #[test]
+    fn a_strip_that_is_nowhere_wide_is_background() {
+        // One to two cells of the table show all along the edge, which crosses a column within two rows.
+        let (window, kinds) = scene(0.25, |row| [65.0 - 0.62 * row, 63.0 - 0.62 * row]);
         let [[strip, of], [sound, mixed]] = wrong(&window, &kinds);
         println!("background taken for mixed: {strip} of {of}; mixed taken for sound: {sound} of {mixed}");
         assert!(strip * 100 < of && sound * 20 < mixed);

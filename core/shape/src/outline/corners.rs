@@ -27,6 +27,10 @@ const PAIR_PART: f64 = 0.4;
 /// Points to either side over which the loop is levelled before its length is measured.
 const LEVELLED: usize = 4;
 
+/// Neighbouring points farther apart, in lattice steps, have a hidden part of the edge between them, which adds nothing to the length: where a corner is hidden
+/// the points beyond it tell its other edge.
+const GAP_STEPS: f64 = 8.0;
+
 /// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
 /// by a few degrees only.
 const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
@@ -50,7 +54,7 @@ pub(super) struct Corner {
 /// [`OutlineError::Corners`] when there are not four.
 pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 4], OutlineError> {
     let reach = NEIGHBOUR_PART * shorter;
-    let around = Loop::new(points);
+    let around = Loop::new(points, GAP_STEPS * step);
     let mut candidates = Vec::new();
     for at in around.sharpest_turns(reach) {
         let mut random = Random::new(SEED ^ at as u64);
@@ -110,16 +114,20 @@ struct Loop<'a> {
 }
 
 impl<'a> Loop<'a> {
-    fn new(points: &'a [Vec2]) -> Self {
+    fn new(points: &'a [Vec2], gap: f64) -> Self {
         let n = points.len();
+        let to_next = |i: usize| {
+            let step = points[(i + 1) % n] - points[i % n];
+            if step.norm() > gap { Vec2::zeros() } else { step }
+        };
         // Points lie up to half a step to either side of the edge: from one to the next is farther than along it.
-        let mean = |i: usize| {
-            let around = (0..=2 * LEVELLED).map(|k| points[(i + k + LEVELLED * (n - 1)) % n]);
+        let levelled = |i: usize| {
+            let around = (0..=2 * LEVELLED).map(|k| to_next(i + k + LEVELLED * (n - 1)));
             around.sum::<Vec2>() / (2 * LEVELLED + 1) as f64
         };
         let mut length = vec![0.0];
         for i in 0..n {
-            length.push(length[i] + (mean(i + 1) - mean(i)).norm());
+            length.push(length[i] + levelled(i).norm());
         }
         Self { points, length }
     }
