@@ -202,12 +202,18 @@ fn the_shop_shows_all_it_has_and_hides_what_it_should() {
 #[test]
 fn a_person_hides_the_nearest_corner() {
     let plate = plate(Shape::Flat);
-    let hidden = Surroundings { person_at_corner: true, ..Surroundings::default() };
-    let scene = Scene::new(Some(plate.clone()), &hidden);
-    let mut corners = plate.corners();
+    let (far_u, far_v) = (plate.width() - 0.02, plate.height() - 0.02);
+    let mut corners =
+        [(0.02, 0.02), (far_u, 0.02), (far_u, far_v), (0.02, far_v)].map(|(u, v)| plate.top(u, v));
     corners.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let seen = |person_at_corner| {
+        let around = Surroundings { person_at_corner, ..Surroundings::default() };
+        let scene = Scene::new(Some(plate.clone()), &around);
+        corners.map(|corner| scene.sees(corner))
+    };
+    assert_eq!(seen(false), [true; 4]);
     // The farthest one may lie behind the person's head.
-    assert_eq!([0, 1, 2].map(|k| scene.sees(corners[k])), [false, true, true]);
+    assert_eq!(seen(true)[..3], [false, true, true]);
 }
 
 #[test]
