@@ -24,11 +24,15 @@ const LEAST_CELLS: usize = 8;
 /// Steepest surface, metres of range per metre across the beam: that of an incidence of 76 degrees.
 const STEEPEST: f32 = 4.0;
 
-/// The same of a plane through mixed pixels: reach, fewest of them, incidence of 83 degrees; pairs that are tried.
+/// The same of a plane through mixed pixels: reach, fewest of them, incidence of 81 degrees; pairs that are tried. The plane holds at least half of
+/// the mixed pixels nearby.
 const STRIP_REACH: usize = 12;
-const STRIP_CELLS: usize = 12;
-const STRIP_STEEPEST: f32 = 8.0;
+const STRIP_CELLS: usize = 20;
+const STRIP_STEEPEST: f32 = 6.0;
 const TRIALS: usize = 32;
+
+/// Cells within which it stays away from the plate, by as many of its own steps from cell to cell.
+const APART_CELLS: usize = 3;
 
 /// Largest departure from the plane, in standard deviations, and largest variance of the plane there, in that of a cell.
 const BOUND: f64 = 5.0;
@@ -116,9 +120,27 @@ fn lies_on_a_strip(
             best = Some((count, slope));
         }
     }
-    let Some((_, slope)) = best.filter(|(count, _)| *count >= STRIP_CELLS) else { return false };
+    let least = STRIP_CELLS.max(near.len() / 2);
+    let Some((_, slope)) = best.filter(|(count, _)| *count >= least) else { return false };
     near.retain(|cell| cell.is_on(slope, expected));
-    is_predicted(near, expected)
+    is_predicted(near, expected) && is_apart(window, index, slope)
+}
+
+/// Returns true when the plane of this slope through a cell stays away from the plate: that of mixed pixels leads onto it within a cell or two.
+fn is_apart(window: &Window, index: usize, slope: [f64; 2]) -> bool {
+    let n_rows = window.n_rows;
+    let reach = APART_CELLS as isize;
+    let per_cell = slope[0].abs() + slope[1].abs();
+    let offsets = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y)));
+    offsets.into_iter().all(|(x, y)| {
+        let Some(at) = index.checked_add_signed(x * n_rows as isize + y).filter(|at| *at < window.own.len())
+        else {
+            return true;
+        };
+        let off = f64::from(window.inverse[at] - window.inverse[index]);
+        let predicted = slope[0] * x as f64 + slope[1] * y as f64;
+        !window.own[at] || (off - predicted).abs() > APART_CELLS as f64 * per_cell
+    })
 }
 
 /// Standard deviation of the inverse range of a cell.
