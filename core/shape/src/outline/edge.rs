@@ -96,13 +96,12 @@ pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge;
     let fit = |k: usize, footprint, own| Edge::fit(edges[k].clone(), footprint, own, sampling);
     let [a, b, c, d] = of_each(|k| telling[k].then(|| fit(k, counted, true)).transpose());
     let mut fitted = [a?, b?, c?, d?];
-    let found: Vec<f64> = fitted.iter().flatten().map(|edge| edge.footprint).collect();
-    let most = footprint::most_of_an_edge(&found);
-    let (usual, apart): (Vec<f64>, Vec<f64>) = found.into_iter().partition(|footprint| *footprint <= most);
-    let common = if usual.is_empty() { counted } else { usual.iter().sum::<f64>() / usual.len() as f64 };
+    let most = footprint::most_of_an_edge(fitted.iter().flatten().map(|edge| edge.footprint));
     for edge in &mut fitted {
-        edge.take_if(|edge| apart.contains(&edge.footprint));
+        edge.take_if(|edge| edge.footprint > most);
     }
+    let found: Vec<f64> = fitted.iter().flatten().map(|edge| edge.footprint).collect();
+    let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
     let [a, b, c, d] = of_each(|k| fitted[k].clone().map_or_else(|| fit(k, common, !telling[k]), Ok));
     Ok([a?, b?, c?, d?])
 }

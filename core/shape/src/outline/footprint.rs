@@ -16,24 +16,26 @@ pub(super) fn is_shown(lines: &[LatticeLine]) -> bool {
     lines.iter().filter(|line| line.shows_footprint()).count() >= LEAST_LINES
 }
 
-/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels: the median of the edges that show it, of two
-/// the lesser one; of all together where none does. 0 where too few lines show it. `angle` is that between beams.
+/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels: the lower median of the edges that show
+/// it, or all edges together where none does; 0 where too few lines show it. `angle` is that between beams.
 pub(super) fn counted(edges: &[&[LatticeLine]], angle: f64) -> f64 {
-    let each: Vec<f64> =
-        edges.iter().map(|lines| by_number(lines.iter(), angle)).filter(|one| *one > 0.0).collect();
-    median(each).unwrap_or_else(|| by_number(edges.iter().copied().flatten(), angle))
+    let each = edges.iter().map(|lines| by_number(lines.iter(), angle)).filter(|one| *one > 0.0);
+    lower_median(each).unwrap_or_else(|| by_number(edges.iter().copied().flatten(), angle))
 }
 
 /// Returns the largest footprint that an edge may show beside those of the others.
-pub(super) fn most_of_an_edge(found: &[f64]) -> f64 {
-    median(found.to_vec()).map_or(0.0, |median| median * (1.0 + 3.0 * FOOTPRINT_SPREAD))
+pub(super) fn most_of_an_edge(found: impl Iterator<Item = f64>) -> f64 {
+    lower_median(found).map_or(0.0, |median| median * (1.0 + 3.0 * FOOTPRINT_SPREAD))
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+/// Returns the lower median, of two values the lesser: cells that pass for mixed pixels only make a footprint wider.
+fn lower_median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len().saturating_sub(1) / 2).copied()
 }
 
+/// Estimates it from the number of mixed pixels per line.
 fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f64 {
     /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
     const MOST_CELLS: f64 = 3.0;
@@ -99,6 +101,6 @@ mod tests {
         assert_eq!(of(&[&narrow, &wide]), alone);
         assert_eq!(of(&[&wide, &narrow, &narrow]), alone);
         let found = [1.0, 1.1, 4.0].map(|times| times * alone);
-        assert!((found[1]..found[2]).contains(&most_of_an_edge(&found)));
+        assert!((found[1]..found[2]).contains(&most_of_an_edge(found.into_iter())));
     }
 }
