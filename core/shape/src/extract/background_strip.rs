@@ -31,9 +31,6 @@ const STRIP_CELLS: usize = 20;
 const STRIP_STEEPEST: f32 = 6.0;
 const TRIALS: usize = 32;
 
-/// Cells within which it stays away from the plate, by as many of its own steps from cell to cell.
-const APART_CELLS: usize = 3;
-
 /// Largest departure from the plane, in standard deviations, and largest variance of the plane there, in that of a cell.
 const BOUND: f64 = 5.0;
 const MOST_LEVERAGE: f64 = 1.0;
@@ -46,18 +43,18 @@ const ROUNDS: usize = 8;
 
 /// Marks the mixed pixels that continue a surface off the component as sound.
 pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
+    let mut planes = Planes { window, noise, near: Vec::new() };
     let mut mixed: Vec<usize> = (0..pixels.len()).filter(|index| pixels[*index] == Pixel::Mixed).collect();
-    let mut near = Vec::new();
     for &index in &mixed {
-        if pixels[index] == Pixel::Mixed && lies_on_a_strip(window, noise, pixels, index, &mut near) {
+        if pixels[index] == Pixel::Mixed && planes.hold_a_strip(pixels, index) {
             pixels[index] = Pixel::Sound;
-            near.iter().for_each(|cell| pixels[cell.index] = Pixel::Sound);
+            planes.near.iter().for_each(|cell| pixels[cell.index] = Pixel::Sound);
         }
     }
     mixed.retain(|index| pixels[*index] == Pixel::Mixed);
     for _ in 0..ROUNDS {
         let (strip, rest): (Vec<usize>, Vec<usize>) =
-            mixed.iter().partition(|index| continues_a_plane(window, noise, pixels, **index, &mut near));
+            mixed.iter().partition(|index| planes.predict(pixels, **index));
         if strip.is_empty() {
             break;
         }
@@ -66,86 +63,97 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     }
 }
 
-/// Returns true when the plane through the sound cells around a cell, of about its range, predicts it.
-fn continues_a_plane(
-    window: &Window,
-    noise: &Noise,
-    pixels: &[Pixel],
-    index: usize,
-    near: &mut Vec<Beside>,
-) -> bool {
-    // A sound cell amid a row or a column of mixed ones, at an edge parallel to it, tells too little.
-    let is_mixed = |at: usize| pixels[at] == Pixel::Mixed;
-    if [1, window.n_rows].iter().any(|step| is_mixed(index - step) && is_mixed(index + step)) {
-        return false;
-    }
-    collect(window, pixels, index, (Pixel::Sound, REACH, STEEPEST), near);
-    near.len() >= LEAST_CELLS && is_predicted(near, expected(window, noise, index))
+/// Planes in inverse range through cells near one of a window.
+struct Planes<'a> {
+    window: &'a Window,
+    noise: &'a Noise,
+    near: Vec<Beside>,
 }
 
-/// Returns true when a cell lies on a plane with other mixed pixels nearby; leaves those in `near`.
-fn lies_on_a_strip(
-    window: &Window,
-    noise: &Noise,
-    pixels: &[Pixel],
-    index: usize,
-    near: &mut Vec<Beside>,
-) -> bool {
-    collect(window, pixels, index, (Pixel::Mixed, 1, STRIP_STEEPEST), near);
-    if near.is_empty() {
-        return false;
-    }
-    collect(window, pixels, index, (Pixel::Mixed, STRIP_REACH, STRIP_STEEPEST), near);
-    if near.len() < STRIP_CELLS {
-        return false;
-    }
-    let expected = expected(window, noise, index);
-    // Inverse range per cell on the steepest surface.
-    let (across, down) = (window.header.azimuth_step, window.header.elevation_step);
-    let steepest = f64::from(STRIP_STEEPEST) * f64::from(window.inverse[index]);
-    let mut random = Random::new(index as u64);
-    let mut best: Option<(usize, [f64; 2])> = None;
-    for _ in 0..TRIALS {
-        let (a, b) = (&near[random.below(near.len())], &near[random.below(near.len())]);
-        let area = a.x * b.y - a.y * b.x;
-        if area == 0.0 {
-            continue;
+impl Planes<'_> {
+    /// Returns true when the plane through the sound cells around a cell, of about its range, predicts it.
+    fn predict(&mut self, pixels: &[Pixel], index: usize) -> bool {
+        // A sound cell amid a row or a column of mixed ones, at an edge parallel to it, tells too little.
+        let is_mixed = |at: usize| pixels[at] == Pixel::Mixed;
+        if [1, self.window.n_rows].iter().any(|step| is_mixed(index - step) && is_mixed(index + step)) {
+            return false;
         }
-        let slope = [(a.off * b.y - b.off * a.y) / area, (a.x * b.off - b.x * a.off) / area];
-        if (slope[0] / across).hypot(slope[1] / down) > steepest {
-            continue;
-        }
-        let count = near.iter().filter(|cell| cell.is_on(slope, expected)).count();
-        if best.is_none_or(|(known, _)| count > known) {
-            best = Some((count, slope));
-        }
+        self.collect(pixels, index, (Pixel::Sound, REACH, STEEPEST));
+        self.near.len() >= LEAST_CELLS && is_predicted(&self.near, self.sigma(index))
     }
-    let least = STRIP_CELLS.max(near.len() / 2);
-    let Some((_, slope)) = best.filter(|(count, _)| *count >= least) else { return false };
-    near.retain(|cell| cell.is_on(slope, expected));
-    is_predicted(near, expected) && is_apart(window, index, slope)
-}
 
-/// Returns true when the plane of this slope through a cell stays away from the plate: that of mixed pixels leads onto it within a cell or two.
-fn is_apart(window: &Window, index: usize, slope: [f64; 2]) -> bool {
-    let n_rows = window.n_rows;
-    let reach = APART_CELLS as isize;
-    let per_cell = slope[0].abs() + slope[1].abs();
-    let offsets = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y)));
-    offsets.into_iter().all(|(x, y)| {
-        let Some(at) = index.checked_add_signed(x * n_rows as isize + y).filter(|at| *at < window.own.len())
-        else {
-            return true;
-        };
-        let off = f64::from(window.inverse[at] - window.inverse[index]);
-        let predicted = slope[0] * x as f64 + slope[1] * y as f64;
-        !window.own[at] || (off - predicted).abs() > APART_CELLS as f64 * per_cell
-    })
-}
+    /// Returns true when a cell lies on a plane with other mixed pixels nearby; leaves those in `near`.
+    fn hold_a_strip(&mut self, pixels: &[Pixel], index: usize) -> bool {
+        self.collect(pixels, index, (Pixel::Mixed, 1, STRIP_STEEPEST));
+        if self.near.is_empty() {
+            return false;
+        }
+        self.collect(pixels, index, (Pixel::Mixed, STRIP_REACH, STRIP_STEEPEST));
+        let least = STRIP_CELLS.max(self.near.len() / 2);
+        let sigma = self.sigma(index);
+        let Some(slope) = self.slope_of_most(index, least) else { return false };
+        self.near.retain(|cell| cell.is_on(slope, sigma));
+        is_predicted(&self.near, sigma)
+    }
 
-/// Standard deviation of the inverse range of a cell.
-fn expected(window: &Window, noise: &Noise, index: usize) -> f64 {
-    f64::from(noise.at(index)) * f64::from(window.inverse[index]).powi(2)
+    /// Returns the slope of the plane through a cell that holds most of those in `near`, and at least so many: RANSAC, from pairs of them.
+    fn slope_of_most(&self, index: usize, least: usize) -> Option<[f64; 2]> {
+        let (near, sigma) = (&self.near, self.sigma(index));
+        if near.len() < least {
+            return None;
+        }
+        // Inverse range per cell on the steepest surface.
+        let (across, down) = (self.window.header.azimuth_step, self.window.header.elevation_step);
+        let steepest = f64::from(STRIP_STEEPEST) * f64::from(self.window.inverse[index]);
+        let mut random = Random::new(index as u64);
+        let mut best: Option<(usize, [f64; 2])> = None;
+        for _ in 0..TRIALS {
+            let (a, b) = (&near[random.below(near.len())], &near[random.below(near.len())]);
+            let area = a.x * b.y - a.y * b.x;
+            let slope = [(a.off * b.y - b.off * a.y) / area, (a.x * b.off - b.x * a.off) / area];
+            if area == 0.0 || (slope[0] / across).hypot(slope[1] / down) > steepest {
+                continue;
+            }
+            let count = near.iter().filter(|cell| cell.is_on(slope, sigma)).count();
+            if best.is_none_or(|(known, _)| count > known) {
+                best = Some((count, slope));
+            }
+        }
+        best.filter(|(count, _)| *count >= least).map(|(_, slope)| slope)
+    }
+
+    /// Collects the cells of a class around a cell, up to `reach` columns and rows off, that one surface no steeper than `steepest` may hold with it.
+    fn collect(&mut self, pixels: &[Pixel], index: usize, (class, reach, steepest): (Pixel, usize, f32)) {
+        self.near.clear();
+        let window = self.window;
+        let n_rows = window.n_rows;
+        let (column, row) = (index / n_rows, index % n_rows);
+        let range = window.cells[index].range_m;
+        let (across, down) = (window.header.azimuth_step as f32, window.header.elevation_step as f32);
+        let farthest = (steepest * range).powi(2);
+        let rows = row.saturating_sub(reach)..(row + reach + 1).min(n_rows);
+        for c in column.saturating_sub(reach)..(column + reach + 1).min(window.n_columns) {
+            for r in rows.clone() {
+                let at = c * n_rows + r;
+                let (x, y) = (c as f32 - column as f32, r as f32 - row as f32);
+                let apart = x * across * x * across + y * down * y * down;
+                let deeper = window.cells[at].range_m - range;
+                if pixels[at] == class
+                    && at != index
+                    && !window.own[at]
+                    && deeper * deeper <= farthest * apart
+                {
+                    let off = f64::from(window.inverse[at] - window.inverse[index]);
+                    self.near.push(Beside { index: at, x: x.into(), y: y.into(), off });
+                }
+            }
+        }
+    }
+
+    /// Returns the standard deviation of the inverse range of a cell.
+    fn sigma(&self, index: usize) -> f64 {
+        f64::from(self.noise.at(index)) * f64::from(self.window.inverse[index]).powi(2)
+    }
 }
 
 /// A cell beside another one.
@@ -163,35 +171,6 @@ impl Beside {
     /// Returns true when the plane of this slope through the other cell predicts this one.
     fn is_on(&self, [x, y]: [f64; 2], expected: f64) -> bool {
         (self.off - x * self.x - y * self.y).abs() <= BOUND * expected
-    }
-}
-
-/// Collects the cells of a class around a cell, up to `reach` columns and rows off, that one surface no steeper than `steepest` may hold with it.
-fn collect(
-    window: &Window,
-    pixels: &[Pixel],
-    index: usize,
-    (class, reach, steepest): (Pixel, usize, f32),
-    near: &mut Vec<Beside>,
-) {
-    near.clear();
-    let n_rows = window.n_rows;
-    let (column, row) = (index / n_rows, index % n_rows);
-    let range = window.cells[index].range_m;
-    let (across, down) = (window.header.azimuth_step as f32, window.header.elevation_step as f32);
-    let farthest = (steepest * range).powi(2);
-    let rows = row.saturating_sub(reach)..(row + reach + 1).min(n_rows);
-    for c in column.saturating_sub(reach)..(column + reach + 1).min(window.n_columns) {
-        for r in rows.clone() {
-            let at = c * n_rows + r;
-            let (x, y) = (c as f32 - column as f32, r as f32 - row as f32);
-            let apart = x * across * x * across + y * down * y * down;
-            let deeper = window.cells[at].range_m - range;
-            if pixels[at] == class && at != index && !window.own[at] && deeper * deeper <= farthest * apart {
-                let off = f64::from(window.inverse[at] - window.inverse[index]);
-                near.push(Beside { index: at, x: x.into(), y: y.into(), off });
-            }
-        }
     }
 }
 
