@@ -161,8 +161,8 @@ impl Place {
             let middle = 0.5 * (corners[edge] + corners[(edge + 1) % 4]);
             let across = middle.xy().norm();
             // Beams over the edge, raised by the strip, meet the table's plane this far away.
-            let behind = |raised: f64| self.table_top / (middle.z.atan2(across) + raised).tan();
-            let seen = middle.xy() * (behind(strip) / across);
+            let behind = self.table_top / (middle.z.atan2(across) + strip).tan();
+            let seen = middle.xy() * (behind / across);
             let beyond = (Vec3::new(seen.x, seen.y, 0.0) - self.centre).dot(&outward);
             let under = (middle - self.centre).dot(&outward) + BESIDE;
             ends[axis][usize::from(sign > 0.0)] =
