@@ -166,3 +166,31 @@ async fn keep(shared: Arc<Shared>, folder: std::path::PathBuf) {
         tokio::time::sleep(STATE).await;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In virtual time: half a second after each look.
+    #[tokio::test(start_paused = true)]
+    async fn a_state_is_written_when_it_changes_and_now_and_then() {
+        let folder = tempfile::tempdir().unwrap();
+        let shared = Arc::new(Shared {
+            cursors: SharedCursors::open(&folder.path().join(CURSORS)).unwrap(),
+            sinks: Mutex::new(vec![SinkStatus::new("historian", "postgresql")]),
+        });
+        let written = || ForwardStatus::load(folder.path()).unwrap().unwrap();
+        let keeper = tokio::spawn(keep(Arc::clone(&shared), folder.path().to_owned()));
+        tokio::time::sleep(STATE / 2).await;
+        let first = written();
+        tokio::time::sleep(3 * STATE).await;
+        assert_eq!(written(), first, "nothing changed");
+        shared.sinks.lock().unwrap()[0].sent = 7;
+        tokio::time::sleep(STATE).await;
+        let changed = written();
+        assert_eq!(changed.sinks[0].sent, 7);
+        tokio::time::sleep(SAME * STATE).await;
+        assert!(written().at > changed.at, "the time tells that the forwarder runs");
+        keeper.abort();
+    }
+}
