@@ -6,9 +6,9 @@
 //! - Where the background is wide enough its cells are sound; a plane through those nearby predicts it, and a cell that it predicts belongs to
 //!   it. A beam that is mixed along an edge parallel to a row passes through all ranges as smoothly, but not through those of the plane.
 //! - Where it is nowhere wide, the strip's own cells lie on a plane (RANSAC, Fischler and Bolles 1981) that no incidence makes too steep; mixed
-//!   pixels along an edge pass from the plate's range to that behind it within a footprint. A strip within one row or column stays mixed: it has no plane.
+//!   pixels along an edge pass from the plate's range to that behind it within a footprint.
 //!
-//! Own.
+//! Limit: a strip within one row or column stays mixed, as its cells lie on no one plane. Own.
 
 use nalgebra::{Matrix3, Vector3};
 use platen_numerics::random::Random;

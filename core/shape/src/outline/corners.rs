@@ -2,7 +2,8 @@
 //! RANSAC (Fischler and Bolles 1981), intersections (Masuda et al., 3.2).
 //!
 //! In: places of the visible boundary in the mean plane. Out: four corners, the starting points of `edge`. Own: k scales with
-//! the lattice, and of more than four candidates those four are taken whose quadrilateral holds most of the loop.
+//! the lattice, hidden parts of the loop add nothing to its length, and of more than four candidates those four are taken whose quadrilateral
+//! holds most of the loop.
 
 use nalgebra::Vector2;
 use platen_numerics::random::Random;
@@ -27,8 +28,8 @@ const PAIR_PART: f64 = 0.4;
 /// Points to either side over which the loop is levelled before its length is measured.
 const LEVELLED: usize = 4;
 
-/// Neighbouring points farther apart, in lattice steps, have a hidden part of the edge between them, which adds nothing to the length: where a corner is hidden
-/// the points beyond it tell its other edge.
+/// Neighbouring points farther apart than this many lattice steps have a hidden part between them: it adds nothing to the length, so that
+/// the points beyond a hidden corner are among its neighbours.
 const GAP_STEPS: f64 = 8.0;
 
 /// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
