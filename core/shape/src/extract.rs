@@ -21,7 +21,7 @@
 //! Limits: the plate is one smooth face of known size, all of it nearer than what lies behind its edges; a
 //! component whose area across the beams exceeds four times the plate's is never looked at.
 
-mod background_strip;
+mod background_planes;
 mod beam_directions;
 mod column_store;
 mod completed_components;

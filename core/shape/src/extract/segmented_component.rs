@@ -1,6 +1,6 @@
 //! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
 
-use super::background_strip;
+use super::background_planes;
 use super::continuity::Continuity;
 use super::faces::{self, Face};
 use super::mixed_pixels::{self, Pixel};
@@ -28,7 +28,7 @@ impl SegmentedComponent {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
         let mut pixels = mixed_pixels::classify(&window, &noise);
-        background_strip::mark_sound(&window, &noise, &mut pixels);
+        background_planes::mark_sound(&window, &noise, &mut pixels);
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smoothed_normals::low_pass(&window, &usable, continuity);

@@ -92,9 +92,10 @@ impl Window {
         let (n_columns, n_rows) = (header.n_columns as usize, header.n_rows as usize);
         let ranges: Vec<(f32, bool)> =
             (0..n_columns * n_rows).map(|index| range(index / n_rows, index % n_rows)).collect();
-        let angle =
-            |start: f64, step: f64, n| (0..n).map(|i| AngleSinCos::of(start + step * i as f64)).collect();
-        Self {
+        let angle = |start: f64, step: f64, n| -> Vec<AngleSinCos> {
+            (0..n).map(|i| AngleSinCos::of(start + step * i as f64)).collect()
+        };
+        let mut window = Self {
             first_column: 0,
             first_row: 0,
             n_columns,
@@ -107,14 +108,18 @@ impl Window {
                 .iter()
                 .map(|(range_m, _)| if *range_m > 0.0 { 1.0 / range_m } else { 0.0 })
                 .collect(),
-            points: vec![[0.0; 3]; ranges.len()],
+            points: Vec::new(),
             own: ranges.iter().map(|(_, own)| *own).collect(),
             spans: vec![0..n_rows; n_columns],
             azimuths: angle(header.azimuth_start, header.azimuth_step, n_columns),
             elevations: angle(header.elevation_start, -header.elevation_step, n_rows),
             per_step: (1.0 / header.azimuth_step, 1.0 / header.elevation_step),
             header,
-        }
+        };
+        let at = |index: usize| window.nominal(index / n_rows, index % n_rows).unit();
+        window.points =
+            ranges.iter().enumerate().map(|(i, (range, _))| (at(i) * f64::from(*range)).into()).collect();
+        window
     }
 
     /// Invalidates the first columns of each face of the scan.

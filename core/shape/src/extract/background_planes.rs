@@ -1,0 +1,229 @@
+//! Background planes: table, floor and walls beside a component, by sequential RANSAC (Fischler and Bolles 1981) over its sound cells.
+//!
+//! A strip of background that shows one or two cells wide beyond an edge, a table or the foot of a wall, has cells with neighbours of another range on
+//! both sides, as a mixed pixel has. Where its plane shows wider elsewhere beside the component, that tells them:
+//!
+//! - A plane n . x = 1 has the inverse range n . d along the unit direction d: linear in n, a fit by linear least squares at any incidence.
+//! - A cell on a plane is no mixed pixel, though its neighbours be others; a mixed pixel meets the range of a plane by chance in one of a hundred.
+//! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
+//!
+//! Limits: a strip whose plane shows nowhere else stays mixed, as mixed pixels along an edge can lie on a plane, too; uneven ground is
+//! several planes. Own.
+
+use nalgebra::{Cholesky, Const, Matrix3};
+use platen_numerics::random::Random;
+
+use super::mixed_pixels::Pixel;
+use super::range_noise::Noise;
+use super::window::Window;
+use crate::Vec3;
+
+/// Cells from which a plane is taken, at most, and fewest of them on it.
+const ENOUGH: usize = 1024;
+const LEAST_CELLS: usize = 24;
+
+/// Planes at most, and triples that are tried for each.
+const PLANES: usize = 6;
+const TRIALS: usize = 300;
+
+/// The second and third cell of a triple are among so many before and behind the first.
+const NEAR: usize = 32;
+
+/// Largest departure from a plane, in standard deviations, and largest variance of a plane there, in that of a cell.
+const BOUND: f64 = 5.0;
+const MOST_LEVERAGE: f64 = 9.0;
+
+/// Cells from a mixed pixel to the strip at whose far edge it is: in any direction, and to both sides along its row or its column.
+const NEAREST: usize = 2;
+const FAR: usize = 12;
+
+/// Steepest surface of a component, metres of range per metre across the beam: that of an incidence of 85 degrees.
+const STEEPEST: f32 = 12.0;
+
+/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound.
+pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
+    let off = off_component(window, pixels);
+    let cell = |index: usize| Cell::of(window, noise, index);
+    let of = |class: Pixel| -> Vec<Cell> {
+        off.iter().filter(|index| pixels[**index] == class).map(|index| cell(*index)).collect()
+    };
+    let planes = find(of(Pixel::Sound), &of(Pixel::Mixed));
+    let mut on = vec![None; pixels.len()];
+    for index in &off {
+        on[*index] = planes.iter().position(|plane| plane.holds(&cell(*index)));
+    }
+    let is_strip = |index: &usize| {
+        let mixed = |at: usize| (pixels[at] == Pixel::Mixed).then(|| cell(at));
+        mixed(*index).is_some_and(|cell| match on[*index] {
+            // Amid mixed pixels of the edge a cell only happens to have the range of the plane.
+            Some(plane) => {
+                let is_before =
+                    |at: usize| mixed(at).is_some_and(|other| planes[plane].depth(&other) < -BOUND);
+                !lies_between(window, *index, [NEAREST, 0], is_before)
+            }
+            None => {
+                let is_before = |at: usize| on[at].is_some_and(|plane| planes[plane].depth(&cell) > BOUND);
+                any_within(window, *index, [NEAREST; 2], [NEAREST; 2], is_before)
+                    || lies_between(window, *index, [FAR, NEAREST], is_before)
+            }
+        })
+    };
+    let strip: Vec<usize> = off.iter().copied().filter(is_strip).collect();
+    strip.into_iter().for_each(|index| pixels[index] = Pixel::Sound);
+}
+
+/// Returns the classified cells off the component and off what may be its continuation.
+fn off_component(window: &Window, pixels: &[Pixel]) -> Vec<usize> {
+    let header = &window.header;
+    let strides = [(1, header.elevation_step), (window.n_rows, header.azimuth_step)];
+    let continues = |index: usize| {
+        let range = window.cells[index].range_m;
+        strides.iter().any(|(stride, step)| {
+            (1..=NEAREST).any(|far| {
+                let bound = STEEPEST * range * (far as f64 * step) as f32;
+                let is_own = |at: usize| window.own[at] && (window.cells[at].range_m - range).abs() <= bound;
+                let far = far * stride;
+                index.checked_sub(far).is_some_and(is_own)
+                    || (index + far < pixels.len() && is_own(index + far))
+            })
+        })
+    };
+    let is_off = |index: &usize| pixels[*index] != Pixel::Unknown && !window.own[*index];
+    (0..pixels.len())
+        .filter(|index| is_off(index) && !(pixels[*index] == Pixel::Sound && continues(*index)))
+        .collect()
+}
+
+/// Returns true when a condition holds somewhere to both sides of a cell, along its row or its column, in arms of a length and half a width.
+fn lies_between(
+    window: &Window,
+    index: usize,
+    [length, half]: [usize; 2],
+    is: impl Fn(usize) -> bool,
+) -> bool {
+    let any = |columns, rows| any_within(window, index, columns, rows, &is);
+    (any([length, 0], [half; 2]) && any([0, length], [half; 2]))
+        || (any([half; 2], [length, 0]) && any([half; 2], [0, length]))
+}
+
+/// Returns true when a condition holds for a cell of a box, given by its columns and rows before and behind a cell.
+fn any_within(
+    window: &Window,
+    index: usize,
+    [left, right]: [usize; 2],
+    [up, down]: [usize; 2],
+    is: impl Fn(usize) -> bool,
+) -> bool {
+    let (column, row) = (index / window.n_rows, index % window.n_rows);
+    let columns = column.saturating_sub(left)..(column + right + 1).min(window.n_columns);
+    let rows = row.saturating_sub(up)..(row + down + 1).min(window.n_rows);
+    columns.flat_map(|column| rows.clone().map(move |row| column * window.n_rows + row)).any(is)
+}
+
+/// A cell off the component.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    direction: Vec3,
+    /// Inverse range, 1/m, and its standard deviation.
+    inverse: f64,
+    sigma: f64,
+}
+
+impl Cell {
+    fn of(window: &Window, noise: &Noise, index: usize) -> Self {
+        let inverse = f64::from(window.inverse[index]);
+        let sigma = f64::from(noise.at(index)) * inverse * inverse;
+        Self { direction: Vec3::from(window.points[index]) * inverse, inverse, sigma }
+    }
+
+    /// Returns true when the plane of this vector holds the cell.
+    fn is_on(&self, plane: &Vec3) -> bool {
+        (self.inverse - plane.dot(&self.direction)).abs() <= BOUND * self.sigma
+    }
+}
+
+/// A plane n . x = 1 and its uncertainty.
+#[derive(Debug, Clone)]
+struct Plane {
+    vector: Vec3,
+    information: Cholesky<f64, Const<3>>,
+    /// Scatter about it in the standard deviation of a cell, at least 1.
+    scatter: f64,
+}
+
+impl Plane {
+    /// Fits a plane to those cells for which `belongs` is true by least squares; `None` where they lie on a line.
+    fn fit<'a>(cells: impl IntoIterator<Item = &'a Cell>, belongs: impl Fn(&Cell) -> bool) -> Option<Self> {
+        let cells: Vec<&Cell> = cells.into_iter().filter(|cell| belongs(cell)).collect();
+        let (mut information, mut rhs) = (Matrix3::zeros(), Vec3::zeros());
+        for cell in &cells {
+            let row = cell.direction / cell.sigma;
+            information += row * row.transpose();
+            rhs += row * (cell.inverse / cell.sigma);
+        }
+        let information = information.cholesky()?;
+        let vector = information.solve(&rhs);
+        let off = |cell: &&Cell| ((cell.inverse - vector.dot(&cell.direction)) / cell.sigma).powi(2);
+        let square: f64 = cells.iter().map(off).sum();
+        let scatter = (square / cells.len() as f64).sqrt().max(1.0);
+        Some(Self { vector, information, scatter })
+    }
+
+    fn holds(&self, cell: &Cell) -> bool {
+        let row = cell.direction / cell.sigma;
+        let leverage = row.dot(&self.information.solve(&row)) * self.scatter * self.scatter;
+        leverage <= MOST_LEVERAGE
+            && (cell.inverse - self.vector.dot(&cell.direction)).abs()
+                <= BOUND * cell.sigma * (self.scatter * self.scatter + leverage).sqrt()
+    }
+
+    /// Returns how far a cell is behind the plane, in standard deviations.
+    fn depth(&self, cell: &Cell) -> f64 {
+        (self.vector.dot(&cell.direction) - cell.inverse) / (cell.sigma * self.scatter)
+    }
+}
+
+/// Finds the planes of the sound cells, the one with most of them first.
+fn find(mut sound: Vec<Cell>, mixed: &[Cell]) -> Vec<Plane> {
+    let mut random = Random::new(1);
+    let mut planes = Vec::new();
+    let every = sound.len().div_ceil(ENOUGH).max(1);
+    while planes.len() < PLANES {
+        let few: Vec<Cell> = sound.iter().step_by(every).copied().collect();
+        let first =
+            most_common(&few, &mut random).and_then(|plane| Plane::fit(&sound, |cell| cell.is_on(&plane)));
+        // The strips that it predicts make a plane sharp there.
+        let Some(plane) =
+            first.and_then(|plane| Plane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell)))
+        else {
+            break;
+        };
+        sound.retain(|cell| !plane.holds(cell));
+        planes.push(plane);
+    }
+    planes
+}
+
+/// Returns the plane through three cells that holds most of them; RANSAC.
+fn most_common(cells: &[Cell], random: &mut Random) -> Option<Vec3> {
+    if cells.len() < LEAST_CELLS {
+        return None;
+    }
+    let (mut most, mut best) = (LEAST_CELLS - 1, None);
+    for _ in 0..TRIALS {
+        let first = random.below(cells.len());
+        let mut near = || &cells[(first + random.below(2 * NEAR)).saturating_sub(NEAR).min(cells.len() - 1)];
+        let (a, b, c) = (&cells[first], near(), near());
+        let directions = Matrix3::from_columns(&[a.direction, b.direction, c.direction]).transpose();
+        let Some(inverse) = directions.try_inverse() else { continue };
+        let plane = inverse * Vec3::new(a.inverse, b.inverse, c.inverse);
+        let count = cells.iter().filter(|cell| cell.is_on(&plane)).count();
+        if count > most {
+            (most, best) = (count, Some(plane));
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests;

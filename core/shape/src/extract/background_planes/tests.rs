@@ -1,0 +1,125 @@
+use platen_numerics::random::Random;
+use platen_scan::ScanHeader;
+
+use super::super::mixed_pixels;
+use super::*;
+
+const STEP: f64 = 9e-4;
+const NOISE: f64 = 3e-4;
+
+/// A level plate 3.5 m below the scanner, a table `below` it and the floor; `places` gives, by row, the columns at which the
+/// plate and the table end. A beam sees a quarter of a step around its middle.
+fn scene(below: f64, places: impl Fn(f64) -> [f64; 2]) -> (Window, Vec<Option<bool>>) {
+    let header = ScanHeader {
+        n_rows: 80,
+        n_columns: 80,
+        azimuth_step: STEP,
+        elevation_start: -0.42,
+        elevation_step: STEP,
+        ..ScanHeader::default()
+    };
+    let beam = |column: usize, row: usize| {
+        let (azimuth, elevation) = (STEP * column as f64, -0.42 - STEP * row as f64);
+        Vec3::new(elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin())
+    };
+    let mut random = Random::new(7);
+    let noise: Vec<f64> = (0..80 * 80).map(|_| NOISE * random.normal()).collect();
+    let part = |at: f64, end: f64| ((at - end) / 0.5 + 0.5).clamp(0.0, 1.0);
+    let share = |column: usize, row: usize| places(row as f64).map(|end| part(column as f64, end));
+    let window = Window::of_ranges(header, |column, row| {
+        let [plate, table] = share(column, row);
+        let down = -beam(column, row).z;
+        let (near, middle, far) = (3.5 / down, (3.5 + below) / down, 4.6 / down);
+        let range = plate * near + (1.0 - plate) * (table * middle + (1.0 - table) * far);
+        ((range + noise[column * 80 + row]) as f32, plate == 1.0)
+    });
+    let kinds = (0..80 * 80).map(|index| {
+        let [plate, _] = share(index / 80, index % 80);
+        let sees_the_edge = (0.1..0.9).contains(&plate);
+        (plate == 0.0 || sees_the_edge).then_some(sees_the_edge)
+    });
+    (window, kinds.collect())
+}
+
+/// Counts the cells of the background that are taken for mixed, and those that see the plate's edge taken for sound, each beside all.
+fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
+    let noise = Noise::estimate(window, &window.own);
+    let mut pixels = mixed_pixels::classify(window, &noise);
+    mark_sound(window, &noise, &mut pixels);
+    let mut counts = [[0; 2]; 2];
+    let inner = |index: usize| [index / 80, index % 80].iter().all(|place| (4..76).contains(place));
+    for index in (0..pixels.len()).filter(|index| inner(*index)) {
+        match (kinds[index], pixels[index]) {
+            (Some(false), pixel) if !window.own[index] => {
+                counts[0][0] += usize::from(pixel == Pixel::Mixed);
+                counts[0][1] += 1;
+            }
+            (Some(true), pixel) => {
+                counts[1][0] += usize::from(pixel == Pixel::Sound);
+                counts[1][1] += 1;
+            }
+            _ => {}
+        }
+    }
+    counts
+}
+
+/// Asserts that nearly no cell of the background passes for mixed, nor one that sees the edge for sound.
+fn assert_told(window: &Window, kinds: &[Option<bool>]) {
+    let [[mixed, background], [sound, edge]] = wrong(window, kinds);
+    println!("background taken for mixed: {mixed} of {background}; edge taken for sound: {sound} of {edge}");
+    assert!(mixed * 100 < background && sound * 20 < edge && edge > 15);
+}
+
+#[test]
+fn a_strip_that_narrows_is_background() {
+    // The table's strip is 8 cells wide at the bottom and ends at the top.
+    let (window, kinds) = scene(0.25, |row| [40.0 - 0.62 * row + 25.0, 40.0 - 0.72 * row + 25.0]);
+    assert_told(&window, &kinds);
+}
+
+#[test]
+fn a_strip_of_one_cell_is_background_where_its_plane_shows_elsewhere() {
+    // The table is wide at the bottom and one cell wide from row 16 on.
+    let (window, kinds) = scene(0.25, |row| {
+        let end = 65.0 - 0.62 * row;
+        [end, if row < 64.0 { end - 1.2 } else { end - 12.0 }]
+    });
+    assert_told(&window, &kinds);
+}
+
+#[test]
+fn smooth_mixing_along_a_row_stays_mixed() {
+    // The plate's edge crosses a column within 80 rows: the ranges down that column are straight.
+    let (window, kinds) = scene(0.25, |row| [39.75 + 0.006 * row, -9.0]);
+    assert_told(&window, &kinds);
+}
+
+#[test]
+fn a_cell_amid_the_mixed_ones_of_an_edge_is_mixed() {
+    // Every tenth beam that sees the edge returns the range of the table.
+    let places = |row: f64| [39.75 + 0.006 * row, -9.0];
+    let (mut window, kinds) = scene(0.25, places);
+    let behind: Vec<usize> =
+        (0..kinds.len()).filter(|index| kinds[*index] == Some(true)).step_by(10).collect();
+    for index in &behind {
+        let up = Vec3::from(window.points[*index]) / f64::from(window.cells[*index].range_m);
+        let range = 3.75 / -up.z;
+        window.cells[*index].range_m = range as f32;
+        window.inverse[*index] = 1.0 / range as f32;
+        window.points[*index] = (up * range).into();
+    }
+    assert!(behind.len() > 5);
+    assert_told(&window, &kinds);
+}
+
+#[test]
+fn a_part_of_the_plate_off_the_component_is_no_background() {
+    // The last columns of the plate were not joined to it; the table shows beyond.
+    let (mut window, kinds) = scene(0.25, |row| [40.0 + 0.05 * row, -9.0]);
+    for row in 0..80 {
+        let end = (40.0 + 0.05 * row as f64) as usize;
+        (end..(end + 3).min(80)).for_each(|column| window.own[column * 80 + row] = false);
+    }
+    assert_told(&window, &kinds);
+}
