@@ -143,7 +143,7 @@ mod tests {
         }
         // Of an odd and an even seed one is the other turned by half a turn.
         let wave = std::f64::consts::TAU / CYCLIC[1];
-        let phase = if seed % 2 == 0 { std::f64::consts::PI - wave * SIDE - 1.0 } else { 1.0 };
+        let phase = if seed.is_multiple_of(2) { std::f64::consts::PI - wave * SIDE - 1.0 } else { 1.0 };
         let mut noise = Random::new(seed);
         let mut fit = SplineFit::new(UniformKnots::new(0.0, SIDE, 32), UniformKnots::new(0.0, height, 24));
         let side = names.determinant();
