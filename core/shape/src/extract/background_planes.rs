@@ -48,21 +48,22 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
         off.iter().filter(|index| pixels[**index] == class).map(|index| cell(*index)).collect()
     };
     let planes = find(of(Pixel::Sound), &of(Pixel::Mixed));
-    let mut on = vec![None; pixels.len()];
+    let mut on: Vec<Option<u8>> = vec![None; pixels.len()];
+    let depth = |plane: u8, cell: &Cell| planes[usize::from(plane)].depth(cell);
     for index in &off {
-        on[*index] = planes.iter().position(|plane| plane.holds(&cell(*index)));
+        on[*index] =
+            (0..).zip(&planes).find(|(_, plane)| plane.holds(&cell(*index))).map(|(number, _)| number);
     }
     let is_strip = |index: &usize| {
         let mixed = |at: usize| (pixels[at] == Pixel::Mixed).then(|| cell(at));
         mixed(*index).is_some_and(|cell| match on[*index] {
             // Amid mixed pixels of the edge a cell only happens to have the range of the plane.
             Some(plane) => {
-                let is_before =
-                    |at: usize| mixed(at).is_some_and(|other| planes[plane].depth(&other) < -BOUND);
+                let is_before = |at: usize| mixed(at).is_some_and(|other| depth(plane, &other) < -BOUND);
                 !lies_between(window, *index, [NEAREST, 0], is_before)
             }
             None => {
-                let is_before = |at: usize| on[at].is_some_and(|plane| planes[plane].depth(&cell) > BOUND);
+                let is_before = |at: usize| on[at].is_some_and(|plane| depth(plane, &cell) > BOUND);
                 any_within(window, *index, [NEAREST; 2], [NEAREST; 2], is_before)
                     || lies_between(window, *index, [FAR, NEAREST], is_before)
             }
