@@ -7,7 +7,7 @@
 //!
 //! Curvature needs no alignment. As long as strokes only add bends, the names given by direction cannot lose by chance:
 //! another naming leaves at least what the stroke bent. Limits: a plate that looks the same either way (flat, a whole cylinder)
-//! cannot be tested; then nothing but the names differs. Curvatures below 1/100 m are lost in the scanner's cyclic range error, which bends
+//! cannot be tested; then nothing but the names differs. Curvatures below about 0.01 1/m are lost in the scanner's cyclic range error, which bends
 //! every scan differently.
 
 use nalgebra::Matrix2;
