@@ -5,6 +5,7 @@
 //!
 //! - A plane n . x = 1 has the inverse range n . d along the unit direction d: linear in n, a fit by linear least squares at any incidence.
 //! - A cell on a plane is no mixed pixel, though its neighbours be others; a mixed pixel meets the range of a plane by chance in one of a hundred.
+//!   One with mixed pixels before the plane to both sides stays mixed: along an edge parallel to a row some beams return the background's range.
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
 //!
 //! Limits: a strip whose plane shows nowhere else stays mixed, as mixed pixels along an edge can lie on a plane, too; uneven ground is
@@ -43,13 +44,13 @@ const STEEPEST: f32 = 12.0;
 /// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound.
 pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     let off = off_component(window, pixels);
-    let cell = |index: usize| Cell::of(window, noise, index);
-    let of = |class: Pixel| -> Vec<Cell> {
+    let cell = |index: usize| BackgroundCell::of(window, noise, index);
+    let of = |class: Pixel| -> Vec<BackgroundCell> {
         off.iter().filter(|index| pixels[**index] == class).map(|index| cell(*index)).collect()
     };
     let planes = find(of(Pixel::Sound), &of(Pixel::Mixed));
     let mut on: Vec<Option<u8>> = vec![None; pixels.len()];
-    let depth = |plane: u8, cell: &Cell| planes[usize::from(plane)].depth(cell);
+    let depth = |plane: u8, cell: &BackgroundCell| planes[usize::from(plane)].depth(cell);
     for index in &off {
         on[*index] =
             (0..).zip(&planes).find(|(_, plane)| plane.holds(&cell(*index))).map(|(number, _)| number);
@@ -121,16 +122,16 @@ fn any_within(
     columns.flat_map(|column| rows.clone().map(move |row| column * window.n_rows + row)).any(is)
 }
 
-/// A cell off the component.
+/// A measured cell off the component, as an observation of a plane.
 #[derive(Debug, Clone, Copy)]
-struct Cell {
+struct BackgroundCell {
     direction: Vec3,
     /// Inverse range, 1/m, and its standard deviation.
     inverse: f64,
     sigma: f64,
 }
 
-impl Cell {
+impl BackgroundCell {
     fn of(window: &Window, noise: &Noise, index: usize) -> Self {
         let inverse = f64::from(window.inverse[index]);
         let sigma = f64::from(noise.at(index)) * inverse * inverse;
@@ -145,17 +146,20 @@ impl Cell {
 
 /// A plane n . x = 1 and its uncertainty.
 #[derive(Debug, Clone)]
-struct Plane {
+struct BackgroundPlane {
     vector: Vec3,
     information: Cholesky<f64, Const<3>>,
     /// Scatter about it in the standard deviation of a cell, at least 1.
     scatter: f64,
 }
 
-impl Plane {
+impl BackgroundPlane {
     /// Fits a plane to those cells for which `belongs` is true by least squares; `None` where they lie on a line.
-    fn fit<'a>(cells: impl IntoIterator<Item = &'a Cell>, belongs: impl Fn(&Cell) -> bool) -> Option<Self> {
-        let cells: Vec<&Cell> = cells.into_iter().filter(|cell| belongs(cell)).collect();
+    fn fit<'a>(
+        cells: impl IntoIterator<Item = &'a BackgroundCell>,
+        belongs: impl Fn(&BackgroundCell) -> bool,
+    ) -> Option<Self> {
+        let cells: Vec<&BackgroundCell> = cells.into_iter().filter(|cell| belongs(cell)).collect();
         let (mut information, mut rhs) = (Matrix3::zeros(), Vec3::zeros());
         for cell in &cells {
             let row = cell.direction / cell.sigma;
@@ -164,13 +168,15 @@ impl Plane {
         }
         let information = information.cholesky()?;
         let vector = information.solve(&rhs);
-        let off = |cell: &&Cell| ((cell.inverse - vector.dot(&cell.direction)) / cell.sigma).powi(2);
+        let off =
+            |cell: &&BackgroundCell| ((cell.inverse - vector.dot(&cell.direction)) / cell.sigma).powi(2);
         let square: f64 = cells.iter().map(off).sum();
         let scatter = (square / cells.len() as f64).sqrt().max(1.0);
         Some(Self { vector, information, scatter })
     }
 
-    fn holds(&self, cell: &Cell) -> bool {
+    /// Returns true when a cell is on the plane and the plane is known well enough there.
+    fn holds(&self, cell: &BackgroundCell) -> bool {
         let row = cell.direction / cell.sigma;
         let leverage = row.dot(&self.information.solve(&row)) * self.scatter * self.scatter;
         leverage <= MOST_LEVERAGE
@@ -179,23 +185,23 @@ impl Plane {
     }
 
     /// Returns how far a cell is behind the plane, in standard deviations.
-    fn depth(&self, cell: &Cell) -> f64 {
+    fn depth(&self, cell: &BackgroundCell) -> f64 {
         (self.vector.dot(&cell.direction) - cell.inverse) / (cell.sigma * self.scatter)
     }
 }
 
 /// Finds the planes of the sound cells, the one with most of them first.
-fn find(mut sound: Vec<Cell>, mixed: &[Cell]) -> Vec<Plane> {
+fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<BackgroundPlane> {
     let mut random = Random::new(1);
     let mut planes = Vec::new();
     let every = sound.len().div_ceil(ENOUGH).max(1);
     while planes.len() < PLANES {
-        let few: Vec<Cell> = sound.iter().step_by(every).copied().collect();
-        let first =
-            most_common(&few, &mut random).and_then(|plane| Plane::fit(&sound, |cell| cell.is_on(&plane)));
+        let few: Vec<BackgroundCell> = sound.iter().step_by(every).copied().collect();
+        let first = most_common(&few, &mut random)
+            .and_then(|plane| BackgroundPlane::fit(&sound, |cell| cell.is_on(&plane)));
         // The strips that it predicts make a plane sharp there.
         let Some(plane) =
-            first.and_then(|plane| Plane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell)))
+            first.and_then(|plane| BackgroundPlane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell)))
         else {
             break;
         };
@@ -206,7 +212,7 @@ fn find(mut sound: Vec<Cell>, mixed: &[Cell]) -> Vec<Plane> {
 }
 
 /// Returns the plane through three cells that holds most of them; RANSAC.
-fn most_common(cells: &[Cell], random: &mut Random) -> Option<Vec3> {
+fn most_common(cells: &[BackgroundCell], random: &mut Random) -> Option<Vec3> {
     if cells.len() < LEAST_CELLS {
         return None;
     }

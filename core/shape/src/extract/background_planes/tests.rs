@@ -98,16 +98,15 @@ fn smooth_mixing_along_a_row_stays_mixed() {
 #[test]
 fn a_cell_amid_the_mixed_ones_of_an_edge_is_mixed() {
     // Every tenth beam that sees the edge returns the range of the table.
-    let places = |row: f64| [39.75 + 0.006 * row, -9.0];
-    let (mut window, kinds) = scene(0.25, places);
+    let (mut window, kinds) = scene(0.25, |row| [39.75 + 0.006 * row, -9.0]);
     let behind: Vec<usize> =
         (0..kinds.len()).filter(|index| kinds[*index] == Some(true)).step_by(10).collect();
     for index in &behind {
-        let up = Vec3::from(window.points[*index]) / f64::from(window.cells[*index].range_m);
-        let range = 3.75 / -up.z;
+        let beam = Vec3::from(window.points[*index]) / f64::from(window.cells[*index].range_m);
+        let range = 3.75 / -beam.z;
         window.cells[*index].range_m = range as f32;
         window.inverse[*index] = 1.0 / range as f32;
-        window.points[*index] = (up * range).into();
+        window.points[*index] = (beam * range).into();
     }
     assert!(behind.len() > 5);
     assert_told(&window, &kinds);
