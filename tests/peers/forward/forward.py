@@ -283,6 +283,8 @@ def check_two_presses_of_one_name_are_kept_apart(site):
         plant.start_host()
         plant.start_forwarder()
         plant.stroke()
+        # The name is whose changes arrive first: the second begins when the first has it.
+        wait("the first to have the name", lambda: site.postgresql.query("SELECT count(acked) FROM platen.stroke") == [(1,)])
     wait("kept apart", lambda: site.postgresql.query("SELECT count(*) FROM platen.aside WHERE why = 'apart'") >= [(3,)])
     first.stroke()
     for plant in (first, second):
