@@ -59,7 +59,7 @@ impl PreparedScan {
         let lattice = lattice(options, plate.as_ref(), window)?;
         let surroundings = surroundings(options, plate.as_ref());
         Ok(Self {
-            scene: Scene::new(plate, &surroundings),
+            scene: Scene::new(plate, &surroundings).with_plate_reflectivity(options.plate_reflectivity),
             lattice,
             pace: Pace::new(options, width(&lattice))?,
             instrument: instrument(options, &lattice, number),

@@ -31,6 +31,7 @@
 //! | `footprint_mrad`, `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
 //! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
 //! | `warm_up_columns` | columns measured before the laser is warm |
+//! | `plate_reflectivity` | share of the light that the plate's faces scatter back |
 //! | `hidden_by` | object in front of the plate |
 //! | `strip_deg` | angle by which the table shows beyond the plate's far edges |
 //! | `seed` | seed of all random numbers |
@@ -99,6 +100,8 @@ options! {
         collimation_urad: f64 = 0.0, unit "urad", min -1000.0, max 1000.0;
         /// Columns measured before the laser is warm.
         warm_up_columns: i64 = 10, min 0, max 1000;
+        /// Diffuse reflectivity of the plate's faces: mill scale 0.35, rust and soot darker, primer brighter.
+        plate_reflectivity: f64 = 0.35, min 0.01, max 1.0;
         /// Object between scanner and plate.
         hidden_by: String = "nothing", choices ["nothing", "person", "person at corner", "chain", "both"];
         /// Angle by which the table shows beyond the plate's far edges; 0: it is as wide as the shop has it.

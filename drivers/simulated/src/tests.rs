@@ -31,6 +31,7 @@ fn options() -> Options {
         dropout: 0.006,
         cyclic_mm: 0.0,
         angular_noise_urad: 0.0,
+        plate_reflectivity: 0.35,
         back_face_from_deg: None,
         collimation_urad: 0.0,
         warm_up_columns: 0,

@@ -100,7 +100,7 @@ impl Instrument {
 pub(crate) fn reflectivity(label: Label) -> f64 {
     match label {
         Label::Nothing => 0.0,
-        Label::PlateTop | Label::PlateUnderside => 0.35,
+        Label::PlateTop | Label::PlateUnderside => PLATE_REFLECTIVITY,
         Label::PlateSide => 0.4,
         Label::Die | Label::Table => 0.25,
         Label::Press => 0.5,
@@ -111,6 +111,9 @@ pub(crate) fn reflectivity(label: Label) -> f64 {
         Label::Chain => 0.2,
     }
 }
+
+/// Reflectivity of a plate's faces unless a scene has another.
+pub(crate) const PLATE_REFLECTIVITY: f64 = 0.35;
 
 /// Reflectivity of marker paint.
 pub(crate) const MARKER_REFLECTIVITY: f64 = 0.05;
@@ -124,12 +127,6 @@ const RANGE_FLOOR: f64 = 0.25;
 /// Exponent of the echo's strength in the standard deviation. A data sheet with 0.6 mm at 90 % and 1.2 mm at 10 % (10 m) gives
 /// 0.32, at 25 m 0.38.
 const STRENGTH_POWER: f64 = 0.35;
-
-/// Returns the strength of an echo relative to a white wall at normal incidence at the same distance (Lambert's law).
-pub(crate) fn strength(hit: &Hit, marker: bool) -> f64 {
-    let reflectivity = if marker { MARKER_REFLECTIVITY } else { reflectivity(hit.label) };
-    reflectivity * hit.cos_incidence
-}
 
 impl Instrument {
     /// Returns the standard deviation of a range for an echo of this strength.

@@ -1,7 +1,7 @@
 //! Measurement of columns: rays of the lattice, echoes of the footprint, errors of the receiver.
 
 use crate::column::{SimColumn, SimState, TruthCell};
-use crate::instrument::{Instrument, strength};
+use crate::instrument::Instrument;
 use crate::lattice::{SimLattice, unit};
 use crate::ray::{Hit, Label, Ray};
 use crate::scene::Scene;
@@ -146,9 +146,9 @@ impl View<'_> {
         out
     }
 
+    /// Returns the echo of a ray; its strength is relative to a white wall at normal incidence at the same distance (Lambert's law).
     fn echo(&self, hit: &Hit) -> Echo {
-        let marker = hit.label == Label::PlateTop && hit.uv.is_some_and(|uv| self.scene.is_marker(uv));
-        Echo { hit: *hit, strength: strength(hit, marker), mixed: false }
+        Echo { hit: *hit, strength: self.scene.reflectivity(hit) * hit.cos_incidence, mixed: false }
     }
 
     /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot:

@@ -1,6 +1,7 @@
 //! Scene of a scan: plate and surroundings with their bounding volume hierarchies.
 
 use crate::bounds::{Bounds, Tree};
+use crate::instrument::{self, MARKER_REFLECTIVITY, PLATE_REFLECTIVITY};
 use crate::patch::{Patch, PatchHit};
 use crate::ray::{Hit, Label, Ray};
 use crate::solid::Solid;
@@ -19,6 +20,7 @@ pub struct Scene {
     plate: Option<Plate>,
     patches: Vec<Patch>,
     patch_tree: Tree,
+    plate_reflectivity: f64,
     solids: Vec<(Label, Solid)>,
     solid_tree: Tree,
 }
@@ -37,7 +39,13 @@ impl Scene {
         let patch_bounds: Vec<Bounds> = plate.as_ref().map(bounds).unwrap_or_default();
         let solid_bounds: Vec<Bounds> = solids.iter().map(|(_, solid)| solid.bounds()).collect();
         let (patch_tree, solid_tree) = (Tree::new(&patch_bounds), Tree::new(&solid_bounds));
-        Self { plate, patches, patch_tree, solids, solid_tree }
+        Self { plate, patches, patch_tree, plate_reflectivity: PLATE_REFLECTIVITY, solids, solid_tree }
+    }
+
+    /// Returns the scene with a plate whose faces have this diffuse reflectivity, 0 to 1: rust is dark, primer is bright.
+    #[must_use]
+    pub fn with_plate_reflectivity(self, plate_reflectivity: f64) -> Self {
+        Self { plate_reflectivity, ..self }
     }
 
     /// Returns the plate, if any.
@@ -80,6 +88,15 @@ impl Scene {
     pub fn is_marker(&self, [u, v]: [f64; 2]) -> bool {
         let near = |marker: &[f64; 2]| (marker[0] - u).hypot(marker[1] - v) < MARKER_RADIUS;
         self.plate.as_ref().is_some_and(|plate| plate.markers().iter().any(near))
+    }
+
+    /// Returns the diffuse reflectivity where a ray hits.
+    pub(crate) fn reflectivity(&self, hit: &Hit) -> f64 {
+        match hit.label {
+            Label::PlateTop if hit.uv.is_some_and(|uv| self.is_marker(uv)) => MARKER_REFLECTIVITY,
+            Label::PlateTop | Label::PlateUnderside => self.plate_reflectivity,
+            other => instrument::reflectivity(other),
+        }
     }
 
     /// Returns true when a point of the upper face is visible from the scanner.

@@ -111,6 +111,20 @@ fn a_share_of_the_ranges_has_wide_errors_and_the_others_keep_theirs() {
     assert!((changed / n - 0.05_f64).abs() < 0.01, "{changed} of {n}");
 }
 
+/// A quarter of the reflectivity: half the amplitude, and the noise of a weaker echo (4^0.35).
+#[test]
+fn a_dark_plate_is_measured_with_more_noise() {
+    let of = |reflectivity: f64| {
+        let scene = target(8.0, 40.0).with_plate_reflectivity(reflectivity);
+        let columns = scan_all(&scene, &narrow(0.02), &Instrument::default(), 2);
+        let middle = columns[columns.len() / 2].intensity.iter().map(|i| f64::from(*i)).fold(0.0, f64::max);
+        (moments(&columns).1, middle)
+    };
+    let (bright, dark) = (of(0.6), of(0.15));
+    assert!((dark.0 / bright.0 / 4_f64.powf(0.35) - 1.0).abs() < 0.04, "{dark:?} {bright:?}");
+    assert!((dark.1 / bright.1 - 0.5).abs() < 0.02, "{dark:?} {bright:?}");
+}
+
 #[test]
 fn echoes_are_lost_by_chance_and_in_the_mirror_lobe() {
     let lost = |incidence_deg, instrument: &Instrument| {

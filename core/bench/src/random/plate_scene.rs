@@ -15,12 +15,23 @@ use crate::scene::{Scene, Setting, Shot};
 
 /// Height of the plate's middle under the simulator's scanner, millimetres: far enough above the floor for every shape.
 const PLATE_MM: f64 = -3200.0;
+/// Reflectivities of the plate: dark mill scale to primer; the walls of the simulator have 0.8, its floor 0.3.
+const REFLECTIVITY: [f64; 2] = [0.1, 0.6];
 /// Share of wide range errors and their factor in the family of that name.
 const TAILS: [f64; 2] = [0.05, 4.0];
 /// Radii of a target, as a share of the plate's: a plate that is not bent enough, and one that is bent too far.
 const TARGET_SHARES: [f64; 2] = [0.95, 1.05];
 /// Radius of the target of a plate with bend bands, metres: the mean of its curvature between them.
 const BANDS_RADIUS: f64 = 15.0;
+
+/// Properties that are the same in all scenes instead of drawn.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Given {
+    /// Amplitude of the cyclic range error, millimetres.
+    pub(super) cyclic_mm: Option<f64>,
+    /// Reflectivity of the plate.
+    pub(super) reflectivity: Option<f64>,
+}
 
 /// A scene of a family.
 pub(super) struct RandomScene {
@@ -32,6 +43,7 @@ pub(super) struct RandomScene {
     /// Angle by which the table shows beyond the far edges, degrees; 0: a wide table.
     strip_deg: f64,
     pub(super) setting: Setting,
+    reflectivity: f64,
     /// Height of the scanner over that of the simulator's shop, metres.
     scanner_m: f64,
     pub(super) cyclic_mm: f64,
@@ -40,8 +52,7 @@ pub(super) struct RandomScene {
 
 impl RandomScene {
     /// Draws the scene of a seed. The same seed gives the same scene in every family but for edges, errors and what hides the plate.
-    /// `cyclic_mm` is the amplitude of the cyclic range error, drawn where it is not given.
-    pub(super) fn of(family: Family, cyclic_mm: Option<f64>, seed: u64) -> Self {
+    pub(super) fn of(family: Family, given: Given, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x7363_656e_6573);
         let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
         let size_mm = [between(2000.0, 5000.0), between(1500.0, 4000.0), between(25.0, 50.0)].map(f64::round);
@@ -119,14 +130,18 @@ impl RandomScene {
             .choice(&["nothing", "nothing", "person", "chain", "nothing", "both"])
             .unwrap_or(&"nothing");
         let drawn_mm = if random.u32(0..3) == 0 { cyclic } else { 0.0 };
-        let cyclic_mm = cyclic_mm.unwrap_or(drawn_mm);
+        let cyclic_mm = given.cyclic_mm.unwrap_or(drawn_mm);
         let setting = Setting { step_deg, noise_mm, ..Setting::of_accuracy(noise_mm, seed) };
         let bevel_mm = if family == Family::Bevel { bevel(&mut random, size_mm[2]) } else { [0.0; 2] };
         let tails = if family == Family::Tails { TAILS } else { [0.0, 1.0] };
         let strip_deg = if family == Family::Strip { step_deg * (1.0 + random.f64()) } else { 0.0 };
         let hidden_by = if family == Family::Hidden { "person at corner" } else { hidden_by };
         let scene = Scene { name: name.into(), size_mm, shape, centre_mm, bevel_mm, yaw_deg };
-        Self { scene, target, tails, strip_deg, setting, scanner_m, cyclic_mm, hidden_by }
+        let [dark, bright] = REFLECTIVITY;
+        // From a generator of its own, so that scenes are those of versions that did not draw it.
+        let drawn = dark * (bright / dark).powf(Rng::with_seed(!seed).f64());
+        let reflectivity = given.reflectivity.unwrap_or(drawn);
+        Self { scene, target, tails, strip_deg, setting, reflectivity, scanner_m, cyclic_mm, hidden_by }
     }
 
     /// Scans the scene.
@@ -136,6 +151,7 @@ impl RandomScene {
             ("cyclic_mm", Value::Float(self.cyclic_mm)),
             ("wide_share", Value::Float(self.tails[0])),
             ("wide_factor", Value::Float(self.tails[1])),
+            ("plate_reflectivity", Value::Float(self.reflectivity)),
             ("strip_deg", Value::Float(self.strip_deg)),
             ("hidden_by", Value::String(self.hidden_by.to_owned())),
         ];
@@ -153,12 +169,13 @@ impl RandomScene {
             [inset, root] => format!(", face inset {inset}, root face {root}"),
         };
         format!(
-            "{} {w:.0} x {h:.0} x {t:.0}{edges}, {:.1} m away, {:.1} m high, yaw {:.0}, {:.3} deg, noise {:.1}, cyclic {:.2}, hidden by {}{strip}",
+            "{} {w:.0} x {h:.0} x {t:.0}{edges}, {:.1} m away, {:.1} m high, yaw {:.0}, {:.3} deg, reflectivity {:.2}, noise {:.1}, cyclic {:.2}, hidden by {}{strip}",
             self.scene.name,
             0.001 * x,
             self.scanner_m - 0.001 * PLATE_MM,
             self.scene.yaw_deg,
             self.setting.step_deg,
+            self.reflectivity,
             self.setting.noise_mm,
             self.cyclic_mm,
             self.hidden_by
@@ -202,16 +219,17 @@ mod tests {
     #[test]
     fn a_scene_follows_from_its_seed_and_lies_in_the_family() {
         for seed in 0..500 {
-            let RandomScene { scene, setting, scanner_m, cyclic_mm, .. } =
-                RandomScene::of(Family::Square, None, seed);
+            let RandomScene { scene, setting, reflectivity, scanner_m, cyclic_mm, .. } =
+                RandomScene::of(Family::Square, Given::default(), seed);
             assert!((-0.2..=1.8).contains(&scanner_m), "{seed}");
             let [w, h, t] = scene.size_mm;
             assert!((2000.0..=5000.0).contains(&w) && (1500.0..=4000.0).contains(&h), "{seed}");
             assert!((25.0..=50.0).contains(&t) && (0.03..=0.055).contains(&setting.step_deg), "{seed}");
             assert!((0.3..=1.5).contains(&setting.noise_mm) && (0.0..=0.3).contains(&cyclic_mm), "{seed}");
+            assert!((0.1..=0.6).contains(&reflectivity), "{seed}");
             assert_eq!(
-                RandomScene::of(Family::Square, None, seed).words(),
-                RandomScene::of(Family::Square, None, seed).words()
+                RandomScene::of(Family::Square, Given::default(), seed).words(),
+                RandomScene::of(Family::Square, Given::default(), seed).words()
             );
         }
     }

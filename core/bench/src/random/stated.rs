@@ -140,7 +140,7 @@ impl Errors {
             .map(|m| distance(Kind::Marker, [metres(m.u_mm), metres(m.v_mm)], Vec3::from(m.position_m), None))
             .fold(0.0, f64::max);
         let found = ShapeChecks::new(outline, surface, range_error);
-        let known = ShapeChecks::new(&true_outline(outline, truth), surface, range_error);
+        let known = ShapeChecks::of_outline(&true_outline(outline, truth), surface, range_error);
         let mut checks = |kind: Kind, found: &[Check], known: &[Check]| {
             stated.extend(found.iter().zip(known).map(|(found, known)| Stated {
                 kind,

@@ -88,6 +88,9 @@ pub struct BenchArguments {
     /// Amplitude of the cyclic range error in every random scene, millimetres, instead of up to 0.3 mm in a third of them
     #[arg(long, value_name = "MM", requires = "random")]
     pub cyclic_mm: Option<f64>,
+    /// Reflectivity of the plate in every random scene, 0.01 to 1, instead of 0.1 to 0.6
+    #[arg(long, value_name = "SHARE", requires = "random")]
+    pub reflectivity: Option<f64>,
     /// File of `platen calibrate`: the scanner's error in the stated uncertainties, instead of the simulated instrument's own figure
     #[arg(long, value_name = "FILE", requires = "random")]
     pub calibration: Option<PathBuf>,

@@ -51,12 +51,28 @@ pub struct EdgeCheck {
 }
 
 impl ShapeChecks {
-    /// Computes the figures of an outline; the surface gives normals and thickness, `range_error` is the scanner's own.
+    /// Computes the figures of a measured outline, with its corners on the surface: a corner of the outline has the height of a few cells,
+    /// one of the surface that of all. `range_error` is the scanner's own.
     #[must_use]
     pub fn new(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
+        let mut corners = outline.corners;
+        for (corner, [u, v]) in corners.iter_mut().zip(CORNERS) {
+            let [u, v] = [u * surface.width(), v * surface.height()];
+            corner.point = projected(corner.point, surface.face(u, v), surface.normal(u, v));
+        }
+        Self::between(&corners, outline, surface, range_error)
+    }
+
+    /// Computes the figures of an outline as it is, such as the true one of a simulated plate; the surface gives normals and thickness.
+    #[must_use]
+    pub fn of_outline(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
+        Self::between(&outline.corners, outline, surface, range_error)
+    }
+
+    fn between(corners: &[Corner; 4], outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
         let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
         let sigma = |u: f64, v: f64| surface.sigma_point(u * surface.width(), v * surface.height());
-        Self::with(&outline.corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma, range_error)
+        Self::with(corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma, range_error)
     }
 
     /// `normal` and `sigma`, the standard deviation along it, at shares of the plate's sides.
@@ -142,6 +158,11 @@ impl Known {
         let unit = way / way.norm().max(f64::MIN_POSITIVE);
         (0..4).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
     }
+}
+
+/// Returns the point projected along the normal onto the plane through `face`.
+fn projected(point: Vec3, face: Vec3, normal: Vec3) -> Vec3 {
+    point + normal * normal.dot(&(face - point))
 }
 
 fn check(value: f64, variance: f64, corners: &[&Known]) -> Check {
@@ -267,6 +288,14 @@ mod tests {
         }
         near(flat.twist[0].value, 0.0, 1e-12);
         near(flat.twist[1].value, 0.0, 1e-12);
+    }
+
+    #[test]
+    fn a_projected_corner_keeps_its_place_and_takes_the_height_of_the_surface() {
+        let normal = Vec3::new(0.6, 0.0, 0.8);
+        let (face, along) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.8, 0.1, -0.6));
+        let found = projected(face + along + normal * 0.004, face, normal);
+        assert!((found - face - along).norm() < 1e-12, "{found}");
     }
 
     #[test]

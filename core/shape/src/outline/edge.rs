@@ -15,6 +15,7 @@ use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::EdgeLikelihood;
 use super::edge_posterior::Posterior;
 use super::footprint;
+use super::height_field::LEAST_COSINE;
 use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
@@ -32,11 +33,18 @@ const CURVATURE: (f64, f64) = (0.003, 0.3);
 /// plates of an independent simulator edges are 0.1 to 0.3 mm farther off than the scatter of their lines explains.
 const COMMON: f64 = 1e-4;
 
-/// The same where the edge is located by the pixels that see both sides of it, in parts of half the footprint on the face and of the logarithm
-/// of one over the cosine of the incidence: a face is the darker the more obliquely it is seen, and what lies behind it outshines it,
-/// so that pixels are mixed farther inside of the edge than outside; of a Gaussian beam by about three times this, if both are
-/// equally bright under normal incidence.
-const CONTRAST_SHARE: f64 = 0.1;
+/// Contrast: a face is the darker the more obliquely it is seen, and what lies behind it outshines it, so that pixels are mixed farther inside of the
+/// edge than outside. Where the edge is located by them it is found too far inwards by the first number times (L - the second), where that is positive, in parts
+/// of half the footprint on the face; L is the logarithm of one over the cosine of the incidence. The reflectivities are not known: these are means over
+/// plates of 0.12, 0.2, 0.35 and 0.7 before walls of 0.8 and a floor of 0.3 (400 random scenes, seeds from 19001), 0.00, 0.04, 0.08 and 0.13
+/// at L = 0.75, 1.05, 1.35 and 1.65; the darkest plates have 0.10 and 0.19 at L = 1.05 and 1.35, the brightest 0.00 and 0.01.
+const CONTRAST: [f64; 2] = [0.15, 0.8];
+
+/// Largest L for which they are known.
+const MOST_DIMMED: f64 = 1.8;
+
+/// Standard deviation of the same, in parts of half the footprint times L.
+const CONTRAST_SPREAD: f64 = 0.1;
 
 /// Newton steps with widened likelihoods, then further ones at most, and the movement that ends them, metres.
 const WIDENED_ROUNDS: i32 = 8;
@@ -178,7 +186,9 @@ impl Edge {
 
     /// Returns the point of the edge at a distance along it.
     pub(super) fn point(&self, along: f64) -> Vec3 {
-        self.strip.lift(Vector2::new(along, self.posterior.curve.at(along)))
+        let at = self.posterior.curve.at(along);
+        let [inwards, _] = self.contrast(along, self.strip.lift(Vector2::new(along, at)));
+        self.strip.lift(Vector2::new(along, at - inwards))
     }
 
     /// Returns the place along the edge nearest to a point.
@@ -198,16 +208,22 @@ impl Edge {
 
     /// Returns the standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
-        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(self.footprint_error(along))
+        let [_, contrast] = self.contrast(along, self.point(along));
+        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(contrast)
     }
 
-    fn footprint_error(&self, along: f64) -> f64 {
-        let (point, normal, inward) = (self.point(along), self.strip.normal(along), self.strip.inward(along));
+    /// Returns by how much the contrast places the edge too far inwards at one of its points, and the standard deviation, metres.
+    fn contrast(&self, along: f64, point: Vec3) -> [f64; 2] {
+        let (normal, inward) = (self.strip.normal(along), self.strip.inward(along));
         if self.side_face.is_seen(point, normal, inward) {
-            return 0.0;
+            return [0.0; 2];
         }
-        let darkness = -(-normal.dot(&point.normalize())).ln();
-        CONTRAST_SHARE * darkness * self.footprint * lattice_line::inwards_per_radian(point, normal, inward)
+        let dimmed = -normal.dot(&-point.normalize()).max(LEAST_COSINE).ln();
+        let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
+        [
+            CONTRAST[0] * (dimmed.min(MOST_DIMMED) - CONTRAST[1]).max(0.0) * seen,
+            CONTRAST_SPREAD * dimmed * seen,
+        ]
     }
 }
 

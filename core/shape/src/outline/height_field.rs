@@ -26,7 +26,7 @@ const ENOUGH: usize = 30_000;
 const CUT_OFF: f64 = 5.0;
 
 /// Least cosine of the incidence in weights: that of 87 degrees.
-const LEAST_COSINE: f64 = 0.05;
+pub(super) const LEAST_COSINE: f64 = 0.05;
 
 /// Newton steps from a point near the face, at most; each squares an error of a few parts in a hundred, and one of less than
 /// this, metres, is the last.

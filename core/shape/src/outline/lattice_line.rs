@@ -17,6 +17,8 @@
 use super::Sampling;
 use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation};
+use super::footprint::FOOTPRINT_SPREAD;
+use super::height_field::LEAST_COSINE;
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
 use crate::Vec3;
@@ -35,6 +37,9 @@ const SIDE_SLOPE: f64 = 0.1;
 
 /// Standard deviations of its range by which the last cell of the face may lie farther out on the side face.
 const LAST_BOUND: f64 = 4.0;
+
+/// Widest footprint at an edge, in halves of the estimated one: twice and twice its spread.
+const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
 /// Properties of the beams.
 #[derive(Debug, Clone, Copy)]
@@ -138,6 +143,15 @@ impl LatticeLine {
         self.low - slack < at && at < self.high + slack
     }
 
+    /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a row and more those
+    /// that are farther from the first than a footprint is wide.
+    fn others(&self, beam: BeamModel) -> u32 {
+        let Some((lowest, highest)) = self.mixed else { return 0 };
+        let width = WIDEST * beam.footprint * self.per_radian;
+        let three = highest - lowest > 1.5 * self.per_step;
+        if width > 0.0 && three { ((highest - width - lowest) / self.per_step).ceil() as u32 } else { 0 }
+    }
+
     /// Returns the likelihood of an edge position given this line; `noise` is that of ranges, metres.
     pub(super) fn likelihood(&self, beam: BeamModel, noise: f64) -> EdgeLikelihood {
         let soft = norm(beam.softness * self.per_angle, FACE_NOISE * (noise * self.per_range.abs()));
@@ -171,8 +185,13 @@ impl LatticeLine {
             above.likely += self.side + seen;
         }
         if let Some((lowest, highest)) = self.mixed {
+            let others = self.others(beam);
+            let lowest = lowest + f64::from(others) * self.per_step;
             let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
             above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
+            if others > 0 {
+                above.likely = above.likely.max(lowest - self.per_step + self.side + seen);
+            }
             below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
         } else if self.side > seen && cell_noise > 0.0 {
             return of([EdgeObservation::Above(above).within(soft), last]);
@@ -183,12 +202,12 @@ impl LatticeLine {
 }
 
 /// Returns the distance inwards on the face by which a beam to `point` moves when it turns, per radian; `normal` and `inward` are
-/// unit vectors there.
+/// unit vectors there. Where an edge is bridged its face may turn away from the beams: it counts as seen at a small angle.
 pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64 {
     let beam = point.normalize();
     // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
     // inward part of that, over all e across the beam, is the length of this vector.
-    let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam));
+    let lever = inward - normal * (inward.dot(&beam) / normal.dot(&beam).min(-LEAST_COSINE));
     point.norm() * (lever - beam * lever.dot(&beam)).norm()
 }
 
@@ -234,6 +253,21 @@ pub(super) mod tests {
     fn inside(line: &LatticeLine, far: f64) -> f64 {
         let of = line.likelihood(BeamModel::of(1.6e-4), 7e-4);
         of.value(line.high + far) / of.value(line.high)
+    }
+
+    /// Three mixed pixels in a row 5.7 mm apart, of which a footprint of 3.2 mm explains one.
+    #[test]
+    fn mixed_pixels_of_another_edge_behind_a_strip_do_not_count() {
+        let line = LatticeLine { low: -21.1e-3, ..open_line(Some((-15.4e-3, -4e-3))) };
+        let of = line.likelihood(BeamModel::of(1.6e-4), 7e-4);
+        for elsewhere in [-15e-3, -9.7e-3, 0.0] {
+            assert!(
+                of.value(-4e-3) > 10.0 * of.value(elsewhere),
+                "{} {}",
+                of.value(-4e-3),
+                of.value(elsewhere)
+            );
+        }
     }
 
     #[test]
