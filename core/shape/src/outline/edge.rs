@@ -40,8 +40,8 @@ const COMMON: f64 = 1e-4;
 /// at L = 0.75, 1.05, 1.35 and 1.65; the darkest plates have 0.10 and 0.19 at L = 1.05 and 1.35, the brightest 0.00 and 0.01.
 const CONTRAST: [f64; 2] = [0.15, 0.8];
 
-/// Largest L for which they are known.
-const MOST_DIMMED: f64 = 1.8;
+/// Least cosine for which they are known: that of L = 1.8. Beyond, an edge is taken outwards by no more than there.
+const LEAST_KNOWN: f64 = 0.165;
 
 /// Standard deviation of the same, in parts of half the footprint times L.
 const CONTRAST_SPREAD: f64 = 0.1;
@@ -218,12 +218,12 @@ impl Edge {
         if self.side_face.is_seen(point, normal, inward) {
             return [0.0; 2];
         }
-        let dimmed = -normal.dot(&-point.normalize()).max(LEAST_COSINE).ln();
+        let cosine = normal.dot(&-point.normalize()).max(LEAST_COSINE);
         let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
-        [
-            CONTRAST[0] * (dimmed.min(MOST_DIMMED) - CONTRAST[1]).max(0.0) * seen,
-            CONTRAST_SPREAD * dimmed * seen,
-        ]
+        // The footprint is longer by one over the cosine.
+        let known = cosine.max(LEAST_KNOWN);
+        let inwards = CONTRAST[0] * (-known.ln() - CONTRAST[1]).max(0.0) * seen * (cosine / known);
+        [inwards, -CONTRAST_SPREAD * cosine.ln() * seen]
     }
 }
 
