@@ -218,13 +218,18 @@ impl Edge {
         if self.side_face.is_seen(point, normal, inward) {
             return [0.0; 2];
         }
-        let cosine = normal.dot(&-point.normalize()).max(LEAST_COSINE);
         let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
-        // The footprint is longer by one over the cosine.
-        let known = cosine.max(LEAST_KNOWN);
-        let inwards = CONTRAST[0] * (-known.ln() - CONTRAST[1]).max(0.0) * seen * (cosine / known);
-        [inwards, -CONTRAST_SPREAD * cosine.ln() * seen]
+        contrast(normal.dot(&-point.normalize())).map(|share| share * seen)
     }
+}
+
+/// Returns by how much the contrast places an edge too far inwards, and the standard deviation, in parts of half the footprint on the face, by the
+/// cosine of the incidence.
+fn contrast(cosine: f64) -> [f64; 2] {
+    let cosine = cosine.max(LEAST_COSINE);
+    let known = cosine.max(LEAST_KNOWN);
+    // The footprint is longer by one over the cosine.
+    [CONTRAST[0] * (-known.ln() - CONTRAST[1]).max(0.0) * cosine / known, -CONTRAST_SPREAD * cosine.ln()]
 }
 
 /// Maximises the likelihood by Newton's method from the middles of the intervals: first one step for each of ever less widened
@@ -268,4 +273,21 @@ fn newton_step(
         normal.add(line.along, to, weight);
     }
     normal.solve()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contrast_grows_with_the_incidence_and_not_beyond_what_is_known() {
+        assert_eq!(contrast(1.0), [0.0, 0.0]);
+        let [inwards, sigma] = contrast((-1.35_f64).exp());
+        assert!((inwards - 0.0825).abs() < 1e-9 && (sigma - 0.135).abs() < 1e-9, "{inwards} {sigma}");
+        // Footprints go with one over the cosine: the edge is moved as far as where it is known.
+        let moved = |cosine: f64| contrast(cosine)[0] / cosine;
+        assert!((moved(0.1) / moved(LEAST_KNOWN) - 1.0).abs() < 1e-12);
+        // A face that is turned away.
+        assert_eq!(contrast(-0.3), contrast(LEAST_COSINE));
+    }
 }

@@ -38,7 +38,7 @@ const SIDE_SLOPE: f64 = 0.1;
 /// Standard deviations of its range by which the last cell of the face may lie farther out on the side face.
 const LAST_BOUND: f64 = 4.0;
 
-/// Widest footprint at an edge, in halves of the estimated one: twice and twice its spread.
+/// Widest footprint at an edge, in halves of the estimated one: both halves, wider by their spread.
 const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
 /// Properties of the beams.
@@ -148,8 +148,8 @@ impl LatticeLine {
     fn others(&self, beam: BeamModel) -> u32 {
         let Some((lowest, highest)) = self.mixed else { return 0 };
         let width = WIDEST * beam.footprint * self.per_radian;
-        let three = highest - lowest > 1.5 * self.per_step;
-        if width > 0.0 && three { ((highest - width - lowest) / self.per_step).ceil() as u32 } else { 0 }
+        let are_three = highest - lowest > 1.5 * self.per_step;
+        if width > 0.0 && are_three { ((highest - width - lowest) / self.per_step).ceil() as u32 } else { 0 }
     }
 
     /// Returns the likelihood of an edge position given this line; `noise` is that of ranges, metres.
