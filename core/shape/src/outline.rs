@@ -59,6 +59,8 @@ pub struct Corner {
     pub point: Vec3,
     /// Standard deviation along the edge that leaves the corner and along the one that arrives, metres.
     pub sigma: [f64; 2],
+    /// Parts of these in which all edges of a plate are off to the same side, inwards or outwards: its contrast.
+    pub contrast: [f64; 2],
     /// False when the corner's neighbourhood was hidden and its place was extrapolated from its edges.
     pub seen: bool,
 }
@@ -164,6 +166,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         Corner {
             point: points[k],
             sigma: [arriving.sigma(arriving.to), leaving.sigma(leaving.from)],
+            contrast: [arriving.contrast_sigma(arriving.to), leaving.contrast_sigma(leaving.from)],
             seen: arriving.seen.at(arriving.to) && leaving.seen.at(leaving.from),
         }
     };

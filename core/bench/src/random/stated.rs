@@ -176,6 +176,11 @@ fn true_outline(outline: &Outline, truth: &Truth) -> Outline {
         let points: Vec<Vec3> = edge.iter().map(|p| Vec3::from(*p)).collect();
         EdgeCurve { seen: vec![true; points.len()], points, sigma: 0.0 }
     });
-    let corners = edges.each_ref().map(|edge| Corner { point: edge.points[0], sigma: [0.0; 2], seen: true });
+    let corners = edges.each_ref().map(|edge| Corner {
+        point: edge.points[0],
+        sigma: [0.0; 2],
+        contrast: [0.0; 2],
+        seen: true,
+    });
     Outline { corners, edges, height_field: outline.height_field.clone() }
 }

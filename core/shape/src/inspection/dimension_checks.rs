@@ -2,7 +2,8 @@
 //!
 //! From the measured outline, not from the rectangle it is mapped to: they show by how many millimetres a cut blank differs
 //! from its order. Standard deviations follow from those of the corners, in the surface from the
-//! outline, across it from the fit, and along the beam from the scanner's range error; errors of different corners count as independent.
+//! outline, across it from the fit, and along the beam from the scanner's range error; errors of different corners count as independent, but those of the plate's contrast, which has all
+//! edges too far inwards or too far outwards.
 
 use crate::outline::{Corner, EdgeCurve};
 use crate::range_error::{RangeError, beam};
@@ -91,8 +92,11 @@ impl ShapeChecks {
         });
         let straight = |from: usize, to: usize| {
             let way = corners[to].at - corners[from].at;
-            let variance = corners[from].variance(way) + corners[to].variance(way);
-            check(way.norm(), variance, &[&corners[from], &corners[to]])
+            check(
+                way.norm(),
+                variance_apart(&corners[from], &corners[to], way),
+                &[&corners[from], &corners[to]],
+            )
         };
         let edges = [0, 1, 2, 3].map(|k| {
             let next = (k + 1) % 4;
@@ -131,6 +135,8 @@ struct Known {
     axes: [Vec3; 4],
     /// Standard deviations along them.
     sigma: [f64; 4],
+    /// Where the corner is by the standard deviation of the contrast, which all corners have together.
+    contrast: Vec3,
     /// Standard deviations of the two edges' directions, radians.
     tilt: [f64; 2],
     seen: bool,
@@ -142,22 +148,31 @@ impl Known {
         corner: &Corner,
         edges: [&EdgeCurve; 2],
         normal: Vec3,
-        sigma: f64,
+        across: f64,
         range_error: RangeError,
     ) -> Self {
-        let Corner { point, sigma: [leaving, arriving], seen } = *corner;
+        let Corner { point, sigma, contrast, seen } = *corner;
         let arm = |edge: &EdgeCurve, from_end: bool| Arm::new(edge, from_end, point, normal, range_error);
         let arms = [arm(edges[0], false), arm(edges[1], true)];
         let axes = [arms[0].direction, arms[1].direction, normal, beam(&point)];
-        let sigma = [leaving, arriving, sigma, range_error.sigma()];
-        Self { at: point, axes, sigma, tilt: arms.map(|arm| arm.tilt), seen }
+        let [leaving, arriving] = [0, 1].map(|k| (sigma[k].powi(2) - contrast[k].powi(2)).max(0.0).sqrt());
+        let sigma = [leaving, arriving, across, range_error.sigma()];
+        // Both edges run from the corner inwards along the other one.
+        let contrast = axes[0] * contrast[0] + axes[1] * contrast[1];
+        Self { at: point, axes, sigma, contrast, tilt: arms.map(|arm| arm.tilt), seen }
     }
 
-    /// Variance of the place along a direction of any length.
+    /// Variance of the place along a direction of any length, without the contrast.
     fn variance(&self, way: Vec3) -> f64 {
         let unit = way / way.norm().max(f64::MIN_POSITIVE);
         (0..4).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
     }
+}
+
+/// Returns the variance of the way from one corner to another along a direction of any length.
+fn variance_apart(from: &Known, to: &Known, along: Vec3) -> f64 {
+    let unit = along / along.norm().max(f64::MIN_POSITIVE);
+    from.variance(along) + to.variance(along) + unit.dot(&(to.contrast - from.contrast)).powi(2)
 }
 
 /// Returns the point projected along the normal onto the plane through `face`.
@@ -226,7 +241,7 @@ fn twist(corners: &[Known; 4], near: [usize; 2], far: [usize; 2]) -> Check {
     let value = a.cross(&b).dot(&sight).atan2(a.dot(&b));
     let tilt = |[from, to]: [usize; 2], way: Vec3| {
         let aside = sight.cross(&way);
-        (corners[from].variance(aside) + corners[to].variance(aside)) / way.norm_squared()
+        variance_apart(&corners[from], &corners[to], aside) / way.norm_squared()
     };
     check(value, tilt(near, a) + tilt(far, b), &[&corners[0], &corners[1], &corners[2], &corners[3]])
 }
@@ -243,13 +258,18 @@ mod tests {
 
     /// The outline of a face over shares of the sides, and its normals by differences.
     fn checks(face: impl Fn(f64, f64) -> Vec3, sigma: f64) -> ShapeChecks {
-        checks_with(face, sigma, RangeError::default())
+        checks_with(face, [sigma, 0.0], RangeError::default())
     }
 
-    fn checks_with(face: impl Fn(f64, f64) -> Vec3, sigma: f64, range_error: RangeError) -> ShapeChecks {
+    fn checks_with(
+        face: impl Fn(f64, f64) -> Vec3,
+        [sigma, contrast]: [f64; 2],
+        range_error: RangeError,
+    ) -> ShapeChecks {
         let corner = |k: usize| Corner {
             point: face(CORNERS[k][0], CORNERS[k][1]),
             sigma: [sigma, 2.0 * sigma],
+            contrast: [contrast; 2],
             seen: k != 2,
         };
         let edge = |k: usize| {
@@ -312,17 +332,31 @@ mod tests {
         assert!(flat.diagonals[1].seen && !flat.twist[0].seen);
     }
 
+    /// Both ends of an edge are off to the same side by it.
+    #[test]
+    fn a_contrast_is_that_of_all_corners() {
+        let contrast = 1e-4;
+        let flat =
+            checks_with(|u, v| Vec3::new(u * W, v * H, 0.0), [contrast, contrast], RangeError::default());
+        // Along the leaving edge all is contrast; along the arriving one three quarters of the variance are not.
+        near(flat.edges[0].chord.sigma, contrast * (3.0_f64 + 4.0).sqrt(), 1e-9);
+        let unit = Vec3::new(W, H, 0.0) / W.hypot(H);
+        // The arriving edges run along v at both ends.
+        let own = 2.0 * 3.0 * unit.y.powi(2);
+        near(flat.diagonals[0].sigma, contrast * (own + (2.0 * (unit.x + unit.y)).powi(2)).sqrt(), 1e-9);
+    }
+
     /// A plate far below the scanner is moved along its normal: its twist is uncertain, its lengths are not. Far aside the beam
     /// runs along u, and the lengths along u are.
     #[test]
     fn a_range_error_counts_along_the_beam() {
         let range_error = RangeError::new(1e-3);
-        let below = checks_with(|u, v| Vec3::new(u * W, v * H, -1e6), 0.0, range_error);
+        let below = checks_with(|u, v| Vec3::new(u * W, v * H, -1e6), [0.0; 2], range_error);
         near(below.twist[0].sigma, 2e-3 / H, 1e-8);
         near(below.twist[1].sigma, 2e-3 / W, 1e-8);
         assert!(below.edges.iter().all(|edge| edge.chord.sigma < 1e-8));
         assert!(below.angles.iter().all(|angle| angle.sigma < 1e-8));
-        let aside = checks_with(|u, v| Vec3::new(1e6 + u * W, v * H, 0.0), 0.0, range_error);
+        let aside = checks_with(|u, v| Vec3::new(1e6 + u * W, v * H, 0.0), [0.0; 2], range_error);
         near(aside.edges[0].mid.sigma, 2.0_f64.sqrt() * 1e-3, 1e-8);
         assert!(aside.edges[1].mid.sigma < 1e-8 && aside.twist[0].sigma < 1e-8);
         // The edges along v are moved across at both ends of their arms.

@@ -125,6 +125,7 @@ impl Scene {
         let corners = at.map(|[u, v]| Corner {
             point: placed.face(u, v) + jitter(0.3 * self.sigma),
             sigma: [0.3 * self.sigma; 2],
+            contrast: [0.0; 2],
             seen: true,
         });
         let edges = [0, 1, 2, 3].map(|k| {

@@ -208,8 +208,13 @@ impl Edge {
 
     /// Returns the standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
-        let [_, contrast] = self.contrast(along, self.point(along));
-        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(contrast)
+        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(self.contrast_sigma(along))
+    }
+
+    /// Returns the part of it that the contrast has, in which all edges of a plate are off to the same side, metres.
+    pub(super) fn contrast_sigma(&self, along: f64) -> f64 {
+        let [_, sigma] = self.contrast(along, self.point(along));
+        sigma
     }
 
     /// Returns by how much the contrast places the edge too far inwards at one of its points, and the standard deviation, metres.
