@@ -2,7 +2,8 @@
 //!
 //! A scene follows from its seed alone ([`RandomScene::of`]): a plate of 2 to 5 x 1.5 to 4 m, 25 to 50 mm thick, of any shape of the
 //! simulator, concave or convex, at any heading, 6 to 11 m away (horizontally, its middle), the scanner 3 to 5 m above it, steps of 0.03 to 0.055 degrees, range
-//! noise of 0.3 to 1.5 mm at 10 m on mill scale, the plate's reflectivity 0.1 to 0.6, a person or a chain in a third of the scenes each, a cyclic range error of up to 0.3 mm in a third.
+//! noise of 0.3 to 1.5 mm at 10 m on mill scale, the plate's reflectivity 0.1 to 0.6, a person or a chain in a third of the scenes each, a
+//! cyclic range error of up to 0.3 mm in a third.
 //! The truth is the simulator's; lengths and angles of the true outline follow the definitions of
 //! [`ShapeChecks`], so that a figure is compared with the same figure.
 //!

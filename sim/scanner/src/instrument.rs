@@ -97,10 +97,11 @@ impl Instrument {
 }
 
 /// Returns the diffuse reflectivity at 905 nm to 1550 nm; typical values: mill scale is dark, painted walls are bright.
-pub(crate) fn reflectivity(label: Label) -> f64 {
+/// That of the plate's faces is the scene's.
+pub(crate) fn reflectivity(label: Label, plate: f64) -> f64 {
     match label {
         Label::Nothing => 0.0,
-        Label::PlateTop | Label::PlateUnderside => PLATE_REFLECTIVITY,
+        Label::PlateTop | Label::PlateUnderside => plate,
         Label::PlateSide => 0.4,
         Label::Die | Label::Table => 0.25,
         Label::Press => 0.5,

@@ -1,7 +1,7 @@
 //! Scene of a scan: plate and surroundings with their bounding volume hierarchies.
 
 use crate::bounds::{Bounds, Tree};
-use crate::instrument::{self, MARKER_REFLECTIVITY, PLATE_REFLECTIVITY};
+use crate::instrument::{MARKER_REFLECTIVITY, PLATE_REFLECTIVITY, reflectivity};
 use crate::patch::{Patch, PatchHit};
 use crate::ray::{Hit, Label, Ray};
 use crate::solid::Solid;
@@ -92,11 +92,8 @@ impl Scene {
 
     /// Returns the diffuse reflectivity where a ray hits.
     pub(crate) fn reflectivity(&self, hit: &Hit) -> f64 {
-        match hit.label {
-            Label::PlateTop if hit.uv.is_some_and(|uv| self.is_marker(uv)) => MARKER_REFLECTIVITY,
-            Label::PlateTop | Label::PlateUnderside => self.plate_reflectivity,
-            other => instrument::reflectivity(other),
-        }
+        let painted = hit.label == Label::PlateTop && hit.uv.is_some_and(|uv| self.is_marker(uv));
+        if painted { MARKER_REFLECTIVITY } else { reflectivity(hit.label, self.plate_reflectivity) }
     }
 
     /// Returns true when a point of the upper face is visible from the scanner.

@@ -1,9 +1,9 @@
 //! Dimension checks as done with tape, square and sight line: edge lengths, diagonals, corner angles, twist.
 //!
 //! From the measured outline, not from the rectangle it is mapped to: they show by how many millimetres a cut blank differs
-//! from its order. Standard deviations follow from those of the corners, in the surface from the
-//! outline, across it from the fit, and along the beam from the scanner's range error; errors of different corners count as independent, but those of the plate's contrast, which has all
-//! edges too far inwards or too far outwards.
+//! from its order. Standard deviations follow from those of the corners (propagation of uncertainty, JCGM 100:2008): in the surface from
+//! the outline, across it from the fit, along the beam from the scanner's range error. Errors of different corners count as independent,
+//! but for the contrast of face and background (`outline::edge`): it has all edges of a plate too far inwards, or all too far outwards.
 
 use crate::outline::{Corner, EdgeCurve};
 use crate::range_error::{RangeError, beam};
@@ -61,16 +61,21 @@ impl ShapeChecks {
             let [u, v] = [u * surface.width(), v * surface.height()];
             corner.point = projected(corner.point, surface.face(u, v), surface.normal(u, v));
         }
-        Self::between(&corners, outline, surface, range_error)
+        Self::of_corners(&corners, outline, surface, range_error)
     }
 
     /// Computes the figures of an outline as it is, such as the true one of a simulated plate; the surface gives normals and thickness.
     #[must_use]
     pub fn of_outline(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
-        Self::between(&outline.corners, outline, surface, range_error)
+        Self::of_corners(&outline.corners, outline, surface, range_error)
     }
 
-    fn between(corners: &[Corner; 4], outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
+    fn of_corners(
+        corners: &[Corner; 4],
+        outline: &Outline,
+        surface: &Surface,
+        range_error: RangeError,
+    ) -> Self {
         let normal = |u: f64, v: f64| surface.normal(u * surface.width(), v * surface.height());
         let sigma = |u: f64, v: f64| surface.sigma_point(u * surface.width(), v * surface.height());
         Self::with(corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma, range_error)

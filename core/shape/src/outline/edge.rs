@@ -4,7 +4,8 @@
 //! the interval-censored likelihoods of its lattice lines (`edge_likelihood`), the prior a curvature like white noise. It is
 //! unbiased where the middle between two samples is not: along a lattice row all lines have the same interval but for the
 //! few cells where the edge changes rows, and those few locate it. Where it changes none, the posterior is sampled
-//! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn.
+//! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn. Mixed pixels have a radiometric
+//! bias, by the contrast of the face and what lies behind it: its mean is taken off, its spread is stated.
 
 use nalgebra::{Cholesky, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
@@ -33,11 +34,12 @@ const CURVATURE: (f64, f64) = (0.003, 0.3);
 /// plates of an independent simulator edges are 0.1 to 0.3 mm farther off than the scatter of their lines explains.
 const COMMON: f64 = 1e-4;
 
-/// Contrast: a face is the darker the more obliquely it is seen, and what lies behind it outshines it, so that pixels are mixed farther inside of the
-/// edge than outside. Where the edge is located by them it is found too far inwards by the first number times (L - the second), where that is positive, in parts
-/// of half the footprint on the face; L is the logarithm of one over the cosine of the incidence. The reflectivities are not known: these are means over
-/// plates of 0.12, 0.2, 0.35 and 0.7 before walls of 0.8 and a floor of 0.3 (400 random scenes, seeds from 19001), 0.00, 0.04, 0.08 and 0.13
-/// at L = 0.75, 1.05, 1.35 and 1.65; the darkest plates have 0.10 and 0.19 at L = 1.05 and 1.35, the brightest 0.00 and 0.01.
+/// Contrast: a face is the darker the more obliquely it is seen, and what lies behind it outshines it, so that pixels are mixed farther
+/// inside of the edge than outside. Where the edge is located by them it is found too far inwards by the first number times (L - the
+/// second), where that is positive, in parts of half the footprint on the face; L is the logarithm of one over the cosine of the incidence.
+/// The reflectivities are not known: these are means over plates of 0.12, 0.2, 0.35 and 0.7 before walls of 0.8 and a floor of 0.3 (400
+/// random scenes, seeds from 19001), 0.00, 0.04, 0.08 and 0.13 at L = 0.75, 1.05, 1.35 and 1.65; the darkest plates have 0.10 and 0.19 at
+/// L = 1.05 and 1.35, the brightest 0.00 and 0.01.
 const CONTRAST: [f64; 2] = [0.15, 0.8];
 
 /// Least cosine for which they are known: that of L = 1.8. Beyond, an edge is taken outwards by no more than there.
@@ -228,8 +230,8 @@ impl Edge {
     }
 }
 
-/// Returns by how much the contrast places an edge too far inwards, and the standard deviation, in parts of half the footprint on the face, by the
-/// cosine of the incidence.
+/// Returns by how much the contrast places an edge too far inwards, and the standard deviation, in parts of half the footprint on the
+/// face, by the cosine of the incidence.
 fn contrast(cosine: f64) -> [f64; 2] {
     let cosine = cosine.max(LEAST_COSINE);
     let known = cosine.max(LEAST_KNOWN);

@@ -4,7 +4,8 @@
 //! the interval:
 //!
 //! - A mixed pixel sees both sides: the edge is within a footprint of its beam. A beam that is not mixed has its centre on its
-//!   own side, and most likely a footprint away; a quarter of the mixed beams is mixed too little to be detected.
+//!   own side, and most likely a footprint away; a quarter of the mixed beams is mixed too little to be detected. Of three and more
+//!   in a row those that a footprint does not reach from the first see another edge, that of a strip of background.
 //! - Where the plate's side face is visible, its silhouette mixes the beams; the silhouette's place beside the edge follows from
 //!   thickness and bevel (`side_face`). A beam on a side face of a few millimetres falls behind the face's continuation in
 //!   proportion to its distance from the edge, on a bevel in the proportion of the strip it meets: a direct observation.
@@ -143,8 +144,8 @@ impl LatticeLine {
         self.low - slack < at && at < self.high + slack
     }
 
-    /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a row and more those
-    /// that are farther from the first than a footprint is wide.
+    /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a
+    /// row and more those that are farther from the first than a footprint is wide.
     fn others(&self, beam: BeamModel) -> u32 {
         let Some((lowest, highest)) = self.mixed else { return 0 };
         let width = WIDEST * beam.footprint * self.per_radian;
