@@ -34,10 +34,25 @@ fn check(arguments: &[&str], bounds: Bounds, coverage: f64) {
     }
 }
 
-/// About twice what is found: 0.65 and 3.5, 0.50 and 3.6, 1.09 and 4.5, 1.62 and 3.0 mm, 0.044 and 0.072, 0.010 and 0.014 degrees. Without the correction
-/// for contrast 92 % of the diagonals of 200 scenes are in their intervals.
+/// Of mill scale, found: 0.61 and 3.1, 0.42 and 2.1, 0.86 and 3.2, 0.86 and 2.2 mm, 0.048 and 0.19, 0.010 and 0.012 degrees; about half of the bounds
+/// at 95 %.
 #[test]
 fn stated_intervals_contain_the_errors_of_random_scenes() {
+    let bounds = [
+        ("corner, u or v, mm", [1.3, 3.5]),
+        ("marker, u or v, mm", [0.8, 3.4]),
+        ("edge, mm", [1.7, 5.2]),
+        ("diagonal, mm", [1.8, 3.4]),
+        ("angle, degrees", [0.13, 0.26]),
+        ("twist, degrees", [0.02, 0.04]),
+    ];
+    check(&["square", "--reflectivity", "0.35"], bounds, COVERAGE);
+}
+
+/// About twice what is found: 0.65 and 3.5, 0.50 and 3.6, 1.09 and 4.5, 1.62 and 3.0 mm, 0.044 and 0.072, 0.010 and 0.014 degrees. Without the
+/// correction for contrast 92 % of the diagonals of 200 scenes are in their intervals.
+#[test]
+fn stated_intervals_contain_the_errors_of_dark_and_bright_plates() {
     let bounds = [
         ("corner, u or v, mm", [1.3, 7.0]),
         ("marker, u or v, mm", [1.0, 7.1]),
@@ -55,7 +70,7 @@ fn stated_intervals_contain_the_errors_of_random_scenes() {
 fn bevelled_edges_are_located_like_square_ones() {
     let bounds = [
         ("corner, u or v, mm", [1.3, 3.1]),
-        ("marker, u or v, mm", [0.9, 2.9]),
+        ("marker, u or v, mm", [0.8, 2.9]),
         ("edge, mm", [1.7, 3.6]),
         ("diagonal, mm", [1.7, 2.9]),
         ("angle, degrees", [0.12, 0.2]),
@@ -68,7 +83,7 @@ fn bevelled_edges_are_located_like_square_ones() {
 #[test]
 fn a_share_of_wide_range_errors_moves_no_figure() {
     let bounds = [
-        ("corner, u or v, mm", [1.3, 4.4]),
+        ("corner, u or v, mm", [1.1, 3.9]),
         ("marker, u or v, mm", [0.8, 3.4]),
         ("edge, mm", [2.0, 4.2]),
         ("diagonal, mm", [1.5, 4.0]),

@@ -89,7 +89,7 @@ pub struct BenchArguments {
     #[arg(long, value_name = "MM", requires = "random")]
     pub cyclic_mm: Option<f64>,
     /// Reflectivity of the plate in every random scene, 0.01 to 1, instead of 0.1 to 0.6
-    #[arg(long, value_name = "SHARE", requires = "random")]
+    #[arg(long, value_name = "SHARE", requires = "random", value_parser = reflectivity)]
     pub reflectivity: Option<f64>,
     /// File of `platen calibrate`: the scanner's error in the stated uncertainties, instead of the simulated instrument's own figure
     #[arg(long, value_name = "FILE", requires = "random")]
@@ -166,6 +166,11 @@ fn share(text: &str) -> Result<f64, String> {
     if (0.0..=0.2).contains(&share) { Ok(share) } else { Err("must lie between 0 and 20%".into()) }
 }
 
+fn reflectivity(text: &str) -> Result<f64, String> {
+    let reflectivity = text.parse().ok().filter(|it| (0.01..=1.0).contains(it));
+    reflectivity.ok_or_else(|| "give a number of 0.01 to 1".to_owned())
+}
+
 /// Replaces this process by `platen-bench`, which lies beside it, with the same arguments.
 pub(super) fn start() -> Result<ExitCode, CliError> {
     let program =
@@ -184,6 +189,8 @@ mod tests {
     fn shares_are_numbers_or_percentages() {
         assert_eq!(share("1%"), Ok(0.01));
         assert_eq!(share("0.005"), Ok(0.005));
+        assert_eq!(reflectivity("0.35"), Ok(0.35));
+        assert!(reflectivity("5").is_err() && reflectivity("NaN").is_err() && reflectivity("0").is_err());
         assert!(share("50%").is_err() && share("-1%").is_err() && share("x").is_err());
     }
 }
