@@ -8,8 +8,7 @@ use nalgebra::{Cholesky, DMatrix, Dyn, SMatrix, SVector};
 use platen_numerics::adaptive_metropolis::mean_and_covariance;
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
-use super::footprint::FOOTPRINT_SPREAD;
-use super::lattice_line::{BeamModel, LatticeLine, SOFTNESS};
+use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 use super::{SEED, Sampling};
 
 /// Free places of the edge where its posterior is sampled: ends and thirds. Between them the prior leaves two tenths of a

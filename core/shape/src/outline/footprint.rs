@@ -4,10 +4,7 @@
 use platen_numerics::normal_distribution::cdf;
 
 use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
-use super::lattice_line::{LatticeLine, SOFTNESS};
-
-/// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
-pub(super) const FOOTPRINT_SPREAD: f64 = 0.3;
+use super::lattice_line::{FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 
 /// Lines that give the number to a tenth.
 const LEAST_LINES: usize = 100;

@@ -18,7 +18,6 @@
 use super::Sampling;
 use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation};
-use super::footprint::FOOTPRINT_SPREAD;
 use super::height_field::LEAST_COSINE;
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
@@ -27,6 +26,9 @@ use crate::extract::Beyond;
 
 /// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
+
+/// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
+pub(super) const FOOTPRINT_SPREAD: f64 = 0.3;
 
 /// Noise of the smooth face near its edges in parts of that of a sample.
 const FACE_NOISE: f64 = 0.03;
