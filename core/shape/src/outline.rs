@@ -14,6 +14,7 @@
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
+//! | `contrast` | radiometric bias of an edge, from the ranges of its mixed pixels | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
 //! | `coverage` | where along an edge it was seen | own |
@@ -23,6 +24,7 @@
 //! between the samples. Limits: four smooth edges meeting at 60 to 120 degrees, no hole that reaches an edge.
 
 mod boundary_loop;
+mod contrast;
 mod corners;
 mod coverage;
 mod developed_strip;

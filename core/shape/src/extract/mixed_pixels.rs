@@ -9,7 +9,7 @@ use super::window::Window;
 const BOUND: f32 = 5.0;
 
 /// The same in parts of the jump between the surfaces on both sides: what is farther away is often noisier than the plate.
-const LEAST_SHARE: f32 = 0.005;
+const LEAST_SHARE: f32 = 0.002;
 
 /// Class of a cell by its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,8 +26,9 @@ pub(super) enum Pixel {
 /// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
 /// from the straight continuation of the two cells on either side and from the middle between its neighbours.
 ///
-/// Straight means in inverse range, so that no limit of the incidence enters.
-pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
+/// Straight means in inverse range, so that no limit of the incidence enters. The noise is that of the surface which is continued: before a
+/// bright background the little that a beam sees of a dark plate is told from it by the noise of the background only.
+pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Vec<Pixel> {
     let n_rows = window.n_rows;
     let mut pixels = vec![Pixel::Unknown; window.cells.len()];
     for (column, rows) in window.inner_spans(2) {
@@ -35,9 +36,11 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
             let index = column * n_rows + row;
             let here = window.inverse[index];
             if here > 0.0 {
-                let bound = BOUND * 6.0_f32.sqrt() * noise.of(column, row) * here * here;
-                let down = along(&window.inverse, index, 1, bound);
-                let across = along(&window.inverse, index, n_rows, bound);
+                let scale = BOUND * 6.0_f32.sqrt() * here * here;
+                let own = noise.of(column, row);
+                let bounds = [own, background.of(column, row).min(own)].map(|noise| scale * noise);
+                let down = along(window, index, 1, bounds);
+                let across = along(window, index, n_rows, bounds);
                 pixels[index] = match (down, across) {
                     (Pixel::Mixed, _) | (_, Pixel::Mixed) => Pixel::Mixed,
                     (Pixel::Sound, Pixel::Sound) => Pixel::Sound,
@@ -49,9 +52,11 @@ pub(super) fn classify(window: &Window, noise: &Noise) -> Vec<Pixel> {
     pixels
 }
 
-/// Classifies a cell along one direction of the lattice: mixed when both sides were measured and nothing explains it.
+/// Classifies a cell along one direction of the lattice: mixed when both sides were measured and nothing explains it. Bounds are those of the component
+/// and of the background.
 #[inline]
-fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
+fn along(window: &Window, index: usize, stride: usize, [own, background]: [f32; 2]) -> Pixel {
+    let inverse = &window.inverse;
     let q = [
         inverse[index - 2 * stride],
         inverse[index - stride],
@@ -60,9 +65,13 @@ fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
         inverse[index + 2 * stride],
     ];
     let known = q.map(|q| q > 0.0);
-    let small = |i: usize| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs() <= bound;
+    let bound_at = |at: usize| if window.own[at] { own } else { background };
+    let small = |i: usize, bound: f32| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs() <= bound;
     let (before, behind) = (known[0] && known[1], known[3] && known[4]);
-    if (before && small(0)) || (known[1] && known[3] && small(1)) || (behind && small(2)) {
+    if (known[1] && known[3] && small(1, own))
+        || (before && small(0, bound_at(index - stride)))
+        || (behind && small(2, bound_at(index + stride)))
+    {
         Pixel::Sound
     } else if before && behind {
         let off = |i: usize| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs();
@@ -72,5 +81,45 @@ fn along(inverse: &[f32], index: usize, stride: usize, bound: f32) -> Pixel {
         Pixel::Mixed
     } else {
         Pixel::Unknown
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use platen_numerics::random::Random;
+    use platen_scan::ScanHeader;
+
+    use super::*;
+
+    /// A wall of little noise 2 m behind a face of much; the beams of one row see 1 % of the face, 20 mm of range.
+    #[test]
+    fn little_of_a_noisy_face_before_a_quiet_wall_is_mixed() {
+        const FACE_ROWS: usize = 40;
+        let header = ScanHeader {
+            n_rows: 80,
+            n_columns: 40,
+            azimuth_step: 9e-4,
+            elevation_step: 9e-4,
+            ..ScanHeader::default()
+        };
+        let mut random = Random::new(11);
+        let noise: Vec<f64> = (0..80 * 40).map(|_| random.normal()).collect();
+        let window = Window::of_ranges(header, |column, row| {
+            let (range, sigma) = match row {
+                0..FACE_ROWS => (8.0, 2e-3),
+                FACE_ROWS => (9.98, 2e-4),
+                _ => (10.0, 2e-4),
+            };
+            ((range + sigma * noise[80 * column + row]) as f32, row < FACE_ROWS)
+        });
+        let face = Noise::estimate(&window, &window.own);
+        let mixed = |background: &Noise| {
+            let pixels = classify(&window, &face, background);
+            (4..36).filter(|column| pixels[80 * column + FACE_ROWS] == Pixel::Mixed).count()
+        };
+        let told = [&face, &Noise::of_background(&window)].map(mixed);
+        println!("told by the noise of the face and of the background: {told:?} of 32");
+        assert_eq!(told[1], 32);
+        assert!(told[0] < 16);
     }
 }

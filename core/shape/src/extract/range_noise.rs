@@ -60,6 +60,12 @@ impl Noise {
         Self { pooled, block, blocks_down, n_rows }
     }
 
+    /// Estimates the noise of the background, all measured cells off the component.
+    pub(super) fn of_background(window: &Window) -> Self {
+        let off = window.own.iter().zip(&window.inverse).map(|(own, inverse)| !own && *inverse > 0.0);
+        Self::estimate(window, &off.collect::<Vec<bool>>())
+    }
+
     /// Returns the standard deviation at a cell, metres.
     pub(super) fn at(&self, index: usize) -> f32 {
         self.of(index / self.n_rows, index % self.n_rows)

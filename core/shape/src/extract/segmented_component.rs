@@ -27,7 +27,7 @@ pub(super) struct SegmentedComponent {
 impl SegmentedComponent {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
-        let mut pixels = mixed_pixels::classify(&window, &noise);
+        let mut pixels = mixed_pixels::classify(&window, &noise, &Noise::of_background(&window));
         background_planes::mark_sound(&window, &noise, &mut pixels);
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();

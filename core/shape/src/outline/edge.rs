@@ -11,6 +11,7 @@ use nalgebra::{Cholesky, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
 use platen_numerics::uniform_knots::UniformKnots;
 
+use super::contrast::Contrast;
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::EdgeLikelihood;
@@ -33,20 +34,6 @@ const CURVATURE: (f64, f64) = (0.003, 0.3);
 /// Standard deviation of errors that all lines of an edge share, metres: squareness of the cut, shape of the footprint. On
 /// plates of an independent simulator edges are 0.1 to 0.3 mm farther off than the scatter of their lines explains.
 const COMMON: f64 = 1e-4;
-
-/// Contrast: a face is the darker the more obliquely it is seen, and what lies behind it outshines it, so that pixels are mixed farther
-/// inside of the edge than outside. Where the edge is located by them it is found too far inwards by the first number times (L - the
-/// second), where that is positive, in parts of half the footprint on the face; L is the logarithm of one over the cosine of the incidence.
-/// The reflectivities are not known: these are means over plates of 0.12, 0.2, 0.35 and 0.7 before walls of 0.8 and a floor of 0.3 (400
-/// random scenes, seeds from 19001), 0.00, 0.04, 0.08 and 0.13 at L = 0.75, 1.05, 1.35 and 1.65; the darkest plates have 0.10 and 0.19 at
-/// L = 1.05 and 1.35, the brightest 0.00 and 0.01.
-const CONTRAST: [f64; 2] = [0.15, 0.8];
-
-/// Least cosine for which they are known: that of L = 1.8. Beyond, an edge is taken outwards by no more than there.
-const LEAST_KNOWN: f64 = 0.165;
-
-/// Standard deviation of the same, in parts of half the footprint times L.
-const CONTRAST_SPREAD: f64 = 0.1;
 
 /// Newton steps with widened likelihoods, then further ones at most, and the movement that ends them, metres.
 const WIDENED_ROUNDS: i32 = 8;
@@ -134,6 +121,7 @@ pub(super) struct Edge {
     posterior: Posterior,
     /// Half the angle that a beam sees, radians.
     footprint: f64,
+    contrast: Contrast,
     /// Coverage by the crossings that agree with it.
     pub(super) seen: Coverage,
     pub(super) from: f64,
@@ -183,13 +171,14 @@ impl Edge {
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        Ok(Self { strip, side_face, posterior, footprint: beam.footprint, seen, from, to })
+        let contrast = Contrast::of(&lines, dithered, noise);
+        Ok(Self { strip, side_face, posterior, footprint: beam.footprint, contrast, seen, from, to })
     }
 
     /// Returns the point of the edge at a distance along it.
     pub(super) fn point(&self, along: f64) -> Vec3 {
         let at = self.posterior.curve.at(along);
-        let [inwards, _] = self.contrast(along, self.strip.lift(Vector2::new(along, at)));
+        let [inwards, _] = self.bias(along, self.strip.lift(Vector2::new(along, at)));
         self.strip.lift(Vector2::new(along, at - inwards))
     }
 
@@ -215,28 +204,20 @@ impl Edge {
 
     /// Returns the part of it that the contrast has, in which all edges of a plate are off to the same side, metres.
     pub(super) fn contrast_sigma(&self, along: f64) -> f64 {
-        let [_, sigma] = self.contrast(along, self.point(along));
+        let [_, sigma] = self.bias(along, self.point(along));
         sigma
     }
 
     /// Returns by how much the contrast places the edge too far inwards at one of its points, and the standard deviation, metres.
-    fn contrast(&self, along: f64, point: Vec3) -> [f64; 2] {
+    fn bias(&self, along: f64, point: Vec3) -> [f64; 2] {
         let (normal, inward) = (self.strip.normal(along), self.strip.inward(along));
         if self.side_face.is_seen(point, normal, inward) {
             return [0.0; 2];
         }
         let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
-        contrast(normal.dot(&-point.normalize())).map(|share| share * seen)
+        let cosine = normal.dot(&-point.normalize()).max(LEAST_COSINE);
+        self.contrast.inwards(cosine).map(|share| share * seen)
     }
-}
-
-/// Returns by how much the contrast places an edge too far inwards, and the standard deviation, in parts of half the footprint on the
-/// face, by the cosine of the incidence.
-fn contrast(cosine: f64) -> [f64; 2] {
-    let cosine = cosine.max(LEAST_COSINE);
-    let known = cosine.max(LEAST_KNOWN);
-    // The footprint is longer by one over the cosine.
-    [CONTRAST[0] * (-known.ln() - CONTRAST[1]).max(0.0) * cosine / known, -CONTRAST_SPREAD * cosine.ln()]
 }
 
 /// Maximises the likelihood by Newton's method from the middles of the intervals: first one step for each of ever less widened
@@ -280,21 +261,4 @@ fn newton_step(
         normal.add(line.along, to, weight);
     }
     normal.solve()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn contrast_grows_with_the_incidence_and_not_beyond_what_is_known() {
-        assert_eq!(contrast(1.0), [0.0, 0.0]);
-        let [inwards, sigma] = contrast((-1.35_f64).exp());
-        assert!((inwards - 0.0825).abs() < 1e-9 && (sigma - 0.135).abs() < 1e-9, "{inwards} {sigma}");
-        // Footprints go with one over the cosine: the edge is moved as far as where it is known.
-        let moved = |cosine: f64| contrast(cosine)[0] / cosine;
-        assert!((moved(0.1) / moved(LEAST_KNOWN) - 1.0).abs() < 1e-12);
-        // A face that is turned away.
-        assert_eq!(contrast(-0.3), contrast(LEAST_COSINE));
-    }
 }

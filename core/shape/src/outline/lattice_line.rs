@@ -22,7 +22,7 @@ use super::height_field::LEAST_COSINE;
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
 use crate::Vec3;
-use crate::extract::Beyond;
+use crate::extract::{Beyond, Crossing};
 
 /// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
@@ -44,6 +44,9 @@ const LAST_BOUND: f64 = 4.0;
 /// Widest footprint at an edge, in halves of the estimated one: both halves, wider by their spread.
 const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
+/// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
+const LEAST_JUMP: f64 = 0.05;
+
 /// Properties of the beams.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BeamModel {
@@ -60,6 +63,26 @@ impl BeamModel {
     }
 }
 
+/// Linear mixing of a single mixed pixel before a sound cell of the background.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mixing {
+    /// Part of the background in the echo, between 0 and 1.
+    pub(super) background: f64,
+    /// Range of the background behind the face's continuation, metres.
+    pub(super) jump: f64,
+}
+
+impl Mixing {
+    fn of(crossing: &Crossing) -> Option<Self> {
+        let jump = f64::from(crossing.excess);
+        let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
+        let background = f64::from(crossing.mixed_excess) / jump;
+        let tells = crossing.beyond == Beyond::Behind && crossing.mixed.is_some_and(is_single);
+        (tells && jump > LEAST_JUMP && background > 0.0 && background < 1.0)
+            .then_some(Self { background, jump })
+    }
+}
+
 /// One lattice line where it crosses an edge, in the edge's developed strip. Distances inwards, metres.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LatticeLine {
@@ -70,6 +93,8 @@ pub(super) struct LatticeLine {
     pub(super) high: f64,
     /// Lowest and highest mixed pixel.
     pub(super) mixed: Option<(f64, f64)>,
+    /// What the range of a single mixed pixel tells.
+    pub(super) mixing: Option<Mixing>,
     complete: bool,
     beyond: Beyond,
     /// Distance inwards on the face per radian of footprint.
@@ -119,6 +144,7 @@ impl LatticeLine {
             low: inside.y.min(outside.y),
             high: inside.y.max(outside.y),
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
+            mixing: Mixing::of(crossing),
             complete: crossing.complete,
             beyond: crossing.beyond,
             per_radian,
@@ -231,6 +257,7 @@ pub(super) mod tests {
             low: -4e-3,
             high: 1.7e-3,
             mixed: None,
+            mixing: None,
             complete: true,
             beyond: Beyond::Behind,
             per_radian: 10.0,

@@ -44,7 +44,7 @@ fn scene(below: f64, places: impl Fn(f64) -> [f64; 2]) -> (Window, Vec<Option<bo
 /// Counts the cells of the background that are taken for mixed, and those that see the plate's edge taken for sound, each beside all.
 fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
     let noise = Noise::estimate(window, &window.own);
-    let mut pixels = mixed_pixels::classify(window, &noise);
+    let mut pixels = mixed_pixels::classify(window, &noise, &Noise::of_background(window));
     mark_sound(window, &noise, &mut pixels);
     let mut counts = [[0; 2]; 2];
     let inner = |index: usize| [index / 80, index % 80].iter().all(|place| (4..76).contains(place));
