@@ -5,6 +5,7 @@
 //! as the file has completed it. Up to 2.6 million cells (126 MB) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
+mod cells;
 mod decode_ahead;
 mod detect;
 pub(crate) mod e57;
@@ -23,7 +24,8 @@ use std::path::Path;
 use platen_scan::{Direction, ScanHeader};
 
 use crate::Format;
-use crate::orient::{Columns, Expected, Mirror, Plan, RawCell, SphericalCell, Survey, ToSpherical};
+use crate::orient::{Columns, Expected, Mirror, Plan, SphericalCell, Survey, ToSpherical};
+use cells::Cells;
 
 pub use error::ReadError;
 use error::Result;
@@ -52,10 +54,7 @@ struct About {
     notes: Vec<String>,
 }
 
-/// Cells in the order of the file. Nothing follows an error.
-pub(crate) type Cells<'a> = Box<dyn Iterator<Item = Result<RawCell>> + Send + 'a>;
-
-/// The same as ranges and directions.
+/// Cells as ranges and directions, in the order of the file. Nothing follows an error.
 pub(crate) type SphericalCells<'a> = Box<dyn Iterator<Item = Result<SphericalCell>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
@@ -63,7 +62,7 @@ trait Source: Send {
     /// Returns the declared properties.
     fn about(&self) -> &About;
     /// Starts at the first cell.
-    fn cells(&mut self) -> Result<Cells<'_>>;
+    fn cells(&mut self) -> Result<Box<dyn Cells + '_>>;
 }
 
 /// One scan of a file.
@@ -131,14 +130,20 @@ impl<'a> ScanReader<'a> {
         let mut fits = about.cells <= MAX_KEPT;
         let kept = &mut self.kept;
         *kept = Vec::with_capacity(if fits { about.cells as usize } else { 0 });
-        decode_ahead::for_each(self.source.cells()?, |(cell, parts)| {
-            fits &= (kept.len() as u64) < MAX_KEPT;
+        let (mut bytes, mut told) = (Vec::new(), 0);
+        decode_ahead::for_each(self.source.cells()?, |batch| {
+            fits &= (kept.len() + batch.len()) as u64 <= MAX_KEPT;
             if fits {
-                kept.push(*cell);
+                kept.extend(batch.iter().map(|(cell, _)| *cell));
             }
-            survey.add(cell, *parts).map_err(ReadError::from)?;
-            checksum = add_to_checksum(checksum, cell);
-            if survey.cells().is_multiple_of(PROGRESS_EVERY) {
+            for (cell, parts) in batch {
+                survey.add(cell, *parts).map_err(ReadError::from)?;
+            }
+            bytes.clear();
+            batch.iter().for_each(|(cell, _)| append_numbers(&mut bytes, cell));
+            checksum = crc32c::crc32c_append(checksum, &bytes);
+            if survey.cells() / PROGRESS_EVERY > told {
+                told = survey.cells() / PROGRESS_EVERY;
                 progress((survey.cells() as f64 / about.cells.max(1) as f64).min(1.0))?;
             }
             Ok::<(), E>(())
@@ -166,7 +171,7 @@ impl<'a> ScanReader<'a> {
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
         let cells: SphericalCells<'s> = if self.kept.is_empty() {
             let mut to_spherical = ToSpherical::default();
-            Box::new(self.source.cells()?.map(move |cell| Ok(to_spherical.convert(&cell?).0)))
+            Box::new(cells::each(self.source.cells()?).map(move |cell| Ok(to_spherical.convert(&cell?).0)))
         } else {
             Box::new(self.kept.iter().copied().map(Ok))
         };
@@ -193,14 +198,14 @@ impl Oriented {
     }
 }
 
-/// Continues a CRC-32C over range, direction, intensity, row and column of a cell.
-fn add_to_checksum(checksum: u32, cell: &SphericalCell) -> u32 {
-    let mut bytes = [0; 40];
+/// Appends range, direction, intensity, row and column of a cell, the numbers of the checksum.
+fn append_numbers(bytes: &mut Vec<u8>, cell: &SphericalCell) {
     let Direction { azimuth, elevation } = cell.direction;
-    for (slot, number) in bytes.chunks_exact_mut(8).zip([cell.range, azimuth, elevation, cell.intensity]) {
+    let mut numbers = [0; 40];
+    for (slot, number) in numbers.chunks_exact_mut(8).zip([cell.range, azimuth, elevation, cell.intensity]) {
         slot.copy_from_slice(&number.to_le_bytes());
     }
-    bytes[32..36].copy_from_slice(&cell.row.to_le_bytes());
-    bytes[36..].copy_from_slice(&cell.column.to_le_bytes());
-    crc32c::crc32c_append(checksum, &bytes)
+    numbers[32..36].copy_from_slice(&cell.row.to_le_bytes());
+    numbers[36..].copy_from_slice(&cell.column.to_le_bytes());
+    bytes.extend_from_slice(&numbers);
 }

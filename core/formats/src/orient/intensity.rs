@@ -20,7 +20,8 @@ impl Observed {
         if value.is_finite() {
             self.min = self.min.min(value);
             self.max = self.max.max(value);
-            self.whole &= value.fract() == 0.0;
+            // A cast is an instruction, `fract` a call.
+            self.whole &= value as i64 as f64 == value;
         }
     }
 }
@@ -76,7 +77,8 @@ impl Scale {
     pub(super) fn apply(&self, value: f64) -> u16 {
         let (a, b) = (f64::from(self.range.0), f64::from(self.range.1));
         let scaled = a + (value - self.low) * (b - a) / (self.high - self.low);
-        scaled.round().clamp(a, b) as u16
+        // The cast rounds down; `round` is a call.
+        (scaled.clamp(a, b) + 0.5) as u16
     }
 }
 

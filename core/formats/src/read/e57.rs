@@ -13,8 +13,9 @@ use std::io::{Read, Seek, SeekFrom};
 use e57::{E57Reader, IndexBounds, PointCloud, Record, RecordDataType, RecordName};
 use platen_scan::{Direction, State};
 
+use super::cells::Cells;
 use super::error::{ReadError, Result};
-use super::{About, Cells, Source};
+use super::{About, Source};
 use crate::header_text;
 use crate::orient::{Position, RawCell};
 use compressed_vector::{CompressedVector, Points};
@@ -56,28 +57,52 @@ impl<R: Read + Seek + Send> Source for E57<R> {
         &self.about
     }
 
-    fn cells(&mut self) -> Result<Cells<'_>> {
+    fn cells(&mut self) -> Result<Box<dyn Cells + '_>> {
         let fields = &self.fields;
         let PointCloud { file_offset, prototype, records, .. } = &self.cloud;
         let wanted = |index| fields.has(index);
-        let mut points = CompressedVector::open(&mut self.file, *file_offset, prototype, *records, wanted)
+        let packets = CompressedVector::open(&mut self.file, *file_offset, prototype, *records, wanted)
             .map_err(unsound)?;
-        let mut number = 0_u64;
-        Ok(Box::new(std::iter::from_fn(move || {
-            loop {
-                let cell = match points.next() {
-                    Ok(None) => return None,
-                    Ok(Some(point)) => fields.cell(point),
-                    Err(what) => Err(what),
-                };
-                number += 1;
-                let wrong = |what| unsound(format!("point {}: {what}", number - 1));
-                if let Some(cell) = cell.map_err(wrong).transpose() {
-                    return Some(cell);
-                }
-            }
-        })))
+        Ok(Box::new(PacketCells { packets, fields, values: Values::default(), before: 0 }))
     }
+}
+
+/// The cells of the packets, one packet after the other.
+struct PacketCells<'a, R> {
+    packets: CompressedVector<R>,
+    fields: &'a Fields,
+    values: Values,
+    /// Points of the packets before.
+    before: u64,
+}
+
+impl<R: Read + Seek + Send> Cells for PacketCells<'_, R> {
+    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()> {
+        let start = batch.len();
+        while batch.len() == start {
+            let wrong = |number: u64, what| unsound(format!("point {number}: {what}"));
+            let packet = self.packets.next().map_err(|what| wrong(self.before, what))?;
+            let Some(points) = packet else { return Ok(()) };
+            self.fields.read(points, &mut self.values);
+            for k in 0..points.len() {
+                let cell = self.fields.cell(&self.values, k);
+                batch.extend(cell.map_err(|what| wrong(self.before + k as u64, what))?);
+            }
+            self.before += points.len() as u64;
+        }
+        Ok(())
+    }
+}
+
+/// Values of the fields of a packet, by point; none of those that the file does not have.
+#[derive(Debug, Default)]
+struct Values {
+    position: [Vec<f64>; 3],
+    intensity: Vec<f64>,
+    row: Vec<i64>,
+    column: Vec<i64>,
+    state: Vec<i64>,
+    echo: Vec<i64>,
 }
 
 fn unsound(what: String) -> ReadError {
@@ -296,34 +321,41 @@ impl Fields {
         self.position.iter().chain([&self.row, &self.column]).chain(more).any(|field| field.index == index)
     }
 
-    /// Returns the cell of a point, `None` for the second and later echoes of a beam.
-    fn cell(&self, point: &Points) -> std::result::Result<Option<RawCell>, String> {
-        let whole = |field: &Field| point.whole(field.index);
-        let number = |field: &Field| point.number(field.index);
-        if let Some(field) = &self.return_index
-            && whole(field) > 0
-        {
+    /// Reads the fields of all points of a packet.
+    fn read(&self, points: &Points, values: &mut Values) {
+        let numbers = |field: &Field, into: &mut Vec<f64>| points.numbers(field.index, into);
+        let wholes = |field: &Field, into: &mut Vec<i64>| points.wholes(field.index, into);
+        self.position.iter().zip(&mut values.position).for_each(|(field, into)| numbers(field, into));
+        wholes(&self.row, &mut values.row);
+        wholes(&self.column, &mut values.column);
+        self.intensity.iter().for_each(|field| numbers(field, &mut values.intensity));
+        self.state.iter().for_each(|field| wholes(field, &mut values.state));
+        self.return_index.iter().for_each(|field| wholes(field, &mut values.echo));
+    }
+
+    /// Returns the cell of a point of a packet, `None` for the second and later echoes of a beam.
+    fn cell(&self, values: &Values, point: usize) -> std::result::Result<Option<RawCell>, String> {
+        if values.echo.get(point).is_some_and(|echo| *echo > 0) {
             return Ok(None);
         }
-        let index = |field: &Field, name: &str, (min, max): (i64, i64)| {
-            let value = whole(field);
+        let index = |value: i64, name: &str, (min, max): (i64, i64)| {
             u32::try_from(value)
                 .ok()
                 .filter(|_| (min..=max).contains(&value))
                 .ok_or_else(|| format!("{name} {value} lies outside of the declared {min} to {max}"))
         };
-        let row = index(&self.row, "row", self.bounds[0])?;
-        let column = index(&self.column, "column", self.bounds[1])?;
-        let state = match self.state.as_ref().map(whole) {
+        let row = index(values.row[point], "row", self.bounds[0])?;
+        let column = index(values.column[point], "column", self.bounds[1])?;
+        let state = match values.state.get(point) {
             None | Some(0) => State::Valid,
             Some(1) => State::DirectionOnly,
             Some(2) => State::NoReturn,
             Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
         };
-        let [a, b, c] = self.position.each_ref().map(number);
+        let [a, b, c] = values.position.each_ref().map(|numbers| numbers[point]);
         let position =
             if self.spherical { spherical(a, b, c, state) } else { Position::Cartesian([a, b, c]) };
-        let intensity = self.intensity.as_ref().map_or(0.0, number);
+        let intensity = values.intensity.get(point).copied().unwrap_or(0.0);
         Ok(Some(RawCell { row, column, position, intensity, state }))
     }
 }
@@ -370,8 +402,9 @@ mod tests {
             let read = |number| {
                 let mut streams = vec![1.0_f64.to_le_bytes().to_vec(); 3];
                 streams.extend([bytes(number), widest(5)]);
-                let points = Points::of(&types, &streams);
-                fields.cell(&points).map(|cell| cell.map(|cell| cell.state))
+                let mut values = Values::default();
+                fields.read(&Points::of(&types, &streams), &mut values);
+                fields.cell(&values, 0).map(|cell| cell.map(|cell| cell.state))
             };
             assert_eq!(read(0), Ok(Some(State::Valid)));
             assert_eq!(read(1), Ok(Some(State::DirectionOnly)));

@@ -8,9 +8,10 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::State;
 
+use super::cells::Cells;
 use super::error::{ReadError, Result};
 use super::lines::{self, Lines};
-use super::{About, Cells, Source};
+use super::{About, Source};
 use crate::orient::{Mirror, Position, RawCell};
 
 const FORMAT: &str = "PTX";
@@ -67,7 +68,7 @@ impl<R: Read + Seek + Send> Source for Ptx<R> {
         &self.about
     }
 
-    fn cells(&mut self) -> Result<Cells<'_>> {
+    fn cells(&mut self) -> Result<Box<dyn Cells + '_>> {
         let Part { offset, line, columns, per_column, .. } = self.part;
         self.file.seek(SeekFrom::Start(offset)).map_err(ReadError::io("going to the scan"))?;
         let mut lines = Lines::new(BufReader::with_capacity(BUFFER, &mut self.file));

@@ -9,9 +9,10 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::{Direction, State};
 
+use super::cells::{Cells, each};
 use super::error::{ReadError, Result};
 use super::scan_order::{self, Placed, Placer, Steps};
-use super::{About, Cells, Source};
+use super::{About, Source};
 use crate::orient::{Expected, Position, RawCell, Survey, ToSpherical};
 
 const FORMAT: &str = "XYB";
@@ -70,7 +71,7 @@ impl<R: Read + Seek + Send> Xyb<R> {
             let steps = xyb.steps()?;
             xyb.order = Order::Hits(steps.clone(), 0);
             let mut lowest = u32::MAX;
-            for cell in xyb.cells()? {
+            for cell in each(xyb.cells()?) {
                 lowest = lowest.min(cell?.row);
             }
             xyb.order = Order::Hits(steps, lowest);
@@ -86,7 +87,7 @@ impl<R: Read + Seek + Send> Xyb<R> {
         for in_a_line in [rows, columns] {
             self.order = Order::Lines(in_a_line);
             let (mut survey, mut to_spherical) = (Survey::default(), ToSpherical::default());
-            for cell in self.cells()? {
+            for cell in each(self.cells()?) {
                 let (cell, parts) = to_spherical.convert(&cell?);
                 survey.add(&cell, parts)?;
             }
@@ -122,7 +123,7 @@ impl<R: Read + Seek + Send> Source for Xyb<R> {
         &self.about
     }
 
-    fn cells(&mut self) -> Result<Cells<'_>> {
+    fn cells(&mut self) -> Result<Box<dyn Cells + '_>> {
         let order = self.order.clone();
         let mut reader = self.records()?;
         match order {

@@ -8,9 +8,10 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::State;
 
+use super::cells::Cells;
 use super::error::{ReadError, Result};
 use super::lines::{self, Lines};
-use super::{About, Cells, Source};
+use super::{About, Source};
 use crate::orient::{Position, RawCell};
 
 const FORMAT: &str = "XYZ";
@@ -42,7 +43,7 @@ impl<R: Read + Seek + Send> Source for Xyz<R> {
         &self.about
     }
 
-    fn cells(&mut self) -> Result<Cells<'_>> {
+    fn cells(&mut self) -> Result<Box<dyn Cells + '_>> {
         self.file.rewind().map_err(ReadError::io("going back to the start"))?;
         let lines = Lines::new(BufReader::with_capacity(BUFFER, &mut self.file));
         let mut points = Points { lines, announced: None, width: None, seen: 0 };

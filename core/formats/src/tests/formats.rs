@@ -257,7 +257,7 @@ fn edited(file: &[u8], from: &str, to: &str) -> Vec<u8> {
 fn an_index_beyond_the_declared_bounds_is_an_error() {
     let lies =
         edited(&e57(PLAIN, 1), "type=\"Integer\">31</columnMaximum>", "type=\"Integer\">17</columnMaximum>");
-    check_refused(&lies, "scan.e57", "column 18 lies outside of the declared 0 to 17");
+    check_refused(&lies, "scan.e57", "point 432: column 18 lies outside of the declared 0 to 17");
 }
 
 /// Found by fuzzing: the XML parser quotes the line break that it met.

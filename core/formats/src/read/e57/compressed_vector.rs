@@ -24,7 +24,7 @@ const INDEX: u8 = 0;
 const DATA: u8 = 1;
 const IGNORED: u8 = 2;
 
-/// Points of one section, one after the other.
+/// Points of one section, packet by packet.
 #[derive(Debug)]
 pub(super) struct CompressedVector<R> {
     pages: Pages<R>,
@@ -55,24 +55,24 @@ impl<R: Read + Seek> CompressedVector<R> {
         }
         pages.seek(header[16..24].iter().rev().fold(0, |offset, byte| offset << 8 | u64::from(*byte)))?;
         let stream = |(k, record): (usize, &Record)| Stream::new(&record.data_type, wanted(k));
-        let points = Points { streams: prototype.iter().enumerate().map(stream).collect(), at: 0, ready: 0 };
+        let points = Points { streams: prototype.iter().enumerate().map(stream).collect(), n: 0 };
         Ok(Self { pages, points, left: records, packet: Vec::new() })
     }
 
-    /// Returns the next point, `None` behind the last.
+    /// Returns the points of the next packet that completes any, `None` behind the last.
     ///
     /// # Errors
     /// The sentence for a packet that cannot be read.
-    #[inline]
     pub(super) fn next(&mut self) -> Result<Option<&Points>, String> {
         if self.left == 0 {
             return Ok(None);
         }
-        self.points.at += 1;
-        while self.points.at >= self.points.ready {
+        self.points.n = 0;
+        while self.points.n == 0 {
             self.next_packet()?;
         }
-        self.left -= 1;
+        self.points.n = self.points.n.min(usize::try_from(self.left).unwrap_or(usize::MAX));
+        self.left -= self.points.n as u64;
         Ok(Some(&self.points))
     }
 
@@ -90,35 +90,40 @@ impl<R: Read + Seek> CompressedVector<R> {
     }
 }
 
-/// Unpacked points.
+/// Unpacked points of one packet.
 #[derive(Debug)]
 pub(super) struct Points {
     streams: Vec<Stream>,
-    /// The present point, and the number of those unpacked.
-    at: usize,
-    ready: usize,
+    n: usize,
 }
 
 impl Points {
-    /// Returns a field of the present point as a number.
-    #[inline]
-    pub(super) fn number(&self, field: usize) -> f64 {
-        let stream = &self.streams[field];
-        stream.encoding.number(stream.raw(self.at))
+    /// Returns the number of points.
+    pub(super) fn len(&self) -> usize {
+        self.n
     }
 
-    /// Returns a field of the present point as a whole number; PDAL writes states as floats.
-    #[inline]
-    pub(super) fn whole(&self, field: usize) -> i64 {
-        let stream = &self.streams[field];
-        stream.encoding.whole(stream.raw(self.at))
+    /// Reads a field of all points as numbers.
+    pub(super) fn numbers(&self, field: usize, into: &mut Vec<f64>) {
+        let Stream { encoding, values, .. } = &self.streams[field];
+        into.clear();
+        into.extend(values.iter().take(self.n).map(|raw| encoding.number(*raw)));
+        into.resize(self.n, encoding.number(0));
+    }
+
+    /// Reads a field of all points as whole numbers; PDAL writes states as floats.
+    pub(super) fn wholes(&self, field: usize, into: &mut Vec<i64>) {
+        let Stream { encoding, values, .. } = &self.streams[field];
+        into.clear();
+        into.extend(values.iter().take(self.n).map(|raw| encoding.whole(*raw)));
+        into.resize(self.n, encoding.whole(0));
     }
 
     /// One packet of bytestreams of these types.
     #[cfg(test)]
     pub(super) fn of(types: &[&RecordDataType], bytestreams: &[Vec<u8>]) -> Self {
         let streams = types.iter().map(|data_type| Stream::new(data_type, true)).collect();
-        let mut points = Self { streams, at: 0, ready: 0 };
+        let mut points = Self { streams, n: 0 };
         let mut packet = (types.len() as u16).to_le_bytes().to_vec();
         packet.extend(bytestreams.iter().flat_map(|bytes| (bytes.len() as u16).to_le_bytes()));
         packet.extend(bytestreams.iter().flatten());
@@ -141,10 +146,9 @@ impl Points {
             stream.append(packet.get(from..to).ok_or_else(broken)?);
             from = to;
         }
-        self.ready = self.streams.iter().filter_map(Stream::complete).min().unwrap_or(0);
-        self.at = 0;
+        self.n = self.streams.iter().filter_map(Stream::complete).min().unwrap_or(0);
         for stream in &mut self.streams {
-            stream.unpack(self.ready);
+            stream.unpack(self.n);
         }
         Ok(())
     }
@@ -205,11 +209,6 @@ impl Stream {
             eight >> (bit % 8) & mask
         }));
         self.values.extend((n.min(fast)..n).map(|k| at(start + k * width, bytes)));
-    }
-
-    #[inline]
-    fn raw(&self, at: usize) -> u64 {
-        self.values.get(at).copied().unwrap_or(0)
     }
 }
 

@@ -1,0 +1,41 @@
+//! Cells of a file, some at a time: a call for each would take longer than many a cell does. For speed only: `tests::speed`.
+
+use crate::orient::RawCell;
+
+use super::error::Result;
+
+/// Cells appended at once by what has no packets of its own.
+const BATCH: usize = 1 << 12;
+
+/// Cells in the order of the file. Nothing follows an error.
+pub(crate) trait Cells: Send {
+    /// Appends the next cells; none behind the last.
+    ///
+    /// # Errors
+    /// That of the file, behind the cells before it.
+    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()>;
+}
+
+impl<I: Iterator<Item = Result<RawCell>> + Send> Cells for I {
+    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()> {
+        self.take(BATCH).try_for_each(|cell| {
+            batch.push(cell?);
+            Ok(())
+        })
+    }
+}
+
+/// Returns the cells one by one.
+pub(super) fn each<'a>(mut cells: Box<dyn Cells + 'a>) -> impl Iterator<Item = Result<RawCell>> + use<'a> {
+    let (mut batch, mut next, mut error) = (Vec::new(), 0, None);
+    std::iter::from_fn(move || {
+        if next == batch.len() && error.is_none() {
+            (next, error) = (0, {
+                batch.clear();
+                cells.append(&mut batch).err()
+            });
+        }
+        next += 1;
+        batch.get(next - 1).copied().map(Ok).or_else(|| error.take().map(Err))
+    })
+}
