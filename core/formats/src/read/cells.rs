@@ -30,12 +30,12 @@ pub(super) fn each<'a>(mut cells: Box<dyn Cells + 'a>) -> impl Iterator<Item = R
     let (mut batch, mut next, mut error) = (Vec::new(), 0, None);
     std::iter::from_fn(move || {
         if next == batch.len() && error.is_none() {
-            (next, error) = (0, {
-                batch.clear();
-                cells.append(&mut batch).err()
-            });
+            batch.clear();
+            next = 0;
+            error = cells.append(&mut batch).err();
         }
-        next += 1;
-        batch.get(next - 1).copied().map(Ok).or_else(|| error.take().map(Err))
+        let cell = batch.get(next).copied();
+        next += usize::from(cell.is_some());
+        cell.map(Ok).or_else(|| error.take().map(Err))
     })
 }

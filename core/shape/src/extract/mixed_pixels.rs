@@ -26,8 +26,8 @@ pub(super) enum Pixel {
 /// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
 /// from the straight continuation of the two cells on either side and from the middle between its neighbours.
 ///
-/// Straight means in inverse range, so that no limit of the incidence enters. The noise is that of the surface which is continued: before a
-/// bright background the little that a beam sees of a dark plate is told from it by the noise of the background only.
+/// Straight means in inverse range, so that no limit of the incidence enters. The noise is that of the surface which is continued: the
+/// little that a beam sees of a dark, noisy plate before a bright wall is told by the noise of the wall.
 pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Vec<Pixel> {
     let n_rows = window.n_rows;
     let mut pixels = vec![Pixel::Unknown; window.cells.len()];
@@ -37,6 +37,7 @@ pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Ve
             let here = window.inverse[index];
             if here > 0.0 {
                 let scale = BOUND * 6.0_f32.sqrt() * here * here;
+                // A background of steps seems noisier than it is.
                 let own = noise.of(column, row);
                 let bounds = [own, background.of(column, row).min(own)].map(|noise| scale * noise);
                 let down = along(window, index, 1, bounds);

@@ -5,7 +5,7 @@
 //! unbiased where the middle between two samples is not: along a lattice row all lines have the same interval but for the
 //! few cells where the edge changes rows, and those few locate it. Where it changes none, the posterior is sampled
 //! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn. Mixed pixels have a radiometric
-//! bias, by the contrast of the face and what lies behind it: its mean is taken off, its spread is stated.
+//! bias, which `contrast` finds: it is taken off, and its spread is stated.
 
 use nalgebra::{Cholesky, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
