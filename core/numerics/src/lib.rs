@@ -5,7 +5,7 @@
 //! | room | method |
 //! |---|---|
 //! | [`simd`], `vector_registers` | dispatch to wide vector registers; clean-up after the dense kernels |
-//! | [`union_find`], [`random`], [`normal_distribution`] | disjoint sets, SplitMix64, the error function |
+//! | [`union_find`], [`random`], [`normal_distribution`], [`median`] | disjoint sets, SplitMix64, the error function, median by selection |
 //! | [`join`] | two computations at the same time |
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
 //! | [`sparse`] | sparse Cholesky on meshes, ordered by nested dissection |
@@ -22,6 +22,7 @@ pub mod block_banded;
 #[cfg(feature = "solvers")]
 pub mod block_banded_cholesky;
 pub mod join;
+pub mod median;
 pub mod normal_distribution;
 #[cfg(feature = "solvers")]
 mod normal_equations;

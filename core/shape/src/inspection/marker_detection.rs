@@ -5,6 +5,7 @@
 //! uncertainty follows from the size of the cells against the disc's: a cell locates the rim to its own width.
 
 use nalgebra::Matrix3;
+use platen_numerics::median::median;
 
 use crate::{Patch, Surface, Vec3};
 
@@ -81,12 +82,12 @@ pub fn detect_marker(
             }
         })
         .collect();
-    let plate = median(cells.iter().map(|cell| cell.intensity)).ok_or(NoMarker::Unseen)?;
+    let plate = median(cells.iter().map(|cell| cell.intensity).collect()).ok_or(NoMarker::Unseen)?;
     let mut spots = spots(&cells, DARK * plate);
     spots.sort_by_key(|spot| std::cmp::Reverse(spot.len()));
     let spot = spots.first().filter(|spot| spot.len() >= LEAST_CELLS).ok_or(NoMarker::Bright)?;
     let rival = spots.get(1).is_some_and(|second| second.len() as f64 > RIVAL * spot.len() as f64);
-    let dark = median(spot.iter().map(|i| cells[*i].intensity)).unwrap_or(0.0);
+    let dark = median(spot.iter().map(|i| cells[*i].intensity).collect()).unwrap_or(0.0);
     let (centre, spread) = moments(spot.iter().map(|i| cells[*i].at));
     if rival || spread[1] > ROUND * spread[0] {
         return Err(NoMarker::Ambiguous);
@@ -188,12 +189,6 @@ fn moments(places: impl Iterator<Item = [f64; 2]> + Clone) -> ([f64; 2], [f64; 2
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -8,12 +8,15 @@
 //! the footprint that is missed grows with C and with the least share of a range's jump that is told from noise. In: lattice lines; out: [`Contrast`].
 //! Own; the scale is found by simulation.
 
+use platen_numerics::median::median;
+
 use super::lattice_line::LatticeLine;
 
 /// Fewest mixed pixels whose median tells the contrast.
 const LEAST_PIXELS: usize = 20;
 
-/// Noise of a mixed pixel beside a surface, in standard deviations of a range, below which it is not detected.
+/// Departure from a surface, in standard deviations of a range, from which a pixel is detected as mixed: the bound of second differences of
+/// `extract::mixed_pixels`, rounded.
 const NOT_DETECTED: f64 = 12.0;
 
 /// An edge is found too far inwards by the first times t (C - 1 / C), where t is the least share of a jump that is detected, at most by the second, in
@@ -38,15 +41,15 @@ impl Contrast {
     /// Estimates it from the lines of an edge. `noise` is that of ranges, metres; without `dithered` the beams do not meet the edge at random.
     pub(super) fn of(lines: &[LatticeLine], dithered: bool, noise: f64) -> Self {
         let mixed = lines.iter().filter(|line| line.shows_footprint()).filter_map(|line| line.mixing);
-        let (mut parts, mut jumps): (Vec<f64>, Vec<f64>) = mixed.map(|of| (of.background, of.jump)).unzip();
-        if !dithered || parts.len() < LEAST_PIXELS {
-            return Self { inwards: None };
-        }
-        let part = median(&mut parts);
-        let contrast = part / (1.0 - part);
-        let least = NOT_DETECTED * noise / median(&mut jumps);
-        let missed = MISSED * least * (contrast - contrast.recip());
-        Self { inwards: Some(missed.clamp(0.0, MOST_MISSED)) }
+        let (parts, jumps): (Vec<f64>, Vec<f64>) = mixed.map(|of| (of.background, of.jump)).unzip();
+        let are_told = dithered && parts.len() >= LEAST_PIXELS;
+        let medians = median(parts).zip(median(jumps)).filter(|_| are_told);
+        let inwards = medians.map(|(part, jump)| {
+            let contrast = part / (1.0 - part);
+            let missed = MISSED * (NOT_DETECTED * noise / jump) * (contrast - contrast.recip());
+            missed.clamp(0.0, MOST_MISSED)
+        });
+        Self { inwards }
     }
 
     /// Returns the distance by which the edge is found too far inwards and its standard deviation, in parts of half the footprint, where a
@@ -55,12 +58,6 @@ impl Contrast {
         self.inwards
             .map_or_else(|| [0.0, -UNKNOWN_SPREAD * cosine.min(1.0).ln()], |inwards| [inwards, SPREAD])
     }
-}
-
-/// Returns the median of some values.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 //! and holes are bridged. Own; Masuda et al. use the raw samples.
 
 use nalgebra::Vector2;
+use platen_numerics::median::median;
 use platen_numerics::simd::dispatch_simd;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
 use platen_numerics::tensor_spline::TensorSpline;
@@ -168,15 +169,10 @@ pub(crate) fn biweight(residual: f64) -> f64 {
 }
 
 /// Returns the standard deviation of normal residuals with outliers: median absolute deviation.
-fn robust_scale(mut sizes: Vec<f64>) -> f64 {
+fn robust_scale(sizes: Vec<f64>) -> f64 {
     /// The median of |x| of the standard normal distribution.
     const MEDIAN: f64 = 0.674_489_750_196_081_7;
-    if sizes.is_empty() {
-        return 1.0;
-    }
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / MEDIAN).max(1e-6)
+    median(sizes).map_or(1.0, |median| (median / MEDIAN).max(1e-6))
 }
 
 /// Thins the samples to as many as a smooth face needs.

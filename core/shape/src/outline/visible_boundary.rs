@@ -4,6 +4,7 @@
 //! `corners` and `edge`. Where something nearer hides the edge its crossings are left out.
 
 use nalgebra::Vector2;
+use platen_numerics::median::median;
 
 use super::OutlineError;
 use super::boundary_loop::Grid;
@@ -81,12 +82,8 @@ impl<'a> VisibleBoundary<'a> {
 /// Returns the spacing of the samples on the plate: the side of the square that a sample stands for, metres.
 fn spacing(patch: &Patch) -> f64 {
     let widths = patch.crossings.iter().filter(|c| c.beyond != Beyond::SideFace);
-    let mut widths: Vec<f64> = widths.map(|c| (c.outside - c.inside).norm()).collect();
-    if widths.is_empty() {
+    median(widths.map(|c| (c.outside - c.inside).norm()).collect()).unwrap_or_else(|| {
         let ranges = patch.samples.iter().map(|s| s.point.norm()).sum::<f64>();
-        return ranges / patch.samples.len().max(1) as f64
-            * (patch.azimuth_step * patch.elevation_step).sqrt();
-    }
-    let middle = widths.len() / 2;
-    *widths.select_nth_unstable_by(middle, f64::total_cmp).1
+        ranges / patch.samples.len().max(1) as f64 * (patch.azimuth_step * patch.elevation_step).sqrt()
+    })
 }
