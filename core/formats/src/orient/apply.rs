@@ -160,13 +160,9 @@ impl Plan {
 
 /// Returns the column from the first to the last row of known direction.
 fn to_column(index: u32, samples: &[Sample]) -> Column {
-    let is_known = |sample: &&Sample| sample.state != State::NoReturn;
-    let rows = samples.iter().filter(is_known).fold(None, |rows, Sample { row, .. }| {
-        let (first, last) = rows.unwrap_or((*row, *row));
-        Some((first.min(*row), last.max(*row)))
-    });
-    let Some((first_row, last_row)) = rows else { return Column { index, ..Column::default() } };
-    let n = (last_row + 1 - first_row) as usize;
+    let known = || samples.iter().filter(|sample| sample.state != State::NoReturn);
+    let first_row = known().map(|sample| sample.row).min().unwrap_or(0);
+    let n = known().map(|sample| sample.row + 1 - first_row).max().unwrap_or(0) as usize;
     let mut column = Column {
         index,
         first_row,
@@ -177,7 +173,7 @@ fn to_column(index: u32, samples: &[Sample]) -> Column {
         state: vec![State::NoReturn; n],
         ..Column::default()
     };
-    for sample in samples.iter().filter(is_known) {
+    for sample in known() {
         let i = (sample.row - first_row) as usize;
         column.range_m[i] = sample.range_m;
         column.azimuth[i] = sample.direction.azimuth;

@@ -20,7 +20,7 @@ impl Observed {
         if value.is_finite() {
             self.min = self.min.min(value);
             self.max = self.max.max(value);
-            // A cast is an instruction, `fract` a call.
+            // A cast is an instruction, `fract` a call. For speed only: `tests::speed`.
             self.whole &= value as i64 as f64 == value;
         }
     }
@@ -77,7 +77,7 @@ impl Scale {
     pub(super) fn apply(&self, value: f64) -> u16 {
         let (a, b) = (f64::from(self.range.0), f64::from(self.range.1));
         let scaled = a + (value - self.low) * (b - a) / (self.high - self.low);
-        // The cast rounds down; `round` is a call.
+        // The cast rounds down; `round` is a call. For speed only: `tests::speed`.
         (scaled.clamp(a, b) + 0.5) as u16
     }
 }

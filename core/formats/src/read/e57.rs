@@ -78,9 +78,9 @@ struct PacketCells<'a, R> {
 
 impl<R: Read + Seek + Send> Cells for PacketCells<'_, R> {
     fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()> {
+        let wrong = |number: u64, what| unsound(format!("point {number}: {what}"));
         let start = batch.len();
         while batch.len() == start {
-            let wrong = |number: u64, what| unsound(format!("point {number}: {what}"));
             let packet = self.packets.next().map_err(|what| wrong(self.before, what))?;
             let Some(points) = packet else { return Ok(()) };
             self.fields.read(points, &mut self.values);

@@ -1,10 +1,11 @@
-//! Points per second, printed: `cargo test --release -p platen-formats speed -- --nocapture`.
+//! Time to all columns and points per second, printed: `cargo test --release -p platen-formats speed -- --nocapture`.
 
 use std::time::Instant;
 
 use platen_tests::samples;
 
-use super::collect::read;
+use crate::orient::Expected;
+use crate::{ReadError, ScanReader};
 
 #[test]
 fn speed_of_every_format() {
@@ -14,13 +15,19 @@ fn speed_of_every_format() {
     for sample in names.into_iter().flat_map(samples::each) {
         let path = samples::unpacked(&sample, temporary.path());
         let start = Instant::now();
-        let lattice = read(&path, None).unwrap();
-        let seconds = start.elapsed().as_secs_f64();
-        let points = lattice.n_valid();
+        let mut reader = ScanReader::open(&path, None, &|| true).unwrap();
+        let opened = start.elapsed();
+        let oriented = reader.orient(&Expected::default(), |_| Ok::<_, ReadError>(())).unwrap();
+        let first_pass = start.elapsed();
+        let points = reader.columns(&oriented).unwrap().finish().unwrap().points;
+        let all = start.elapsed();
         eprintln!(
-            "{}: {points} points in {seconds:.3} s, {:.2} M/s",
-            points as f64 / seconds / 1e6,
-            sample.display()
+            "{}: {points} points in {:.1?} (open {opened:.1?}, first pass {:.1?}, columns {:.1?}), {:.1} M/s",
+            sample.display(),
+            all,
+            first_pass - opened,
+            all - first_pass,
+            points as f64 / all.as_secs_f64() / 1e6,
         );
     }
 }
