@@ -1,10 +1,10 @@
-//! Cells of a file, some at a time: a call for each would take longer than many a cell does. For speed only: `tests::speed`.
+//! Batches of cells in the order of the file: of a packet, or of a fixed number. One dynamic call a batch instead of one a cell; for speed only: `tests::speed`.
 
 use crate::orient::RawCell;
 
 use super::error::Result;
 
-/// Cells appended at once by what has no packets of its own.
+/// Cells of a batch where the format has no packets.
 const BATCH: usize = 1 << 12;
 
 /// Cells in the order of the file. Nothing follows an error.

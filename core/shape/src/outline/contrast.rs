@@ -1,12 +1,14 @@
 //! Radiometric bias of an edge by the contrast of the face and what lies behind it, from the ranges of its mixed pixels.
 //!
-//! The range of a mixed pixel is the mean of both sides weighted by their echoes (linear mixing), so that it tells the part b of the background in the
-//! beam's echo. Over an edge that crosses rows and columns the beams meet it at random: half of the mixed ones see more of the background than
-//! of the face, and for them b is above C / (1 + C), where C is the contrast, the echo of the background over that of the face. The median of b gives C without
-//! any law of intensities. Where a background outshines the face, beams that see little of the face are not told from it: pixels are found mixed
-//! farther inside of the edge than outside, and the edge, which is found in their middle, too far inwards. The part of
-//! the footprint that is missed grows with C and with the least share of a range's jump that is told from noise. In: lattice lines; out: [`Contrast`].
-//! Own; the scale is found by simulation.
+//! 1. Linear mixing model: the range of a mixed pixel is the mean of both sides weighted by their echoes, so that it tells the background's share b of the
+//!    beam's echo.
+//! 2. The beams meet an edge that crosses rows and columns at random. Half of the mixed ones see more of the background than of the face, and theirs
+//!    is b > C / (1 + C), where C is the contrast, the echo of the background over that of the face: the median of b gives C, without a law of intensities.
+//! 3. A beam that sees so little of one side that its range stays within the detection limit is not found mixed. Where the background outshines the face
+//!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside, and the edge, located in their middle, too far inwards.
+//!    The part of the footprint that is missed grows with C and with the detection limit over the jump of the range.
+//!
+//! In: lattice lines; out: [`Contrast`]. Own; the scale of 3 is found by simulation.
 
 use platen_numerics::median::median;
 
@@ -15,11 +17,11 @@ use super::lattice_line::LatticeLine;
 /// Fewest mixed pixels whose median tells the contrast.
 const LEAST_PIXELS: usize = 20;
 
-/// Departure from a surface, in standard deviations of a range, from which a pixel is detected as mixed: the bound of second differences of
+/// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: the bound of second differences of
 /// `extract::mixed_pixels`, rounded.
-const NOT_DETECTED: f64 = 12.0;
+const DETECTION_LIMIT: f64 = 12.0;
 
-/// An edge is found too far inwards by the first times t (C - 1 / C), where t is the least share of a jump that is detected, at most by the second, in
+/// An edge is found too far inwards by the first times t (C - 1 / C), where t is the detection limit in parts of the jump, at most by the second, in
 /// parts of half the footprint: by regression over 382 edges of 200 random scenes (seeds from 18001), plates of 0.1 to 0.6. Where the face outshines
 /// what lies behind it, they are off by 0.01 outwards, those of an independent simulator by 0.06 inwards: nothing is taken off.
 const MISSED: f64 = 2.0;
@@ -46,7 +48,7 @@ impl Contrast {
         let medians = median(parts).zip(median(jumps)).filter(|_| are_told);
         let inwards = medians.map(|(part, jump)| {
             let contrast = part / (1.0 - part);
-            let missed = MISSED * (NOT_DETECTED * noise / jump) * (contrast - contrast.recip());
+            let missed = MISSED * (DETECTION_LIMIT * noise / jump) * (contrast - contrast.recip());
             missed.clamp(0.0, MOST_MISSED)
         });
         Self { inwards }

@@ -12,6 +12,8 @@
 //! - The last cell taken for one of the face may itself lie on the side face, within the noise: both its range and that of the
 //!   first cell not taken enter, else the selection would bias the edge outwards.
 //!
+//! The range of a single mixed pixel also tells how much it sees of either side ([`Mixing`], for `contrast`).
+//!
 //! In: a projected crossing in its developed strip; out: its [`EdgeLikelihood`]. All distances inwards, in metres. Own; Masuda et al.
 //! take the boundary samples as the edge.
 

@@ -1,6 +1,6 @@
 //! Binary section of a point cloud (ASTM E2807, CompressedVector): packets of bytestreams, one per field of the prototype.
 //!
-//! Whole packets are unpacked field by field into arrays of raw bits; a value is converted where it is used. The `e57` crate, which
+//! Whole packets are unpacked and converted field by field, array by array. The `e57` crate, which
 //! reads the rest of the file, makes an enum of every value and a vector of every point, at five times the processor time
 //! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not looked at: they were checked when the file was opened.
 
