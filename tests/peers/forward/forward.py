@@ -92,10 +92,7 @@ class Site:
             reader, self.reader = self.reader, None
             reader.disconnect()
         self.mosquitto.stop()
-        try:
-            self.postgresql.stop("immediate")
-        except subprocess.CalledProcessError:
-            pass
+        self.postgresql.stop(signal.SIGQUIT)
 
 
 def one_stroke(site, *kinds, name="press-1"):
@@ -442,12 +439,12 @@ def check_a_full_disk_of_the_database(site):
         line = wait("a sentence", lambda: (m := re.search(r"sink postgresql: (not connected: .*(No space|disk|recovery|closed|refused).*)", plant.status())) and m[1], 90)
         said(line)
         filler.unlink()
-        if not (site.postgresql.data / "postmaster.pid").exists():
+        if site.postgresql.process.poll() is not None:
             site.postgresql.start()
         wait("everything", lambda: json.loads((plant.folder / "results/forward.json").read_text())["sinks"][0]["backlog"] == 0, 120)
         assert site.postgresql.query("SELECT count(*), count(acked) FROM platen.stroke") == [(6501, 6501)]
         plant.end_all()
-        site.postgresql.stop("immediate")
+        site.postgresql.stop(signal.SIGQUIT)
     finally:
         subprocess.run(["umount", "-l", small], check=False)
 

@@ -22,10 +22,19 @@ def wait(what, check, limit=30.0, every=0.02):
     raise AssertionError(f"not within {limit} s: {what}")
 
 
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
+def reserved_port():
+    """A socket bound to a free port of loopback. While it is held no connection gets that port as its own, and a server can take it, again and again."""
+    held = socket.socket()
+    held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    held.bind(("127.0.0.1", 0))
+    return held, held.getsockname()[1]
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def run(*arguments, code=0, timeout=120, **more):
@@ -67,11 +76,13 @@ class Postgresql:
     """A PostgreSQL server; `folder` may lie on a small disk. Without `settings` it has PostgreSQL's own."""
 
     def __init__(self, authority, folder, settings="shared_buffers=64MB\nmax_wal_size=64MB\nmin_wal_size=32MB\n"):
-        self.port, self.folder, self.data = free_port(), folder, folder / "data"
+        self.held, self.port = reserved_port()
+        self.folder, self.data, self.process = folder, folder / "data", None
         folder.mkdir(exist_ok=True)
         shutil.chown(folder, "postgres")
         (folder / "password").write_text("owner\n")
-        self.as_postgres(POSTGRESQL / "initdb", "-D", self.data, "-A", "scram-sha-256", "-U", OWNER, f"--pwfile={folder / 'password'}", "--no-sync")
+        made = self.as_postgres("initdb", "-D", self.data, "-A", "scram-sha-256", "-U", OWNER, f"--pwfile={folder / 'password'}", "--no-sync").wait()
+        assert made == 0, self.log()
         certificate, key = authority.sign("postgresql")
         for file, name in [(certificate, "server.pem"), (key, "server.key")]:
             shutil.copy(file, self.data / name)
@@ -84,19 +95,35 @@ class Postgresql:
         with self.connect("postgres") as database:
             database.execute("CREATE DATABASE platen")
 
-    def as_postgres(self, *arguments):
-        subprocess.run(["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups", *map(str, arguments)], check=True,
-                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd="/")
+    def as_postgres(self, program, *arguments):
+        return subprocess.Popen([POSTGRESQL / program, *arguments], user="postgres", group="postgres", extra_groups=[], cwd="/",
+                                stdout=open(self.folder / "log", "a"), stderr=subprocess.STDOUT)
+
+    def log(self):
+        return "PostgreSQL's log ends with:\n" + "".join((self.folder / "log").read_text().splitlines(True)[-10:])
 
     def start(self):
-        self.as_postgres(POSTGRESQL / "pg_ctl", "-D", self.data, "-l", self.folder / "log", "-w", "start")
+        """Starts it as a child of this program, which alone can say that a killed server has ended; its process id in the lock file is free then."""
+        self.process = self.as_postgres("postgres", "-D", self.data)
 
-    def stop(self, mode="fast"):
-        self.as_postgres(POSTGRESQL / "pg_ctl", "-D", self.data, "-m", mode, "-w", "stop")
+        def answers():
+            assert self.process.poll() is None, self.log()
+            return subprocess.run([POSTGRESQL / "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port)]).returncode == 0
+        wait("PostgreSQL", answers, 60)
+
+    def stop(self, how=signal.SIGINT):
+        """SIGINT: its fast shutdown; SIGQUIT: the immediate one."""
+        self.process.send_signal(how)
+        self.process.wait(60)
 
     def kill(self):
-        os.kill(int((self.data / "postmaster.pid").read_text().split()[0]), signal.SIGKILL)
-        subprocess.run(["pkill", "-9", "-f", f"postgres: .*{self.data}"], check=False)
+        """Kills it and its children, and waits for their end: an orphan holds the shared memory, and the next server does not start."""
+        self.process.send_signal(signal.SIGSTOP)
+        children = subprocess.run(["pgrep", "-P", str(self.process.pid)], capture_output=True, text=True).stdout.split()
+        for pid in [self.process.pid, *map(int, children)]:
+            os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+        wait("the end of its children", lambda: not any(map(is_running, children)))
 
     def connect(self, name="platen"):
         return psycopg.connect(host="127.0.0.1", port=self.port, dbname=name, user=OWNER, password="owner", autocommit=True)
@@ -114,7 +141,8 @@ class Mosquitto:
     """A mosquitto broker on TLS with a password and a list of access for each press."""
 
     def __init__(self, authority, folder, certificate=None):
-        self.port, self.folder, self.users, self.process = free_port(), folder, [], None
+        self.held, self.port = reserved_port()
+        self.folder, self.process = folder, None
         folder.mkdir(exist_ok=True)
         pem, key = certificate or authority.sign("mosquitto")
         (folder / "conf").write_text(

@@ -7,7 +7,7 @@
 Plates of twelve strokes, 33 plates a press and day, written into the tables by SQL, past the inbox. Every query of the dashboards is asked twice, the second
 time is told: the last day of one press within 1 s, the last month of all within 10 s, else its plan is printed and the exit code is 1.
 """
-import argparse, sys, tempfile, time
+import argparse, signal, sys, tempfile, time
 from pathlib import Path
 
 import dashboards
@@ -81,7 +81,7 @@ def main():
                             slow += 1
                             print("\n".join(line for line, in database.execute(f"EXPLAIN (ANALYZE, BUFFERS) {asked}")), flush=True)
         finally:
-            server.stop("immediate")
+            server.stop(signal.SIGQUIT)
     return 1 if slow else 0
 
 
