@@ -204,6 +204,7 @@ fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrumen
         tail_dof: options.tail_dof,
         wide_errors: (options.wide_share > 0.0).then_some(wide_errors),
         footprint: options.footprint_mrad * 1e-3,
+        wings: options.beam_wings,
         angular_sigma: options.angular_noise_urad * 1e-6,
         dropout: options.dropout,
         cyclic: (options.cyclic_mm > 0.0).then_some(cyclic),

@@ -14,6 +14,8 @@ pub struct Instrument {
     pub wide_errors: Option<WideErrors>,
     /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
+    /// Whether the beam has power beyond that width.
+    pub wings: bool,
     /// Standard deviation of each reported angle against the true direction of the beam.
     pub angular_sigma: f64,
     /// Probability that any echo is lost.
@@ -76,6 +78,7 @@ impl Default for Instrument {
             tail_dof: None,
             wide_errors: None,
             footprint: 0.3e-3,
+            wings: false,
             angular_sigma: 0.0,
             dropout: 0.006,
             cyclic: None,

@@ -9,6 +9,7 @@ use platen_sim_plate::Vec3;
 use rand_distr::{Distribution, StandardNormal, StudentT};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::RngCore;
+use std::sync::LazyLock;
 
 /// Range difference of neighbouring cells of one object that is treated as an edge, metres.
 const RANGE_JUMP: f64 = 0.1;
@@ -156,10 +157,12 @@ impl View<'_> {
     fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>) -> Option<Echo> {
         let across = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
         let up = across.cross(&ray.direction);
+        let spot: &[Sample] = if self.instrument.wings { &*WINGED_SPOT } else { &SPOT };
+        let whole: f64 = spot.iter().map(|(_, _, weight)| weight).sum();
         let (mut power, mut range, mut strength) = (0.0, 0.0, 0.0);
         let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
         let mut nearest_hit = middle;
-        for (x, y, weight) in SPOT {
+        for (x, y, weight) in spot {
             let radius = self.instrument.footprint / 2.0;
             let direction = (ray.direction + across * (x * radius) + up * (y * radius)).normalize();
             let Some(hit) = self.cast(&Ray { origin: ray.origin, direction }) else { continue };
@@ -167,7 +170,7 @@ impl View<'_> {
             let received = weight * echo.strength / (hit.range * hit.range);
             power += received;
             range += received * hit.range;
-            strength += weight / SPOT_WEIGHT * echo.strength;
+            strength += weight / whole * echo.strength;
             if hit.range < nearest {
                 (nearest, nearest_hit) = (hit.range, Some(hit));
             }
@@ -231,8 +234,11 @@ struct Echo {
     mixed: bool,
 }
 
-/// Samples of the spot (x, y in units of its 1/e^2 radius, weight of a Gaussian beam): the middle and two rings.
-const SPOT: [(f64, f64, f64); 19] = {
+/// Sample of the spot: x, y in units of its 1/e^2 radius, weight of a Gaussian beam.
+type Sample = (f64, f64, f64);
+
+/// A spot that ends at its 1/e^2 radius: the middle and two rings.
+const SPOT: [Sample; 19] = {
     const INNER: f64 = 0.606_530_659_712_633_4; // exp(-2 * 0.5^2)
     const OUTER: f64 = 0.135_335_283_236_612_7; // exp(-2)
     const H: f64 = 0.866_025_403_784_438_6; // sin 60 degrees
@@ -259,15 +265,16 @@ const SPOT: [(f64, f64, f64); 19] = {
     ]
 };
 
-/// Sum of the weights of [`SPOT`].
-const SPOT_WEIGHT: f64 = {
-    let (mut sum, mut k) = (0.0, 0);
-    while k < SPOT.len() {
-        sum += SPOT[k].2;
-        k += 1;
-    }
-    sum
-};
+/// A spot with wings to 1.5 of its 1/e^2 radii, beyond which lies 1 % of the power: samples of equal areas on a sunflower spiral (Vogel 1979). No two lie at one
+/// distance from an edge, so that the power beyond it changes in small steps.
+static WINGED_SPOT: LazyLock<[Sample; 61]> = LazyLock::new(|| {
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    std::array::from_fn(|k| {
+        let radius = 1.5 * ((k as f64 + 0.5) / 61.0).sqrt();
+        let (sin, cos) = (golden_angle * k as f64).sin_cos();
+        (radius * cos, radius * sin, (-2.0 * radius * radius).exp())
+    })
+});
 
 /// Returns true when one of the eight neighbours lies on another object or across a range jump.
 fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Trace>) -> bool {

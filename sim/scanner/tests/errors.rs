@@ -176,27 +176,43 @@ fn angular_noise_shows_as_range_noise_on_a_tilted_plate() {
 
 #[test]
 fn ranges_mix_where_the_footprint_straddles_an_edge() {
-    // A board's edge at y = 0, 3 m before a wall.
+    // Azimuths beyond the spot see one surface only.
+    let cells = at_an_edge(0.005, false);
+    assert!(cells.iter().all(|(azimuth, mixed)| !mixed || *azimuth < 0.21e-3));
+    let mixed = cells.iter().filter(|(_, mixed)| *mixed).count();
+    assert!(mixed > 500, "{mixed}");
+}
+
+#[test]
+fn a_beam_with_wings_mixes_beyond_its_width() {
+    // The columns on both sides of that at the edge are 0.22 mrad from it, 1.1 of the beam's radii; one of them has the other surface for a neighbour.
+    let mixed = |wings: bool| {
+        let cells = at_an_edge(0.0125, wings);
+        let beside = cells.into_iter().filter(|(azimuth, _)| (0.21e-3..0.23e-3).contains(azimuth));
+        beside.filter(|(_, mixed)| *mixed).count()
+    };
+    assert!(mixed(true) > 50, "{}", mixed(true));
+    assert_eq!(mixed(false), 0);
+}
+
+/// Scans a board's edge at y = 0, 3 m before a wall, with a beam of 0.2 mrad to each side. Returns per cell how far from the edge it is, radians, and whether
+/// both surfaces are mixed; its range tells the same.
+fn at_an_edge(step_deg: f64, wings: bool) -> Vec<(f64, bool)> {
     let board = Solid::upright(Vec3::new(7.0, 1.0, 0.0), Vec3::new(0.02, 2.0, 2.0), 0.0);
     let wall = Solid::upright(Vec3::new(10.1, 0.0, 0.0), Vec3::new(0.2, 4.0, 4.0), 0.0);
     let scene = Scene::of(None, vec![(Label::Cabinet, board), (Label::Wall, wall)]);
     let instrument =
-        Instrument { footprint: 0.4e-3, range_sigma: 0.0, dropout: 0.0, ..Instrument::default() };
-    let columns = scan_all(&scene, &narrow(0.005), &instrument, 1);
-    let mut mixed = 0;
-    for column in &columns {
-        for i in 0..column.truth.len() {
-            let range = f64::from(column.range_m[i]);
-            // Azimuths beyond the spot see one surface only.
-            if column.azimuth[i].abs() > 0.21e-3 {
-                assert!(!column.truth[i].mixed && !(7.01..=9.99).contains(&range), "{range}");
-            } else if column.truth[i].mixed {
-                mixed += 1;
-                assert!((6.99..10.02).contains(&range));
-            }
-        }
-    }
-    assert!(mixed > 500, "{mixed}");
+        Instrument { footprint: 0.4e-3, wings, range_sigma: 0.0, dropout: 0.0, ..Instrument::default() };
+    let cell = |column: &SimColumn, i: usize| {
+        let (range, mixed) = (f64::from(column.range_m[i]), column.truth[i].mixed);
+        assert!(
+            if mixed { (6.98..10.02).contains(&range) } else { !(7.02..=9.98).contains(&range) },
+            "{range}"
+        );
+        (column.azimuth[i].abs(), mixed)
+    };
+    let columns = scan_all(&scene, &narrow(step_deg), &instrument, 1);
+    columns.iter().flat_map(|column| (0..column.truth.len()).map(move |i| cell(column, i))).collect()
 }
 
 #[test]

@@ -42,6 +42,8 @@ pub(super) struct RandomScene {
     tails: [f64; 2],
     /// Angle by which the table shows beyond the far edges, degrees; 0: a wide table.
     strip_deg: f64,
+    /// Whether the beam has power beyond its 1/e^2 width.
+    wings: bool,
     pub(super) setting: Setting,
     reflectivity: f64,
     /// Height of the scanner over that of the simulator's shop, metres.
@@ -141,7 +143,19 @@ impl RandomScene {
         // From a generator of its own, so that scenes are those of versions that did not draw it.
         let drawn = dark * (bright / dark).powf(Rng::with_seed(!seed).f64());
         let reflectivity = given.reflectivity.unwrap_or(drawn);
-        Self { scene, target, tails, strip_deg, setting, reflectivity, scanner_m, cyclic_mm, hidden_by }
+        let wings = family == Family::Wings;
+        Self {
+            scene,
+            target,
+            tails,
+            strip_deg,
+            wings,
+            setting,
+            reflectivity,
+            scanner_m,
+            cyclic_mm,
+            hidden_by,
+        }
     }
 
     /// Scans the scene.
@@ -153,6 +167,7 @@ impl RandomScene {
             ("wide_factor", Value::Float(self.tails[1])),
             ("plate_reflectivity", Value::Float(self.reflectivity)),
             ("strip_deg", Value::Float(self.strip_deg)),
+            ("beam_wings", Value::Bool(self.wings)),
             ("hidden_by", Value::String(self.hidden_by.to_owned())),
         ];
         self.scene.scan(catalogue, folder, self.setting, &more)

@@ -43,6 +43,8 @@ pub enum Family {
     Strip,
     /// A person stands before the nearest corner
     Hidden,
+    /// The beam has power beyond its 1/e^2 width, to one and a half of it
+    Wings,
 }
 
 /// A lattice of the part `scale`.

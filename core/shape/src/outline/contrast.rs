@@ -8,7 +8,8 @@
 //!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside, and the edge, located in their middle, too far inwards.
 //!    The part of the footprint that is missed grows with C and with the detection limit over the jump of the range.
 //!
-//! In: lattice lines; out: [`Contrast`]. Own; the scale of 3 is found by simulation.
+//! In: lattice lines; out: [`Contrast`]. Own; the scale of 3 is found by simulation, with beams that end at their 1/e^2 radius. Limits: a beam with wings is found
+//! mixed farther inside, and a far edge is found up to a quarter of half the footprint too far inwards (`platen bench accuracy --family wings`).
 
 use platen_numerics::median::median;
 
