@@ -14,7 +14,7 @@ pub struct Instrument {
     pub wide_errors: Option<WideErrors>,
     /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
-    /// Whether the beam has power beyond that width.
+    /// Whether the beam has power beyond that width, to one and a half of it. Only cells next to an edge of the scene are mixed, whatever the step.
     pub wings: bool,
     /// Standard deviation of each reported angle against the true direction of the beam.
     pub angular_sigma: f64,
