@@ -206,7 +206,7 @@ fn at_an_edge(step_deg: f64, wings: bool) -> Vec<(f64, bool)> {
     let cell = |column: &SimColumn, i: usize| {
         let (range, mixed) = (f64::from(column.range_m[i]), column.truth[i].mixed);
         assert!(
-            if mixed { (6.98..10.02).contains(&range) } else { !(7.02..=9.98).contains(&range) },
+            if mixed { (6.99..10.02).contains(&range) } else { !(7.01..=9.99).contains(&range) },
             "{range}"
         );
         (column.azimuth[i].abs(), mixed)
