@@ -237,7 +237,7 @@ struct Echo {
 /// Sample of the spot: x, y in units of its 1/e^2 radius, weight of a Gaussian beam.
 type Sample = (f64, f64, f64);
 
-/// A spot that ends at its 1/e^2 radius: the middle and two rings.
+/// Gaussian beam truncated at its 1/e^2 radius: the middle and two rings.
 const SPOT: [Sample; 19] = {
     const INNER: f64 = 0.606_530_659_712_633_4; // exp(-2 * 0.5^2)
     const OUTER: f64 = 0.135_335_283_236_612_7; // exp(-2)
@@ -265,12 +265,16 @@ const SPOT: [Sample; 19] = {
     ]
 };
 
-/// A spot with wings to 1.5 of its 1/e^2 radii, beyond which lies 1 % of the power: samples of equal areas on a sunflower spiral (Vogel 1979). No two lie at one
-/// distance from an edge, so that the power beyond it changes in small steps.
-static WINGED_SPOT: LazyLock<[Sample; 61]> = LazyLock::new(|| {
+/// Samples of a beam with wings, and where it is truncated, in its 1/e^2 radii: beyond lies 1 % of the power.
+const WINGED_SAMPLES: usize = 61;
+const WINGED_RADIUS: f64 = 1.5;
+
+/// Gaussian beam with wings: samples of equal areas on Vogel's spiral (1979). No two lie at one distance from an edge, so that the power beyond it changes in small
+/// steps.
+static WINGED_SPOT: LazyLock<[Sample; WINGED_SAMPLES]> = LazyLock::new(|| {
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     std::array::from_fn(|k| {
-        let radius = 1.5 * ((k as f64 + 0.5) / 61.0).sqrt();
+        let radius = WINGED_RADIUS * ((k as f64 + 0.5) / WINGED_SAMPLES as f64).sqrt();
         let (sin, cos) = (golden_angle * k as f64).sin_cos();
         (radius * cos, radius * sin, (-2.0 * radius * radius).exp())
     })
