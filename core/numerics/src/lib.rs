@@ -4,7 +4,7 @@
 //!
 //! | room | method |
 //! |---|---|
-//! | [`simd`], `vector_registers` | dispatch to wide vector registers; clean-up after the dense kernels |
+//! | [`simd`], `vector_registers`, [`cache_sizes`] | dispatch to wide vector registers; clean-up after the dense kernels; what they ask of the processor |
 //! | [`union_find`], [`random`], [`normal_distribution`], [`median`] | disjoint sets, SplitMix64, the error function, median by selection |
 //! | [`join`] | two computations at the same time |
 //! | [`adaptive_metropolis`] | mean and covariance of an unnormalised density (Vihola 2012) |
@@ -21,6 +21,8 @@ pub mod adaptive_metropolis;
 pub mod block_banded;
 #[cfg(feature = "solvers")]
 pub mod block_banded_cholesky;
+#[cfg(feature = "solvers")]
+pub mod cache_sizes;
 pub mod join;
 pub mod median;
 pub mod normal_distribution;

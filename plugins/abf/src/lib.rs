@@ -59,6 +59,7 @@ mod angles;
 mod chart;
 mod reduced_system;
 
+use platen_numerics::cache_sizes;
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result};
 use platen_shape::flatten::check_fit;
 use platen_shape::{Chart, DiskMesh};
@@ -75,6 +76,7 @@ impl Flattening for Abf {
     type Options = ();
 
     fn new((): ()) -> Result<Self> {
+        cache_sizes::read();
         Ok(Self)
     }
 

@@ -67,6 +67,7 @@ mod material_law_bound;
 mod membrane;
 mod newton;
 
+use platen_numerics::cache_sizes;
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result, options};
 use platen_shape::flatten::check_fit;
 use platen_shape::{Chart, DiskMesh};
@@ -91,6 +92,7 @@ impl Flattening for Elastic {
     type Options = Options;
 
     fn new(options: Options) -> Result<Self> {
+        cache_sizes::read();
         Ok(Self(options))
     }
 

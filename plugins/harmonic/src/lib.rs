@@ -44,6 +44,7 @@
 //! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose lengths
 //! differ from the sides of the rectangle by more than a tenth.
 
+use platen_numerics::cache_sizes;
 use platen_numerics::sparse::SparseError;
 use platen_sdk::{Error, ErrorKind, Flattening, Info, Job, Result};
 use platen_shape::flatten::{check_fit, cotangents, fixed_boundary};
@@ -61,6 +62,7 @@ impl Flattening for Harmonic {
     type Options = ();
 
     fn new((): ()) -> Result<Self> {
+        cache_sizes::read();
         Ok(Self)
     }
 
