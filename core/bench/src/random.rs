@@ -9,10 +9,11 @@
 //!
 //! Families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
 //! of the scenes with a root face of up to 6 mm; a share of wide range errors; a table that shows in one to two rows beyond the far edges;
-//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Limits: one scan a scene.
+//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`repeated`]).
 
 mod laid_template;
 mod plate_scene;
+mod repeated;
 mod stated;
 
 use std::path::Path;
@@ -32,6 +33,7 @@ use crate::scene::Shot;
 use crate::seeds::shared;
 use crate::stages;
 use plate_scene::{Given, RandomScene, widest_spacing};
+use repeated::Repeated;
 use stated::{Errors, KINDS, Kind, Stated};
 
 use serde_json::{Value as Json, json};
@@ -39,6 +41,8 @@ use serde_json::{Value as Json, json};
 /// One scene, measured.
 struct Outcome {
     seed: u64,
+    /// Number of the scan of this scene.
+    scan: u64,
     scene: String,
     /// Amplitude of the cyclic range error, millimetres.
     cyclic_mm: f64,
@@ -56,31 +60,55 @@ pub(super) fn random(
     silent: bool,
 ) -> Result<Json, CliError> {
     let seeds: Vec<u64> = (0..n as u64).map(|k| arguments.seed.wrapping_add(k)).collect();
+    let scans: Vec<(u64, u64)> =
+        seeds.iter().flat_map(|seed| (0..arguments.scans).map(|scan| (*seed, scan))).collect();
     let load = || {
         let flattenings = stages::flattenings(catalogue, &arguments.flattening[..1])?;
         Ok((flattenings, laid_template::load(catalogue)?))
     };
     let given = Given { cyclic_mm: arguments.cyclic_mm, reflectivity: arguments.reflectivity };
     let calibration = arguments.calibration.as_deref().map(Calibration::load).transpose()?;
-    let outcomes = shared(&seeds, arguments.threads, load, |(flattenings, template), seed| {
-        progress::phase(&format!("random scene {seed}"));
-        let scene = RandomScene::of(arguments.family, given, *seed);
+    let outcomes = shared(&scans, arguments.threads, load, |(flattenings, template), (seed, scan)| {
+        progress::phase(&format!("random scene {seed}, scan {}", scan + 1));
+        let scene = RandomScene::of(arguments.family, given, *seed).repeated(*scan);
         let shot = scene.scan(catalogue, folder)?;
         let flattening = flattenings.first_mut();
         let result = flattening.map_or(Err("no flattening".into()), |f| {
             errors(&scene, &shot, calibration.as_ref(), f, template)
         });
         let spacing = widest_spacing(&shot.truth, scene.setting.step_deg.to_radians());
-        Ok(Outcome { seed: *seed, scene: scene.words(), cyclic_mm: scene.cyclic_mm, spacing, result })
+        Ok(Outcome {
+            seed: *seed,
+            scan: *scan,
+            scene: scene.words(),
+            cyclic_mm: scene.cyclic_mm,
+            spacing,
+            result,
+        })
     })?;
     progress::done();
+    let repeated = repeated(&outcomes);
     if !silent {
         print(&outcomes)?;
+        print_repeated(&repeated)?;
     }
+    let biases = |(seed, figures): &(u64, Vec<Repeated>)| json!({ "seed": seed, "figures": figures.iter().map(Repeated::document).collect::<Vec<_>>() });
     Ok(json!({
         "scenes": outcomes.iter().map(document).collect::<Vec<_>>(),
+        "repeated": repeated.iter().map(biases).collect::<Vec<_>>(),
         "summary": KINDS.map(|kind| summary(&outcomes, kind).document()),
     }))
+}
+
+/// Returns the figures of each scene over its scans; none of a scene that was measured once.
+fn repeated(outcomes: &[Outcome]) -> Vec<(u64, Vec<Repeated>)> {
+    let of_scene = |scans: &[Outcome]| {
+        let measured: Vec<&[Stated]> =
+            scans.iter().filter_map(|scan| Some(scan.result.as_ref().ok()?.stated.as_slice())).collect();
+        (scans[0].seed, KINDS.iter().flat_map(|kind| Repeated::of(&measured, *kind)).collect())
+    };
+    let scenes = outcomes.chunk_by(|a, b| a.seed == b.seed).map(of_scene);
+    scenes.filter(|(_, figures): &(u64, Vec<Repeated>)| !figures.is_empty()).collect()
 }
 
 fn errors(
@@ -151,14 +179,16 @@ impl Summary {
 
     fn row(&self) -> Vec<String> {
         let quantiles = self.quantiles.map(|value| format!("{value:.3}"));
-        let coverage = self.coverage.map(|share| format!("{:.1} %", 100.0 * share));
+        let percent =
+            |share: f64| if share.is_nan() { "-".into() } else { format!("{:.1} %", 100.0 * share) };
+        let coverage = self.coverage.map(percent);
         let row = [self.name.to_owned(), self.n.to_string()].into_iter().chain(quantiles).chain(coverage);
         row.chain([format!("{:.2}", self.ratio)]).collect()
     }
 }
 
 fn document(outcome: &Outcome) -> Json {
-    let mut document = json!({ "seed": outcome.seed, "scene": outcome.scene, "cyclic_mm": outcome.cyclic_mm, "widest_spacing_mm": mm(outcome.spacing) });
+    let mut document = json!({ "seed": outcome.seed, "scan": outcome.scan, "scene": outcome.scene, "cyclic_mm": outcome.cyclic_mm, "widest_spacing_mm": mm(outcome.spacing) });
     match &outcome.result {
         Err(refusal) => document["refused"] = json!(refusal),
         Ok(errors) => {
@@ -172,7 +202,9 @@ fn document(outcome: &Outcome) -> Json {
 }
 
 fn print(outcomes: &[Outcome]) -> Result<(), CliError> {
-    output::line(&format!("\nErrors on {} random scenes, and stated 95 % intervals", outcomes.len()))?;
+    let n_scenes = outcomes.chunk_by(|a, b| a.seed == b.seed).count();
+    let scans = if n_scenes < outcomes.len() { format!(", {} scans", outcomes.len()) } else { String::new() };
+    output::line(&format!("\nErrors on {n_scenes} random scenes{scans}, and stated 95 % intervals"))?;
     let head = ["", "n", "median", "95 %", "max", "inside", "not cyclic", "cyclic", "rms/sigma"]
         .map(str::to_owned)
         .to_vec();
@@ -190,9 +222,24 @@ fn print(outcomes: &[Outcome]) -> Result<(), CliError> {
             Ok(_) => continue,
         };
         output::line(&format!(
-            "seed {}: {said}; samples {spacing:.0} mm apart\n  {}",
-            outcome.seed, outcome.scene
+            "seed {}{}: {said}; samples {spacing:.0} mm apart\n  {}",
+            outcome.seed,
+            if outcome.scan > 0 { format!(", scan {}", outcome.scan + 1) } else { String::new() },
+            outcome.scene
         ))?;
     }
     Ok(())
+}
+
+fn print_repeated(scenes: &[(u64, Vec<Repeated>)]) -> Result<(), CliError> {
+    if scenes.is_empty() {
+        return Ok(());
+    }
+    output::line("\nRepeated scans: bias and scatter of each figure, root mean squares over figures")?;
+    let head = ["", "n", "bias", "largest", "scatter", "stated sigma"].map(str::to_owned).to_vec();
+    let rows = KINDS.iter().map(|kind| {
+        let figures = scenes.iter().flat_map(|(_, figures)| figures).filter(|figure| figure.kind == *kind);
+        repeated::row(*kind, &figures.collect::<Vec<_>>())
+    });
+    output::table(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }

@@ -24,6 +24,10 @@ const TARGET_SHARES: [f64; 2] = [0.95, 1.05];
 /// Radius of the target of a plate with bend bands, metres: the mean of its curvature between them.
 const BANDS_RADIUS: f64 = 15.0;
 
+/// Largest movement of the plate along x and y, millimetres, and largest turn, degrees, between repeated scans: another place on the lattice, the same incidence.
+const MOVED_MM: f64 = 30.0;
+const TURNED_DEG: f64 = 0.5;
+
 /// Properties that are the same in all scenes instead of drawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Given {
@@ -158,6 +162,19 @@ impl RandomScene {
         }
     }
 
+    /// Returns the scene as its repeated scan of a number sees it, 0 itself: with other noise, the plate moved by up to [`MOVED_MM`] and turned by up to [`TURNED_DEG`].
+    pub(super) fn repeated(mut self, number: u64) -> Self {
+        if number > 0 {
+            self.setting.seed ^= number << 32;
+            let mut random = Rng::with_seed(self.setting.seed);
+            let mut within = |most: f64| most * (2.0 * random.f64() - 1.0);
+            self.scene.centre_mm[0] += within(MOVED_MM);
+            self.scene.centre_mm[1] += within(MOVED_MM);
+            self.scene.yaw_deg += within(TURNED_DEG);
+        }
+        self
+    }
+
     /// Scans the scene.
     pub(super) fn scan(&self, catalogue: &Catalogue, folder: &Path) -> Result<Shot, CliError> {
         let more = [
@@ -247,6 +264,19 @@ mod tests {
                 RandomScene::of(Family::Square, Given::default(), seed).words()
             );
         }
+    }
+
+    #[test]
+    fn a_repeated_scan_has_other_noise_and_nearly_the_same_place() {
+        let of = |number| RandomScene::of(Family::Square, Given::default(), 7).repeated(number);
+        let (itself, first, again) = (of(0), of(1), of(1));
+        assert_eq!(itself.words(), RandomScene::of(Family::Square, Given::default(), 7).words());
+        assert_eq!(first.scene.centre_mm, again.scene.centre_mm);
+        assert_ne!(first.setting.seed, itself.setting.seed);
+        let moved = first.scene.centre_mm[0] - itself.scene.centre_mm[0];
+        assert!(moved != 0.0 && moved.abs() <= MOVED_MM, "{moved}");
+        let turned = first.scene.yaw_deg - itself.scene.yaw_deg;
+        assert!(turned != 0.0 && turned.abs() <= TURNED_DEG, "{turned}");
     }
 
     /// Straight down on a plane, samples lie as far apart as the range times the angle; at 60 degrees across the edge twice as far.

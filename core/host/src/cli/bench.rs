@@ -62,7 +62,8 @@ pub enum Cells {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  platen bench\n  platen bench --flattening harmonic --repeat 11\n  \
                         platen bench --json | jq .tables.table_2\n  platen bench accuracy --seeds 50 --noise-mm 0.5,2 --threads 2\n  \
-                        platen bench accuracy --random 40 --flattening harmonic --threads 2\n  platen bench advice --plates 100 --threads 2\n  platen bench scale --cells dome\n\n\
+                        platen bench accuracy --random 40 --flattening harmonic --threads 2\n  \
+                        platen bench accuracy --random 1 --seed 18026 --scans 24\n  platen bench advice --plates 100 --threads 2\n  platen bench scale --cells dome\n\n\
                         Scans come from the `simulated` driver library; the true shape is written beside them into --out. \
                         Times are processor time of one measurement, of both its threads, whatever --threads is.")]
 pub struct BenchArguments {
@@ -87,6 +88,9 @@ pub struct BenchArguments {
     /// Family of the random scenes: edges of the plate and errors of the scanner
     #[arg(long, value_enum, default_value_t, requires = "random")]
     pub family: Family,
+    /// Scans of each random scene, with other noise and the plate moved by up to 30 mm and half a degree: their mean error is a bias
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "random", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub scans: u64,
     /// Amplitude of the cyclic range error in every random scene, millimetres, instead of up to 0.3 mm in a third of them
     #[arg(long, value_name = "MM", requires = "random")]
     pub cyclic_mm: Option<f64>,
