@@ -9,7 +9,7 @@
 //!
 //! Families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
 //! of the scenes with a root face of up to 6 mm; a share of wide range errors; a table that shows in one to two rows beyond the far edges;
-//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`repeated`]).
+//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`mod@repeated`]).
 
 mod laid_template;
 mod plate_scene;
