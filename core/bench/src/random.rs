@@ -9,7 +9,7 @@
 //!
 //! Families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
 //! of the scenes with a root face of up to 6 mm; a share of wide range errors; a table that shows in one to two rows beyond the far edges;
-//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`mod@repeated`]).
+//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`repeated`]).
 
 mod laid_template;
 mod plate_scene;
@@ -41,7 +41,7 @@ use serde_json::{Value as Json, json};
 /// One scene, measured.
 struct Outcome {
     seed: u64,
-    /// Number of the scan of this scene.
+    /// Number of the scan of this scene, from 0; people read it from 1.
     scan: u64,
     scene: String,
     /// Amplitude of the cyclic range error, millimetres.
@@ -87,7 +87,7 @@ pub(super) fn random(
         })
     })?;
     progress::done();
-    let repeated = repeated(&outcomes);
+    let repeated = over_scans(&outcomes);
     if !silent {
         print(&outcomes)?;
         print_repeated(&repeated)?;
@@ -101,7 +101,7 @@ pub(super) fn random(
 }
 
 /// Returns the figures of each scene over its scans; none of a scene that was measured once.
-fn repeated(outcomes: &[Outcome]) -> Vec<(u64, Vec<Repeated>)> {
+fn over_scans(outcomes: &[Outcome]) -> Vec<(u64, Vec<Repeated>)> {
     let of_scene = |scans: &[Outcome]| {
         let measured: Vec<&[Stated]> =
             scans.iter().filter_map(|scan| Some(scan.result.as_ref().ok()?.stated.as_slice())).collect();
@@ -188,7 +188,7 @@ impl Summary {
 }
 
 fn document(outcome: &Outcome) -> Json {
-    let mut document = json!({ "seed": outcome.seed, "scan": outcome.scan, "scene": outcome.scene, "cyclic_mm": outcome.cyclic_mm, "widest_spacing_mm": mm(outcome.spacing) });
+    let mut document = json!({ "seed": outcome.seed, "scan": outcome.scan + 1, "scene": outcome.scene, "cyclic_mm": outcome.cyclic_mm, "widest_spacing_mm": mm(outcome.spacing) });
     match &outcome.result {
         Err(refusal) => document["refused"] = json!(refusal),
         Ok(errors) => {

@@ -15,7 +15,7 @@
 //! | [`reml`], `normal_equations`, [`spline_fit`] | penalised least squares on scattered points, smoothing by restricted maximum likelihood |
 //!
 //! Every routine but [`join`] runs on one thread and its results are the same to the last bit in each run, whatever the load of the
-//! machine. Lengths have no unit here. No clock, no files, no randomness but from a given seed.
+//! machine. Lengths have no unit here. No clock, no files but those of [`cache_sizes`], no randomness but from a given seed.
 
 pub mod adaptive_metropolis;
 pub mod block_banded;

@@ -1,4 +1,4 @@
-//! Bias and scatter of figures over repeated scans of one scene.
+//! Bias and scatter of figures over repeated scans of one scene (trueness and precision of ISO 5725-1).
 //!
 //! A stated standard deviation covers both: what noise scatters, and what an edge, its contrast and its place on the lattice leave in every scan. Errors on random
 //! scenes do not tell them apart. Over scans of one scene with other noise and the plate moved a little the mean error is the bias, its deviations are the scatter.
