@@ -4,7 +4,8 @@
 //! both sides, as a mixed pixel has. Where its plane shows wider elsewhere beside the component, that tells them:
 //!
 //! - A plane n . x = 1 has the inverse range n . d along the unit direction d: linear in n, a fit by linear least squares at any incidence.
-//! - A cell on a plane is no mixed pixel, though its neighbours be others; a mixed pixel meets the range of a plane by chance in one of a hundred.
+//! - A cell on a plane is no mixed pixel, though its neighbours be others; a mixed pixel meets the range of a plane by chance in one of a hundred, more often
+//!   before a plane whose continuation is close behind the edge. A plane of a strip holds many of them; alone on one that holds few, it is there by chance.
 //!   One with mixed pixels before the plane to both sides stays mixed: along an edge parallel to a row some beams return the background's range.
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
 //!
@@ -38,6 +39,9 @@ const MOST_LEVERAGE: f64 = 9.0;
 const NEAREST: usize = 2;
 const FAR: usize = 12;
 
+/// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
+const FEW: usize = 20;
+
 /// Steepest surface of a component, metres of range per metre across the beam: that of an incidence of 85 degrees.
 const STEEPEST: f32 = 12.0;
 
@@ -54,6 +58,9 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     for index in &off {
         on[*index] =
             (0..).zip(&planes).find(|(_, plane)| plane.holds(&cell(*index))).map(|(number, _)| number);
+    }
+    for index in by_chance(window, pixels, &off, &on) {
+        on[index] = None;
     }
     let is_strip = |index: &usize| {
         let mixed = |at: usize| (pixels[at] == Pixel::Mixed).then(|| cell(at));
@@ -72,6 +79,18 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     };
     let strip: Vec<usize> = off.iter().copied().filter(is_strip).collect();
     strip.into_iter().for_each(|index| pixels[index] = Pixel::Sound);
+}
+
+/// Returns the mixed pixels that are alone on a plane which holds few of them.
+fn by_chance(window: &Window, pixels: &[Pixel], off: &[usize], on: &[Option<u8>]) -> Vec<usize> {
+    let mixed: Vec<usize> = off.iter().copied().filter(|index| pixels[*index] == Pixel::Mixed).collect();
+    let mut held = [0; PLANES];
+    mixed.iter().filter_map(|index| on[*index]).for_each(|plane| held[usize::from(plane)] += 1);
+    let is_few = |plane: u8| FEW * held[usize::from(plane)] < mixed.len();
+    let is_alone = |index: usize| {
+        !any_within(window, index, [1; 2], [1; 2], |other| other != index && on[other] == on[index])
+    };
+    mixed.iter().copied().filter(|index| on[*index].is_some_and(is_few) && is_alone(*index)).collect()
 }
 
 /// Returns the classified cells off the component and off what may be its continuation.

@@ -122,3 +122,20 @@ fn a_part_of_the_plate_off_the_component_is_no_background() {
     }
     assert_told(&window, &kinds);
 }
+
+#[test]
+fn alone_on_a_plane_of_few_is_by_chance() {
+    let header = ScanHeader { n_rows: 8, n_columns: 50, ..ScanHeader::default() };
+    let window = Window::of_ranges(header, |_, _| (9.0, false));
+    // Every second of 50 mixed pixels along a row is on a plane of a strip, two side by side and one alone on another.
+    let mixed: Vec<usize> = (0..50).map(|column| 8 * column + 4).collect();
+    let (mut pixels, mut on) = (vec![Pixel::Sound; 400], vec![None; 400]);
+    mixed.iter().for_each(|index| pixels[*index] = Pixel::Mixed);
+    mixed.iter().step_by(2).for_each(|index| on[*index] = Some(0));
+    [11, 12].iter().for_each(|k| on[mixed[*k]] = Some(1));
+    on[mixed[31]] = Some(2);
+    assert_eq!(by_chance(&window, &pixels, &mixed, &on), [mixed[31]]);
+    // Beside a sound cell of its plane it is where that plane ends.
+    on[mixed[31] + 1] = Some(2);
+    assert!(by_chance(&window, &pixels, &mixed, &on).is_empty());
+}
