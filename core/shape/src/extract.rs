@@ -11,6 +11,7 @@
 //! | `window`, `beam_directions` | one component as a dense grid with its margin | |
 //! | `range_noise` | noise of the range from third differences | own |
 //! | `mixed_pixels` | beams that straddle an edge | own |
+//! | `background_planes` | narrow strips of background told from mixed pixels, by sequential RANSAC | Fischler and Bolles 1981; own |
 //! | `smoothed_normals` | Taubin's low-pass filter of the inverse range and its normals | 3.1 |
 //! | `faces`, `segmented_component` | smooth faces: connected components of cells where the normal does not turn | 3.1 |
 //! | `occlusion` | faces joined across something nearer | own |
