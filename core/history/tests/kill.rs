@@ -6,7 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
@@ -71,18 +71,20 @@ impl Host {
 
     /// Returns the next report. A child that ends without being killed has failed; its standard error shows why.
     fn report(&mut self) -> String {
-        loop {
-            let mut line = String::new();
-            assert!(self.reports.read_line(&mut line).unwrap() > 0, "the host died by itself");
-            if let Some(report) = line.trim_end().strip_prefix("host: ") {
-                return report.to_owned();
-            }
-        }
+        self.left().next().unwrap_or_else(|| panic!("the host died by itself"))
     }
 
-    fn kill(mut self) {
+    /// Returns the reports up to the end of the child.
+    fn left(&mut self) -> impl Iterator<Item = String> {
+        let lines = self.reports.by_ref().lines().map(Result::unwrap);
+        lines.filter_map(|line| Some(line.trim_end().strip_prefix("host: ")?.to_owned()))
+    }
+
+    /// Kills the child; returns what it had reported before and nobody had read.
+    fn kill(mut self) -> Vec<String> {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
+        self.left().collect()
     }
 }
 
@@ -142,7 +144,7 @@ fn press(database: &Path, strokes: u16, stop: &str, mut fatal: impl FnMut(&str) 
         witness.see(&report);
         if fatal(&report) {
             deaths += 1;
-            host.kill();
+            host.kill().iter().for_each(|unread| witness.see(unread));
             host = Host::start(database, "");
             host.order(&format!("trigger {stroke}"));
             continue;
