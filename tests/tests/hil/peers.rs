@@ -59,39 +59,48 @@ impl Peer {
 }
 
 /// A line or a gateway of socat's, gone when dropped.
-struct Socat(Child);
+struct Socat {
+    child: Child,
+    /// Links to its terminals.
+    links: Vec<PathBuf>,
+}
 
 impl Socat {
     /// Two pseudo terminals with their lines joined, linked as `a` and `b` in `folder`.
     fn line(folder: &Path) -> Self {
-        let end = |name: &str| format!("pty,raw,echo=0,link={}", folder.join(name).display());
-        Self::start(&[end("a"), end("b")], "starting data transfer").0
+        let links = ["a", "b"].map(|name| folder.join(name));
+        let ends = links.each_ref().map(|link| format!("pty,raw,echo=0,link={}", link.display()));
+        Self::start(&ends, "starting data transfer", links.into()).0
     }
 
     /// A port that passes what comes to a serial device; one connection at a time opens it.
     fn gateway(device: &Path) -> (Self, u16) {
         let device = format!("{},raw,echo=0", device.display());
         let listen = "TCP-LISTEN:0,bind=127.0.0.1,reuseaddr,fork,nodelay".to_owned();
-        let (socat, line) = Self::start(&[listen, device], "listening on");
+        let (socat, line) = Self::start(&[listen, device], "listening on", Vec::new());
         (socat, line.rsplit(':').next().unwrap().trim().parse().unwrap())
     }
 
     /// Waits for a line of its log.
-    fn start(ends: &[String; 2], wanted: &str) -> (Self, String) {
+    fn start(ends: &[String; 2], wanted: &str, links: Vec<PathBuf>) -> (Self, String) {
         let mut child =
             Command::new("socat").args(["-d", "-d"]).args(ends).stderr(Stdio::piped()).spawn().unwrap();
         let mut log = BufReader::new(child.stderr.take().unwrap()).lines();
         let line = log.find_map(|line| line.ok().filter(|line| line.contains(wanted))).unwrap();
         // Its log must not fill the pipe.
         std::thread::spawn(move || log.for_each(drop));
-        (Self(child), line)
+        (Self { child, links }, line)
     }
 }
 
 impl Drop for Socat {
+    /// Removes the links first, as those of an unplugged adapter are: another test may get a terminal of the same number a moment later.
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        for link in &self.links {
+            let _ = std::fs::remove_file(link);
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
