@@ -31,6 +31,12 @@ impl SplineCurve {
         self.with(&self.coefficients + by)
     }
 
+    /// Returns the number of coefficients.
+    #[must_use]
+    pub fn n_coefficients(&self) -> usize {
+        self.coefficients.len()
+    }
+
     /// Returns the value at `x` as a linear functional of the coefficients.
     #[must_use]
     pub fn functional(&self, x: f64) -> DVector<f64> {
@@ -57,7 +63,8 @@ impl SplineCurve {
     }
 }
 
-/// Normal equations of a smoothing curve: sums over data, and a Gaussian prior of its roughness.
+/// Normal equations of a smoothing curve: sums over data, and a Gaussian prior of its roughness. Further parameters that enter observations linearly
+/// beside the curve stand behind its coefficients.
 #[derive(Debug, Clone)]
 pub struct CurveFit {
     knots: UniformKnots,
@@ -95,6 +102,33 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
+    /// Appends one parameter for each normal prior, given by mean and standard deviation.
+    #[must_use]
+    pub fn with_parameters(mut self, priors: &[(f64, f64)]) -> Self {
+        let from = self.right.len();
+        let n = from + priors.len();
+        self.matrix = self.matrix.resize(n, n, 0.0);
+        self.right = self.right.resize_vertically(n, 0.0);
+        for (k, (mean, spread)) in (from..).zip(priors) {
+            let weight = spread.powi(-2);
+            self.matrix[(k, k)] = weight;
+            self.right[k] = weight * mean;
+        }
+        self
+    }
+
+    /// Adds a value `y` at `x` of the curve plus `factor` times the parameter of a number, with the weight `w`.
+    pub fn add_with(&mut self, x: f64, y: f64, w: f64, (number, factor): (usize, f64)) {
+        self.add(x, y, w);
+        let (first, values) = self.knots.values(x);
+        let at = self.knots.n_coefficients() + number;
+        for (i, value) in values.iter().enumerate() {
+            self.matrix[(at, first + i)] += w * factor * value;
+        }
+        self.matrix[(at, at)] += w * factor * factor;
+        self.right[at] += w * factor * y;
+    }
+
     /// Adds a value `y` at `x` with the weight `w` (one over its variance).
     pub fn add(&mut self, x: f64, y: f64, w: f64) {
         let (first, values) = self.knots.values(x);
@@ -121,8 +155,46 @@ impl CurveFit {
     /// Solves for the most likely curve; also returns the Cholesky factor of its precision. `None` when it is undetermined.
     #[must_use]
     pub fn solve(self) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
+        let (curve, _, factor) = self.solve_with_parameters()?;
+        Some((curve, factor))
+    }
+
+    /// Solves for the most likely curve and parameters; also returns the Cholesky factor of the precision of both, the curve's coefficients first.
+    #[must_use]
+    pub fn solve_with_parameters(self) -> Option<(SplineCurve, DVector<f64>, Cholesky<f64, Dyn>)> {
         let factor = Cholesky::new(self.matrix)?;
-        let coefficients = factor.solve(&self.right);
-        Some((SplineCurve::new(self.knots, coefficients), factor))
+        let solution = factor.solve(&self.right);
+        let n = self.knots.n_coefficients();
+        let (curve, parameters) =
+            (solution.rows(0, n).into_owned(), solution.rows(n, solution.len() - n).into_owned());
+        Some((SplineCurve::new(self.knots, curve), parameters, factor))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values of a parabola, every other one off by three parts of a parameter: both are found, and the precision tells that the parameter is known.
+    #[test]
+    fn a_shared_parameter_is_found_together_with_the_curve() {
+        const OFF: f64 = 0.7;
+        let knots = UniformKnots::new(0.0, 2.0, 8);
+        let mut fit =
+            CurveFit::with_prior(knots, Roughness::Curvature, 1e3, 1.0).with_parameters(&[(0.1, 10.0); 2]);
+        for k in 0..=100 {
+            let x = 0.02 * f64::from(k);
+            if k % 2 == 0 {
+                fit.add(x, x * x, 1e4);
+            } else {
+                fit.add_with(x, x * x + 3.0 * OFF, 1e4, (1, 3.0));
+            }
+        }
+        let (curve, parameters, precision) = fit.solve_with_parameters().unwrap();
+        assert!((curve.at(1.3) - 1.69).abs() < 1e-4, "{}", curve.at(1.3));
+        assert!((parameters[1] - OFF).abs() < 1e-4 && (parameters[0] - 0.1).abs() < 1e-9, "{parameters}");
+        let variance = precision.inverse().diagonal();
+        let at = curve.n_coefficients();
+        assert!((variance[at] - 100.0).abs() < 1e-6 && variance[at + 1].sqrt() < 1e-3, "{variance}");
     }
 }

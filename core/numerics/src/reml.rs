@@ -10,7 +10,7 @@
 //! pair of weights costs one pass over the coefficients instead of a factorisation. Unequal density of the points
 //! and holes only enter the choice of the weights this way, never the fit itself.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
 
 use crate::uniform_knots::UniformKnots;
 
@@ -38,6 +38,11 @@ pub struct SelectedPenalty {
 /// independent noise of equal size there.
 pub(crate) const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_812_9];
 
+/// Returns the place of a value of a row of them, in spans from the start.
+fn place_in_spans(k: usize) -> f64 {
+    (k / 2) as f64 + 0.5 + GAUSS[k % 2]
+}
+
 /// Values at the Gauss places of all spans, `None` where nothing was seen.
 #[derive(Debug, Clone)]
 pub(crate) struct GridValues {
@@ -54,8 +59,8 @@ const NULLITY: usize = 3;
 /// The search covers penalties whose largest eigenvalue is 10^x times that of the data, x in this range. Beyond the
 /// upper end rounding would bend the shapes that the penalty is to leave alone; beyond the lower the fit interpolates.
 const EXPONENTS: (f64, f64) = (-1.0, 10.0);
-/// Exponents of a spline that hardly does more than a quadratic.
-const STIFF: [f64; 2] = [9.0, 9.0];
+/// Exponents of the spline that goes through first: it follows waves over ten spans and damps those over four, as kinks of a fill are.
+const STIFF: [f64; 2] = [6.0, 6.0];
 /// From this exponent on spans of twice the length will do: a wave over four of them is damped to 1/240, and it is
 /// the shortest that they follow to a hundredth.
 const COARSE: f64 = 6.0;
@@ -75,7 +80,8 @@ impl GridValues {
         let mut criterion = RestrictedLikelihood::new(&along_u, &along_v, &filled);
         let mut best = STIFF;
         if !gaps.is_empty() {
-            // A crude fill has kinks that would pass for shape: first a stiff spline goes through, then the chosen one.
+            // A crude fill has kinks that would pass for shape, and so has one that does not follow the shape: first a stiff spline goes through, then the
+            // chosen one.
             criterion.refill(&mut filled, &gaps, best);
             best = criterion.minimise();
             criterion.refill(&mut filled, &gaps, best);
@@ -94,10 +100,14 @@ impl GridValues {
         }
     }
 
-    /// The values with gaps filled by the seen values around them, weighted by distance; and the gaps.
+    /// The values, with gaps their departures from their biquadratic trend, the gaps filled by those around them, weighted by distance; and the gaps. The trend is in
+    /// the null space of the penalty and does not change the likelihood; without it a gap at the border of an inclined plate would be filled far off it.
     fn filled(&self) -> (DMatrix<f64>, Vec<(usize, usize)>) {
         let (n_u, n_v) = (2 * self.u.n_spans(), 2 * self.v.n_spans());
-        let at = |i: usize, k: usize| self.values[k * n_u + i];
+        let trend = if self.values.contains(&None) { self.trend() } else { Trend::zeros() };
+        let off = |index: usize| Some(self.values[index]? - trend.dot(&biquadratic(index, [n_u, n_v])));
+        let departures: Vec<Option<f64>> = (0..self.values.len()).map(off).collect();
+        let at = |i: usize, k: usize| departures[k * n_u + i];
         let mut missing = Vec::new();
         let filled = DMatrix::from_fn(n_u, n_v, |i, k| {
             at(i, k).unwrap_or_else(|| {
@@ -117,6 +127,30 @@ impl GridValues {
         });
         (filled, missing)
     }
+
+    /// Returns the coefficients of the biquadratic function nearest to the values; 0 where they do not determine it.
+    fn trend(&self) -> Trend {
+        let size = [2 * self.u.n_spans(), 2 * self.v.n_spans()];
+        let (mut gram, mut rhs) = (SMatrix::<f64, TREND, TREND>::zeros(), Trend::zeros());
+        for (index, value) in self.values.iter().enumerate().filter_map(|(index, y)| Some((index, (*y)?))) {
+            let terms = biquadratic(index, size);
+            gram += terms * terms.transpose();
+            rhs += terms * value;
+        }
+        gram.cholesky().map_or_else(Trend::zeros, |factor| factor.solve(&rhs))
+    }
+}
+
+/// Terms of the null space of the penalty.
+const TREND: usize = NULLITY * NULLITY;
+type Trend = SVector<f64, TREND>;
+
+/// Returns the terms x^p y^q, p and q up to 2, of a value of a grid; x and y run from -1 to 1.
+fn biquadratic(index: usize, [n_u, n_v]: [usize; 2]) -> Trend {
+    let place = |k: usize, n: usize| 2.0 * place_in_spans(k) / (n / 2) as f64 - 1.0;
+    let (x, y) = (place(index % n_u, n_u), place(index / n_u, n_v));
+    let powers = |x: f64| [1.0, x, x * x];
+    Trend::from_fn(|term, _| powers(x)[term % NULLITY] * powers(y)[term / NULLITY])
 }
 
 /// The basis of an axis that makes data and penalty diagonal.
@@ -132,8 +166,7 @@ impl AxisSpectrum {
         let n = axis.n_coefficients();
         let mut basis = DMatrix::zeros(2 * axis.n_spans(), n);
         for j in 0..2 * axis.n_spans() {
-            let (first, values) =
-                axis.values(axis.start() + axis.step() * ((j / 2) as f64 + 0.5 + GAUSS[j % 2]));
+            let (first, values) = axis.values(axis.start() + axis.step() * place_in_spans(j));
             (0..4).for_each(|i| basis[(j, first + i)] = values[i]);
         }
         // Two places per span do not quite determine a spline of few spans: a touch of the identity does.
