@@ -26,6 +26,7 @@ use platen_host::cli::bench::BenchArguments;
 use platen_host::cli::{CliError, output};
 use platen_host::progress;
 use platen_model::units::mm;
+use platen_numerics::normal_distribution::cdf;
 use platen_shape::{EXPANDED, RangeError};
 
 use crate::accuracy::rms;
@@ -37,6 +38,9 @@ use repeated::Repeated;
 use stated::{Errors, KINDS, Kind, Stated};
 
 use serde_json::{Value as Json, json};
+
+/// Figures of corners beyond this are far off, metres.
+const FAR: f64 = 1e-3;
 
 /// One scene, measured.
 struct Outcome {
@@ -97,6 +101,7 @@ pub(super) fn random(
         "scenes": outcomes.iter().map(document).collect::<Vec<_>>(),
         "repeated": repeated.iter().map(biases).collect::<Vec<_>>(),
         "summary": KINDS.map(|kind| summary(&outcomes, kind).document()),
+        "far_corners": far_corners(&outcomes).document(),
     }))
 }
 
@@ -187,6 +192,30 @@ impl Summary {
     }
 }
 
+/// Figures of corners that are far off and outside of their 95 % interval.
+struct FarCorners {
+    found: usize,
+    /// As many as there would be if all errors were normally distributed with the stated standard deviations: a twentieth of all figures is outside.
+    expected: f64,
+}
+
+fn far_corners(outcomes: &[Outcome]) -> FarCorners {
+    let measured = outcomes.iter().filter_map(|outcome| outcome.result.as_ref().ok());
+    let corners: Vec<&Stated> =
+        measured.flat_map(|errors| &errors.stated).filter(|s| s.kind == Kind::Corner).collect();
+    let bound = |s: &Stated| (EXPANDED * s.sigma).max(FAR);
+    FarCorners {
+        found: corners.iter().filter(|s| s.error.abs() > bound(s)).count(),
+        expected: corners.iter().map(|s| 2.0 * cdf(-bound(s) / s.sigma)).sum(),
+    }
+}
+
+impl FarCorners {
+    fn document(&self) -> Json {
+        json!({ "found": self.found, "expected": self.expected })
+    }
+}
+
 fn document(outcome: &Outcome) -> Json {
     let mut document = json!({ "seed": outcome.seed, "scan": outcome.scan + 1, "scene": outcome.scene, "cyclic_mm": outcome.cyclic_mm, "widest_spacing_mm": mm(outcome.spacing) });
     match &outcome.result {
@@ -210,6 +239,11 @@ fn print(outcomes: &[Outcome]) -> Result<(), CliError> {
         .to_vec();
     let rows = KINDS.iter().map(|kind| summary(outcomes, *kind).row());
     output::table(&std::iter::once(head).chain(rows).collect::<Vec<_>>())?;
+    let FarCorners { found, expected } = far_corners(outcomes);
+    output::line(&format!(
+        "\nFigures of corners more than {:.0} mm off and outside of their interval: {found}; of normal errors {expected:.1}",
+        mm(FAR)
+    ))?;
     output::line("\nGross errors (corner above 2 mm, marker above 1 mm) and refusals")?;
     for outcome in outcomes {
         let spacing = mm(outcome.spacing);

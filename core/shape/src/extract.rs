@@ -48,12 +48,13 @@ use std::collections::BTreeMap;
 use platen_scan::{Column, ColumnError, ScanHeader};
 
 use crate::PlateSpec;
+pub(crate) use background_planes::PLANES as BACKGROUND_PLANES;
 use column_store::{Cell, ColumnStore, Segment, StoredColumn, cells_of};
 use completed_components::Completed;
 use connected_components::{Components, Run};
 use continuity::Continuity;
 use occlusion::FacePiece;
-pub use patch::{Beyond, Crossing, Patch, Sample};
+pub use patch::{Beyond, Crossing, Patch, PlaneBehind, Sample};
 pub use refusal::Refusal;
 use segmented_component::SegmentedComponent;
 
@@ -288,7 +289,7 @@ impl Extractor {
     }
 
     fn patch(&self, surface: &SegmentedComponent, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
-        let SegmentedComponent { window, noise, pixels, slope_reach, normals, .. } = surface;
+        let SegmentedComponent { window, noise, pixels, background, slope_reach, normals, .. } = surface;
         let mut face = vec![false; window.cells.len()];
         for region in regions {
             for (cell, core) in face.iter_mut().zip(region_growing::erode(window, region, *slope_reach)) {
@@ -310,8 +311,15 @@ impl Extractor {
                 });
             }
         }
-        let (crossings, cut) =
-            crossings::find(window, noise, &face, pixels, self.spec.flank_depth(), |cell| number[cell]);
+        let scene = crossings::Scene {
+            window,
+            noise,
+            face: &face,
+            pixels,
+            background,
+            flank_depth: self.spec.flank_depth(),
+        };
+        let (crossings, cut) = crossings::find(&scene, |cell| number[cell]);
         if cut > CUT_TOLERANCE {
             return Err(Refusal::CutByRegion { cut_mm: cut * 1000.0 });
         }

@@ -14,7 +14,7 @@
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
-//! | `contrast` | radiometric bias of an edge, from the ranges of its mixed pixels | own |
+//! | `contrast` | where an edge crosses a mixed pixel, by its range and the contrast of plate and background (linear mixing model) | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
 //! | `coverage` | where along an edge it was seen | own |

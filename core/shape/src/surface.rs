@@ -10,6 +10,8 @@ mod fit_surface;
 mod height_draws;
 mod mask;
 mod parts;
+#[cfg(feature = "measure")]
+mod place_by_chart;
 
 #[cfg(feature = "measure")]
 pub use fit_surface::Quality;

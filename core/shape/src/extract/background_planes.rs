@@ -15,7 +15,8 @@
 use nalgebra::{Cholesky, Const, Matrix3};
 use platen_numerics::random::Random;
 
-use super::mixed_pixels::Pixel;
+use super::mixed_pixels::{Pixel, STEEPEST};
+use super::patch::PlaneBehind;
 use super::range_noise::Noise;
 use super::window::Window;
 use crate::Vec3;
@@ -25,7 +26,7 @@ const ENOUGH: usize = 1024;
 const LEAST_CELLS: usize = 24;
 
 /// Planes at most, and triples that are tried for each.
-const PLANES: usize = 6;
+pub(crate) const PLANES: usize = 6;
 const TRIALS: usize = 300;
 
 /// The second and third cell of a triple are among so many before and behind the first.
@@ -42,11 +43,24 @@ const FAR: usize = 12;
 /// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
 const FEW: usize = 20;
 
-/// Steepest surface of a component, metres of range per metre across the beam: that of an incidence of 85 degrees.
-const STEEPEST: f32 = 12.0;
+/// Planes of the background by cell.
+#[derive(Debug, Clone)]
+pub(super) struct PlaneOfCell {
+    numbers: Vec<Option<u8>>,
+    /// Of each plane from the scanner, metres.
+    distances: Vec<f64>,
+}
 
-/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound.
-pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
+impl PlaneOfCell {
+    /// Returns the plane that holds a cell.
+    pub(super) fn at(&self, index: usize) -> Option<PlaneBehind> {
+        let number = self.numbers[index]?;
+        Some(PlaneBehind { number, distance: self.distances[usize::from(number)] as f32 })
+    }
+}
+
+/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound. Returns the planes by cell.
+pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -> PlaneOfCell {
     let off = off_component(window, pixels);
     let cell = |index: usize| BackgroundCell::of(window, noise, index);
     let of = |class: Pixel| -> Vec<BackgroundCell> {
@@ -79,6 +93,7 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) {
     };
     let strip: Vec<usize> = off.iter().copied().filter(is_strip).collect();
     strip.into_iter().for_each(|index| pixels[index] = Pixel::Sound);
+    PlaneOfCell { numbers: on, distances: planes.iter().map(|plane| 1.0 / plane.vector.norm()).collect() }
 }
 
 /// Returns the mixed pixels that are alone on a plane which holds few of them.

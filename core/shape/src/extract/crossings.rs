@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use super::background_planes::PlaneOfCell;
 use super::local_quadric::LocalQuadric;
 use super::mixed_pixels::Pixel;
 use super::patch::{Beyond, Crossing};
@@ -24,20 +25,13 @@ const FIT_FAR: usize = 3;
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
 const FRONT_BOUND: f64 = 4.0;
 
-/// Returns all crossings of the cells of `face`, by cell, in the order up, down, back, next. `number` gives the place of a cell
-/// of the face among the samples, `flank_depth` is that of the upper flank of a bevelled edge. Also returns the length over which the region of interest cuts the face, metres.
-pub(super) fn find(
-    window: &Window,
-    noise: &Noise,
-    face: &[bool],
-    pixels: &[Pixel],
-    flank_depth: Option<f64>,
-    number: impl Fn(usize) -> u32,
-) -> (Vec<Crossing>, f64) {
+/// Returns all crossings of the face's cells, by cell, in the order up, down, back, next. `number` gives the place of a cell
+/// of the face among the samples. Also returns the length over which the region of interest cuts the face, metres.
+pub(super) fn find(scene: &Scene, number: impl Fn(usize) -> u32) -> (Vec<Crossing>, f64) {
+    let Scene { window, face, .. } = *scene;
     let mut fits: BTreeMap<(usize, usize), Option<LocalQuadric>> = BTreeMap::new();
     let mut crossings = Vec::new();
     let mut cut = 0.0;
-    let scene = Scene { window, noise, face, pixels, flank_depth };
     let inside = |i: usize| face.get(i).is_some_and(|f| *f);
     // Cells amid the face leave it nowhere.
     let is_rim = |i: &usize| {
@@ -81,12 +75,15 @@ enum End {
     Nothing,
 }
 
-struct Scene<'a> {
-    window: &'a Window,
-    noise: &'a Noise,
-    face: &'a [bool],
-    pixels: &'a [Pixel],
-    flank_depth: Option<f64>,
+/// A face and what is beside it, cell by cell.
+pub(super) struct Scene<'a> {
+    pub(super) window: &'a Window,
+    pub(super) noise: &'a Noise,
+    pub(super) face: &'a [bool],
+    pub(super) pixels: &'a [Pixel],
+    pub(super) background: &'a PlaneOfCell,
+    /// Depth of the upper flank of a bevelled edge, metres.
+    pub(super) flank_depth: Option<f64>,
 }
 
 impl Scene<'_> {
@@ -162,6 +159,7 @@ impl Scene<'_> {
             mixed_excess: mixed_excess as f32,
             complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
+            background: measured.and_then(|at| self.background.at(at)),
             beyond,
         };
         Some((crossing, cut))

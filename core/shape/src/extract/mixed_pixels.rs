@@ -11,6 +11,9 @@ const BOUND: f32 = 5.0;
 /// The same in parts of the jump between the surfaces on both sides: what is farther away is often noisier than the plate.
 const LEAST_SHARE: f32 = 0.002;
 
+/// Steepest surface, metres of range per metre across the beam: that of an incidence of 85 degrees.
+pub(super) const STEEPEST: f32 = 12.0;
+
 /// Class of a cell by its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Pixel {
@@ -24,7 +27,8 @@ pub(super) enum Pixel {
 }
 
 /// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
-/// from the straight continuation of the two cells on either side and from the middle between its neighbours.
+/// from the straight continuation of the two cells on either side and from the middle between its neighbours. In the middle between two surfaces a mixed pixel
+/// lies by chance: it tells a surface no steeper than [`STEEPEST`].
 ///
 /// Straight means in inverse range, so that no limit of the incidence enters. The noise is that of the surface which is continued: the
 /// little that a beam sees of a dark, noisy plate before a bright wall is told by the noise of the wall.
@@ -40,8 +44,8 @@ pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Ve
                 // A background of steps seems noisier than it is.
                 let own = noise.of(column, row);
                 let bounds = [own, background.of(column, row).min(own)].map(|noise| scale * noise);
-                let down = along(window, index, 1, bounds);
-                let across = along(window, index, n_rows, bounds);
+                let down = along(window, index, (1, window.header.elevation_step), bounds);
+                let across = along(window, index, (n_rows, window.header.azimuth_step), bounds);
                 pixels[index] = match (down, across) {
                     (Pixel::Mixed, _) | (_, Pixel::Mixed) => Pixel::Mixed,
                     (Pixel::Sound, Pixel::Sound) => Pixel::Sound,
@@ -53,10 +57,10 @@ pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Ve
     pixels
 }
 
-/// Classifies a cell along one direction of the lattice: mixed when both sides were measured and nothing explains it. Bounds are those of the component
-/// and of the background.
+/// Classifies a cell along one direction of the lattice, given by the stride of its cells and the angle between them: mixed when both sides were measured and
+/// nothing explains it. Bounds are those of the component and of the background.
 #[inline]
-fn along(window: &Window, index: usize, stride: usize, [own, background]: [f32; 2]) -> Pixel {
+fn along(window: &Window, index: usize, (stride, angle): (usize, f64), [own, background]: [f32; 2]) -> Pixel {
     let inverse = &window.inverse;
     let q = [
         inverse[index - 2 * stride],
@@ -69,7 +73,8 @@ fn along(window: &Window, index: usize, stride: usize, [own, background]: [f32; 
     let bound_at = |at: usize| if window.own[at] { own } else { background };
     let small = |i: usize, bound: f32| (q[i] - 2.0 * q[i + 1] + q[i + 2]).abs() <= bound;
     let (before, behind) = (known[0] && known[1], known[3] && known[4]);
-    if (known[1] && known[3] && small(1, own))
+    let is_steep = (q[3] - q[1]).abs() > 2.0 * STEEPEST * angle as f32 * q[2];
+    if (known[1] && known[3] && small(1, own) && !is_steep)
         || (before && small(0, bound_at(index - stride)))
         || (behind && small(2, bound_at(index + stride)))
     {
@@ -92,10 +97,10 @@ mod tests {
 
     use super::*;
 
-    /// A wall of little noise 2 m behind a face of much; the beams of one row see 1 % of the face, 20 mm of range.
-    #[test]
-    fn little_of_a_noisy_face_before_a_quiet_wall_is_mixed() {
-        const FACE_ROWS: usize = 40;
+    const FACE_ROWS: usize = 40;
+
+    /// A face of [`FACE_ROWS`] rows before a surface; `range` gives the range of a row and its standard deviation.
+    fn window(seed: u64, range: impl Fn(usize) -> (f64, f64)) -> Window {
         let header = ScanHeader {
             n_rows: 80,
             n_columns: 40,
@@ -103,15 +108,36 @@ mod tests {
             elevation_step: 9e-4,
             ..ScanHeader::default()
         };
-        let mut random = Random::new(11);
+        let mut random = Random::new(seed);
         let noise: Vec<f64> = (0..80 * 40).map(|_| random.normal()).collect();
-        let window = Window::of_ranges(header, |column, row| {
-            let (range, sigma) = match row {
-                0..FACE_ROWS => (8.0, 2e-3),
-                FACE_ROWS => (9.98, 2e-4),
-                _ => (10.0, 2e-4),
-            };
+        Window::of_ranges(header, |column, row| {
+            let (range, sigma) = range(row);
             ((range + sigma * noise[80 * column + row]) as f32, row < FACE_ROWS)
+        })
+    }
+
+    /// A wall 2 m behind a face; the beams of one row see as much of either that their inverse range is the mean of both.
+    #[test]
+    fn halfway_between_two_surfaces_is_mixed() {
+        let window = window(3, |row| match row {
+            0..FACE_ROWS => (8.0, 1e-3),
+            FACE_ROWS => (2.0 / (1.0 / 8.0 + 1.0 / 10.0), 1e-3),
+            _ => (10.0, 1e-3),
+        });
+        let pixels =
+            classify(&window, &Noise::estimate(&window, &window.own), &Noise::of_background(&window));
+        let all = |class: Pixel, row: usize| (4..36).all(|column| pixels[80 * column + row] == class);
+        assert!(all(Pixel::Mixed, FACE_ROWS));
+        assert!(all(Pixel::Sound, FACE_ROWS + 1));
+    }
+
+    /// A wall of little noise 2 m behind a face of much; the beams of one row see 1 % of the face, 20 mm of range.
+    #[test]
+    fn little_of_a_noisy_face_before_a_quiet_wall_is_mixed() {
+        let window = window(11, |row| match row {
+            0..FACE_ROWS => (8.0, 2e-3),
+            FACE_ROWS => (9.98, 2e-4),
+            _ => (10.0, 2e-4),
         });
         let face = Noise::estimate(&window, &window.own);
         let mixed = |background: &Noise| {

@@ -30,6 +30,15 @@ pub enum Beyond {
     Nothing,
 }
 
+/// A plane of the background: a floor, a wall, a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaneBehind {
+    /// Equal for all cells that see it.
+    pub number: u8,
+    /// Distance from the scanner, metres.
+    pub distance: f32,
+}
+
 /// Crossing of a row or a column of the lattice with the boundary of the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
@@ -53,6 +62,8 @@ pub struct Crossing {
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
     pub excess: f32,
+    /// Plane of the background that holds that cell.
+    pub background: Option<PlaneBehind>,
     /// Kind of object that ends it.
     pub beyond: Beyond,
 }

@@ -1,6 +1,6 @@
 //! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
 
-use super::background_planes;
+use super::background_planes::{self, PlaneOfCell};
 use super::continuity::Continuity;
 use super::faces::{self, Face};
 use super::mixed_pixels::{self, Pixel};
@@ -17,6 +17,7 @@ pub(super) struct SegmentedComponent {
     pub(super) window: Window,
     pub(super) noise: Noise,
     pub(super) pixels: Vec<Pixel>,
+    pub(super) background: PlaneOfCell,
     /// Cells on each side over which the normals' slopes are taken.
     pub(super) slope_reach: usize,
     pub(super) normals: Vec<Normal>,
@@ -28,14 +29,14 @@ impl SegmentedComponent {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
         let mut pixels = mixed_pixels::classify(&window, &noise, &Noise::of_background(&window));
-        background_planes::mark_sound(&window, &noise, &mut pixels);
+        let background = background_planes::mark_sound(&window, &noise, &mut pixels);
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
         let smooth = smoothed_normals::low_pass(&window, &usable, continuity);
         let slope_reach = smoothed_normals::slope_reach(&window, noise.pooled);
         let normals = smoothed_normals::normals(&window, &smooth, &usable, slope_reach);
         let (labels, faces) = faces::find_faces(&window, &normals, slope_reach);
-        Self { root, window, noise, pixels, slope_reach, normals, labels, faces }
+        Self { root, window, noise, pixels, background, slope_reach, normals, labels, faces }
     }
 
     /// Returns the faces of at least `least` square metres. `number` is the surface's own, for [`FacePiece::surface`].

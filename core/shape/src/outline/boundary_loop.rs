@@ -271,6 +271,7 @@ mod tests {
                     complete: true,
                     mixed_excess: 0.0,
                     excess: 0.0,
+                    background: None,
                     beyond,
                 };
                 patch.crossings.push(crossing);

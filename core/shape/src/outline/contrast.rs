@@ -1,109 +1,316 @@
-//! Radiometric bias of an edge by the contrast of the face and what lies behind it, from the ranges of its mixed pixels.
+//! Contrast of the plate and what lies behind it: where an edge crosses a mixed pixel, by linear mixing.
 //!
-//! 1. Linear mixing model: the range of a mixed pixel is the mean of both sides weighted by their echoes, so that it tells the background's share b of the
-//!    beam's echo.
-//! 2. The beams meet an edge that crosses rows and columns at random. Half of the mixed ones see more of the background than of the face, and theirs
-//!    is b > C / (1 + C), where C is the contrast, the echo of the background over that of the face: the median of b gives C, without a law of intensities.
-//! 3. A beam that sees so little of one side that its range stays within the detection limit is not found mixed. Where the background outshines the face
-//!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside, and the edge, located in their middle, too far inwards.
-//!    The part of the footprint that is missed grows with C and with the detection limit over the jump of the range.
+//! 1. Linear mixing model: the range of a mixed pixel is the mean of both sides weighted by their echoes. It tells the odds of the background, its echo
+//!    over that of the face: C s / (1 - s), where s is the part of the beam's power beyond the edge and C the contrast, the echo of the background alone over
+//!    that of the face alone.
+//! 2. Of a Gaussian beam of radius r (1/e^2), with its middle a distance x inside of the edge, s = cdf(-2 x / r), in the logistic approximation
+//!    1 / (1 + exp(3.4 x / r)). So x / r = (ln C - ln odds) / 3.4: one mixed pixel locates the edge within its footprint, given the contrast.
+//! 3. The contrast, as the ratio of the reflectivities, is one unknown for each plane of the background, found together with the edge: the mixed pixels of one plane share it, those at the
+//!    ends of their row, where the beam sees nearly one side only, tell it. Along the plane it follows the cosines of the incidence on the face and on the
+//!    plane (Lambert's law) and the square of the ranges.
+//! 4. The edges before a plane share its contrast: each is fitted with what the others tell as its prior (belief propagation, exact for normal
+//!    distributions on a tree).
+//! 5. A receiver need not mix linearly: how far the mixed pixels of an edge scatter about it is estimated with it, and they count by that.
+//! 6. A beam that sees so little of one side that its range stays within the detection limit is not found mixed. Where the background outshines the face
+//!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside.
 //!
-//! In: lattice lines; out: [`Contrast`]. Own; the scale of 3 is found by simulation, with Gaussian beams truncated at their 1/e^2 radius. Limits: a beam with wings is
-//! found mixed farther inside. Its edges are left too far inwards by 0.07 of half the footprint on average, by about 0.2 where C is 4 and more (263 edges of 120 random
-//! scenes; `platen bench accuracy --family wings`).
+//! In: one lattice line; out: [`Mixing`], what its likelihood needs. Own. Limits: beams are taken for Gaussian ones that end at their radius; a beam with
+//! wings is found mixed farther inside.
 
-use platen_numerics::median::median;
+use platen_numerics::median::robust_deviation;
 
-use super::lattice_line::LatticeLine;
+use super::edge_likelihood::SharedObservation;
+use super::height_field::LEAST_COSINE;
+use crate::Vec3;
+use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing};
 
-/// Fewest mixed pixels whose median tells the contrast.
-const LEAST_PIXELS: usize = 20;
+/// Slope of the log odds of a Gaussian beam's power over the distance of an edge in its radii: twice that of the logistic approximation of the normal
+/// distribution (Camilli 1994).
+const LOGISTIC: f64 = 2.0 * 1.702;
+
+/// Mean slope of the log odds from the edge to where a beam is no longer found mixed. A beam truncated at its 1/e^2 radius has 4.0 to odds of 11 and 4.7 to 44;
+/// one that is not has 3.5 and 3.8.
+const DETECTION_SLOPE: f64 = 4.2;
+
+/// Prior of the logarithm of the ratio of the reflectivities of background and plate: mean and standard deviation. Walls of 0.8 and floors of 0.3 behind plates
+/// of 0.1 to 0.6.
+const PRIOR: (f64, f64) = (0.7, 0.7);
+
+/// Standard deviation of the logarithm of a contrast from one edge to another: planes are not evenly bright.
+const BETWEEN_EDGES: f64 = 0.1;
+
+/// Part of the prior's precision above which an edge tells a contrast.
+const LEAST_TOLD: f64 = 1e-3;
+
+/// Part of the standard deviation of the place of an edge by one mixed pixel that the shape of the beam has, alike for all of a row, in radii of the beam.
+const SHAPE_SPREAD: f64 = 0.2;
+
+/// Scatter of such places from one mixed pixel to the other that is expected, in radii, and how many pixels it counts for. Ranges anywhere between the two
+/// surfaces scatter by half a radius.
+const SCATTER: (f64, f64) = (0.2, 10.0);
+
+/// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
+const LEAST_JUMP: f64 = 0.05;
 
 /// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: the bound of second differences of
-/// `extract::mixed_pixels`, rounded.
+/// `extract::mixed_pixels`, rounded; and its largest part of the jump.
 const DETECTION_LIMIT: f64 = 12.0;
+const MOST_LIMIT: f64 = 0.45;
 
-/// An edge is found too far inwards by the first times t (C - 1 / C), where t is the detection limit in parts of the jump, at most by the second, in
-/// parts of half the footprint: by regression over 382 edges of 200 random scenes (seeds from 18001), plates of 0.1 to 0.6. Where the face outshines
-/// what lies behind it, they are off by 0.01 outwards, those of an independent simulator by 0.06 inwards: nothing is taken off.
-const MISSED: f64 = 2.0;
-const MOST_MISSED: f64 = 0.4;
+/// Least part of the radius at which a beam is found mixed.
+const LEAST_SEEN: f64 = 0.05;
 
-/// Standard deviation of what is left, in the same parts: that of these edges beyond the scatter of their lines; and where no contrast is known, per
-/// logarithm of one over the cosine of the incidence: a face is the darker the more obliquely it is seen.
-const SPREAD: f64 = 0.065;
-const UNKNOWN_SPREAD: f64 = 0.1;
+/// Logarithms of the ratio of the reflectivities of each background plane and the plate.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contrasts([f64; BACKGROUND_PLANES]);
 
-/// Radiometric bias of an edge, in parts of half the footprint on the face.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Contrast {
-    /// Distance by which the edge is found too far inwards; `None` where no contrast is known.
-    inwards: Option<f64>,
-}
-
-impl Contrast {
-    /// Estimates it from the lines of an edge. `noise` is that of ranges, metres; without `dithered` the beams do not meet the edge at random.
-    pub(super) fn of(lines: &[LatticeLine], dithered: bool, noise: f64) -> Self {
-        let mixed = lines.iter().filter(|line| line.shows_footprint()).filter_map(|line| line.mixing);
-        let (parts, jumps): (Vec<f64>, Vec<f64>) = mixed.map(|of| (of.background, of.jump)).unzip();
-        let are_told = dithered && parts.len() >= LEAST_PIXELS;
-        let medians = median(parts).zip(median(jumps)).filter(|_| are_told);
-        let inwards = medians.map(|(part, jump)| {
-            let contrast = part / (1.0 - part);
-            let missed = MISSED * (DETECTION_LIMIT * noise / jump) * (contrast - contrast.recip());
-            missed.clamp(0.0, MOST_MISSED)
-        });
-        Self { inwards }
+impl Contrasts {
+    /// Returns true when no edge moves by more than a hundredth of the beam's radius between these and others.
+    pub(super) fn are_near(&self, other: &Self) -> bool {
+        self.0.iter().zip(&other.0).all(|(one, other)| (one - other).abs() < 0.01 * LOGISTIC)
     }
 
-    /// Returns the distance by which the edge is found too far inwards and its standard deviation, in parts of half the footprint, where a
-    /// face is seen at an incidence of this cosine.
-    pub(super) fn inwards(self, cosine: f64) -> [f64; 2] {
-        self.inwards
-            .map_or_else(|| [0.0, -UNKNOWN_SPREAD * cosine.min(1.0).ln()], |inwards| [inwards, SPREAD])
+    /// Takes as many as there are planes.
+    pub(super) fn of(logarithms: &[f64]) -> Self {
+        Self(std::array::from_fn(|plane| logarithms[plane]))
+    }
+
+    /// Returns them in the order of the planes.
+    pub(super) fn logarithms(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+/// Independent normal distributions of these logarithms: mean and standard deviation of each.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ContrastDistribution([(f64, f64); BACKGROUND_PLANES]);
+
+impl ContrastDistribution {
+    /// Before any mixed pixel is seen.
+    pub(super) const PRIOR: Self = Self([PRIOR; BACKGROUND_PLANES]);
+
+    /// Takes means and standard deviations in the order of the planes.
+    pub(super) fn of(contrasts: &Contrasts, spread: impl Fn(usize) -> f64) -> Self {
+        Self(std::array::from_fn(|plane| (contrasts.0[plane], spread(plane))))
+    }
+
+    /// Combines the prior with what edges tell that were fitted with that prior.
+    pub(super) fn told_by<'a>(edges: impl Iterator<Item = &'a Self>) -> Self {
+        let prior = PRIOR.1.powi(-2);
+        let mut sums = [(prior, prior * PRIOR.0); BACKGROUND_PLANES];
+        for edge in edges {
+            for ((precision, weighted), (mean, spread)) in sums.iter_mut().zip(&edge.0) {
+                let told = spread.powi(-2) - prior;
+                if told > LEAST_TOLD * prior {
+                    let mean = (spread.powi(-2) * mean - prior * PRIOR.0) / told;
+                    let weight = 1.0 / (1.0 / told + BETWEEN_EDGES * BETWEEN_EDGES);
+                    *precision += weight;
+                    *weighted += weight * mean;
+                }
+            }
+        }
+        Self(sums.map(|(precision, weighted)| (weighted / precision, precision.powf(-0.5))))
+    }
+
+    /// Returns mean and standard deviation in the order of the planes.
+    pub(super) fn planes(&self) -> &[(f64, f64)] {
+        &self.0
+    }
+
+    /// Returns the contrasts that are expected.
+    pub(super) fn mean(&self) -> Contrasts {
+        self.off(0.0)
+    }
+
+    /// Returns the contrasts that all are so many standard deviations above the mean.
+    pub(super) fn off(&self, deviations: f64) -> Contrasts {
+        Contrasts(self.0.map(|(mean, spread)| mean + deviations * spread))
+    }
+}
+
+/// Estimates the standard deviation of the place of an edge by one mixed pixel, in radii of the beam, from the sizes of the edge's distances from such
+/// places: a receiver need not mix linearly. Returns the one expected without any.
+pub(super) fn spread(sizes: Vec<f64>) -> f64 {
+    let (expected, weight) = SCATTER;
+    let n = sizes.len() as f64;
+    let scatter = robust_deviation(sizes).unwrap_or(0.0);
+    ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt().hypot(SHAPE_SPREAD)
+}
+
+/// Linear mixing along one lattice line before a background plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mixing {
+    /// Number of the plane.
+    plane: usize,
+    /// Range of the plane behind the face's continuation, metres.
+    jump: f64,
+    /// Logarithm of the contrast by incidence and range.
+    by_geometry: f64,
+    /// Logarithm of the odds of the background in a single mixed pixel.
+    odds: Option<f64>,
+}
+
+impl Mixing {
+    /// Measures the mixing of a crossing all of whose cells were measured; `None` without a background plane.
+    pub(super) fn of(crossing: &Crossing) -> Option<Self> {
+        let jump = f64::from(crossing.excess);
+        let plane = crossing
+            .background
+            .filter(|_| crossing.complete && crossing.beyond == Beyond::Behind && jump > LEAST_JUMP)?;
+        let range = crossing.inside.norm();
+        let on_face = crossing.normal.dot(&-crossing.inside) / range;
+        let on_plane = f64::from(plane.distance) / (range + jump);
+        let [on_face, on_plane] = [on_face, on_plane].map(|cosine| cosine.max(LEAST_COSINE));
+        let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
+        let background = f64::from(crossing.mixed_excess) / jump;
+        let is_between = background > 0.0 && background < 1.0;
+        Some(Self {
+            plane: usize::from(plane.number),
+            jump,
+            by_geometry: (on_plane / on_face).ln() - 2.0 * (1.0 + jump / range).ln(),
+            odds: (crossing.mixed.is_some_and(is_single) && is_between)
+                .then(|| (background / (1.0 - background)).ln()),
+        })
+    }
+
+    /// Returns the same without what a mixed pixel tells: of a silhouette that is not the edge of the face.
+    pub(super) fn without_odds(self) -> Self {
+        Self { odds: None, ..self }
+    }
+
+    /// Returns the parts of the beam's radius inside and outside of the edge up to which it is found mixed; `noise` is that of ranges, metres.
+    pub(super) fn seen(&self, contrasts: &Contrasts, noise: f64) -> [f64; 2] {
+        let contrast = contrasts.0[self.plane] + self.by_geometry;
+        let limit = (DETECTION_LIMIT * noise / self.jump).min(MOST_LIMIT);
+        let most = ((1.0 - limit) / limit).ln();
+        [most + contrast, most - contrast].map(|odds| (odds / DETECTION_SLOPE).clamp(LEAST_SEEN, 1.0))
+    }
+
+    /// Returns true for a single mixed pixel.
+    pub(super) fn tells(&self) -> bool {
+        self.odds.is_some()
+    }
+
+    /// Returns the place of the edge by a single mixed pixel at `at`, of a beam of this radius on the face; `spread` is its standard deviation in radii.
+    pub(super) fn edge(&self, at: f64, radius: f64, spread: f64) -> Option<SharedObservation> {
+        let per_logarithm = radius / LOGISTIC;
+        self.odds.map(|odds| SharedObservation {
+            place: at + per_logarithm * (odds - self.by_geometry),
+            soft: spread * radius,
+            number: self.plane,
+            factor: per_logarithm,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::lattice_line::Mixing;
-    use super::super::lattice_line::tests::open_line;
+    use platen_numerics::normal_distribution::cdf;
+
     use super::*;
+    use crate::extract::PlaneBehind;
 
-    /// Lines of an edge before a background so many times as bright as the face, 2 m behind it, whose beams see all parts of it alike.
-    fn edge(contrast: f64) -> Vec<LatticeLine> {
-        let part = |k: usize| (k as f64 + 0.5) / 100.0;
-        let mixing =
-            |seen: f64| Mixing { background: contrast * seen / (contrast * seen + 1.0 - seen), jump: 2.0 };
-        let line = |k: usize| {
-            let mut line = open_line(None);
-            line.mixing = Some(mixing(part(k)));
-            line
+    const JUMP: f64 = 2.0;
+    const RANGE: f64 = 8.0;
+
+    /// A crossing straight below the scanner, before a plane 2 m behind it whose echo is part of a mixed pixel's.
+    fn crossing(background: f64) -> Crossing {
+        let at = |y: f64| Vec3::new(0.0, y, -RANGE);
+        Crossing {
+            sample: 0,
+            step: [0, -1],
+            cells: 2,
+            inside: at(5e-3),
+            outside: at(-5e-3),
+            normal: Vec3::z(),
+            mixed: Some([at(0.0); 2]),
+            mixed_excess: (background * JUMP) as f32,
+            complete: true,
+            excess: JUMP as f32,
+            background: Some(PlaneBehind { number: 2, distance: (RANGE + JUMP) as f32 }),
+            beyond: Beyond::Behind,
+        }
+    }
+
+    /// Contrasts of planes whose echo is so many times that of the face, seen as squarely.
+    fn contrasts(times: f64) -> Contrasts {
+        Contrasts::of(&[times.ln() + 2.0 * (1.0 + JUMP / RANGE).ln(); BACKGROUND_PLANES])
+    }
+
+    /// Edges that tell the first plane's contrast and that of no other.
+    #[test]
+    fn edges_tell_each_other_the_contrast_of_a_plane() {
+        let own = 0.2_f64;
+        let told = |mean: f64| {
+            let precision = own.powi(-2) + PRIOR.1.powi(-2);
+            let mean = (mean * own.powi(-2) + PRIOR.0 * PRIOR.1.powi(-2)) / precision;
+            let mut planes = [PRIOR; BACKGROUND_PLANES];
+            planes[0] = (mean, precision.powf(-0.5));
+            ContrastDistribution(planes)
         };
-        (0..100).map(line).collect()
+        let edges = [told(-1.0), told(-1.4)];
+        let of = ContrastDistribution::told_by(edges.iter());
+        // Both with the spread between edges, and the prior.
+        let both = 2.0 / (own * own + BETWEEN_EDGES * BETWEEN_EDGES);
+        let precision = both + PRIOR.1.powi(-2);
+        let (mean, spread) = of.planes()[0];
+        assert!((mean - (both * -1.2 + PRIOR.1.powi(-2) * PRIOR.0) / precision).abs() < 1e-12, "{mean}");
+        assert!((spread - precision.powf(-0.5)).abs() < 1e-12, "{spread}");
+        assert!((of.planes()[1].0 - PRIOR.0).abs() < 1e-12 && (of.planes()[1].1 - PRIOR.1).abs() < 1e-12);
     }
 
-    fn inwards(contrast: f64, noise: f64) -> f64 {
-        Contrast::of(&edge(contrast), true, noise).inwards(0.2)[0]
+    /// The logistic approximation is off by 0.035 radii at 0.8, by less farther inside.
+    #[test]
+    fn one_mixed_pixel_of_a_gaussian_beam_locates_the_edge() {
+        for times in [0.5, 1.0, 8.0_f64] {
+            for edge in [-0.8, -0.3, 0.0, 0.5, 0.8] {
+                let beyond = cdf(2.0 * edge);
+                let part = times * beyond / (times * beyond + 1.0 - beyond);
+                let mixing = Mixing::of(&crossing(part)).unwrap();
+                let found = mixing.edge(0.0, 1.0, 0.2).unwrap();
+                let at = found.place - found.factor * contrasts(times).0[found.number];
+                assert!((at - edge).abs() < 0.04, "{times} times, {edge}: {at}");
+            }
+        }
     }
 
     #[test]
-    fn an_edge_before_what_outshines_it_is_found_too_far_inwards() {
-        let (one, five) = (inwards(1.0, 2e-3), inwards(5.0, 2e-3));
-        // 12 mm of noise in 2 m, by five times less a fifth.
-        assert!(one.abs() < 1e-3 && (five / (2.0 * 0.012 * 4.8) - 1.0).abs() < 0.1, "{one} {five}");
-        assert_eq!(inwards(0.2, 2e-3), 0.0);
-        assert!(inwards(5.0, 1e-3) < 0.6 * five, "with less noise less is missed");
-        assert_eq!(inwards(50.0, 1e-2), MOST_MISSED);
+    fn beams_before_what_outshines_the_face_are_found_mixed_farther_inside_than_outside() {
+        let seen =
+            |times: f64, noise: f64| Mixing::of(&crossing(0.5)).unwrap().seen(&contrasts(times), noise);
+        assert_eq!(seen(1.0, 1e-3), [1.0; 2]);
+        let [inside, outside] = seen(10.0, 2e-3);
+        // 24 mm of noise in 2 m: odds of 82, a tenth of them where the background is ten times as bright.
+        let expected = (0.988_f64 / 0.012 / 10.0).ln() / DETECTION_SLOPE;
+        assert!(inside == 1.0 && (outside - expected).abs() < 1e-6, "{outside}");
+        assert!(seen(10.0, 4e-3)[1] < outside, "with more noise less is found");
+        let [dark, bright] = seen(0.1, 2e-3);
+        assert!((dark - outside).abs() < 1e-6 && bright == inside, "{dark}");
     }
 
     #[test]
-    fn without_mixed_pixels_at_random_only_the_incidence_tells_the_spread() {
-        let few = Contrast::of(&edge(5.0)[..LEAST_PIXELS - 1], true, 2e-3);
-        assert_eq!(few, Contrast::of(&edge(5.0), false, 2e-3));
-        assert_eq!(few.inwards(1.0), [0.0, 0.0]);
-        let [inwards, sigma] = few.inwards((-1.35_f64).exp());
-        assert!(inwards == 0.0 && (sigma - 0.135).abs() < 1e-9, "{sigma}");
-        assert_eq!(Contrast::of(&edge(5.0), true, 2e-3).inwards(1.0)[1], SPREAD);
+    fn ranges_anywhere_between_the_surfaces_count_less() {
+        assert!((spread(Vec::new()) - SCATTER.0.hypot(SHAPE_SPREAD)).abs() < 1e-12);
+        let exact = spread(vec![0.0; 90]);
+        // The scatter of one in ten.
+        assert!((exact - (0.1 * SCATTER.0 * SCATTER.0).sqrt().hypot(SHAPE_SPREAD)).abs() < 1e-12, "{exact}");
+        let anywhere =
+            (1..1000).map(|k| f64::from(k) / 1000.0).map(|part| (part / (1.0 - part)).ln() / LOGISTIC);
+        let uniform = spread(anywhere.map(f64::abs).collect());
+        assert!((uniform - 0.52).abs() < 0.01, "{uniform}");
+    }
+
+    #[test]
+    fn only_a_single_mixed_pixel_before_a_plane_tells() {
+        let of = |crossing: Crossing| Mixing::of(&crossing);
+        let known = crossing(0.5);
+        assert!(of(Crossing { background: None, ..known }).is_none());
+        assert!(of(Crossing { complete: false, ..known }).is_none());
+        assert!(of(Crossing { beyond: Beyond::Nothing, ..known }).is_none());
+        let tells = |crossing: Crossing| of(crossing).is_some_and(|mixing| mixing.tells());
+        assert!(tells(known));
+        assert!(!tells(crossing(1.01)));
+        assert!(!tells(Crossing { mixed: None, ..known }));
+        assert!(!tells(Crossing { mixed: Some([known.inside, known.outside]), ..known }));
     }
 }

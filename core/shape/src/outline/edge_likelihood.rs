@@ -20,6 +20,42 @@ pub(super) const HIDDEN_PART: f64 = 0.25;
 pub(super) struct EdgeLikelihood {
     pub(super) along: f64,
     pub(super) terms: [Term; 2],
+    pub(super) shared: Option<SharedObservation>,
+}
+
+/// Direct observation of an edge that depends on a parameter which it shares with other lines: the edge plus `factor` times the parameter is at `place`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SharedObservation {
+    pub(super) place: f64,
+    /// Standard deviation, metres.
+    pub(super) soft: f64,
+    /// Number of the parameter.
+    pub(super) number: usize,
+    pub(super) factor: f64,
+}
+
+impl SharedObservation {
+    /// Returns how far inside of it an edge at `at` lies, metres.
+    pub(super) fn off(&self, at: f64, parameters: &[f64]) -> f64 {
+        at + self.factor * parameters[self.number] - self.place
+    }
+
+    /// Returns its likelihood, given the edge and the parameters, and its weight.
+    fn likelihood(&self, at: f64, parameters: &[f64], least_soft: f64) -> (f64, f64) {
+        let soft = self.soft.max(least_soft);
+        let off = self.off(at, parameters) / soft;
+        ((-0.5 * off * off).exp(), 1.0 / (soft * soft))
+    }
+}
+
+/// One Newton step of the log likelihood of a line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NewtonStep {
+    /// Place that the terms lead to, and its weight (the curvature).
+    pub(super) to: f64,
+    pub(super) weight: f64,
+    /// Weight of the shared observation.
+    pub(super) shared_weight: f64,
 }
 
 /// One observation of the edge and its standard deviation, metres.
@@ -143,23 +179,29 @@ impl EdgeLikelihood {
         (0.5 * (above + below), 12.0 / (below - above).max(step).powi(2))
     }
 
-    /// Returns the likelihood of an edge at `at`, up to a constant factor.
-    pub(super) fn value(&self, at: f64) -> f64 {
+    /// Returns the likelihood of an edge at `at` and the shared parameters, up to a constant factor.
+    pub(super) fn value(&self, at: f64, parameters: &[f64]) -> f64 {
         let [a, b] = self.terms.map(|term| term.value(at));
-        (1.0 - OUTLIER_PART) * a * b + OUTLIER_PART * OUTLIER_LIKELIHOOD
+        let shared = self.shared.map_or(1.0, |shared| shared.likelihood(at, parameters, 0.0).0);
+        (1.0 - OUTLIER_PART) * a * b * shared + OUTLIER_PART * OUTLIER_LIKELIHOOD
     }
 
-    /// Returns one Newton step of the log likelihood from `at`: the place it leads to and its weight (the curvature). The weight
-    /// fades where the line is more likely an outlier.
+    /// Returns one Newton step of the log likelihood from `at` and the shared parameters. Its weights fade where the line is more likely an outlier.
     ///
     /// `least_soft` widens the likelihood, to give it a slope far away.
-    pub(super) fn newton_step(&self, at: f64, least_soft: f64) -> (f64, f64) {
+    pub(super) fn newton_step(&self, at: f64, parameters: &[f64], least_soft: f64) -> NewtonStep {
         let [a, b] = self.terms.map(|term| term.likelihood(at, least_soft));
-        let mine = (1.0 - OUTLIER_PART) * a.0 * b.0;
+        let (shared, shared_weight) =
+            self.shared.map_or((1.0, 0.0), |shared| shared.likelihood(at, parameters, least_soft));
+        let mine = (1.0 - OUTLIER_PART) * a.0 * b.0 * shared;
         let belongs = mine / (mine + OUTLIER_PART * OUTLIER_LIKELIHOOD);
         // The middle of a wide interval is flat: a small curvature, of a tenth of a metre, keeps the step finite.
         let bend = (a.2 + b.2).max(LEAST_BEND);
-        (at + (a.1 + b.1) / bend, belongs * bend)
+        NewtonStep {
+            to: at + (a.1 + b.1) / bend,
+            weight: belongs * bend,
+            shared_weight: belongs * shared_weight,
+        }
     }
 
     /// Returns true when an edge at `at` agrees with both observations within `slack`.
@@ -177,12 +219,12 @@ mod tests {
         let bound = |at: f64| Bound { sure: at, likely: at };
         let terms = [EdgeObservation::Above(bound(-0.003)), EdgeObservation::Below(bound(0.003))]
             .map(|observation| observation.within(3e-4));
-        let line = EdgeLikelihood { along: 0.0, terms };
-        let (to, weight) = line.newton_step(0.004, 2e-3);
+        let line = EdgeLikelihood { along: 0.0, terms, shared: None };
+        let NewtonStep { to, weight, .. } = line.newton_step(0.004, &[], 2e-3);
         assert!(to < 0.004 && weight > 0.0);
-        let (to, weight) = line.newton_step(0.001, 0.0);
+        let NewtonStep { to, weight, .. } = line.newton_step(0.001, &[], 0.0);
         assert!((to - 0.001).abs() < 1e-6 && weight < 1e5);
         // Half a metre off it has nothing to do with the edge.
-        assert!(line.newton_step(0.5, 0.0).1 < 1e-3);
+        assert!(line.newton_step(0.5, &[], 0.0).weight < 1e-3);
     }
 }

@@ -2,12 +2,13 @@
 //!
 //! By Laplace's method (the normal distribution at the maximum) where the edge is dithered, that is, crosses many lines of the
 //! lattice. Along a lattice line the likelihood is flat between steep sides and Laplace's method fails: there the curve at four
-//! places, the footprint and the softness are integrated over by adaptive Metropolis.
+//! places, the footprint, the softness and the contrast are integrated over by adaptive Metropolis.
 
-use nalgebra::{Cholesky, DMatrix, Dyn, SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector};
 use platen_numerics::adaptive_metropolis::mean_and_covariance;
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
+use super::contrast::ContrastDistribution;
 use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 use super::{SEED, Sampling};
 
@@ -15,9 +16,10 @@ use super::{SEED, Sampling};
 /// millimetre undetermined.
 const PLACES: usize = 4;
 
-/// Dimensions sampled: those places, the footprint, and the logarithm of the softness relative to that of a dithered edge
-/// (which includes what the curve of such an edge does not follow), of this prior mean and standard deviation one.
-const FREE: usize = PLACES + 2;
+/// Dimensions sampled: those places, then of each its distance from the prior mean in standard deviations: the footprint; the logarithm of the softness relative to
+/// that of a dithered edge (which includes what the curve of such an edge does not follow), of this prior mean and standard deviation one; the logarithm of the
+/// contrasts, the same for all planes.
+const FREE: usize = PLACES + 3;
 const LOG_SOFTNESS: f64 = -1.2;
 
 /// Weight with which the places are held, 1/m^2, to find the prior given these places: as stiff as the prior's own.
@@ -38,23 +40,26 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Approximates the posterior by the normal distribution at its maximum (Laplace's method): for a dithered edge.
-    pub(super) fn laplace(curve: SplineCurve, precision: &Cholesky<f64, Dyn>) -> Self {
-        Self { curve, covariance: precision.inverse() }
+    /// Approximates the posterior by the normal distribution at its maximum (Laplace's method): for a dithered edge. `covariance` is that of the curve's
+    /// coefficients and of what was found with them.
+    pub(super) fn laplace(curve: SplineCurve, covariance: &DMatrix<f64>) -> Self {
+        let n = curve.n_coefficients();
+        Self { curve, covariance: covariance.view((0, 0), (n, n)).into_owned() }
     }
 
     /// Samples the posterior by adaptive Metropolis: for an edge along a line of the lattice, which lies anywhere between two of
     /// them. Its likelihood is flat between steep sides; the place of its maximum and the curvature there do not give its
     /// width, and where mixed pixels begin depends on the footprint as much as on the edge.
     ///
-    /// `curve` is a likely one, its ends the places of the edge's corners along it, `footprint` that of all edges,
-    /// radians. `None` when the prior leaves the curve undetermined.
+    /// `curve` is a likely one, its ends the places of the edge's corners along it, `beam` the beams of all edges,
+    /// `known` the contrasts by the other edges. `None` when the prior leaves the curve undetermined.
     pub(super) fn sampled(
         curve: &SplineCurve,
         prior: &CurveFit,
         lines: &[LatticeLine],
         [from, to]: [f64; 2],
-        footprint: f64,
+        beam: BeamModel,
+        known: &ContrastDistribution,
         sampling: Sampling,
     ) -> Option<Self> {
         let Sampling { step, noise, .. } = sampling;
@@ -78,18 +83,21 @@ impl Posterior {
             .collect();
         let logarithm = |free: &SVector<f64, FREE>| {
             let by: SVector<f64, PLACES> = free.fixed_rows::<PLACES>(0).into_owned();
+            let contrasts = known.off(free[PLACES + 2]);
             let beam = BeamModel {
-                footprint: footprint * (1.0 + FOOTPRINT_SPREAD * free[PLACES]).max(0.0),
+                footprint: beam.footprint * (1.0 + FOOTPRINT_SPREAD * free[PLACES]).max(0.0),
                 softness: SOFTNESS * (LOG_SOFTNESS + free[PLACES + 1]).exp(),
+                contrasts,
+                ..beam
             };
             let likelihood = |(line, at, parts): &(&LatticeLine, f64, SVector<f64, PLACES>)| {
-                line.likelihood(beam, noise).value(at + parts.dot(&by))
+                line.likelihood(beam, noise).value(at + parts.dot(&by), contrasts.logarithms())
             };
             let together = |lines: &[_]| lines.iter().map(likelihood).product::<f64>().ln();
             let bent = curve.moved(&(&through * by));
             at_lines.chunks(TOGETHER).map(together).sum::<f64>()
                 - prior.roughness(&bent)
-                - 0.5 * (free[PLACES].powi(2) + free[PLACES + 1].powi(2))
+                - 0.5 * free.fixed_rows::<{ FREE - PLACES }>(PLACES).norm_squared()
         };
         let first = SVector::from_fn(|k, _| if k < PLACES { FIRST_STEP * step } else { FIRST_PART });
         let (mean, covariance) = mean_and_covariance(first, SEED ^ FREE as u64, logarithm);

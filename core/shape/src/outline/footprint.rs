@@ -4,7 +4,7 @@
 use platen_numerics::normal_distribution::cdf;
 
 use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
-use super::lattice_line::{FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
+use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 
 /// Lines that give the number to a tenth.
 const LEAST_LINES: usize = 100;
@@ -47,8 +47,14 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
 }
 
 /// Estimates the footprint at an edge of known place, near that of all edges, by maximum likelihood of its mixed and its sound
-/// pixels; two nested grid searches.
-pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64) -> f64 {
+/// pixels; two nested grid searches. `beam` holds what else is known of the beams, `noise` is that of ranges, metres.
+pub(super) fn at_edge(
+    lines: &[LatticeLine],
+    edge: impl Fn(f64) -> f64,
+    all: f64,
+    beam: BeamModel,
+    noise: f64,
+) -> f64 {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
     /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
@@ -56,9 +62,9 @@ pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64
     let showing: Vec<(&LatticeLine, f64)> =
         lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
     let likelihood = |line: &LatticeLine, edge: f64, footprint: f64| {
-        let seen = footprint * line.per_radian;
-        let is_mixed =
-            |off: f64| (1.0 - HIDDEN_PART) * cdf((seen - (off - edge).abs()) / (SOFTNESS * line.per_angle));
+        let [inside, outside] = line.seen(BeamModel { footprint, ..beam }, noise);
+        let within = |off: f64| if off > edge { inside - (off - edge) } else { outside - (edge - off) };
+        let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * cdf(within(off) / (SOFTNESS * line.per_angle));
         let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
         line.mixed.map_or(sound, |(low, high)| {
             sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART)

@@ -7,7 +7,7 @@
 //! and holes are bridged. Own; Masuda et al. use the raw samples.
 
 use nalgebra::Vector2;
-use platen_numerics::median::median;
+use platen_numerics::median::robust_deviation;
 use platen_numerics::simd::dispatch_simd;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
 use platen_numerics::tensor_spline::TensorSpline;
@@ -132,7 +132,8 @@ impl Heights {
                     * self.per_sigmas[i]
             })
             .collect();
-        let scale = robust_scale(residuals.iter().map(|r| r.abs()).collect());
+        let scale = robust_deviation(residuals.iter().map(|r| r.abs()).collect())
+            .map_or(1.0, |scale| scale.max(1e-6));
         // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
         let robust = self.weighted(axes, |i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2));
         Ok((robust.solve_with(penalty)?, scale))
@@ -166,13 +167,6 @@ pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
 pub(crate) fn biweight(residual: f64) -> f64 {
     let x = residual * (1.0 / CUT_OFF);
     (1.0 - x * x).max(0.0).powi(2)
-}
-
-/// Returns the standard deviation of normal residuals with outliers: median absolute deviation.
-fn robust_scale(sizes: Vec<f64>) -> f64 {
-    /// The median of |x| of the standard normal distribution.
-    const MEDIAN: f64 = 0.674_489_750_196_081_7;
-    median(sizes).map_or(1.0, |median| (median / MEDIAN).max(1e-6))
 }
 
 /// Thins the samples to as many as a smooth face needs.

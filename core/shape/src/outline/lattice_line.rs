@@ -11,20 +11,20 @@
 //!   proportion to its distance from the edge, on a bevel in the proportion of the strip it meets: a direct observation.
 //! - The last cell taken for one of the face may itself lie on the side face, within the noise: both its range and that of the
 //!   first cell not taken enter, else the selection would bias the edge outwards.
-//!
-//! The range of a single mixed pixel also tells how much it sees of either side ([`Mixing`], for `contrast`).
+//! - The range of a single mixed pixel tells how much it sees of either side, and so where in its footprint the edge is (`contrast`).
 //!
 //! In: a projected crossing in its developed strip; out: its [`EdgeLikelihood`]. All distances inwards, in metres. Own; Masuda et al.
 //! take the boundary samples as the edge.
 
 use super::Sampling;
+use super::contrast::{self, Contrasts, Mixing};
 use super::developed_strip::DevelopedStrip;
-use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation};
+use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation, SharedObservation};
 use super::height_field::LEAST_COSINE;
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
 use crate::Vec3;
-use crate::extract::{Beyond, Crossing};
+use crate::extract::Beyond;
 
 /// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
@@ -46,8 +46,8 @@ const LAST_BOUND: f64 = 4.0;
 /// Widest footprint at an edge, in halves of the estimated one: both halves, wider by their spread.
 const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
-/// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
-const LEAST_JUMP: f64 = 0.05;
+/// Largest difference of the standard deviation by a mixed pixel that moves no edge, in radii.
+const NEAR_SPREAD: f64 = 0.02;
 
 /// Properties of the beams.
 #[derive(Debug, Clone, Copy)]
@@ -56,32 +56,23 @@ pub(super) struct BeamModel {
     pub(super) footprint: f64,
     /// Standard deviation of an interval's ends, in parts of the angle between beams.
     pub(super) softness: f64,
+    /// Contrasts of the planes of the background.
+    pub(super) contrasts: Contrasts,
+    /// Standard deviation of the place of an edge by one mixed pixel, in radii of the beam.
+    pub(super) mixed_spread: f64,
 }
 
 impl BeamModel {
     /// Builds beams of the usual softness.
-    pub(super) fn of(footprint: f64) -> Self {
-        Self { footprint, softness: SOFTNESS }
+    pub(super) fn of(footprint: f64, contrasts: Contrasts) -> Self {
+        Self { footprint, softness: SOFTNESS, contrasts, mixed_spread: contrast::spread(Vec::new()) }
     }
-}
 
-/// Linear mixing of a single mixed pixel before a sound cell of the background.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Mixing {
-    /// Part of the background in the echo, between 0 and 1.
-    pub(super) background: f64,
-    /// Range of the background behind the face's continuation, metres.
-    pub(super) jump: f64,
-}
-
-impl Mixing {
-    fn of(crossing: &Crossing) -> Option<Self> {
-        let jump = f64::from(crossing.excess);
-        let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
-        let background = f64::from(crossing.mixed_excess) / jump;
-        let tells = crossing.beyond == Beyond::Behind && crossing.mixed.is_some_and(is_single);
-        (tells && jump > LEAST_JUMP && background > 0.0 && background < 1.0)
-            .then_some(Self { background, jump })
+    /// Returns true when an edge located by these beams is where others of the same softness locate it.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        self.footprint == other.footprint
+            && self.contrasts.are_near(&other.contrasts)
+            && (self.mixed_spread - other.mixed_spread).abs() < NEAR_SPREAD
     }
 }
 
@@ -95,8 +86,8 @@ pub(super) struct LatticeLine {
     pub(super) high: f64,
     /// Lowest and highest mixed pixel.
     pub(super) mixed: Option<(f64, f64)>,
-    /// What the range of a single mixed pixel tells.
-    pub(super) mixing: Option<Mixing>,
+    /// Mixing of the plate with a plane of the background; where the side face is seen, of its silhouette, which does not tell the edge of the face.
+    mixing: Option<Mixing>,
     complete: bool,
     beyond: Beyond,
     /// Distance inwards on the face per radian of footprint.
@@ -146,7 +137,8 @@ impl LatticeLine {
             low: inside.y.min(outside.y),
             high: inside.y.max(outside.y),
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
-            mixing: Mixing::of(crossing),
+            mixing: Mixing::of(crossing)
+                .map(|mixing| if sight.silhouette == 0.0 { mixing } else { mixing.without_odds() }),
             complete: crossing.complete,
             beyond: crossing.beyond,
             per_radian,
@@ -174,6 +166,24 @@ impl LatticeLine {
         self.low - slack < at && at < self.high + slack
     }
 
+    /// Returns the distances inside and outside of the edge up to which a beam is found mixed.
+    pub(super) fn seen(&self, beam: BeamModel, noise: f64) -> [f64; 2] {
+        let radius = beam.footprint * self.per_radian;
+        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts, noise)).map(|part| part * radius)
+    }
+
+    /// Returns true when its mixed pixel tells the place of the edge, given the contrast.
+    pub(super) fn tells_contrast(&self) -> bool {
+        self.mixing.is_some_and(|mixing| mixing.tells())
+    }
+
+    /// Returns the place of the edge by its single mixed pixel.
+    fn edge_in_pixel(&self, beam: BeamModel) -> Option<SharedObservation> {
+        let (at, _) = self.mixed?;
+        let radius = beam.footprint * self.per_radian;
+        self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, beam.mixed_spread)
+    }
+
     /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a
     /// row and more those that are farther from the first than a footprint is wide.
     fn others(&self, beam: BeamModel) -> u32 {
@@ -189,7 +199,9 @@ impl LatticeLine {
         let [off_noise, cell_noise] =
             [self.off_per_range, self.cell_per_range].map(|per_range| noise * per_range.abs());
         let seen = beam.footprint * self.per_radian;
-        let of = |terms| EdgeLikelihood { along: self.along, terms };
+        let [seen_inside, seen_outside] = self.seen(beam, noise);
+        let shared = self.edge_in_pixel(beam);
+        let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
         let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(cell_noise);
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
@@ -210,15 +222,16 @@ impl LatticeLine {
         // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that. The last cell of the face lies on
         // the side face as far out as its range falls behind.
         let outside = (self.behind.max(0.0) + LAST_BOUND * cell_noise).min(self.side).min(seen);
-        let mut below = Bound { sure: self.high + outside, likely: self.high - (seen - self.side).max(0.0) };
+        let mut below =
+            Bound { sure: self.high + outside, likely: self.high - (seen_inside - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
             above.sure += self.side;
-            above.likely += self.side + seen;
+            above.likely += self.side + seen_outside;
         }
         if let Some((lowest, highest)) = self.mixed {
             let others = self.others(beam);
             let lowest = lowest + f64::from(others) * self.per_step;
-            let (least, most) = (highest + self.side - seen, lowest + self.side + seen);
+            let (least, most) = (highest + self.side - seen_inside, lowest + self.side + seen_outside);
             above = Bound { sure: above.sure.max(least), likely: above.likely.max(least) };
             if others > 0 {
                 above.likely = above.likely.max(lowest - self.per_step + self.side + seen);
@@ -249,6 +262,7 @@ fn norm(a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::contrast::ContrastDistribution;
     use super::*;
 
     /// A line without mixed pixels at a side face that shows 1.35 mm beside the edge and falls 50 mm behind per millimetre; a beam sees 1.6 mm.
@@ -283,21 +297,21 @@ pub(super) mod tests {
 
     /// Likelihood of an edge so far inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
     fn inside(line: &LatticeLine, far: f64) -> f64 {
-        let of = line.likelihood(BeamModel::of(1.6e-4), 7e-4);
-        of.value(line.high + far) / of.value(line.high)
+        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()), 7e-4);
+        of.value(line.high + far, &[]) / of.value(line.high, &[])
     }
 
     /// Three mixed pixels in a row 5.7 mm apart, of which a footprint of 3.2 mm explains one.
     #[test]
     fn mixed_pixels_of_another_edge_behind_a_strip_do_not_count() {
         let line = LatticeLine { low: -21.1e-3, ..open_line(Some((-15.4e-3, -4e-3))) };
-        let of = line.likelihood(BeamModel::of(1.6e-4), 7e-4);
+        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()), 7e-4);
         for elsewhere in [-15e-3, -9.7e-3, 0.0] {
             assert!(
-                of.value(-4e-3) > 10.0 * of.value(elsewhere),
+                of.value(-4e-3, &[]) > 10.0 * of.value(elsewhere, &[]),
                 "{} {}",
-                of.value(-4e-3),
-                of.value(elsewhere)
+                of.value(-4e-3, &[]),
+                of.value(elsewhere, &[])
             );
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! A spline through the vertices' (u, v) carries the chart from the vertices to every place (a, b) of the face. Each
 //! sample then has its (u, v), its own mid-surface point (half the thickness below it along the face's normal) and its
-//! weight: one over its variance along the normal, less where it is an outlier from the smooth face.
+//! weight: one over its variance along the normal, less where it is an outlier from the smooth face. The fit gives the heights,
+//! the chart the places within the surface (`place_by_chart`).
 
 use platen_numerics::reml::Penalty;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
@@ -11,6 +12,7 @@ use platen_numerics::uniform_knots::UniformKnots;
 
 use crate::mesh::{Facets, SmoothFace};
 use crate::outline::{biweight, per_sigma_across};
+use crate::surface::place_by_chart::place_by_chart;
 use crate::surface::{Mask, Surface};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
@@ -79,7 +81,8 @@ pub(crate) fn fit_surface(
             variance += f64::from(sample.sigma).powi(2);
         },
     );
-    let fitted = fit.solve(direction(&face.mid).into())?;
+    let mut fitted = moved(fit.solve(direction(&face.mid).into())?, middle);
+    place_by_chart(&mut fitted.spline, &face.mid, &carried);
     let n = patch.samples.len();
     let quality = Quality {
         n_samples: n,
@@ -89,7 +92,7 @@ pub(crate) fn fit_surface(
         rms: (fitted.residual_square / fitted.weight).sqrt(),
         lattice_step: (spec.width * spec.height * seen.mask.coverage() / n.max(1) as f64).sqrt(),
     };
-    let surface = Surface::new(moved(fitted, middle), spec.thickness, seen.mask);
+    let surface = Surface::new(fitted, spec.thickness, seen.mask);
     Ok(FitToSamples { surface, quality })
 }
 
