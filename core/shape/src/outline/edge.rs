@@ -214,8 +214,8 @@ impl Edge {
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        let contrast_known =
-            dithered && lines.iter().filter(|line| line.tells_contrast()).count() >= LEAST_PIXELS;
+        let told = lines.iter().filter(|line| line.tells_contrast()).count();
+        let contrast_known = dithered && beam.mixes_linearly() && told >= LEAST_PIXELS;
         let footprint = beam.footprint;
         Ok(Self { strip, side_face, posterior, footprint, contrasts, contrast_known, seen, from, to })
     }

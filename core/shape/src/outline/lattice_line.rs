@@ -68,6 +68,11 @@ impl BeamModel {
         Self { footprint, softness: SOFTNESS, contrasts, mixed_spread: contrast::spread(Vec::new()) }
     }
 
+    /// Returns true when the ranges of mixed pixels tell the place of the edge.
+    pub(super) fn mixes_linearly(&self) -> bool {
+        self.mixed_spread < contrast::NOTHING_TOLD
+    }
+
     /// Returns true when an edge located by these beams is where others of the same softness locate it.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         self.footprint == other.footprint
