@@ -62,6 +62,12 @@ pub fn error(text: &str) {
 /// The folder exists and is not marked with `.platen-VERB`, or the system refuses.
 pub fn fresh_folder(folder: &Path, verb: &str) -> Result<(), CliError> {
     let mark = folder.join(format!(".platen-{verb}"));
+    let failed = |error: std::io::Error| {
+        CliError::Failed(format!(
+            "{}: {error}; if another `platen {verb}` is writing there, give another --out",
+            folder.display()
+        ))
+    };
     if folder.exists() {
         if !mark.is_file() {
             let text = format!(
@@ -70,8 +76,8 @@ pub fn fresh_folder(folder: &Path, verb: &str) -> Result<(), CliError> {
             );
             return Err(CliError::Usage(text));
         }
-        std::fs::remove_dir_all(folder)?;
+        std::fs::remove_dir_all(folder).map_err(failed)?;
     }
-    std::fs::create_dir_all(folder)?;
-    Ok(std::fs::write(mark, format!("made by `platen {verb}`, which may replace this folder\n"))?)
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    std::fs::write(mark, format!("made by `platen {verb}`, which may replace this folder\n")).map_err(failed)
 }
