@@ -8,7 +8,7 @@ mod synthetic;
 use platen_shape::Vec3;
 use platen_shape::extract::Extractor;
 use platen_shape::outline::{Outline, outline};
-use synthetic::{Plate, Scene};
+use synthetic::{Plate, Receiver, Scene};
 
 fn outline_of(scene: &Scene, around: f64) -> Outline {
     let (header, columns) = scene.scan_around(around);
@@ -48,13 +48,15 @@ fn ratios(name: &str, scene: &Scene, edge: usize) -> Vec<[f64; 2]> {
 }
 
 fn check(name: &str, scene: &Scene, edge: usize) {
+    // Contrast and shape of a beam that mixes linearly are off alike at every place, by up to what is stated.
+    let most_mean = if scene.receiver == Receiver::Anywhere { 0.5 } else { 0.8 };
     let ratios = ratios(name, scene, edge);
     for end in [0, 1] {
         let n = ratios.len() as f64;
         let mean = ratios.iter().map(|r| r[end]).sum::<f64>() / n;
         let rms = (ratios.iter().map(|r| r[end].powi(2)).sum::<f64>() / n).sqrt();
         println!("{name}: errors over stated deviations: mean {mean:.2}, rms {rms:.2}");
-        assert!(mean.abs() < 0.5 && (0.6..1.4).contains(&rms), "{name}, end {end}: {mean} {rms}");
+        assert!(mean.abs() < most_mean && (0.6..1.4).contains(&rms), "{name}, end {end}: {mean} {rms}");
     }
 }
 
@@ -62,18 +64,30 @@ fn plate() -> Plate {
     Plate { centre: Vec3::new(6.0, 1.25, -3.6), turn: 0.0, ..Plate::rolled() }
 }
 
-#[test]
-fn along_a_column_and_nearly_so() {
+/// Plates that are less bright than the prior of the contrast takes them for.
+const LINEAR: Receiver = Receiver::Linear { plates: 0.3 };
+
+fn check_along_columns(receiver: Receiver) {
     // The edge v = 0, whose near end lies in the plane through the mirror's axis, turned about that end.
     for turn in [0.0, -0.7e-3, 1.5e-3, 6e-3] {
         let plate = Plate { turn, ..plate() };
         let shift = Plate { turn: 0.0, ..plate }.face(0.0, 0.0) - plate.face(0.0, 0.0);
-        check(&format!("turned by {turn}"), &Scene::of(Plate { centre: plate.centre + shift, ..plate }), 0);
+        let scene = Scene { receiver, ..Scene::of(Plate { centre: plate.centre + shift, ..plate }) };
+        check(&format!("turned by {turn}"), &scene, 0);
     }
 }
 
 #[test]
-fn along_a_row() {
+fn along_a_column_and_nearly_so() {
+    check_along_columns(Receiver::Anywhere);
+}
+
+#[test]
+fn along_a_column_and_nearly_so_by_linear_mixing() {
+    check_along_columns(LINEAR);
+}
+
+fn check_along_a_row(receiver: Receiver) {
     // An upright plate whose upper edge u = W is at the height of the scanner.
     let upright = Plate {
         radius: None,
@@ -81,5 +95,15 @@ fn along_a_row() {
         centre: Vec3::new(5.0, 0.3, -1.5),
         ..plate()
     };
-    check("along a row", &Scene { floor: -3.2, ..Scene::of(upright) }, 1);
+    check("along a row", &Scene { floor: -3.2, receiver, ..Scene::of(upright) }, 1);
+}
+
+#[test]
+fn along_a_row() {
+    check_along_a_row(Receiver::Anywhere);
+}
+
+#[test]
+fn along_a_row_by_linear_mixing() {
+    check_along_a_row(LINEAR);
 }

@@ -36,6 +36,9 @@ const NEAR: usize = 32;
 const BOUND: f64 = 5.0;
 const MOST_LEVERAGE: f64 = 9.0;
 
+/// Largest cosine of the incidence of a plane that no scanner sees: a row of a round wall lies in a plane through the scanner, too.
+const LEAST_COSINE: f64 = 0.1;
+
 /// Cells from a mixed pixel to the strip at whose far edge it is: in any direction, and to both sides along its row or its column.
 const NEAREST: usize = 2;
 const FAR: usize = 12;
@@ -218,6 +221,11 @@ impl BackgroundPlane {
                 <= BOUND * cell.sigma * (self.scatter * self.scatter + leverage).sqrt()
     }
 
+    /// Returns the cosine of the incidence on the plane at a cell on it.
+    fn cosine(&self, cell: &BackgroundCell) -> f64 {
+        cell.inverse / self.vector.norm()
+    }
+
     /// Returns how far a cell is behind the plane, in standard deviations.
     fn depth(&self, cell: &BackgroundCell) -> f64 {
         (self.vector.dot(&cell.direction) - cell.inverse) / (cell.sigma * self.scatter)
@@ -239,8 +247,11 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
         else {
             break;
         };
+        let is_seen = sound.iter().any(|cell| plane.holds(cell) && plane.cosine(cell) > LEAST_COSINE);
         sound.retain(|cell| !plane.holds(cell));
-        planes.push(plane);
+        if is_seen {
+            planes.push(plane);
+        }
     }
     planes
 }

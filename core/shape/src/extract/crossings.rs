@@ -22,6 +22,11 @@ const FAR: usize = 12;
 /// Cells beyond the face up to which a range is compared with its continuation, cells.
 const FIT_FAR: usize = 3;
 
+/// A range behind the face's continuation by less than so many standard deviations (those of a second difference in `mixed_pixels`, rounded), and than
+/// so much, metres, is of a beam that sees little of what lies behind: no end of the face, though no mixed pixel by its neighbours.
+const HARDLY_MIXED: f64 = 12.0;
+const MOST_HARDLY_MIXED: f64 = 0.015;
+
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
 const FRONT_BOUND: f64 = 4.0;
 
@@ -49,10 +54,12 @@ pub(super) fn find(scene: &Scene, number: impl Fn(usize) -> u32) -> (Vec<Crossin
             if face[first] {
                 continue;
             }
-            let Some(end) = scene.end_of_face(index, step) else { continue };
             let tile = LocalQuadric::tile(window, index);
             let fit = fits.entry(tile).or_insert_with(|| LocalQuadric::fit(window, face, tile));
-            let crossing = fit.as_ref().and_then(|fit| scene.crossing(fit, index, step, end, number(index)));
+            let crossing = fit.as_ref().and_then(|fit| {
+                let end = scene.end_of_face(fit, index, step)?;
+                scene.crossing(fit, index, step, end, number(index))
+            });
             match crossing {
                 Some((crossing, false)) => crossings.push(crossing),
                 // An edge crosses rows and columns: each crossing stands for half a step.
@@ -94,21 +101,41 @@ impl Scene<'_> {
             .then_some(column * self.window.n_rows + row)
     }
 
-    /// Returns the end of the face; `None` where it goes on behind a gap of cells without return, mixed or unclassified ones.
-    fn end_of_face(&self, index: usize, step: (isize, isize)) -> Option<End> {
-        let mut last_mixed = None;
+    /// Returns the end of the face; `None` where it goes on behind a gap of cells without return, mixed or unclassified ones, or only cells follow
+    /// that are hardly behind it.
+    fn end_of_face(&self, fit: &LocalQuadric, index: usize, step: (isize, isize)) -> Option<End> {
+        let (mut last_mixed, mut hardly_mixed) = (None, false);
         for far in 1..=WIDEST_GAP {
             let Some(at) = self.beside(index, step, far) else { break };
             if self.face[at] {
                 return None;
             }
             match self.pixels[at] {
+                Pixel::Sound if far <= FAR && self.is_hardly_mixed(fit, at, far, index, step) => {
+                    hardly_mixed = true;
+                }
                 Pixel::Sound if far <= FAR => return Some(End::Sound(far)),
                 Pixel::Mixed if far <= FAR => last_mixed = Some(far),
                 _ => {}
             }
         }
-        Some(last_mixed.map_or(End::Nothing, End::Mixed))
+        (last_mixed.is_some() || !hardly_mixed).then(|| last_mixed.map_or(End::Nothing, End::Mixed))
+    }
+
+    /// Returns true for a cell, `far` steps from `index`, that is hardly behind the face's continuation.
+    fn is_hardly_mixed(
+        &self,
+        fit: &LocalQuadric,
+        at: usize,
+        far: usize,
+        index: usize,
+        step: (isize, isize),
+    ) -> bool {
+        let sigma = f64::from(self.noise.at(index));
+        let hardly = -FRONT_BOUND * sigma..(HARDLY_MIXED * sigma).min(MOST_HARDLY_MIXED);
+        self.window.cells[at].inside
+            && self.excess(fit, at, far, index, step).is_some_and(|excess| hardly.contains(&excess))
+            && self.crease(fit, index, step, far).is_none()
     }
 
     /// Measures a crossing; also returns whether the face goes on beyond the region of interest.

@@ -3,8 +3,8 @@
 //! 1. Linear mixing model: the range of a mixed pixel is the mean of both sides weighted by their echoes. It tells the odds of the background, its echo
 //!    over that of the face: C s / (1 - s), where s is the part of the beam's power beyond the edge and C the contrast, the echo of the background alone over
 //!    that of the face alone.
-//! 2. Of a Gaussian beam of radius r (1/e^2), with its middle a distance x inside of the edge, s = cdf(-2 x / r), in the logistic approximation
-//!    1 / (1 + exp(3.4 x / r)). So x / r = (ln C - ln odds) / 3.4: one mixed pixel locates the edge within its footprint, given the contrast.
+//! 2. So the range of one mixed pixel gives s, and s where in the beam the edge is, given the contrast: between where it is in a Gaussian beam, and in one
+//!    truncated at its radius (1/e^2).
 //! 3. The contrast, as the ratio of the reflectivities, is one unknown for each plane of the background, found together with the edge: the mixed pixels of one plane share it, those at the
 //!    ends of their row, where the beam sees nearly one side only, tell it. Along the plane it follows the cosines of the incidence on the face and on the
 //!    plane (Lambert's law) and the square of the ranges.
@@ -25,13 +25,18 @@ use super::height_field::LEAST_COSINE;
 use crate::Vec3;
 use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing};
 
-/// Slope of the log odds of a Gaussian beam's power over the distance of an edge in its radii: twice that of the logistic approximation of the normal
-/// distribution (Camilli 1994).
-const LOGISTIC: f64 = 2.0 * 1.702;
+/// Place of an edge in a beam by the log odds l of the power beyond it, in radii: l / (A + B l^2). A Gaussian beam has A = 3.19, B = 0.034, one truncated at its radius
+/// 3.52 and 0.080 (each within 0.01 up to l = 5); these are midway.
+const PLACE: (f64, f64) = (3.35, 0.057);
 
-/// Mean slope of the log odds from the edge to where a beam is no longer found mixed. A beam truncated at its 1/e^2 radius has 4.0 to odds of 11 and 4.7 to 44;
-/// one that is not has 3.5 and 3.8.
-const DETECTION_SLOPE: f64 = 4.2;
+/// Standard deviation of that place by the shape of the beam, over l^2: half the difference of both, and that by an error of the radius.
+const PLACE_SPREAD: f64 = 0.01;
+
+/// Least standard deviation of the place by one pixel, in radii: the shape of the beam has all pixels of a row off alike, however little they scatter.
+const LEAST_SPREAD: f64 = 0.1;
+
+/// Log odds beyond which a pixel tells no more.
+const MOST_ODDS: f64 = 5.0;
 
 /// Prior of the logarithm of the ratio of the reflectivities of background and plate: mean and standard deviation. Walls of 0.8 and floors of 0.3 behind plates
 /// of 0.1 to 0.6.
@@ -43,9 +48,6 @@ const BETWEEN_EDGES: f64 = 0.1;
 /// Part of the prior's precision above which an edge tells a contrast.
 const LEAST_TOLD: f64 = 1e-3;
 
-/// Part of the standard deviation of the place of an edge by one mixed pixel that the shape of the beam has, alike for all of a row, in radii of the beam.
-const SHAPE_SPREAD: f64 = 0.2;
-
 /// Scatter of such places from one mixed pixel to the other that is expected, in radii, and how many pixels it counts for.
 const SCATTER: (f64, f64) = (0.2, 10.0);
 
@@ -53,7 +55,7 @@ const SCATTER: (f64, f64) = (0.2, 10.0);
 /// where all beams have the edge at one place, by more elsewhere.
 const MOST_SCATTER: f64 = 0.33;
 
-/// Standard deviation of the place of an edge by a mixed pixel that tells nothing of it, in radii.
+/// Scatter that stands for pixels which tell nothing, in radii.
 pub(super) const NOTHING_TOLD: f64 = 10.0;
 
 /// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
@@ -74,7 +76,7 @@ pub(super) struct Contrasts([f64; BACKGROUND_PLANES]);
 impl Contrasts {
     /// Returns true when no edge moves by more than a hundredth of the beam's radius between these and others.
     pub(super) fn are_near(&self, other: &Self) -> bool {
-        self.0.iter().zip(&other.0).all(|(one, other)| (one - other).abs() < 0.01 * LOGISTIC)
+        self.0.iter().zip(&other.0).all(|(one, other)| (one - other).abs() < 0.01 * PLACE.0)
     }
 
     /// Takes as many as there are planes.
@@ -135,8 +137,8 @@ impl ContrastDistribution {
     }
 }
 
-/// Estimates the standard deviation of the place of an edge by one mixed pixel, in radii of the beam, from the sizes of the edge's distances from such
-/// places: a receiver need not mix linearly. Returns the one expected without any.
+/// Estimates how far the places of an edge by its mixed pixels scatter, in radii of the beam, from the sizes of its distances from them: a receiver need not mix
+/// linearly. Returns the scatter expected without any.
 pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     let (expected, weight) = SCATTER;
     let n = sizes.len() as f64;
@@ -144,7 +146,15 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     if scatter > MOST_SCATTER {
         return NOTHING_TOLD;
     }
-    ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt().hypot(SHAPE_SPREAD)
+    ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt()
+}
+
+/// Returns the place of an edge in a beam, in radii from its middle, by the log odds of the power beyond it, and the slope of it.
+fn place_in_beam(log_odds: f64) -> (f64, f64) {
+    let (a, b) = PLACE;
+    let l = log_odds.clamp(-MOST_ODDS, MOST_ODDS);
+    let by = a + b * l * l;
+    (l / by, (a - b * l * l) / (by * by))
 }
 
 /// Linear mixing along one lattice line before a background plane.
@@ -193,7 +203,7 @@ impl Mixing {
         let contrast = contrasts.0[self.plane] + self.by_geometry;
         let limit = (DETECTION_LIMIT * noise / self.jump).min(MOST_LIMIT);
         let most = ((1.0 - limit) / limit).ln();
-        [most + contrast, most - contrast].map(|odds| (odds / DETECTION_SLOPE).clamp(LEAST_SEEN, 1.0))
+        [most + contrast, most - contrast].map(|odds| place_in_beam(odds).0.clamp(LEAST_SEEN, 1.0))
     }
 
     /// Returns true for a single mixed pixel.
@@ -201,14 +211,26 @@ impl Mixing {
         self.odds.is_some()
     }
 
-    /// Returns the place of the edge by a single mixed pixel at `at`, of a beam of this radius on the face; `spread` is its standard deviation in radii.
-    pub(super) fn edge(&self, at: f64, radius: f64, spread: f64) -> Option<SharedObservation> {
-        let per_logarithm = radius / LOGISTIC;
-        self.odds.map(|odds| SharedObservation {
-            place: at + per_logarithm * (odds - self.by_geometry),
-            soft: spread * radius,
-            number: self.plane,
-            factor: per_logarithm,
+    /// Returns the place of the edge by a single mixed pixel at `at`, of a beam of this radius on the face, linear about these contrasts; such places
+    /// scatter by `spread`, in radii.
+    pub(super) fn edge(
+        &self,
+        at: f64,
+        radius: f64,
+        contrasts: &Contrasts,
+        spread: f64,
+    ) -> Option<SharedObservation> {
+        let contrast = contrasts.0[self.plane];
+        self.odds.map(|odds| {
+            let log_odds = odds - self.by_geometry - contrast;
+            let (place, slope) = place_in_beam(log_odds);
+            SharedObservation {
+                place: at + radius * (place + slope * contrast),
+                soft: radius * spread.hypot(LEAST_SPREAD).hypot(PLACE_SPREAD * log_odds * log_odds),
+                radius,
+                number: self.plane,
+                factor: radius * slope,
+            }
         })
     }
 }
@@ -269,17 +291,33 @@ mod tests {
         assert!((of.planes()[1].0 - PRIOR.0).abs() < 1e-12 && (of.planes()[1].1 - PRIOR.1).abs() < 1e-12);
     }
 
-    /// The logistic approximation is off by 0.035 radii at 0.8, by less farther inside.
+    /// Part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by strips of equal width.
+    fn beyond(most: f64, off: f64) -> f64 {
+        const STRIPS: i32 = 1000;
+        let strip = |k: i32| {
+            let x = most * (f64::from(2 * k + 1) / f64::from(STRIPS) - 1.0);
+            // Half the chord there, and the power along it.
+            let chord = (most * most - x * x).sqrt();
+            (x, (-2.0 * x * x).exp() * (cdf(2.0 * chord) - 0.5))
+        };
+        let sum = |from: f64| (0..STRIPS).map(strip).filter(|(x, _)| *x > from).map(|(_, p)| p).sum::<f64>();
+        sum(off) / sum(f64::NEG_INFINITY)
+    }
+
     #[test]
-    fn one_mixed_pixel_of_a_gaussian_beam_locates_the_edge() {
+    fn one_mixed_pixel_locates_the_edge_midway_between_a_gaussian_beam_and_a_truncated_one() {
         for times in [0.5, 1.0, 8.0_f64] {
             for edge in [-0.8, -0.3, 0.0, 0.5, 0.8] {
-                let beyond = cdf(2.0 * edge);
-                let part = times * beyond / (times * beyond + 1.0 - beyond);
-                let mixing = Mixing::of(&crossing(part)).unwrap();
-                let found = mixing.edge(0.0, 1.0, 0.2).unwrap();
-                let at = found.place - found.factor * contrasts(times).0[found.number];
-                assert!((at - edge).abs() < 0.04, "{times} times, {edge}: {at}");
+                let [gaussian, truncated] = [4.0, 1.0].map(|most| {
+                    let beyond = beyond(most, -edge);
+                    let part = times * beyond / (times * beyond + 1.0 - beyond);
+                    let mixing = Mixing::of(&crossing(part)).unwrap();
+                    let found = mixing.edge(0.0, 1.0, &contrasts(times), 0.2).unwrap();
+                    let at = found.place - found.factor * contrasts(times).0[found.number];
+                    (at - edge) * edge.signum()
+                });
+                assert!(gaussian.abs() < 0.06 && truncated.abs() < 0.12, "{edge}: {gaussian} {truncated}");
+                assert!(edge == 0.0 || gaussian < 0.0 && truncated > 0.0, "{edge}: {gaussian} {truncated}");
             }
         }
     }
@@ -291,7 +329,7 @@ mod tests {
         assert_eq!(seen(1.0, 1e-3), [1.0; 2]);
         let [inside, outside] = seen(10.0, 2e-3);
         // 24 mm of noise in 2 m: odds of 82, a tenth of them where the background is ten times as bright.
-        let expected = (0.988_f64 / 0.012 / 10.0).ln() / DETECTION_SLOPE;
+        let expected = place_in_beam((0.988_f64 / 0.012 / 10.0).ln()).0;
         assert!(inside == 1.0 && (outside - expected).abs() < 1e-6, "{outside}");
         assert!(seen(10.0, 4e-3)[1] < outside, "with more noise less is found");
         let [dark, bright] = seen(0.1, 2e-3);
@@ -300,14 +338,14 @@ mod tests {
 
     #[test]
     fn ranges_anywhere_between_the_surfaces_tell_nothing() {
-        assert!((spread(Vec::new()) - SCATTER.0.hypot(SHAPE_SPREAD)).abs() < 1e-12);
+        assert!((spread(Vec::new()) - SCATTER.0).abs() < 1e-12);
         let exact = spread(vec![0.0; 90]);
         // The scatter of one in ten.
-        assert!((exact - (0.1 * SCATTER.0 * SCATTER.0).sqrt().hypot(SHAPE_SPREAD)).abs() < 1e-12, "{exact}");
+        assert!((exact - (0.1 * SCATTER.0 * SCATTER.0).sqrt()).abs() < 1e-12, "{exact}");
         let anywhere =
-            (1..1000).map(|k| f64::from(k) / 1000.0).map(|part| (part / (1.0 - part)).ln() / LOGISTIC);
+            (1..1000).map(|k| f64::from(k) / 1000.0).map(|part| place_in_beam((part / (1.0 - part)).ln()).0);
         let uniform: Vec<f64> = anywhere.map(f64::abs).collect();
-        assert!((robust_deviation(uniform.clone()).unwrap() - 0.479).abs() < 1e-3);
+        assert!((robust_deviation(uniform.clone()).unwrap() - 0.476).abs() < 1e-3);
         assert_eq!(spread(uniform), NOTHING_TOLD);
     }
 

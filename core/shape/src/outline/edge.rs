@@ -88,7 +88,7 @@ impl EdgeData {
 
 /// Fits the four edges, those that show the beam first and then all of them.
 ///
-/// - Half the angle that a beam sees is counted from the mixed pixels, then estimated at each edge that shows it, and their mean taken for those that do not.
+/// - Half the angle that a beam sees is counted from the mixed pixels, then estimated at each edge that shows it; their mean is what all start from in the second fit.
 ///   It is the scanner's, not the edge's: cells of a narrow background that pass for mixed pixels make one edge show far more than the others, and that edge
 ///   takes theirs.
 /// - Each edge is fitted again with what the others tell of the contrasts.
@@ -118,8 +118,8 @@ pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge;
         let others = first.iter().enumerate().filter(|(other, _)| *other != k);
         let told =
             ContrastDistribution::told_by(others.filter_map(|(_, edge)| Some(&edge.as_ref()?.contrasts)));
-        let (footprint, own) = if first[k].is_some() { (counted, true) } else { (common, !showing[k]) };
-        fit(k, footprint, own, &told)
+        let own = first[k].is_some() || !showing[k];
+        fit(k, common, own, &told)
     });
     Ok([a?, b?, c?, d?])
 }
@@ -181,7 +181,7 @@ impl Edge {
         for _ in 0..ROUNDS {
             let last = beam;
             beam.contrasts = found.contrasts;
-            beam.mixed_spread = mixed_spread(&used, &found, beam.mixed_spread);
+            beam.mixed_spread = mixed_spread(&used, &found);
             if own && footprint > 0.0 {
                 let at = |along| found.curve.at(along);
                 beam.footprint = footprint::at_edge(&lines, at, footprint, beam, noise);
@@ -288,12 +288,12 @@ fn most_likely(prior: &CurveFit, lines: &[EdgeLikelihood], step: f64) -> Option<
     Some(found)
 }
 
-/// Estimates the standard deviation of the place of the edge by one mixed pixel, in radii of the beam; `used` is that of the likelihoods.
-fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely, used: f64) -> f64 {
+/// Estimates how far the places of the edge by its mixed pixels scatter, in radii of the beam.
+fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely) -> f64 {
     let size = |line: &EdgeLikelihood| {
         let shared = line.shared?;
         let off = shared.off(found.curve.at(line.along), found.contrasts.logarithms());
-        Some(used * (off / shared.soft).abs())
+        Some((off / shared.radius).abs())
     };
     contrast::spread(lines.iter().filter_map(size).collect())
 }

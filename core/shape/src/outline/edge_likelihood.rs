@@ -29,6 +29,8 @@ pub(super) struct SharedObservation {
     pub(super) place: f64,
     /// Standard deviation, metres.
     pub(super) soft: f64,
+    /// Radius of the beam, metres.
+    pub(super) radius: f64,
     /// Number of the parameter.
     pub(super) number: usize,
     pub(super) factor: f64,

@@ -47,7 +47,7 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
 }
 
 /// Estimates the footprint at an edge of known place, near that of all edges, by maximum likelihood of its mixed and its sound
-/// pixels; two nested grid searches. `beam` holds what else is known of the beams, `noise` is that of ranges, metres.
+/// pixels, and of where in the mixed ones their ranges have the edge; two nested grid searches. `beam` holds what else is known of the beams, `noise` is that of ranges, metres.
 pub(super) fn at_edge(
     lines: &[LatticeLine],
     edge: impl Fn(f64) -> f64,
@@ -62,12 +62,17 @@ pub(super) fn at_edge(
     let showing: Vec<(&LatticeLine, f64)> =
         lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
     let likelihood = |line: &LatticeLine, edge: f64, footprint: f64| {
-        let [inside, outside] = line.seen(BeamModel { footprint, ..beam }, noise);
+        let beam = BeamModel { footprint, ..beam };
+        let [inside, outside] = line.seen(beam, noise);
         let within = |off: f64| if off > edge { inside - (off - edge) } else { outside - (edge - off) };
         let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * cdf(within(off) / (SOFTNESS * line.per_angle));
         let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
+        let by_odds = line.edge_in_pixel(beam).map_or(1.0, |shared| {
+            let off = shared.off(edge, beam.contrasts.logarithms()) / shared.soft;
+            OUTLIER_PART + (-0.5 * off * off).exp() * all * line.per_radian / shared.soft
+        });
         line.mixed.map_or(sound, |(low, high)| {
-            sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART)
+            sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART) * by_odds
         })
     };
     let fits = |footprint: f64| {

@@ -46,7 +46,7 @@ const LAST_BOUND: f64 = 4.0;
 /// Widest footprint at an edge, in halves of the estimated one: both halves, wider by their spread.
 const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
-/// Largest difference of the standard deviation by a mixed pixel that moves no edge, in radii.
+/// Largest difference of the scatter of mixed pixels that moves no edge, in radii.
 const NEAR_SPREAD: f64 = 0.02;
 
 /// Properties of the beams.
@@ -58,7 +58,7 @@ pub(super) struct BeamModel {
     pub(super) softness: f64,
     /// Contrasts of the planes of the background.
     pub(super) contrasts: Contrasts,
-    /// Standard deviation of the place of an edge by one mixed pixel, in radii of the beam.
+    /// Scatter of the places of an edge by its mixed pixels, in radii of the beam.
     pub(super) mixed_spread: f64,
 }
 
@@ -183,10 +183,10 @@ impl LatticeLine {
     }
 
     /// Returns the place of the edge by its single mixed pixel.
-    fn edge_in_pixel(&self, beam: BeamModel) -> Option<SharedObservation> {
+    pub(super) fn edge_in_pixel(&self, beam: BeamModel) -> Option<SharedObservation> {
         let (at, _) = self.mixed?;
         let radius = beam.footprint * self.per_radian;
-        self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, beam.mixed_spread)
+        self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, &beam.contrasts, beam.mixed_spread)
     }
 
     /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a

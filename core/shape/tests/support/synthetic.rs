@@ -79,6 +79,12 @@ impl Plate {
         [x + 0.5 * self.width, p.y + 0.5 * self.height]
     }
 
+    /// Unit normal of the faces at a point, scanner frame.
+    fn normal(&self, point: Vec3) -> Vec3 {
+        let p = self.to_local(point - self.centre);
+        self.to_scanner(self.radius.map_or(Vec3::z(), |r| Vec3::new(p.x, 0.0, p.z - r).normalize()))
+    }
+
     /// The upper face's point above (u, v) of the mid-surface, scanner frame.
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
         let (x, y) = (u - 0.5 * self.width, v - 0.5 * self.height);
@@ -139,6 +145,18 @@ impl Plate {
     }
 }
 
+/// Range of the wall that closes the room.
+const WALL: f64 = 15.0;
+
+/// Range that a receiver gives for a beam that sees two surfaces.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Receiver {
+    /// Anywhere between those of both, for three quarters of the beams that a corner of theirs sees beyond an edge.
+    Anywhere,
+    /// The mean over a Gaussian beam, weighted by power (Lambert's law); plates reflect so much of what the floor does.
+    Linear { plates: f64 },
+}
+
 /// A scene and the parameters of its scan.
 #[derive(Clone)]
 pub struct Scene {
@@ -151,6 +169,7 @@ pub struct Scene {
     pub step: f64,
     /// Half the angle that a beam sees.
     pub footprint: f64,
+    pub receiver: Receiver,
     /// Standard deviation of the range, metres.
     pub sigma: f64,
     /// Part of the samples with four times that.
@@ -169,6 +188,7 @@ impl Scene {
             floor: -4.5,
             step: 0.05_f64.to_radians(),
             footprint: 1.5e-4,
+            receiver: Receiver::Anywhere,
             sigma: 5e-4,
             tails: 0.0,
             dropouts: 0.01,
@@ -199,8 +219,33 @@ impl Scene {
             let range = (b - discriminant.max(0.0).sqrt()) / a;
             (discriminant > 0.0 && (low..high).contains(&(range * beam.z))).then_some(range)
         });
-        // A wall far away closes the room.
-        plates.chain(people).fold(floor.min(15.0), f64::min)
+        plates.chain(people).fold(floor.min(WALL), f64::min)
+    }
+
+    /// Range and power of the echo of one ray, of the echo of the floor straight below at one metre.
+    fn echo(&self, beam: Vec3, plates: f64) -> (f64, f64) {
+        let range = self.range(beam);
+        let plate = self.plates.iter().find(|p| p.hit(beam) == Some(range));
+        let (reflects, cosine) = match plate {
+            Some(plate) => (plates, plate.normal(beam * range).dot(&beam).abs()),
+            None if range < WALL => (1.0, beam.z.abs()),
+            None => (1.0, 1.0),
+        };
+        (range, reflects * cosine / (range * range))
+    }
+
+    /// Mean range over a Gaussian beam of which the directions from its middle are given in its radii.
+    fn mean_range(&self, beam: impl Fn(f64, f64) -> Vec3, plates: f64, turned: f64) -> f64 {
+        const SAMPLES: usize = 200;
+        let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let echo = |k: usize| {
+            let radius = ((k as f64 + 0.5) / SAMPLES as f64).sqrt();
+            let (sin, cos) = (golden_angle * k as f64 + turned).sin_cos();
+            let (range, power) = self.echo(beam(radius * cos, radius * sin), plates);
+            (range, power * (-2.0 * radius * radius).exp())
+        };
+        let sum = (0..SAMPLES).map(echo).fold((0.0, 0.0), |sum, (r, p)| (sum.0 + r * p, sum.1 + p));
+        sum.0 / sum.1
     }
 
     /// The scan, over the plates and half a metre around them.
@@ -266,16 +311,24 @@ impl Scene {
         for row in 0..rows {
             let elevation = header.elevation_start - header.elevation_step * row as f64;
             column.elevation.push(elevation);
-            let beam = |across: f64, up: f64| {
+            let direction = |across: f64, up: f64| {
                 let d = Direction { azimuth: azimuth + across / elevation.cos(), elevation: elevation + up };
-                self.range(Vec3::from(d.unit()))
+                Vec3::from(d.unit())
             };
+            let beam = |across: f64, up: f64| self.range(direction(across, up));
             let f = self.footprint;
             let centre = beam(0.0, 0.0);
             let around = [beam(f, 0.0), beam(-f, 0.0), beam(0.0, f), beam(0.0, -f)];
             let other = around.into_iter().find(|r| (r - centre).abs() > 0.05);
-            let (share, told) = (random.uniform(), random.uniform() < 0.75);
-            let range = other.filter(|_| told).map_or(centre, |other| share * centre + (1.0 - share) * other);
+            let (share, told) = (random.uniform(), random.uniform());
+            let range = match (other, self.receiver) {
+                (None, _) => centre,
+                (Some(other), Receiver::Anywhere) if told < 0.75 => share * centre + (1.0 - share) * other,
+                (Some(_), Receiver::Anywhere) => centre,
+                (Some(_), Receiver::Linear { plates }) => {
+                    self.mean_range(|x, y| direction(f * x, f * y), plates, std::f64::consts::TAU * share)
+                }
+            };
             let spread = if random.uniform() < self.tails { 4.0 } else { 1.0 };
             column.range_m[row] = range + self.sigma * spread * random.normal();
             if random.uniform() >= self.dropouts && !self.is_specular(azimuth, elevation, centre) {
