@@ -7,7 +7,8 @@
 //! | none | `no_fault` | 0.8 mm, 0.01 mm |
 //! | mixed pixels at the edges | `mixed_pixels_at_the_edges` | 0.8 mm, 0.01 mm |
 //! | hole by specular reflection on bright metal, through an edge | `a_specular_hole_through_an_edge` | 0.5 mm, 0.01 mm |
-//! | specular lobe as wide as the plate | `an_edge_in_the_specular_lobe_is_refused` | refused: "plate: 4 % of one edge of the plate is seen .." |
+//! | specular lobe along an edge, whose ends are seen | `a_specular_lobe_along_an_edge` | 0.35 mm, 0.01 mm |
+//! | specular lobe as wide as the plate | `an_edge_in_the_specular_lobe_is_refused` | refused: "scan: the face .. measures about .." |
 //! | dark plate: three times the noise, 5 % of the echoes lost | `a_dark_plate` | 1.0 mm, 0.025 mm |
 //! | cyclic range error of 0.3 mm | `cyclic_range_error` | 0.9 mm, 0.22 mm |
 //! | angular noise of 30 urad | `angular_noise` | 1.1 mm, 0.012 mm |
@@ -162,10 +163,15 @@ fn a_specular_hole_through_an_edge() {
 }
 
 #[test]
+fn a_specular_lobe_along_an_edge() {
+    let found = survives(0.35, 0.01, in_specular_reflection(5.0));
+    assert!(found.coverage < 0.8, "no hole: {found:?}");
+}
+
+#[test]
 fn an_edge_in_the_specular_lobe_is_refused() {
-    let refused = measure(in_specular_reflection(5.0)).unwrap_err().to_string();
-    assert!(refused.contains("% of one edge of the plate is seen"), "{refused}");
-    assert!(refused.contains("or tilt it where it mirrors the beam"), "{refused}");
+    let refused = measure(in_specular_reflection(6.0)).unwrap_err().to_string();
+    assert!(refused.starts_with("scan: the face at") && refused.contains("measures about"), "{refused}");
 }
 
 #[test]
