@@ -53,6 +53,7 @@ use column_store::{Cell, ColumnStore, Segment, StoredColumn, cells_of};
 use completed_components::Completed;
 use connected_components::{Components, Run};
 use continuity::Continuity;
+pub(crate) use mixed_pixels::DETECTION_LIMIT;
 use occlusion::FacePiece;
 pub use patch::{Beyond, Crossing, Patch, PlaneBehind, Sample};
 pub use refusal::Refusal;

@@ -37,7 +37,7 @@ const BOUND: f64 = 5.0;
 const MOST_LEVERAGE: f64 = 9.0;
 
 /// Largest cosine of the incidence of a plane that no scanner sees: a row of a round wall lies in a plane through the scanner, too.
-const LEAST_COSINE: f64 = 0.1;
+const EDGE_ON: f64 = 0.1;
 
 /// Cells from a mixed pixel to the strip at whose far edge it is: in any direction, and to both sides along its row or its column.
 const NEAREST: usize = 2;
@@ -247,7 +247,7 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
         else {
             break;
         };
-        let is_seen = sound.iter().any(|cell| plane.holds(cell) && plane.cosine(cell) > LEAST_COSINE);
+        let is_seen = sound.iter().any(|cell| plane.holds(cell) && plane.cosine(cell) > EDGE_ON);
         sound.retain(|cell| !plane.holds(cell));
         if is_seen {
             planes.push(plane);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::background_planes::PlaneOfCell;
 use super::local_quadric::LocalQuadric;
-use super::mixed_pixels::Pixel;
+use super::mixed_pixels::{DETECTION_LIMIT, Pixel};
 use super::patch::{Beyond, Crossing};
 use super::range_noise::Noise;
 use super::window::Window;
@@ -22,9 +22,8 @@ const FAR: usize = 12;
 /// Cells beyond the face up to which a range is compared with its continuation, cells.
 const FIT_FAR: usize = 3;
 
-/// A range behind the face's continuation by less than so many standard deviations (those of a second difference in `mixed_pixels`, rounded), and than
-/// so much, metres, is of a beam that sees little of what lies behind: no end of the face, though no mixed pixel by its neighbours.
-const HARDLY_MIXED: f64 = 12.0;
+/// A range behind the face's continuation by less than the detection limit of a mixed pixel, and than so much, metres, is of a beam that sees little of what
+/// lies behind: no end of the face, though no mixed pixel by its neighbours.
 const MOST_HARDLY_MIXED: f64 = 0.015;
 
 /// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
@@ -104,6 +103,13 @@ impl Scene<'_> {
     /// Returns the end of the face; `None` where it goes on behind a gap of cells without return, mixed or unclassified ones, or only cells follow
     /// that are hardly behind it.
     fn end_of_face(&self, fit: &LocalQuadric, index: usize, step: (isize, isize)) -> Option<End> {
+        let sigma = f64::from(self.noise.at(index));
+        let hardly = -FRONT_BOUND * sigma..(DETECTION_LIMIT * sigma).min(MOST_HARDLY_MIXED);
+        let is_hardly_mixed = |at: usize, far: usize| {
+            self.window.cells[at].inside
+                && self.excess(fit, at, far, index, step).is_some_and(|excess| hardly.contains(&excess))
+                && self.crease(fit, index, step, far).is_none()
+        };
         let (mut last_mixed, mut hardly_mixed) = (None, false);
         for far in 1..=WIDEST_GAP {
             let Some(at) = self.beside(index, step, far) else { break };
@@ -111,31 +117,13 @@ impl Scene<'_> {
                 return None;
             }
             match self.pixels[at] {
-                Pixel::Sound if far <= FAR && self.is_hardly_mixed(fit, at, far, index, step) => {
-                    hardly_mixed = true;
-                }
+                Pixel::Sound if far <= FAR && is_hardly_mixed(at, far) => hardly_mixed = true,
                 Pixel::Sound if far <= FAR => return Some(End::Sound(far)),
                 Pixel::Mixed if far <= FAR => last_mixed = Some(far),
                 _ => {}
             }
         }
         (last_mixed.is_some() || !hardly_mixed).then(|| last_mixed.map_or(End::Nothing, End::Mixed))
-    }
-
-    /// Returns true for a cell, `far` steps from `index`, that is hardly behind the face's continuation.
-    fn is_hardly_mixed(
-        &self,
-        fit: &LocalQuadric,
-        at: usize,
-        far: usize,
-        index: usize,
-        step: (isize, isize),
-    ) -> bool {
-        let sigma = f64::from(self.noise.at(index));
-        let hardly = -FRONT_BOUND * sigma..(HARDLY_MIXED * sigma).min(MOST_HARDLY_MIXED);
-        self.window.cells[at].inside
-            && self.excess(fit, at, far, index, step).is_some_and(|excess| hardly.contains(&excess))
-            && self.crease(fit, index, step, far).is_none()
     }
 
     /// Measures a crossing; also returns whether the face goes on beyond the region of interest.

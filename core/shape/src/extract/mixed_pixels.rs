@@ -11,6 +11,9 @@ const BOUND: f32 = 5.0;
 /// The same in parts of the jump between the surfaces on both sides: what is farther away is often noisier than the plate.
 const LEAST_SHARE: f32 = 0.002;
 
+/// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: [`BOUND`] times that of a second difference, rounded.
+pub(crate) const DETECTION_LIMIT: f64 = 12.0;
+
 /// Steepest surface, metres of range per metre across the beam: that of an incidence of 85 degrees.
 pub(super) const STEEPEST: f32 = 12.0;
 

@@ -23,7 +23,7 @@ use platen_numerics::median::robust_deviation;
 use super::edge_likelihood::SharedObservation;
 use super::height_field::LEAST_COSINE;
 use crate::Vec3;
-use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing};
+use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing, DETECTION_LIMIT};
 
 /// Place of an edge in a beam by the log odds l of the power beyond it, in radii: l / (A + B l^2). A Gaussian beam has A = 3.19, B = 0.034, one truncated at its radius
 /// 3.52 and 0.080 (each within 0.01 up to l = 5); these are midway.
@@ -62,9 +62,7 @@ pub(super) const NOTHING_TOLD: f64 = 10.0;
 /// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
 const LEAST_JUMP: f64 = 0.05;
 
-/// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: the bound of second differences of
-/// `extract::mixed_pixels`, rounded; and its largest part of the jump.
-const DETECTION_LIMIT: f64 = 12.0;
+/// Largest part of the jump at which a mixed pixel is told from a surface.
 const MOST_LIMIT: f64 = 0.45;
 
 /// Least part of the radius at which a beam is found mixed.
