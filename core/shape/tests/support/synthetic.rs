@@ -211,25 +211,29 @@ impl Scene {
     }
 
     fn range(&self, beam: Vec3) -> f64 {
+        self.plates.iter().filter_map(|p| p.hit(beam)).fold(self.range_beside_plates(beam), f64::min)
+    }
+
+    fn range_beside_plates(&self, beam: Vec3) -> f64 {
         let floor = if beam.z < 0.0 { self.floor / beam.z } else { f64::MAX };
-        let plates = self.plates.iter().filter_map(|p| p.hit(beam));
         let people = self.people.iter().filter_map(|&[x, y, radius, low, high]| {
             let (a, b) = (beam.x.powi(2) + beam.y.powi(2), beam.x * x + beam.y * y);
             let discriminant = b * b - a * (x * x + y * y - radius * radius);
             let range = (b - discriminant.max(0.0).sqrt()) / a;
             (discriminant > 0.0 && (low..high).contains(&(range * beam.z))).then_some(range)
         });
-        plates.chain(people).fold(floor.min(WALL), f64::min)
+        people.fold(floor.min(WALL), f64::min)
     }
 
     /// Range and power of the echo of one ray, of the echo of the floor straight below at one metre.
     fn echo(&self, beam: Vec3, plates: f64) -> (f64, f64) {
-        let range = self.range(beam);
-        let plate = self.plates.iter().find(|p| p.hit(beam) == Some(range));
-        let (reflects, cosine) = match plate {
-            Some(plate) => (plates, plate.normal(beam * range).dot(&beam).abs()),
-            None if range < WALL => (1.0, beam.z.abs()),
-            None => (1.0, 1.0),
+        let behind = self.range_beside_plates(beam);
+        let hits = self.plates.iter().filter_map(|plate| Some((plate.hit(beam)?, plate)));
+        let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(range, _)| *range < behind);
+        let (range, reflects, cosine) = match nearest {
+            Some((range, plate)) => (range, plates, plate.normal(beam * range).dot(&beam).abs()),
+            None if behind < WALL => (behind, 1.0, beam.z.abs()),
+            None => (behind, 1.0, 1.0),
         };
         (range, reflects * cosine / (range * range))
     }
