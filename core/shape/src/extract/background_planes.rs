@@ -8,6 +8,7 @@
 //!   before a plane whose continuation is close behind the edge. A plane of a strip holds many of them; alone on one that holds few, it is there by chance.
 //!   One with mixed pixels before the plane to both sides stays mixed: along an edge parallel to a row some beams return the background's range.
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
+//! - A plane seen edge-on is none: the cells of one row of a round wall lie in a plane through the scanner, too.
 //!
 //! Limits: a strip whose plane shows nowhere else stays mixed, as mixed pixels along an edge can lie on a plane, too; uneven ground is
 //! several planes. Own.

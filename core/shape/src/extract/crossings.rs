@@ -1,5 +1,8 @@
 //! Boundary crossings: where rows and columns of the lattice leave the face, and what lies beyond.
 //!
+//! Beside the face a cell may see so little of what lies behind that neither its neighbours tell it for a mixed pixel nor its range for one of the
+//! face. The face does not end there: the edge is up to a footprint farther out.
+//!
 //! In: the cells of the face, mixed pixels, noise. Out: per crossing the last point inside and the first outside, mixed pixels
 //! between them, and the range beyond against the face's continuation (`local_quadric`); observations for the outline.
 

@@ -15,7 +15,7 @@
 //! 6. A beam that sees so little of one side that its range stays within the detection limit is not found mixed. Where the background outshines the face
 //!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside.
 //!
-//! In: one lattice line; out: [`Mixing`], what its likelihood needs. Own. Limits: beams are taken for Gaussian ones that end at their radius; a beam with
+//! In: one lattice line; out: [`Mixing`], what its likelihood needs. Own. Limits: how much power a beam has near its rim differs between instruments; a beam with
 //! wings is found mixed farther inside.
 
 use platen_numerics::median::robust_deviation;

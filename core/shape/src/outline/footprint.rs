@@ -1,5 +1,5 @@
-//! The beam's footprint at an edge: half the angle that it sees, from the mixed pixels, by counting and by maximum likelihood. It is the scanner's:
-//! an edge that shows far more than the others has background beside it that passes for mixed pixels. Own.
+//! The beam's footprint at an edge: half the angle that it sees, from the mixed pixels, by counting and by maximum likelihood of which pixels are mixed and where in
+//! them their ranges have the edge (`contrast`). It is the scanner's: an edge that shows far more than the others has background beside it that passes for mixed pixels. Own.
 
 use platen_numerics::normal_distribution::cdf;
 
