@@ -154,21 +154,29 @@ impl View<'_> {
 
     /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot:
     /// the range is the mean, weighted by power, which falls with the square of the distance. The samples of the spot are turned by
-    /// an angle.
+    /// an angle. The echo is that of the middle ray where the rim of the spot lies on one surface with it.
     fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>, turned: f64) -> Option<Echo> {
         let level = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
         let upright = level.cross(&ray.direction);
         let (sin, cos) = turned.sin_cos();
         let (across, up) = (level * cos + upright * sin, upright * cos - level * sin);
         let spot = if self.instrument.wings { &WINGED_SPOT } else { &SPOT };
+        let radius = self.instrument.footprint / 2.0;
+        let cast = |(x, y, _): &Sample| {
+            let direction = (ray.direction + across * (x * radius) + up * (y * radius)).normalize();
+            self.cast(&Ray { origin: ray.origin, direction })
+        };
+        let (inner, rim) = spot.split_at(SAMPLES - RIM);
+        let rim: [Option<Hit>; RIM] = std::array::from_fn(|k| cast(&rim[k]));
+        if rim.iter().all(|hit| is_one_surface(&middle, hit, MIXED_SPREAD)) {
+            return middle.map(|hit| self.echo(&hit));
+        }
         let whole: f64 = spot.iter().map(|(_, _, weight)| weight).sum();
         let (mut power, mut range, mut strength) = (0.0, 0.0, 0.0);
         let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
         let mut nearest_hit = middle;
-        for (x, y, weight) in spot.iter() {
-            let radius = self.instrument.footprint / 2.0;
-            let direction = (ray.direction + across * (x * radius) + up * (y * radius)).normalize();
-            let Some(hit) = self.cast(&Ray { origin: ray.origin, direction }) else { continue };
+        for ((_, _, weight), hit) in spot.iter().zip(inner.iter().map(cast).chain(rim)) {
+            let Some(hit) = hit else { continue };
             let echo = self.echo(&hit);
             let received = weight * echo.strength / (hit.range * hit.range);
             power += received;
@@ -243,6 +251,9 @@ type Sample = (f64, f64, f64);
 /// Samples of a beam.
 const SAMPLES: usize = 61;
 
+/// The outermost samples, whose convex hull holds all others: a straight edge that divides the samples divides these.
+const RIM: usize = 13;
+
 /// Where a beam with wings is truncated, in its 1/e^2 radii: beyond lies 1 % of the power.
 const WINGED_RADIUS: f64 = 1.5;
 
@@ -271,14 +282,18 @@ fn turned(column: u32, row: usize) -> f64 {
 
 /// Returns true when one of the eight neighbours lies on another object or across a range jump.
 fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Trace>) -> bool {
-    let middle = here.hits[row];
-    let differs = |other: &Option<Hit>| match (&middle, other) {
-        (Some(a), Some(b)) => a.object != b.object || (a.range - b.range).abs() > RANGE_JUMP,
-        (None, None) => false,
-        _ => true,
-    };
+    let differs = |other: &Option<Hit>| !is_one_surface(&here.hits[row], other, RANGE_JUMP);
     let rows = row.saturating_sub(1)..(row + 2).min(here.hits.len());
     columns.into_iter().any(|column| column.hits[rows.clone()].iter().any(differs))
+}
+
+/// Returns true when two rays hit one object at ranges that differ by no more than `jump`, or both hit nothing.
+fn is_one_surface(a: &Option<Hit>, b: &Option<Hit>, jump: f64) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.object == b.object && (a.range - b.range).abs() <= jump,
+        (None, None) => true,
+        _ => false,
+    }
 }
 
 /// Draws a uniform deviate in [0, 1).
@@ -301,6 +316,16 @@ mod tests {
         };
         let sum = |from: f64| (0..STRIPS).map(place).filter(|x| *x > from).map(strip).sum::<f64>();
         sum(off) / sum(-truncated)
+    }
+
+    #[test]
+    fn the_rim_reaches_farthest_in_every_direction() {
+        for angle in (0..720).map(|k| f64::from(k).to_radians() / 2.0) {
+            let reach = |(x, y, _): &Sample| x * angle.cos() + y * angle.sin();
+            let farthest = |samples: &[Sample]| samples.iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
+            let (inner, rim) = SPOT.split_at(SAMPLES - RIM);
+            assert!(farthest(inner) < farthest(rim), "{angle}");
+        }
     }
 
     /// In each direction: largest error of a beam, and mean error of a hundred turned ones.
