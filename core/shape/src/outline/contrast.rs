@@ -161,17 +161,17 @@ fn place_in_beam(log_odds: f64) -> (f64, f64) {
 pub(super) struct Mixing {
     /// Number of the plane.
     plane: usize,
-    /// Range of the plane behind the face's continuation, metres.
-    jump: f64,
     /// Logarithm of the contrast by incidence and range.
     by_geometry: f64,
+    /// Largest log odds of either surface at which a pixel is found mixed.
+    most_odds: f64,
     /// Logarithm of the odds of the background in a single mixed pixel.
     odds: Option<f64>,
 }
 
 impl Mixing {
-    /// Measures the mixing of a crossing all of whose cells were measured; `None` without a background plane.
-    pub(super) fn of(crossing: &Crossing) -> Option<Self> {
+    /// Measures the mixing of a crossing all of whose cells were measured; `None` without a background plane. `noise` is that of ranges, metres.
+    pub(super) fn of(crossing: &Crossing, noise: f64) -> Option<Self> {
         let jump = f64::from(crossing.excess);
         let plane = crossing
             .background
@@ -180,13 +180,14 @@ impl Mixing {
         let on_face = crossing.normal.dot(&-crossing.inside) / range;
         let on_plane = f64::from(plane.distance) / (range + jump);
         let [on_face, on_plane] = [on_face, on_plane].map(|cosine| cosine.max(LEAST_COSINE));
+        let limit = (DETECTION_LIMIT * noise / jump).min(MOST_LIMIT);
         let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
         let background = f64::from(crossing.mixed_excess) / jump;
         let is_between = background > 0.0 && background < 1.0;
         Some(Self {
             plane: usize::from(plane.number),
-            jump,
             by_geometry: (on_plane / on_face).ln() - 2.0 * (1.0 + jump / range).ln(),
+            most_odds: ((1.0 - limit) / limit).ln(),
             odds: (crossing.mixed.is_some_and(is_single) && is_between)
                 .then(|| (background / (1.0 - background)).ln()),
         })
@@ -197,12 +198,11 @@ impl Mixing {
         Self { odds: None, ..self }
     }
 
-    /// Returns the parts of the beam's radius inside and outside of the edge up to which it is found mixed; `noise` is that of ranges, metres.
-    pub(super) fn seen(&self, contrasts: &Contrasts, noise: f64) -> [f64; 2] {
+    /// Returns the parts of the beam's radius inside and outside of the edge up to which it is found mixed.
+    pub(super) fn seen(&self, contrasts: &Contrasts) -> [f64; 2] {
         let contrast = contrasts.0[self.plane] + self.by_geometry;
-        let limit = (DETECTION_LIMIT * noise / self.jump).min(MOST_LIMIT);
-        let most = ((1.0 - limit) / limit).ln();
-        [most + contrast, most - contrast].map(|odds| place_in_beam(odds).0.clamp(LEAST_SEEN, 1.0))
+        [self.most_odds + contrast, self.most_odds - contrast]
+            .map(|odds| place_in_beam(odds).0.clamp(LEAST_SEEN, 1.0))
     }
 
     /// Returns true for a single mixed pixel.
@@ -223,9 +223,10 @@ impl Mixing {
         self.odds.map(|odds| {
             let log_odds = odds - self.by_geometry - contrast;
             let (place, slope) = place_in_beam(log_odds);
+            let by_place = PLACE_SPREAD * log_odds * log_odds;
             SharedObservation {
                 place: at + radius * (place + slope * contrast),
-                soft: radius * spread.hypot(LEAST_SPREAD).hypot(PLACE_SPREAD * log_odds * log_odds),
+                soft: radius * (spread * spread + LEAST_SPREAD * LEAST_SPREAD + by_place * by_place).sqrt(),
                 radius,
                 number: self.plane,
                 factor: radius * slope,
@@ -310,7 +311,7 @@ mod tests {
                 let [gaussian, truncated] = [4.0, 1.0].map(|most| {
                     let beyond = beyond(most, -edge);
                     let part = times * beyond / (times * beyond + 1.0 - beyond);
-                    let mixing = Mixing::of(&crossing(part)).unwrap();
+                    let mixing = Mixing::of(&crossing(part), 1e-3).unwrap();
                     let found = mixing.edge(0.0, 1.0, &contrasts(times), 0.2).unwrap();
                     let at = found.place - found.factor * contrasts(times).0[found.number];
                     (at - edge) * edge.signum()
@@ -324,7 +325,7 @@ mod tests {
     #[test]
     fn beams_before_what_outshines_the_face_are_found_mixed_farther_inside_than_outside() {
         let seen =
-            |times: f64, noise: f64| Mixing::of(&crossing(0.5)).unwrap().seen(&contrasts(times), noise);
+            |times: f64, noise: f64| Mixing::of(&crossing(0.5), noise).unwrap().seen(&contrasts(times));
         assert_eq!(seen(1.0, 1e-3), [1.0; 2]);
         let [inside, outside] = seen(10.0, 2e-3);
         // 24 mm of noise in 2 m: odds of 82, a tenth of them where the background is ten times as bright.
@@ -350,7 +351,7 @@ mod tests {
 
     #[test]
     fn only_a_single_mixed_pixel_before_a_plane_tells() {
-        let of = |crossing: Crossing| Mixing::of(&crossing);
+        let of = |crossing: Crossing| Mixing::of(&crossing, 1e-3);
         let known = crossing(0.5);
         assert!(of(Crossing { background: None, ..known }).is_none());
         assert!(of(Crossing { complete: false, ..known }).is_none());

@@ -164,7 +164,7 @@ impl Edge {
         known: &ContrastDistribution,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
-        let Sampling { step, noise, .. } = sampling;
+        let step = sampling.step;
         let EdgeData { strip, side_face, lines, dithered, from, to } = data;
         let (start, end) = strip.span();
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
@@ -172,7 +172,7 @@ impl Edge {
         let with_contrasts = prior.clone().with_parameters(known.planes());
         let too_few = || strip.too_few();
         let fit = |beam: BeamModel| {
-            let used: Vec<EdgeLikelihood> = lines.iter().map(|l| l.likelihood(beam, noise)).collect();
+            let used: Vec<EdgeLikelihood> = lines.iter().map(|l| l.likelihood(beam)).collect();
             let found = most_likely(&with_contrasts, &used, step)?;
             Some((used, found))
         };
@@ -184,7 +184,7 @@ impl Edge {
             beam.mixed_spread = mixed_spread(&used, &found);
             if own && footprint > 0.0 {
                 let at = |along| found.curve.at(along);
-                beam.footprint = footprint::at_edge(&lines, at, footprint, beam, noise);
+                beam.footprint = footprint::at_edge(&lines, at, footprint, beam);
             }
             // The same beams give the same curve, and that one the same beams.
             if beam.is_near(&last) {
@@ -208,7 +208,7 @@ impl Edge {
                 [from, to],
                 BeamModel { footprint, ..beam },
                 known,
-                sampling,
+                step,
             )
             .ok_or_else(too_few)?
         };

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use platen_numerics::adaptive_metropolis::mean_and_covariance;
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 
+use super::SEED;
 use super::contrast::ContrastDistribution;
 use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
-use super::{SEED, Sampling};
 
 /// Free places of the edge where its posterior is sampled: ends and thirds. Between them the prior leaves two tenths of a
 /// millimetre undetermined.
@@ -52,7 +52,7 @@ impl Posterior {
     /// width, and where mixed pixels begin depends on the footprint as much as on the edge.
     ///
     /// `curve` is a likely one, its ends the places of the edge's corners along it, `beam` the beams of all edges,
-    /// `known` the contrasts by the other edges. `None` when the prior leaves the curve undetermined.
+    /// `known` the contrasts by the other edges, `step` the spacing of the samples. `None` when the prior leaves the curve undetermined.
     pub(super) fn sampled(
         curve: &SplineCurve,
         prior: &CurveFit,
@@ -60,9 +60,8 @@ impl Posterior {
         [from, to]: [f64; 2],
         beam: BeamModel,
         known: &ContrastDistribution,
-        sampling: Sampling,
+        step: f64,
     ) -> Option<Self> {
-        let Sampling { step, noise, .. } = sampling;
         let places: [_; PLACES] =
             std::array::from_fn(|k| curve.functional(from + (to - from) * k as f64 / (PLACES - 1) as f64));
         // The prior given the places: its mean as a linear map of the places, and its covariance.
@@ -91,7 +90,7 @@ impl Posterior {
                 ..beam
             };
             let likelihood = |(line, at, parts): &(&LatticeLine, f64, SVector<f64, PLACES>)| {
-                line.likelihood(beam, noise).value(at + parts.dot(&by), contrasts.logarithms())
+                line.likelihood(beam).value(at + parts.dot(&by), contrasts.logarithms())
             };
             let together = |lines: &[_]| lines.iter().map(likelihood).product::<f64>().ln();
             let bent = curve.moved(&(&through * by));

@@ -47,14 +47,8 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
 }
 
 /// Estimates the footprint at an edge of known place, near that of all edges, by maximum likelihood of its mixed and its sound
-/// pixels, and of where in the mixed ones their ranges have the edge; two nested grid searches. `beam` holds what else is known of the beams, `noise` is that of ranges, metres.
-pub(super) fn at_edge(
-    lines: &[LatticeLine],
-    edge: impl Fn(f64) -> f64,
-    all: f64,
-    beam: BeamModel,
-    noise: f64,
-) -> f64 {
+/// pixels, and of where in the mixed ones their ranges have the edge; two nested grid searches. `beam` holds what else is known of the beams.
+pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64, beam: BeamModel) -> f64 {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
     /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
@@ -63,7 +57,7 @@ pub(super) fn at_edge(
         lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
     let likelihood = |line: &LatticeLine, edge: f64, footprint: f64| {
         let beam = BeamModel { footprint, ..beam };
-        let [inside, outside] = line.seen(beam, noise);
+        let [inside, outside] = line.seen(beam);
         let within = |off: f64| if off > edge { inside - (off - edge) } else { outside - (edge - off) };
         let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * cdf(within(off) / (SOFTNESS * line.per_angle));
         let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));

@@ -103,16 +103,16 @@ pub(super) struct LatticeLine {
     pub(super) per_step: f64,
     /// Distance outside of the edge at which the plate's silhouette is seen, on the face's continuation; 0 where the side face is hidden.
     side: f64,
-    /// Distance inwards per range of the beam.
-    per_range: f64,
-    /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and that distance per range.
+    /// Noise of the smooth face near its edges, inwards.
+    face_noise: f64,
+    /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and the noise of that.
     off: f64,
     on_side: f64,
-    off_per_range: f64,
+    off_noise: f64,
     /// The last cell of the face, and the same of it.
     cell: f64,
     behind: f64,
-    cell_per_range: f64,
+    cell_noise: f64,
 }
 
 impl LatticeLine {
@@ -121,7 +121,7 @@ impl LatticeLine {
         strip: &DevelopedStrip,
         settled: &ProjectedCrossing,
         side_face: &SideFace,
-        Sampling { angle, .. }: Sampling,
+        Sampling { angle, noise, .. }: Sampling,
     ) -> Self {
         let crossing = &settled.crossing;
         let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
@@ -142,7 +142,7 @@ impl LatticeLine {
             low: inside.y.min(outside.y),
             high: inside.y.max(outside.y),
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
-            mixing: Mixing::of(crossing)
+            mixing: Mixing::of(crossing, noise)
                 .map(|mixing| if sight.silhouette == 0.0 { mixing } else { mixing.without_odds() }),
             complete: crossing.complete,
             beyond: crossing.beyond,
@@ -150,13 +150,13 @@ impl LatticeLine {
             per_angle: angle * per_radian,
             per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
             side: sight.silhouette,
-            per_range: inward.dot(&beam),
+            face_noise: FACE_NOISE * noise * inward.dot(&beam).abs(),
             off,
             on_side,
-            off_per_range,
+            off_noise: noise * off_per_range.abs(),
             cell: strip.flatten(settled.cell).y,
             behind,
-            cell_per_range,
+            cell_noise: noise * cell_per_range.abs(),
         }
     }
 
@@ -172,9 +172,9 @@ impl LatticeLine {
     }
 
     /// Returns the distances inside and outside of the edge up to which a beam is found mixed.
-    pub(super) fn seen(&self, beam: BeamModel, noise: f64) -> [f64; 2] {
+    pub(super) fn seen(&self, beam: BeamModel) -> [f64; 2] {
         let radius = beam.footprint * self.per_radian;
-        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts, noise)).map(|part| part * radius)
+        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts)).map(|part| part * radius)
     }
 
     /// Returns true when its mixed pixel tells the place of the edge, given the contrast.
@@ -198,16 +198,14 @@ impl LatticeLine {
         if width > 0.0 && are_three { ((highest - width - lowest) / self.per_step).ceil() as u32 } else { 0 }
     }
 
-    /// Returns the likelihood of an edge position given this line; `noise` is that of ranges, metres.
-    pub(super) fn likelihood(&self, beam: BeamModel, noise: f64) -> EdgeLikelihood {
-        let soft = norm(beam.softness * self.per_angle, FACE_NOISE * (noise * self.per_range.abs()));
-        let [off_noise, cell_noise] =
-            [self.off_per_range, self.cell_per_range].map(|per_range| noise * per_range.abs());
+    /// Returns the likelihood of an edge position given this line.
+    pub(super) fn likelihood(&self, beam: BeamModel) -> EdgeLikelihood {
+        let soft = norm(beam.softness * self.per_angle, self.face_noise);
         let seen = beam.footprint * self.per_radian;
-        let [seen_inside, seen_outside] = self.seen(beam, noise);
+        let [seen_inside, seen_outside] = self.seen(beam);
         let shared = self.edge_in_pixel(beam);
         let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
-        let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(cell_noise);
+        let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(self.cell_noise);
         if self.beyond == Beyond::SideFace {
             // Given as two standard deviations about the crease.
             let soft = norm(soft, 0.25 * (self.high - self.low));
@@ -217,16 +215,16 @@ impl LatticeLine {
         // Of a side face a few beams wide each may pass for mixed.
         if self.side > 0.0
             && self.beyond == Beyond::Behind
-            && (self.mixed.is_none() || on_side > -3.0 * off_noise)
-            && on_side < SIDE_SLACK * self.side + 3.0 * off_noise
+            && (self.mixed.is_none() || on_side > -3.0 * self.off_noise)
+            && on_side < SIDE_SLACK * self.side + 3.0 * self.off_noise
         {
-            let soft = norm(norm(soft, off_noise), SIDE_SLOPE * on_side);
+            let soft = norm(norm(soft, self.off_noise), SIDE_SLOPE * on_side);
             return of([EdgeObservation::At(self.off + on_side).within(soft), last]);
         }
         let mut above = Bound { sure: self.low, likely: self.low };
         // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that. The last cell of the face lies on
         // the side face as far out as its range falls behind.
-        let outside = (self.behind.max(0.0) + LAST_BOUND * cell_noise).min(self.side).min(seen);
+        let outside = (self.behind.max(0.0) + LAST_BOUND * self.cell_noise).min(self.side).min(seen);
         let mut below =
             Bound { sure: self.high + outside, likely: self.high - (seen_inside - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
@@ -242,7 +240,7 @@ impl LatticeLine {
                 above.likely = above.likely.max(lowest - self.per_step + self.side + seen);
             }
             below = Bound { sure: below.sure.min(most), likely: below.likely.min(most) };
-        } else if self.side > seen && cell_noise > 0.0 {
+        } else if self.side > seen && self.cell_noise > 0.0 {
             return of([EdgeObservation::Above(above).within(soft), last]);
         }
         of([EdgeObservation::Above(above), EdgeObservation::Below(below)]
@@ -285,13 +283,13 @@ pub(super) mod tests {
             per_angle: 6e-3,
             per_step: 5.7e-3,
             side: 1.35e-3,
-            per_range: 0.02,
+            face_noise: FACE_NOISE * 1.4e-5,
             off: -4e-3,
             on_side: 0.05,
-            off_per_range: 0.02,
+            off_noise: 1.4e-5,
             cell: 1.7e-3,
             behind,
-            cell_per_range: 0.02,
+            cell_noise: 1.4e-5,
         }
     }
 
@@ -302,7 +300,7 @@ pub(super) mod tests {
 
     /// Likelihood of an edge so far inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
     fn inside(line: &LatticeLine, far: f64) -> f64 {
-        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()), 7e-4);
+        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
         of.value(line.high + far, &[]) / of.value(line.high, &[])
     }
 
@@ -310,7 +308,7 @@ pub(super) mod tests {
     #[test]
     fn mixed_pixels_of_another_edge_behind_a_strip_do_not_count() {
         let line = LatticeLine { low: -21.1e-3, ..open_line(Some((-15.4e-3, -4e-3))) };
-        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()), 7e-4);
+        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
         for elsewhere in [-15e-3, -9.7e-3, 0.0] {
             assert!(
                 of.value(-4e-3, &[]) > 10.0 * of.value(elsewhere, &[]),
