@@ -2,6 +2,8 @@
 
 mod support;
 
+use platen_shape::Vec3;
+use platen_shape::extract::Patch;
 use platen_shape::outline::{OutlineError, outline};
 use platen_tests::samples;
 
@@ -55,4 +57,34 @@ fn a_hint_between_two_edges_and_another_size_are_refused() {
     let refusal = outline(&patch, &sample.spec).unwrap_err();
     println!("{refusal}");
     assert!(matches!(refusal, OutlineError::WrongSize { side: "width", .. }));
+}
+
+/// Crossings nearer to one edge than so far are removed, up to a margin from its ends.
+#[test]
+fn an_edge_seen_at_its_ends_alone_is_told_and_one_not_seen_is_refused() {
+    let sample = support::read(&samples::plates()[0]);
+    let patch = support::extract(&sample, 0..sample.columns.len()).unwrap();
+    let corner = |k: usize| support::vec3(&sample.truth["corners_m"][k]);
+    let (from, along) = (corner(0), (corner(1) - corner(0)).normalize());
+    let length = (corner(1) - corner(0)).norm();
+    let without = |near: f64, margin: f64| {
+        let is_removed = |point: Vec3| {
+            let at = (point - from).dot(&along);
+            (point - from - along * at).norm() < near && (margin..length - margin).contains(&at)
+        };
+        let crossings = patch.crossings.iter().filter(|c| !is_removed(c.inside)).copied().collect();
+        outline(&Patch { crossings, ..patch.clone() }, &sample.spec)
+    };
+    for (margin, seen) in [(0.1, true), (0.0, false)] {
+        let found = without(0.1, margin).unwrap();
+        for k in [0, 1] {
+            let corner_found = &found.corners[k];
+            let off = (corner_found.point - corner(k)).norm();
+            let [a, b] = corner_found.sigma;
+            println!("{margin} m: corner {k} {:.2} mm off, {:.2} stated", 1e3 * off, 1e3 * a.hypot(b));
+            assert!(off < 2.0 * a.hypot(b) && corner_found.seen == seen, "{off} {corner_found:?}");
+        }
+    }
+    let refused = without(0.15, 0.0).unwrap_err();
+    assert!(matches!(refused, OutlineError::Corners { found: 2 }), "{refused}");
 }

@@ -256,3 +256,18 @@ fn develop(points: &[(Vec3, Vec3)], depth: f64) -> Vec<Station> {
     }
     stations
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_without_crossings_is_refused() {
+        let sampling = Sampling { step: 0.01, angle: 1e-3, noise: 5e-4 };
+        let refused = DevelopedStrip::new(&[], [Vec3::zeros(), Vec3::x()], 0.02, sampling).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "0 % of one edge of the plate is seen, too little to locate it; clear what hides it, or tilt it where it mirrors the beam"
+        );
+    }
+}
