@@ -41,15 +41,13 @@ const N: usize = 12;
 /// exact to rounding.
 const LONGEST: f64 = 0.05;
 
-/// Chebyshev series of position, tangent angle and curvature on one interval of arc length.
+/// Chebyshev series on one interval of arc length.
 #[derive(Debug, Clone)]
 struct Interval {
     middle: f64,
     half: f64,
-    curvature: [f64; N],
-    angle: [f64; N],
-    x: [f64; N],
-    z: [f64; N],
+    /// Coefficients of x, z, tangent angle and curvature side by side: their recurrences run together.
+    series: [[f64; 4]; N],
 }
 
 /// Point of a profile: position, tangent angle and curvature at an arc length.
@@ -125,31 +123,18 @@ impl Profile {
     fn interval(&self, from: f64, to: f64, angle_at_origin: f64) -> Interval {
         let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
         let at = |t: f64| self.raw_angle(middle + half * t) - angle_at_origin;
-        Interval {
-            middle,
-            half,
-            curvature: series(|t| self.curvature(middle + half * t)),
-            angle: series(at),
-            x: integral(&series(|t| at(t).cos()), half),
-            z: integral(&series(|t| at(t).sin()), half),
-        }
+        let x = integral(&series(|t| at(t).cos()), half);
+        let z = integral(&series(|t| at(t).sin()), half);
+        let (angle, curvature) = (series(at), series(|t| self.curvature(middle + half * t)));
+        Interval { middle, half, series: std::array::from_fn(|k| [x[k], z[k], angle[k], curvature[k]]) }
     }
 
     /// Shifts the positions of the intervals so that the curve is continuous and passes through the origin at 0.
     fn join(&mut self) {
         let origin = self.index(0.0);
-        let (mut x, mut z) = (0.0, 0.0);
-        for interval in &mut self.intervals[origin..] {
-            interval.x[0] += x - value(&interval.x, -1.0);
-            interval.z[0] += z - value(&interval.z, -1.0);
-            (x, z) = (value(&interval.x, 1.0), value(&interval.z, 1.0));
-        }
-        (x, z) = (0.0, 0.0);
-        for interval in self.intervals[..origin].iter_mut().rev() {
-            interval.x[0] += x - value(&interval.x, 1.0);
-            interval.z[0] += z - value(&interval.z, 1.0);
-            (x, z) = (value(&interval.x, -1.0), value(&interval.z, -1.0));
-        }
+        let (before, after) = self.intervals.split_at_mut(origin);
+        join(after.iter_mut(), 1.0);
+        join(before.iter_mut().rev(), -1.0);
     }
 
     fn index(&self, s: f64) -> usize {
@@ -161,16 +146,13 @@ impl Profile {
         let interval = &self.intervals[self.index(s)];
         let t = (s - interval.middle) / interval.half;
         let inside = t.clamp(-1.0, 1.0);
-        let angle = value(&interval.angle, inside);
+        let [x, z, angle, curvature] = values(&interval.series, inside);
         let beyond = (t - inside) * interval.half;
-        let (sin, cos) = angle.sin_cos();
-        let curvature = if beyond == 0.0 { value(&interval.curvature, t) } else { 0.0 };
-        Place {
-            x: value(&interval.x, inside) + beyond * cos,
-            z: value(&interval.z, inside) + beyond * sin,
-            angle,
-            curvature,
+        if beyond == 0.0 {
+            return Place { x, z, angle, curvature };
         }
+        let (sin, cos) = angle.sin_cos();
+        Place { x: x + beyond * cos, z: z + beyond * sin, angle, curvature: 0.0 }
     }
 }
 
@@ -194,13 +176,25 @@ fn integral(c: &[f64; N], half: f64) -> [f64; N] {
     })
 }
 
-/// Evaluates a series at `t` by Clenshaw's recurrence.
-fn value(c: &[f64; N], t: f64) -> f64 {
-    let (mut b1, mut b2) = (0.0, 0.0);
-    for k in (1..N).rev() {
-        (b1, b2) = (2.0 * t * b1 - b2 + c[k], b1);
+/// Shifts the positions of intervals that follow each other from the origin on, towards arc length of this sign.
+fn join<'a>(intervals: impl Iterator<Item = &'a mut Interval>, sign: f64) {
+    let mut joint = [0.0; 2];
+    for Interval { series, .. } in intervals {
+        let [x, z, ..] = values(series, -sign);
+        series[0][0] += joint[0] - x;
+        series[0][1] += joint[1] - z;
+        let [x, z, ..] = values(series, sign);
+        joint = [x, z];
     }
-    t * b1 - b2 + c[0]
+}
+
+/// Evaluates series at `t` by Clenshaw's recurrence.
+fn values(series: &[[f64; 4]; N], t: f64) -> [f64; 4] {
+    let (mut b1, mut b2) = ([0.0; 4], [0.0; 4]);
+    for c in series[1..].iter().rev() {
+        (b1, b2) = (std::array::from_fn(|m| 2.0 * t * b1[m] - b2[m] + c[m]), b1);
+    }
+    std::array::from_fn(|m| t * b1[m] - b2[m] + series[0][m])
 }
 
 #[cfg(test)]
