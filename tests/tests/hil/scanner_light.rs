@@ -90,15 +90,6 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     assert_eq!(scanned.warm_up_columns, left_out);
     let measured = stroke::measure_scanned(&mut rig, &scanned, &spec, None, Baseline::None)?;
 
-    for e in &measured.outline.edges {
-        println!(
-            "EDGE seen {:.3} of {} sigma {:.3} mm",
-            e.seen.iter().filter(|s| **s).count() as f64 / e.seen.len() as f64,
-            e.seen.len(),
-            1e3 * e.sigma
-        );
-    }
-    println!("SEEN {:?}", measured.outline.corners);
     let corner = |k: usize| (measured.outline.corners[k].point - truth.corners()[k]).norm();
     let surface = &measured.measurement.surface;
     let mut squares = 0.0;
