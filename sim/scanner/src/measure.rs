@@ -252,6 +252,7 @@ type Sample = (f64, f64, f64);
 const SAMPLES: usize = 61;
 
 /// The outermost samples, whose convex hull holds all others: a straight edge that divides the samples divides these.
+/// For speed only: `platen demo`.
 const RIM: usize = 13;
 
 /// Where a beam with wings is truncated, in its 1/e^2 radii: beyond lies 1 % of the power.
