@@ -61,9 +61,6 @@ pub(crate) struct Place {
 
 /// Plane curve of unit speed through the origin at s = 0, where its tangent is +x; it bends towards +z where
 /// its curvature is positive.
-///
-/// The angle is the exact integral of the curvature; positions are integrals of its cosine and sine, taken as
-/// Chebyshev series that are exact to rounding (tested against arcs and against Simpson's rule to 1e-13 m).
 #[derive(Debug, Clone)]
 pub(crate) struct Profile {
     initial: f64,
