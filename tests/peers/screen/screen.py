@@ -3,7 +3,7 @@
 Runs the release build's `platen run` beside `platen-sim press`, both as child processes. Every check prints one line; the first that
 fails ends the program with exit code 1. `--bless` writes the screenshots of tests/golden/screen anew; `--only WORD` runs some checks.
 """
-import argparse, io, json, math, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
+import argparse, io, json, math, os, re, signal, socket, ssl, statistics, subprocess, sys, tempfile, threading, time, urllib.error, urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -413,42 +413,57 @@ def check_it_stands_behind_a_proxy(_):
         assert not ours, ours
 
 
+@contextmanager
+def driver_in_a_namespace_of_its_own():
+    """A browser's driver in its own network namespace; yields its two cables, each by name, our address and its address.
+
+    The namespace and its cables last as long as the driver's processes, and those as long as this one: nothing is left on the machine
+    by a test that was killed. The addresses are of 198.18.0.0/15, which RFC 2544 keeps for tests.
+    """
+    number = os.getpid() % 256
+    cables = [(f"platen{os.getpid()}{end}", f"198.{18 + k}.{number}.1", f"198.{18 + k}.{number}.2") for k, end in enumerate("ab")]
+    run = lambda *command: subprocess.run(command, check=True, capture_output=True)
+    driver = subprocess.Popen(["setpriv", "--pdeathsig", "KILL", "unshare", "--net", "--pid", "--fork", "--kill-child", "--mount-proc", "sh", "-c",
+                               "read _ && exec chromedriver --port=9515 --allowed-ips= '--allowed-origins=*'"],
+                              stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    try:
+        net = lambda pid: os.readlink(f"/proc/{pid}/ns/net")
+        wait("a network namespace", lambda: net(driver.pid) != net("self"))
+        inside = ["nsenter", "--net", "--target", str(driver.pid), "ip"]
+        run(*inside, "link", "set", "lo", "up")
+        for name, ours, its in cables:
+            run("ip", "link", "add", name, "type", "veth", "peer", "name", f"{name}2", "netns", str(driver.pid))
+            run("ip", "addr", "add", f"{ours}/24", "dev", name)
+            run("ip", "link", "set", name, "up")
+            run(*inside, "addr", "add", f"{its}/24", "dev", f"{name}2")
+            run(*inside, "link", "set", f"{name}2", "up")
+        driver.stdin.write(b"\n")
+        driver.stdin.close()
+        yield cables
+    finally:
+        driver.kill()
+        driver.wait()
+
+
 def check_a_cut_cable_leaves_no_result(_):
     """Host and browser in two network namespaces: the cable between them is cut, and put back."""
-    run = lambda *command: subprocess.run(command, check=True, capture_output=True)
-    name = f"platen{time.time_ns() % 10000}"
-    run("ip", "netns", "add", name)
-    try:
-        # One cable for the page, one for the browser's driver.
-        for cable, net in [("a", "10.213.1"), ("b", "10.213.2")]:
-            run("ip", "link", "add", f"{name}{cable}", "type", "veth", "peer", "name", f"{name}{cable}2", "netns", name)
-            run("ip", "addr", "add", f"{net}.1/24", "dev", f"{name}{cable}")
-            run("ip", "link", "set", f"{name}{cable}", "up")
-            run("ip", "netns", "exec", name, "ip", "addr", "add", f"{net}.2/24", "dev", f"{name}{cable}2")
-            run("ip", "netns", "exec", name, "ip", "link", "set", f"{name}{cable}2", "up")
-        run("ip", "netns", "exec", name, "ip", "link", "set", "lo", "up")
-        with tempfile.TemporaryDirectory() as folder:
-            token = Path(folder) / "token"
-            run(BIN / "platen", "screen", "token", token)
-            driver = subprocess.Popen(["ip", "netns", "exec", name, "chromedriver", "--port=9515", "--allowed-ips=", "--allowed-origins=*"], stdout=subprocess.DEVNULL)
+    # One cable for the page, one for the browser's driver.
+    with driver_in_a_namespace_of_its_own() as [(cable, ours, _), (_, _, driver)], tempfile.TemporaryDirectory() as folder:
+        token = Path(folder) / "token"
+        subprocess.run([BIN / "platen", "screen", "token", token], check=True, capture_output=True)
+        with cell(strokes=2, listen=ours, more=f'token_file = "{token}"\n') as (press, host):
+            wait("driver", lambda: socket.socket().connect_ex((driver, 9515)) == 0, 20)
+            browser = chromium(driver=f"http://{driver}:9515")
             try:
-                with cell(strokes=2, listen="10.213.1.1", more=f'token_file = "{token}"\n') as (press, host):
-                    wait("driver", lambda: socket.socket().connect_ex(("10.213.2.2", 9515)) == 0, 20)
-                    browser = chromium(driver="http://10.213.2.2:9515")
-                    try:
-                        opened(browser, host, f"/?token={token.read_text().strip()}")
-                        assert "token" not in browser.current_url
-                        took = gone_after(browser, lambda: run("ip", "link", "set", f"{name}a", "down"), 2.0)
-                        run("ip", "link", "set", f"{name}a", "up")
-                        _, back = wait("the result is back", lambda: shown(browser)["gap"], 30)
-                        said(f"cable cut: gone after {took:.2f} s; put back: shown again after {back:.2f} s")
-                    finally:
-                        browser.quit()
+                opened(browser, host, f"/?token={token.read_text().strip()}")
+                assert "token" not in browser.current_url
+                link = lambda state: subprocess.run(["ip", "link", "set", cable, state], check=True)
+                took = gone_after(browser, lambda: link("down"), 2.0)
+                link("up")
+                _, back = wait("the result is back", lambda: shown(browser)["gap"], 30)
+                said(f"cable cut: gone after {took:.2f} s; put back: shown again after {back:.2f} s")
             finally:
-                driver.terminate()
-                driver.wait()
-    finally:
-        run("ip", "netns", "del", name)
+                browser.quit()
 
 
 def check_everybody_can_read_it(browser):
