@@ -130,7 +130,8 @@ fn errors(
     // Without a calibration the instrument's own figure.
     let own = || ScannerError::known(RangeError::new(shot.header.range_error_m.unwrap_or(0.0)), surface);
     let scanner = calibration.map_or_else(own, |of| ScannerError::calibrated(of, surface));
-    let mut errors = Errors::of(&measurement, &seen.outline, &shot.truth, scanner.range());
+    let mut errors =
+        Errors::of(&measurement, &seen.outline, &shot.truth, shot.spec.face_inset, scanner.range());
     errors.stated.extend(laid_template::errors(template, scene, shot, surface, &scanner)?);
     Ok(errors)
 }

@@ -335,7 +335,7 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
 pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
     let surface = &measured.measurement.surface;
     let ordered = Blank::rectangle(plate.plate.width, plate.plate.height);
-    let cut = measured.blank.as_ref().unwrap_or(&ordered).edge_lengths();
+    let cut = measured.blank.as_ref().unwrap_or(&ordered).face_edge_lengths(plate.plate.face_inset);
     edge_doubts(&ShapeChecks::new(&measured.outline, surface, RangeError::default()), surface, cut)
 }
 

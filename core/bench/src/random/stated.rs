@@ -101,6 +101,7 @@ impl Errors {
         measurement: &Measurement,
         outline: &Outline,
         truth: &Truth,
+        face_inset: f64,
         range_error: RangeError,
     ) -> Self {
         let surface = &measurement.surface;
@@ -153,7 +154,7 @@ impl Errors {
         checks(Kind::Diagonal, &found.diagonals, &known.diagonals);
         checks(Kind::Angle, &found.angles, &known.angles);
         checks(Kind::Twist, &found.twist, &known.twist);
-        let doubts = edge_doubts(&found, surface, Blank::rectangle(w, h).edge_lengths());
+        let doubts = edge_doubts(&found, surface, Blank::rectangle(w, h).face_edge_lengths(face_inset));
         Self { stated, corner, marker, corners_seen: corners_seen(outline, &doubts) }
     }
 

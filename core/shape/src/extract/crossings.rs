@@ -57,7 +57,7 @@ pub(super) fn find(scene: &Scene, number: impl Fn(usize) -> u32) -> (Vec<Crossin
                 continue;
             }
             let tile = LocalQuadric::tile(window, index);
-            let fit = fits.entry(tile).or_insert_with(|| LocalQuadric::fit(window, face, tile));
+            let fit = fits.entry(tile).or_insert_with(|| LocalQuadric::fit(window, scene.noise, face, tile));
             let crossing = fit.as_ref().and_then(|fit| {
                 let end = scene.end_of_face(fit, index, step)?;
                 scene.crossing(fit, index, step, end, number(index))

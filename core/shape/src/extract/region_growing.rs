@@ -113,7 +113,7 @@ pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec
         }
         ring.clear();
         for (tile, cells) in &by_tile {
-            if let Some(fit) = LocalQuadric::fit(window, &trusted, *tile) {
+            if let Some(fit) = LocalQuadric::fit(window, noise, &trusted, *tile) {
                 let judgement = judge(window, noise, &fit, cells);
                 ring.extend(judgement.continuing);
                 judgement.open.into_iter().for_each(|cell| judged[cell] = false);

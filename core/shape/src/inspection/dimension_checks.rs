@@ -45,7 +45,8 @@ pub struct Check {
 pub struct EdgeCheck {
     /// A tape laid along the edge of the scanned face, metres.
     pub face: Check,
-    /// The same on the mid-surface, which bending does not stretch: to be held against the cut size, metres.
+    /// The same on the mid-surface, which bending does not stretch: to be held against the cut size, of a bevelled plate less the face's inset
+    /// at both ends, metres.
     pub mid: Check,
     /// Straight from corner to corner, metres.
     pub chord: Check,

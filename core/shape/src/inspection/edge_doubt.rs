@@ -24,7 +24,7 @@ pub struct EdgeDoubt {
     pub length: f64,
     /// See `length`.
     pub sigma: f64,
-    /// Length that was cut.
+    /// Length that was cut, less the insets of bevels at both ends.
     pub cut: f64,
 }
 
@@ -35,7 +35,8 @@ impl EdgeDoubt {
     }
 }
 
-/// Returns the edges whose lengths differ from those that were cut, metres, by more than is explained.
+/// Returns the edges whose lengths differ from those that were cut ([`Blank::face_edge_lengths`](crate::Blank::face_edge_lengths)), metres,
+/// by more than is explained.
 ///
 /// A plate of Gaussian curvature K and sides a and b is strained in its plane by about K b^2 / 24 along the edges of length a
 /// (least membrane energy; Timoshenko, Woinowsky-Krieger, "Theory of plates and shells", compatibility of strains); as much is
@@ -87,6 +88,14 @@ mod tests {
         assert_eq!(doubtful([1.9, -2.1, 0.0, 2.1], 0.0), [1, 3]);
         // A sphere of R 11 m: edges of 3 m may be 6.5 mm shorter.
         assert_eq!(doubtful([-8.4, 0.0, -8.6, 0.0], 1.0 / 121.0), [2]);
+    }
+
+    #[test]
+    fn the_face_of_a_bevelled_plate_is_smaller_than_the_plate_and_not_in_doubt() {
+        let blank = crate::Blank::rectangle(3.0, 2.5);
+        let edges = [2.982, 2.482, 2.982, 2.482].map(|value| Check { value, sigma: 2e-4, seen: true });
+        assert!(unexplained(edges, 0.0, [3.0, 2.5], blank.face_edge_lengths(9e-3)).is_empty());
+        assert_eq!(unexplained(edges, 0.0, [3.0, 2.5], blank.edge_lengths()).len(), 4);
     }
 
     #[test]

@@ -33,12 +33,12 @@ pub enum OutlineError {
     /// A side comes out wrong where an edge beside it is hidden.
     #[error(
         "{seen_percent:.0} % of one edge of the plate is seen, too little to measure the plate's {side}: it comes out at \
-         {found_mm:.0} mm, {expected_mm:.0} mm in the plate file; clear what hides it, or tilt it where it mirrors the beam"
+         {found_mm:.0} mm, {expected_mm:.0} mm by the plate file; clear what hides it, or tilt it where it mirrors the beam"
     )]
     Hidden { seen_percent: f64, side: &'static str, found_mm: f64, expected_mm: f64 },
     /// A side differs from the plate file.
     #[error(
-        "the plate's {side} measures {found_mm:.0} mm on its mid-surface, {expected_mm:.0} mm in the plate file; check \
+        "the plate's {side} measures {found_mm:.0} mm on its mid-surface, {expected_mm:.0} mm by the plate file; check \
          the recipe and the u axis hint"
     )]
     WrongSize { side: &'static str, found_mm: f64, expected_mm: f64 },

@@ -50,6 +50,12 @@ impl Blank {
         [(0, 1), (1, 2), (2, 3), (3, 0)].map(|(a, b)| self.distance(a, b))
     }
 
+    /// Returns the lengths of the scanned face's edges on the flat plate: those of a bevelled one are `inset` shorter at both ends, metres.
+    #[must_use]
+    pub fn face_edge_lengths(&self, inset: f64) -> [f64; 4] {
+        self.edge_lengths().map(|length| length - 2.0 * inset)
+    }
+
     /// Returns the mean lengths of opposite edges, straight from corner to corner: along u, along v, metres.
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
