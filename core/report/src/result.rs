@@ -250,6 +250,7 @@ impl ResultRecord {
             says: sentences(context.reports)
                 .into_iter()
                 .chain(doubts.iter().map(doubt_sentence))
+                .chain(bevel_sentence(context.plate.plate.face_inset))
                 .chain(context.assumption.map(str::to_owned))
                 .collect(),
             supports: context.plate.plate.supports.clone(),
@@ -337,6 +338,16 @@ pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
     let ordered = Blank::rectangle(plate.plate.width, plate.plate.height);
     let cut = measured.blank.as_ref().unwrap_or(&ordered).face_edge_lengths(plate.plate.face_inset);
     edge_doubts(&ShapeChecks::new(&measured.outline, surface, RangeError::default()), surface, cut)
+}
+
+/// Says which lengths are those of a bevelled plate, `None` where its edges are square.
+fn bevel_sentence(face_inset: f64) -> Option<String> {
+    (face_inset > 0.0).then(|| {
+        format!(
+            "bevelled edges: edges, diagonals and angles are those of the scanned face, {:.1} mm inside of the plate's edges",
+            mm(face_inset)
+        )
+    })
 }
 
 fn doubt_sentence(doubt: &EdgeDoubt) -> String {
