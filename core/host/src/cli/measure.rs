@@ -187,11 +187,16 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     ))
 }
 
+/// Whole millimetres, 0 without a sign.
+fn millimetres(x: f64) -> String {
+    format!("{:.0}", x.round() + 0.0)
+}
+
 fn row(name: &str, u: f64, v: f64, [x, y, z]: &[f64; 3], uncertainty: Option<f64>) -> Vec<String> {
     vec![
         name.to_owned(),
-        format!("{u:.0}"),
-        format!("{v:.0}"),
+        millimetres(u),
+        millimetres(v),
         format!("{x:.4}"),
         format!("{y:.4}"),
         format!("{z:.4}"),
