@@ -219,10 +219,8 @@ fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result
 
 /// Compares the lengths of the mid-surface's edges with the plate file.
 fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
-    for (k, (side, size)) in
-        [("width", spec.width), ("height", spec.height)].into_iter().cycle().take(4).enumerate()
-    {
-        let expected = size - 2.0 * spec.face_inset;
+    let cut = spec.rectangle().face_edge_lengths(spec.face_inset);
+    for (k, (side, expected)) in ["width", "height"].into_iter().cycle().zip(cut).enumerate() {
         let found = edges[k].length_below(0.5 * spec.thickness);
         if (found - expected).abs() > SIZE_TOLERANCE * expected {
             let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);

@@ -3,7 +3,8 @@
 //!
 //! In space, not over the lattice: a bent plate is a quadratic there however obliquely it is seen and however far apart
 //! its samples are, while the range along a row grows without bound towards the horizon of a bend. Noise along the
-//! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit.
+//! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit. The second order is regularised (ridge) by
+//! a normal prior of the curvature: a crease is no part of a plate.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 use platen_numerics::simd::dispatch_simd;
