@@ -55,7 +55,7 @@ use connected_components::{Components, Run};
 use continuity::Continuity;
 pub(crate) use mixed_pixels::DETECTION_LIMIT;
 use occlusion::FacePiece;
-pub use patch::{Beyond, Crossing, Patch, PlaneBehind, Sample};
+pub use patch::{Beyond, Crossing, MixedPixels, Patch, PlaneBehind, PlaneSet, Sample};
 pub use refusal::Refusal;
 use segmented_component::SegmentedComponent;
 

@@ -51,7 +51,7 @@ pub mod template_seat;
 #[cfg(feature = "measure")]
 pub use correspondence::{BlankError, Reorientation, reorientation};
 #[cfg(feature = "measure")]
-pub use extract::{Beyond, Crossing, Patch, PlaneBehind, Sample};
+pub use extract::{Beyond, Crossing, MixedPixels, Patch, PlaneBehind, PlaneSet, Sample};
 #[cfg(feature = "measure")]
 pub use flatten::{Chart, Flatten, FlattenError};
 #[cfg(feature = "measure")]

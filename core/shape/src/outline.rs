@@ -11,6 +11,7 @@
 //! | `projected_crossing` | crossings moved along their beams onto that height field | own |
 //! | `developed_strip` | each edge's surroundings developed into the plane | own |
 //! | `lattice_line` | one lattice line across an edge as an observation: interval, mixed pixels, side face | own |
+//! | `background_strip` | lattice lines beside a strip of background narrower than a beam | own |
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
@@ -23,6 +24,7 @@
 //! to the boundary samples themselves, which lie up to a lattice step inside the plate; this module locates the edge
 //! between the samples. Limits: four smooth edges meeting at 60 to 120 degrees, no hole that reaches an edge.
 
+mod background_strip;
 mod boundary_loop;
 mod contrast;
 mod corners;
@@ -142,12 +144,12 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * visible.step;
-        let crossings: Vec<ProjectedCrossing> = visible
+        let crossings = visible
             .between(corners[k].at, corners[(k + 1) % 4].at)
             .filter_map(|crossing| ProjectedCrossing::of(crossing, patch, &height_field))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
-        EdgeData::new(&crossings, [from, to], spec.thickness, side_face, sampling)
+        EdgeData::new(crossings, [from, to], spec.thickness, side_face, sampling)
     };
     let [a, b, c, d] = of_each(side);
     let mut edges = edge::fit_all([a?, b?, c?, d?], sampling)?;

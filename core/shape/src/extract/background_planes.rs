@@ -17,7 +17,7 @@ use nalgebra::{Cholesky, Const, Matrix3};
 use platen_numerics::random::Random;
 
 use super::mixed_pixels::{Pixel, STEEPEST};
-use super::patch::PlaneBehind;
+use super::patch::{PlaneBehind, PlaneSet};
 use super::range_noise::Noise;
 use super::window::Window;
 use crate::Vec3;
@@ -37,6 +37,9 @@ const NEAR: usize = 32;
 const BOUND: f64 = 5.0;
 const MOST_LEVERAGE: f64 = 9.0;
 
+/// Largest scatter of the cells on a plane that is flat, in the standard deviation of a cell.
+const MOST_SCATTER: f64 = 1.5;
+
 /// Largest cosine of the incidence of a plane that no scanner sees: a row of a round wall lies in a plane through the scanner, too.
 const EDGE_ON: f64 = 0.1;
 
@@ -47,24 +50,40 @@ const FAR: usize = 12;
 /// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
 const FEW: usize = 20;
 
-/// Planes of the background by cell.
+/// Planes of the background and the cells on them.
 #[derive(Debug, Clone)]
-pub(super) struct PlaneOfCell {
+pub(super) struct Background {
+    planes: Vec<BackgroundPlane>,
     numbers: Vec<Option<u8>>,
-    /// Of each plane from the scanner, metres.
-    distances: Vec<f64>,
 }
 
-impl PlaneOfCell {
+impl Background {
     /// Returns the plane that holds a cell.
     pub(super) fn at(&self, index: usize) -> Option<PlaneBehind> {
         let number = self.numbers[index]?;
-        Some(PlaneBehind { number, distance: self.distances[usize::from(number)] as f32 })
+        let vector = self.planes[usize::from(number)].vector;
+        Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32 })
+    }
+
+    /// Returns the flat planes, if they reach so far, that are in front of a cell of the background and behind a place on the beam of another.
+    pub(super) fn between(&self, place: &BackgroundCell, behind: &BackgroundCell) -> PlaneSet {
+        let is_between = |plane: &BackgroundPlane| {
+            plane.scatter < MOST_SCATTER && plane.depth(place) < -BOUND && plane.depth(behind) > BOUND
+        };
+        let numbers =
+            (0..).zip(&self.planes).filter(|(_, plane)| is_between(plane)).map(|(number, _)| number);
+        numbers.map(PlaneSet::of).fold(PlaneSet::default(), PlaneSet::union)
+    }
+
+    /// Returns true when a cell is behind one of these planes.
+    pub(super) fn is_behind(&self, planes: PlaneSet, cell: &BackgroundCell) -> bool {
+        let mut numbered = (0..).zip(&self.planes);
+        numbered.any(|(number, plane)| planes.contains(number) && plane.depth(cell) > BOUND)
     }
 }
 
 /// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound. Returns the planes by cell.
-pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -> PlaneOfCell {
+pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -> Background {
     let off = off_component(window, pixels);
     let cell = |index: usize| BackgroundCell::of(window, noise, index);
     let of = |class: Pixel| -> Vec<BackgroundCell> {
@@ -97,7 +116,7 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -
     };
     let strip: Vec<usize> = off.iter().copied().filter(is_strip).collect();
     strip.into_iter().for_each(|index| pixels[index] = Pixel::Sound);
-    PlaneOfCell { numbers: on, distances: planes.iter().map(|plane| 1.0 / plane.vector.norm()).collect() }
+    Background { planes, numbers: on }
 }
 
 /// Returns the mixed pixels that are alone on a plane which holds few of them.
@@ -162,7 +181,7 @@ fn any_within(
 
 /// A measured cell off the component, as an observation of a plane.
 #[derive(Debug, Clone, Copy)]
-struct BackgroundCell {
+pub(super) struct BackgroundCell {
     direction: Vec3,
     /// Inverse range, 1/m, and its standard deviation.
     inverse: f64,
@@ -170,10 +189,15 @@ struct BackgroundCell {
 }
 
 impl BackgroundCell {
-    fn of(window: &Window, noise: &Noise, index: usize) -> Self {
+    pub(super) fn of(window: &Window, noise: &Noise, index: usize) -> Self {
         let inverse = f64::from(window.inverse[index]);
         let sigma = f64::from(noise.at(index)) * inverse * inverse;
         Self { direction: Vec3::from(window.points[index]) * inverse, inverse, sigma }
+    }
+
+    /// Returns the cell with another range, metres.
+    pub(super) fn at(self, range: f64) -> Self {
+        Self { inverse: 1.0 / range, ..self }
     }
 
     /// Returns true when the plane of this vector holds the cell.
@@ -215,11 +239,13 @@ impl BackgroundPlane {
 
     /// Returns true when a cell is on the plane and the plane is known well enough there.
     fn holds(&self, cell: &BackgroundCell) -> bool {
+        self.leverage(cell) <= MOST_LEVERAGE && self.depth(cell).abs() <= BOUND
+    }
+
+    /// Returns the variance of the plane at a cell, in that of the cell.
+    fn leverage(&self, cell: &BackgroundCell) -> f64 {
         let row = cell.direction / cell.sigma;
-        let leverage = row.dot(&self.information.solve(&row)) * self.scatter * self.scatter;
-        leverage <= MOST_LEVERAGE
-            && (cell.inverse - self.vector.dot(&cell.direction)).abs()
-                <= BOUND * cell.sigma * (self.scatter * self.scatter + leverage).sqrt()
+        row.dot(&self.information.solve(&row)) * self.scatter * self.scatter
     }
 
     /// Returns the cosine of the incidence on the plane at a cell on it.
@@ -227,9 +253,10 @@ impl BackgroundPlane {
         cell.inverse / self.vector.norm()
     }
 
-    /// Returns how far a cell is behind the plane, in standard deviations.
+    /// Returns how far a cell is behind the plane, in standard deviations of both.
     fn depth(&self, cell: &BackgroundCell) -> f64 {
-        (self.vector.dot(&cell.direction) - cell.inverse) / (cell.sigma * self.scatter)
+        let sigma = cell.sigma * (self.scatter * self.scatter + self.leverage(cell)).sqrt();
+        (self.vector.dot(&cell.direction) - cell.inverse) / sigma
     }
 }
 

@@ -8,12 +8,13 @@
 
 use std::collections::BTreeMap;
 
-use super::background_planes::PlaneOfCell;
+use super::background_planes::{Background, BackgroundCell};
 use super::local_quadric::LocalQuadric;
 use super::mixed_pixels::{DETECTION_LIMIT, Pixel};
-use super::patch::{Beyond, Crossing};
+use super::patch::{Beyond, Crossing, MixedPixels, PlaneSet};
 use super::range_noise::Noise;
 use super::window::Window;
+use crate::Vec3;
 
 /// Widest gap along a row or a column behind which the face may go on, cells.
 const WIDEST_GAP: usize = 48;
@@ -84,13 +85,31 @@ enum End {
     Nothing,
 }
 
+/// A mixed pixel beside the face.
+struct MixedCell {
+    cell: BackgroundCell,
+    /// Where its beam meets the continuation of the face.
+    on_face: Vec3,
+    /// Its range minus that of the continuation, metres.
+    excess: f32,
+}
+
+impl MixedCell {
+    /// Joins the mixed pixels of a row or a column, the nearest to the face first.
+    fn joined<'a>(mut pixels: impl DoubleEndedIterator<Item = &'a Self>) -> Option<MixedPixels> {
+        let near = pixels.next()?;
+        let far = pixels.next_back().unwrap_or(near);
+        Some(MixedPixels { ends: [near.on_face, far.on_face], excess: near.excess })
+    }
+}
+
 /// A face and what is beside it, cell by cell.
 pub(super) struct Scene<'a> {
     pub(super) window: &'a Window,
     pub(super) noise: &'a Noise,
     pub(super) face: &'a [bool],
     pub(super) pixels: &'a [Pixel],
-    pub(super) background: &'a PlaneOfCell,
+    pub(super) background: &'a Background,
     /// Depth of the upper flank of a bevelled edge, metres.
     pub(super) flank_depth: Option<f64>,
 }
@@ -156,15 +175,19 @@ impl Scene<'_> {
                 beyond = Beyond::SideFace;
             }
         }
-        let between = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
-        let mixed = between.clone().filter(|(_, at)| self.pixels[*at] == Pixel::Mixed);
-        let (mixed, mixed_excess) = match (mixed.clone().next(), mixed.clone().next_back()) {
-            (Some((near, at)), Some((far, _))) => (
-                Some([on_face(near as f64)?.point, on_face(far as f64)?.point]),
-                self.excess(fit, at, near.min(FIT_FAR), index, step)?,
-            ),
-            _ => (None, 0.0),
+        let cells = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
+        let mixed: Vec<MixedCell> = cells
+            .clone()
+            .filter(|(_, at)| self.pixels[*at] == Pixel::Mixed)
+            .map(|(far, at)| self.mixed_cell(fit, at, far, index, step))
+            .collect::<Option<_>>()?;
+        let end = measured.map(|end| BackgroundCell::of(self.window, self.noise, end));
+        let between = |pixel: &MixedCell| {
+            let face = pixel.cell.at(pixel.on_face.norm());
+            end.as_ref().map_or(PlaneSet::default(), |end| self.background.between(&face, end))
         };
+        let strips = mixed.iter().map(between).fold(PlaneSet::default(), PlaneSet::union);
+        let is_sure = |pixel: &&MixedCell| !self.background.is_behind(strips, &pixel.cell);
         let (inside, outside) = (on_face(from)?, on_face(to)?);
         let crossing = Crossing {
             sample,
@@ -173,14 +196,33 @@ impl Scene<'_> {
             inside: inside.point,
             outside: outside.point,
             normal: inside.normal,
-            mixed,
-            mixed_excess: mixed_excess as f32,
-            complete: between.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
+            mixed: MixedCell::joined(mixed.iter()),
+            surely_mixed: MixedCell::joined(mixed.iter().filter(is_sure)),
+            strips,
+            complete: cells.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
             background: measured.and_then(|at| self.background.at(at)),
             beyond,
         };
         Some((crossing, cut))
+    }
+
+    /// Returns the mixed pixel `at`, `far` steps from `index`.
+    fn mixed_cell(
+        &self,
+        fit: &LocalQuadric,
+        at: usize,
+        far: usize,
+        index: usize,
+        step: (isize, isize),
+    ) -> Option<MixedCell> {
+        let (x, y) = self.window.place_of(index);
+        let on_face = fit.at(self.window, x + far as f64 * step.0 as f64, y + far as f64 * step.1 as f64)?;
+        Some(MixedCell {
+            cell: BackgroundCell::of(self.window, self.noise, at),
+            on_face: on_face.point,
+            excess: self.excess(fit, at, far.min(FIT_FAR), index, step)? as f32,
+        })
     }
 
     /// Returns the range of the cell `at` behind the face's continuation `far` steps from `index`.

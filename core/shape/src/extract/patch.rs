@@ -39,6 +39,45 @@ pub struct PlaneBehind {
     pub distance: f32,
 }
 
+/// A set of planes of the background.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PlaneSet(u8);
+
+impl PlaneSet {
+    /// Returns the set of one plane, given by its number.
+    #[must_use]
+    pub fn of(number: u8) -> Self {
+        Self(1_u8.checked_shl(number.into()).unwrap_or(0))
+    }
+
+    /// Returns the planes of either set.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Returns true when a plane is in the set.
+    #[must_use]
+    pub fn contains(self, number: u8) -> bool {
+        self.0 & Self::of(number).0 != 0
+    }
+
+    /// Returns true when no plane is in the set.
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// Mixed pixels along a row or a column: their beams straddle the end of the face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MixedPixels {
+    /// The nearest and the farthest of them, metres, scanner frame, on the continuation of the smoothed face.
+    pub ends: [Vec3; 2],
+    /// Range of the nearest minus that of the continuation there, metres.
+    pub excess: f32,
+}
+
 /// Crossing of a row or a column of the lattice with the boundary of the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
@@ -54,10 +93,13 @@ pub struct Crossing {
     pub outside: Vec3,
     /// Unit normal of the face towards the scanner.
     pub normal: Vec3,
-    /// The nearest and the farthest mixed pixel between them: their beams straddle the end of the face.
-    pub mixed: Option<[Vec3; 2]>,
-    /// Range of the nearest of them minus that of the face's continuation there, metres; 0 without one.
-    pub mixed_excess: f32,
+    /// Mixed pixels between them.
+    pub mixed: Option<MixedPixels>,
+    /// Those of them in front of all planes of `strips`: they see the plate, whatever else they see.
+    pub surely_mixed: Option<MixedPixels>,
+    /// Planes of the background between the face and the cell at `outside` that the beams of the mixed pixels meet, if they reach so far:
+    /// a strip of them may show here.
+    pub strips: PlaneSet,
     /// True when every cell between them was measured: none but those is mixed.
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.

@@ -1,6 +1,6 @@
 //! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
 
-use super::background_planes::{self, PlaneOfCell};
+use super::background_planes::{self, Background};
 use super::continuity::Continuity;
 use super::faces::{self, Face};
 use super::mixed_pixels::{self, Pixel};
@@ -17,7 +17,7 @@ pub(super) struct SegmentedComponent {
     pub(super) window: Window,
     pub(super) noise: Noise,
     pub(super) pixels: Vec<Pixel>,
-    pub(super) background: PlaneOfCell,
+    pub(super) background: Background,
     /// Cells on each side over which the normals' slopes are taken.
     pub(super) slope_reach: usize,
     pub(super) normals: Vec<Normal>,

@@ -224,7 +224,7 @@ fn shortest_path(
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::extract::Crossing;
+    use crate::extract::{Crossing, PlaneSet};
 
     fn patch(cells: impl Iterator<Item = (u32, u32)>) -> Patch {
         let sample = |(column, row)| Sample { point: Vec3::zeros(), column, row, sigma: 1e-3, intensity: 0 };
@@ -269,7 +269,8 @@ mod tests {
                     cells: 1,
                     mixed: None,
                     complete: true,
-                    mixed_excess: 0.0,
+                    surely_mixed: None,
+                    strips: PlaneSet::default(),
                     excess: 0.0,
                     background: None,
                     beyond,

@@ -182,14 +182,13 @@ impl Mixing {
         let [on_face, on_plane] = [on_face, on_plane].map(|cosine| cosine.max(LEAST_COSINE));
         let limit = (DETECTION_LIMIT * noise / jump).min(MOST_LIMIT);
         let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
-        let background = f64::from(crossing.mixed_excess) / jump;
-        let is_between = background > 0.0 && background < 1.0;
+        let single = crossing.mixed.filter(|pixels| is_single(pixels.ends));
+        let part = single.map(|pixels| f64::from(pixels.excess) / jump);
         Some(Self {
             plane: usize::from(plane.number),
             by_geometry: (on_plane / on_face).ln() - 2.0 * (1.0 + jump / range).ln(),
             most_odds: ((1.0 - limit) / limit).ln(),
-            odds: (crossing.mixed.is_some_and(is_single) && is_between)
-                .then(|| (background / (1.0 - background)).ln()),
+            odds: part.filter(|part| *part > 0.0 && *part < 1.0).map(|part| (part / (1.0 - part)).ln()),
         })
     }
 
@@ -240,7 +239,7 @@ mod tests {
     use platen_numerics::normal_distribution::cdf;
 
     use super::*;
-    use crate::extract::PlaneBehind;
+    use crate::extract::{MixedPixels, PlaneBehind, PlaneSet};
 
     const JUMP: f64 = 2.0;
     const RANGE: f64 = 8.0;
@@ -255,8 +254,9 @@ mod tests {
             inside: at(5e-3),
             outside: at(-5e-3),
             normal: Vec3::z(),
-            mixed: Some([at(0.0); 2]),
-            mixed_excess: (background * JUMP) as f32,
+            mixed: Some(MixedPixels { ends: [at(0.0); 2], excess: (background * JUMP) as f32 }),
+            surely_mixed: None,
+            strips: PlaneSet::default(),
             complete: true,
             excess: JUMP as f32,
             background: Some(PlaneBehind { number: 2, distance: (RANGE + JUMP) as f32 }),
@@ -360,6 +360,7 @@ mod tests {
         assert!(tells(known));
         assert!(!tells(crossing(1.01)));
         assert!(!tells(Crossing { mixed: None, ..known }));
-        assert!(!tells(Crossing { mixed: Some([known.inside, known.outside]), ..known }));
+        let several = MixedPixels { ends: [known.inside, known.outside], excess: 0.5 };
+        assert!(!tells(Crossing { mixed: Some(several), ..known }));
     }
 }

@@ -11,6 +11,7 @@ use nalgebra::{Cholesky, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
 use platen_numerics::uniform_knots::UniformKnots;
 
+use super::background_strip;
 use super::contrast::{self, ContrastDistribution, Contrasts};
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
@@ -60,6 +61,7 @@ const ROUNDS: usize = 3;
 pub(super) struct EdgeData {
     strip: DevelopedStrip,
     side_face: SideFace,
+    crossings: Vec<ProjectedCrossing>,
     lines: Vec<LatticeLine>,
     dithered: bool,
     from: Vec3,
@@ -72,45 +74,57 @@ impl EdgeData {
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
     pub(super) fn new(
-        crossings: &[ProjectedCrossing],
+        crossings: Vec<ProjectedCrossing>,
         [from, to]: [Vec3; 2],
         thickness: f64,
         side_face: SideFace,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
-        let strip = DevelopedStrip::new(crossings, [from, to], 0.5 * thickness, sampling)?;
+        let strip = DevelopedStrip::new(&crossings, [from, to], 0.5 * thickness, sampling)?;
         let line = |crossing| LatticeLine::new(&strip, crossing, &side_face, sampling);
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
-        Ok(Self { strip, side_face, lines, dithered, from, to })
+        Ok(Self { strip, side_face, crossings, lines, dithered, from, to })
+    }
+
+    /// Takes lines, given by their numbers, as beside a strip of background narrower than a beam.
+    fn take_for_strip(&mut self, lines: impl IntoIterator<Item = usize>, sampling: Sampling) {
+        for at in lines {
+            let crossing = self.crossings[at].beside_strip();
+            self.lines[at] = LatticeLine::new(&self.strip, &crossing, &self.side_face, sampling);
+        }
     }
 }
 
 /// Fits the four edges, those that show the beam first and then all of them.
 ///
 /// - Half the angle that a beam sees is counted from the mixed pixels, then estimated at each edge that shows it; their mean is what all start from in the second fit.
-///   It is the scanner's, not the edge's: cells of a narrow background that pass for mixed pixels make one edge show far more than the others, and that edge
-///   takes theirs.
+///   It is the scanner's, not the edge's: an edge that shows far more than the others has a strip of background beside it whose far edge mixes the beams, too.
+///   It takes the footprint of the others, and only those mixed pixels that surely see the plate.
 /// - Each edge is fitted again with what the others tell of the contrasts.
 ///
 /// # Errors
 /// [`OutlineError::Edge`] when too little of one is seen.
-pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
+pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
+    let shown = background_strip::shown(edges.each_ref().map(|edge| edge.lines.as_slice()));
+    edges.iter_mut().zip(shown).for_each(|(edge, lines)| edge.take_for_strip(lines, sampling));
     // Along an edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
     let any = edges.iter().any(|edge| edge.dithered);
     let counting: Vec<&[LatticeLine]> =
         edges.iter().filter(|edge| edge.dithered || !any).map(|edge| edge.lines.as_slice()).collect();
     let counted = footprint::counted(&counting, sampling.angle);
     let showing = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
-    let fit = |k: usize, footprint, own, known: &ContrastDistribution| {
-        Edge::fit(edges[k].clone(), footprint, own, known, sampling)
+    let fit = |data: &EdgeData, footprint, own, known: &ContrastDistribution| {
+        Edge::fit(data.clone(), footprint, own, known, sampling)
     };
-    let [a, b, c, d] =
-        of_each(|k| showing[k].then(|| fit(k, counted, true, &ContrastDistribution::PRIOR)).transpose());
+    let prior = &ContrastDistribution::PRIOR;
+    let [a, b, c, d] = of_each(|k| showing[k].then(|| fit(&edges[k], counted, true, prior)).transpose());
     let mut first = [a?, b?, c?, d?];
     let most = footprint::most_of_an_edge(first.iter().flatten().map(|edge| edge.footprint));
-    for edge in &mut first {
-        edge.take_if(|edge| edge.footprint > most);
+    for (edge, data) in first.iter_mut().zip(&mut edges) {
+        if edge.take_if(|edge| edge.footprint > most).is_some() {
+            data.take_for_strip(0..data.lines.len(), sampling);
+        }
     }
     let found: Vec<f64> = first.iter().flatten().map(|edge| edge.footprint).collect();
     let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
@@ -119,7 +133,7 @@ pub(super) fn fit_all(edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge;
         let told =
             ContrastDistribution::told_by(others.filter_map(|(_, edge)| Some(&edge.as_ref()?.contrasts)));
         let own = first[k].is_some() || !showing[k];
-        fit(k, common, own, &told)
+        fit(&edges[k], common, own, &told)
     });
     Ok([a?, b?, c?, d?])
 }
@@ -165,7 +179,7 @@ impl Edge {
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let step = sampling.step;
-        let EdgeData { strip, side_face, lines, dithered, from, to } = data;
+        let EdgeData { strip, side_face, lines, dithered, from, to, .. } = data;
         let (start, end) = strip.span();
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);

@@ -24,7 +24,7 @@ use super::height_field::LEAST_COSINE;
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
 use crate::Vec3;
-use crate::extract::Beyond;
+use crate::extract::{Beyond, PlaneSet};
 
 /// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
@@ -91,6 +91,9 @@ pub(super) struct LatticeLine {
     pub(super) high: f64,
     /// Lowest and highest mixed pixel.
     pub(super) mixed: Option<(f64, f64)>,
+    /// Planes of the background of which a strip may show here, and the one that shows beyond.
+    pub(super) strips: PlaneSet,
+    pub(super) background: Option<u8>,
     /// Mixing of the plate with a plane of the background; where the side face is seen, of its silhouette, which does not tell the edge of the face.
     mixing: Option<Mixing>,
     complete: bool,
@@ -125,14 +128,14 @@ impl LatticeLine {
     ) -> Self {
         let crossing = &settled.crossing;
         let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
-        let mixed = crossing.mixed.map(|ends| ends.map(|p| strip.flatten(p).y));
+        let mixed = crossing.mixed.map(|pixels| pixels.ends.map(|p| strip.flatten(p).y));
         let along = 0.5 * (inside.x + outside.x);
         let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
         let per_radian = inwards_per_radian(crossing.inside, normal, inward);
         let sight = side_face.seen_by(crossing.inside, normal, inward);
-        let (off, excess) = match mixed {
-            Some([near, _]) => (near, crossing.mixed_excess),
-            None => (inside.y.min(outside.y), crossing.excess),
+        let (off, excess) = match (mixed, crossing.mixed) {
+            (Some([near, _]), Some(pixels)) => (near, pixels.excess),
+            _ => (inside.y.min(outside.y), crossing.excess),
         };
         let (on_side, off_per_range) = sight.outside(f64::from(excess));
         let (behind, cell_per_range) = sight.outside(settled.residual);
@@ -142,6 +145,8 @@ impl LatticeLine {
             low: inside.y.min(outside.y),
             high: inside.y.max(outside.y),
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
+            strips: crossing.strips,
+            background: crossing.background.map(|plane| plane.number),
             mixing: Mixing::of(crossing, noise)
                 .map(|mixing| if sight.silhouette == 0.0 { mixing } else { mixing.without_odds() }),
             complete: crossing.complete,
@@ -276,6 +281,8 @@ pub(super) mod tests {
             low: -4e-3,
             high: 1.7e-3,
             mixed: None,
+            strips: PlaneSet::default(),
+            background: None,
             mixing: None,
             complete: true,
             beyond: Beyond::Behind,

@@ -5,7 +5,7 @@
 
 use super::height_field::HeightField;
 use crate::Vec3;
-use crate::extract::{Beyond, Crossing, Patch};
+use crate::extract::{Beyond, Crossing, MixedPixels, Patch};
 
 /// A crossing with its places on the height field.
 #[derive(Debug, Clone, Copy)]
@@ -27,12 +27,14 @@ impl ProjectedCrossing {
         let (mut inside, normal) = height_field.meet(crossing.inside)?;
         let (mut outside, _) = height_field.meet(crossing.outside)?;
         // Ranges beyond the edge lie farther behind the height field than behind the local continuation by the same amount.
-        let (mut mixed, mut mixed_excess) = (None, crossing.mixed_excess);
-        if let Some([near, far]) = crossing.mixed {
-            let (nearest, farthest) = (height_field.meet(near)?.0, height_field.meet(far)?.0);
-            mixed = Some([nearest, farthest]);
-            mixed_excess += (near.norm() - nearest.norm()) as f32;
-        }
+        let project = |pixels: MixedPixels| {
+            let [near, far] = pixels.ends;
+            let ends = [height_field.meet(near)?.0, height_field.meet(far)?.0];
+            let excess = pixels.excess + (near.norm() - ends[0].norm()) as f32;
+            Some(MixedPixels { ends, excess })
+        };
+        let all = |pixels: Option<MixedPixels>| pixels.map_or(Some(None), |pixels| project(pixels).map(Some));
+        let (mixed, surely_mixed) = (all(crossing.mixed)?, all(crossing.surely_mixed)?);
         let more = crossing.outside.norm() - outside.norm();
         if crossing.beyond == Beyond::SideFace {
             // From outside to inside are four standard deviations of a range on the side face.
@@ -42,10 +44,24 @@ impl ProjectedCrossing {
         let excess = crossing.excess + more as f32;
         let residual = sample.point.norm() - cell.norm();
         Some(Self {
-            crossing: Crossing { inside, outside, normal, mixed, mixed_excess, excess, ..*crossing },
+            crossing: Crossing { inside, outside, normal, mixed, surely_mixed, excess, ..*crossing },
             cell,
             residual,
             place: [sample.column, sample.row],
         })
+    }
+
+    /// Returns the crossing as it is beside a strip of background that may be narrower than a beam: of a mixed pixel behind the strip's plane it is not
+    /// known whether it sees the plate, and of no mixed pixel which background.
+    pub(super) fn beside_strip(&self) -> Self {
+        let crossing = self.crossing;
+        let mixed = crossing.surely_mixed;
+        let crossing = Crossing {
+            mixed,
+            complete: crossing.complete && mixed == crossing.mixed,
+            background: crossing.background.filter(|_| crossing.strips.is_empty()),
+            ..crossing
+        };
+        Self { crossing, ..*self }
     }
 }

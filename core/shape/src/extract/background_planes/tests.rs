@@ -124,6 +124,27 @@ fn a_part_of_the_plate_off_the_component_is_no_background() {
 }
 
 #[test]
+fn the_plane_of_a_table_is_between_the_plate_and_the_floor() {
+    // Of the beams of a row that see the end of the table, one in front of its plane sees the plate, too.
+    let (window, _) = scene(0.25, |row| {
+        let end = 65.0 - 0.62 * row;
+        [end, if row < 64.0 { end - 1.2 } else { end - 12.0 }]
+    });
+    let noise = Noise::estimate(&window, &window.own);
+    let mut pixels = mixed_pixels::classify(&window, &noise, &Noise::of_background(&window));
+    let background = mark_sound(&window, &noise, &mut pixels);
+    let (row, floor) = (20, 10);
+    let beam = |column: usize| BackgroundCell::of(&window, &noise, 80 * column + row);
+    let down = -beam(50).direction.z;
+    let [plate, before, behind, floor] =
+        [beam(50).at(3.5 / down), beam(50).at(3.7 / down), beam(50).at(4.0 / down), beam(floor)];
+    let planes = background.between(&plate, &floor);
+    assert!(!planes.is_empty());
+    assert!(background.is_behind(planes, &behind) && !background.is_behind(planes, &before));
+    assert!(background.between(&behind, &floor).is_empty() && background.between(&plate, &before).is_empty());
+}
+
+#[test]
 fn alone_on_a_plane_of_few_is_by_chance() {
     let header = ScanHeader { n_rows: 8, n_columns: 50, ..ScanHeader::default() };
     let window = Window::of_ranges(header, |_, _| (9.0, false));

@@ -1,0 +1,76 @@
+//! Strips of background beside an edge that are narrower than a beam: the foot of a wall, a table's top.
+//!
+//! A mixed pixel behind the plane of such a strip sees the strip's far edge, and perhaps not the plate. Whether a strip shows at a place is told by the lattice
+//! lines around it that end on its plane, in columns or rows on both sides: a plane that shows on one side only ends there, but goes on around a corner.
+//!
+//! In: the lattice lines of the edges and the planes that lie between face and background along each (`extract/background_planes`). Out: the lines beside a strip.
+//! Own. Limit: a strip so narrow that it fills no beam over more than [`REACH`] is told by the footprint of its edge alone (`edge`).
+
+use super::lattice_line::LatticeLine;
+use crate::extract::BACKGROUND_PLANES;
+
+/// Columns and rows over which a strip is taken to go on.
+const REACH: u32 = 48;
+
+/// Lattice lines to either side that show it, at least: one in a hundred ends on a plane by chance.
+const LEAST: usize = 3;
+
+/// Returns the numbers of the lines of each edge that are beside a strip.
+pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
+    let planes = || (0..BACKGROUND_PLANES).filter_map(|plane| u8::try_from(plane).ok());
+    let shows = |line: &LatticeLine, plane: u8| {
+        let on_plane = edges.into_iter().flatten().filter(|other| other.background == Some(plane));
+        let mut sides = [[0; 2]; 2];
+        for other in on_plane.filter(|other| is_near(line, other)) {
+            for (k, [before, behind]) in sides.iter_mut().enumerate() {
+                *before += usize::from(other.place[k] < line.place[k]);
+                *behind += usize::from(other.place[k] > line.place[k]);
+            }
+        }
+        sides.iter().any(|both| both.iter().all(|count| *count >= LEAST))
+    };
+    let is_beside =
+        |line: &LatticeLine| planes().any(|plane| line.strips.contains(plane) && shows(line, plane));
+    edges.map(|lines| (0..lines.len()).filter(|at| is_beside(&lines[*at])).collect())
+}
+
+/// Returns true when two lines end within [`REACH`] of each other.
+fn is_near(one: &LatticeLine, other: &LatticeLine) -> bool {
+    one.place.iter().zip(&other.place).all(|(one, other)| one.abs_diff(*other) <= REACH)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lattice_line::tests::open_line;
+    use super::*;
+    use crate::extract::PlaneSet;
+
+    /// Every second line has a mixed pixel that a strip of plane 2 may be in front of; some of the others end on that plane.
+    fn lines(ends_on_it: impl Fn(u32) -> bool) -> Vec<LatticeLine> {
+        let line = |k: u32| {
+            let is_mixed = k.is_multiple_of(2);
+            let strips = if is_mixed { PlaneSet::of(2) } else { PlaneSet::default() };
+            let background = (!is_mixed && ends_on_it(k)).then_some(2);
+            let mut line = open_line(None);
+            (line.strips, line.background) = (strips, background);
+            (line.along, line.place) = (5e-3 * f64::from(k), [k, 0]);
+            line
+        };
+        (0..200).map(line).collect()
+    }
+
+    #[test]
+    fn a_strip_goes_on_between_places_that_show_it_on_both_sides() {
+        let shown = |ends_on_it: &dyn Fn(u32) -> bool| {
+            let [shown, ..] = shown([&lines(ends_on_it), &[], &[], &[]]);
+            shown
+        };
+        // It shows up to line 60 and from line 100 on.
+        let gap = shown(&|k| !(60..100).contains(&k));
+        assert!((6..194).step_by(2).all(|k| gap.contains(&k)), "{gap:?}");
+        // It ends at line 60.
+        let end = shown(&|k| k < 60);
+        assert!((6..54).step_by(2).all(|k| end.contains(&k)) && !end.iter().any(|k| *k >= 60), "{end:?}");
+        assert!(shown(&|k| k == 51 || k == 151).is_empty());
+    }
+}
