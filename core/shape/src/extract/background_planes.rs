@@ -65,24 +65,21 @@ impl Background {
         Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32 })
     }
 
-    /// Returns the flat planes, if they reach so far, that are in front of a cell of the background and behind a place on the beam of another.
-    pub(super) fn between(&self, place: &BackgroundCell, behind: &BackgroundCell) -> PlaneSet {
-        let is_between = |plane: &BackgroundPlane| {
-            plane.scatter < MOST_SCATTER && plane.depth(place) < -BOUND && plane.depth(behind) > BOUND
+    /// Returns the numbers of the flat planes that, if they reach so far, are in front of a cell of the background and behind a place on the beam of another.
+    pub(super) fn between(&self, place: BackgroundCell, behind: BackgroundCell) -> impl Iterator<Item = u8> {
+        let is_between = move |plane: &BackgroundPlane| {
+            plane.scatter < MOST_SCATTER && plane.depth(&place) < -BOUND && plane.depth(&behind) > BOUND
         };
-        let numbers =
-            (0..).zip(&self.planes).filter(|(_, plane)| is_between(plane)).map(|(number, _)| number);
-        numbers.map(PlaneSet::of).fold(PlaneSet::default(), PlaneSet::union)
+        (0..).zip(&self.planes).filter(move |(_, plane)| is_between(plane)).map(|(number, _)| number)
     }
 
     /// Returns true when a cell is behind one of these planes.
     pub(super) fn is_behind(&self, planes: PlaneSet, cell: &BackgroundCell) -> bool {
-        let mut numbered = (0..).zip(&self.planes);
-        numbered.any(|(number, plane)| planes.contains(number) && plane.depth(cell) > BOUND)
+        planes.numbers().any(|number| self.planes[usize::from(number)].depth(cell) > BOUND)
     }
 }
 
-/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound. Returns the planes by cell.
+/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound. Returns the planes and the cells on them.
 pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -> Background {
     let off = off_component(window, pixels);
     let cell = |index: usize| BackgroundCell::of(window, noise, index);
@@ -196,7 +193,7 @@ impl BackgroundCell {
     }
 
     /// Returns the cell with another range, metres.
-    pub(super) fn at(self, range: f64) -> Self {
+    pub(super) fn with_range(self, range: f64) -> Self {
         Self { inverse: 1.0 / range, ..self }
     }
 

@@ -95,6 +95,11 @@ struct MixedCell {
 }
 
 impl MixedCell {
+    /// Returns the place on the face's continuation as a cell.
+    fn face(&self) -> BackgroundCell {
+        self.cell.with_range(self.on_face.norm())
+    }
+
     /// Joins the mixed pixels of a row or a column, the nearest to the face first.
     fn joined<'a>(mut pixels: impl DoubleEndedIterator<Item = &'a Self>) -> Option<MixedPixels> {
         let near = pixels.next()?;
@@ -176,17 +181,15 @@ impl Scene<'_> {
             }
         }
         let cells = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
-        let mixed: Vec<MixedCell> = cells
-            .clone()
-            .filter(|(_, at)| self.pixels[*at] == Pixel::Mixed)
-            .map(|(far, at)| self.mixed_cell(fit, at, far, index, step))
-            .collect::<Option<_>>()?;
-        let end = measured.map(|end| BackgroundCell::of(self.window, self.noise, end));
-        let between = |pixel: &MixedCell| {
-            let face = pixel.cell.at(pixel.on_face.norm());
-            end.as_ref().map_or(PlaneSet::default(), |end| self.background.between(&face, end))
+        let cell = |at| BackgroundCell::of(self.window, self.noise, at);
+        let mixed_cell = |(far, at): (usize, usize)| {
+            let excess = self.excess(fit, at, far.min(FIT_FAR), index, step)? as f32;
+            Some(MixedCell { cell: cell(at), on_face: on_face(far as f64)?.point, excess })
         };
-        let strips = mixed.iter().map(between).fold(PlaneSet::default(), PlaneSet::union);
+        let mixed = cells.clone().filter(|(_, at)| self.pixels[*at] == Pixel::Mixed);
+        let mixed = mixed.map(mixed_cell).collect::<Option<Vec<_>>>()?;
+        let before = |end| mixed.iter().flat_map(move |pixel| self.background.between(pixel.face(), end));
+        let strips: PlaneSet = measured.map(cell).into_iter().flat_map(before).collect();
         let is_sure = |pixel: &&MixedCell| !self.background.is_behind(strips, &pixel.cell);
         let (inside, outside) = (on_face(from)?, on_face(to)?);
         let crossing = Crossing {
@@ -205,24 +208,6 @@ impl Scene<'_> {
             beyond,
         };
         Some((crossing, cut))
-    }
-
-    /// Returns the mixed pixel `at`, `far` steps from `index`.
-    fn mixed_cell(
-        &self,
-        fit: &LocalQuadric,
-        at: usize,
-        far: usize,
-        index: usize,
-        step: (isize, isize),
-    ) -> Option<MixedCell> {
-        let (x, y) = self.window.place_of(index);
-        let on_face = fit.at(self.window, x + far as f64 * step.0 as f64, y + far as f64 * step.1 as f64)?;
-        Some(MixedCell {
-            cell: BackgroundCell::of(self.window, self.noise, at),
-            on_face: on_face.point,
-            excess: self.excess(fit, at, far.min(FIT_FAR), index, step)? as f32,
-        })
     }
 
     /// Returns the range of the cell `at` behind the face's continuation `far` steps from `index`.

@@ -43,23 +43,17 @@ pub struct PlaneBehind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PlaneSet(u8);
 
+impl FromIterator<u8> for PlaneSet {
+    /// Collects planes by their numbers, each below 8.
+    fn from_iter<I: IntoIterator<Item = u8>>(numbers: I) -> Self {
+        Self(numbers.into_iter().fold(0, |set, number| set | 1_u8.checked_shl(number.into()).unwrap_or(0)))
+    }
+}
+
 impl PlaneSet {
-    /// Returns the set of one plane, given by its number.
-    #[must_use]
-    pub fn of(number: u8) -> Self {
-        Self(1_u8.checked_shl(number.into()).unwrap_or(0))
-    }
-
-    /// Returns the planes of either set.
-    #[must_use]
-    pub fn union(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-
-    /// Returns true when a plane is in the set.
-    #[must_use]
-    pub fn contains(self, number: u8) -> bool {
-        self.0 & Self::of(number).0 != 0
+    /// Returns the numbers of the planes.
+    pub fn numbers(self) -> impl Iterator<Item = u8> {
+        (0..8).filter(move |number| self.0 >> number & 1 == 1)
     }
 
     /// Returns true when no plane is in the set.

@@ -7,7 +7,6 @@
 //! Own. Limit: a strip so narrow that it fills no beam over more than [`REACH`] is told by the footprint of its edge alone (`edge`).
 
 use super::lattice_line::LatticeLine;
-use crate::extract::BACKGROUND_PLANES;
 
 /// Columns and rows over which a strip is taken to go on.
 const REACH: u32 = 48;
@@ -17,7 +16,6 @@ const LEAST: usize = 3;
 
 /// Returns the numbers of the lines of each edge that are beside a strip.
 pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
-    let planes = || (0..BACKGROUND_PLANES).filter_map(|plane| u8::try_from(plane).ok());
     let shows = |line: &LatticeLine, plane: u8| {
         let on_plane = edges.into_iter().flatten().filter(|other| other.background == Some(plane));
         let mut sides = [[0; 2]; 2];
@@ -29,8 +27,7 @@ pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
         }
         sides.iter().any(|both| both.iter().all(|count| *count >= LEAST))
     };
-    let is_beside =
-        |line: &LatticeLine| planes().any(|plane| line.strips.contains(plane) && shows(line, plane));
+    let is_beside = |line: &LatticeLine| line.strips.numbers().any(|plane| shows(line, plane));
     edges.map(|lines| (0..lines.len()).filter(|at| is_beside(&lines[*at])).collect())
 }
 
@@ -49,7 +46,7 @@ mod tests {
     fn lines(ends_on_it: impl Fn(u32) -> bool) -> Vec<LatticeLine> {
         let line = |k: u32| {
             let is_mixed = k.is_multiple_of(2);
-            let strips = if is_mixed { PlaneSet::of(2) } else { PlaneSet::default() };
+            let strips: PlaneSet = is_mixed.then_some(2).into_iter().collect();
             let background = (!is_mixed && ends_on_it(k)).then_some(2);
             let mut line = open_line(None);
             (line.strips, line.background) = (strips, background);

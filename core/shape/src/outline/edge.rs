@@ -115,7 +115,7 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
     let counted = footprint::counted(&counting, sampling.angle);
     let showing = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
     let fit = |data: &EdgeData, footprint, own, known: &ContrastDistribution| {
-        Edge::fit(data.clone(), footprint, own, known, sampling)
+        Edge::fit(data, footprint, own, known, sampling)
     };
     let prior = &ContrastDistribution::PRIOR;
     let [a, b, c, d] = of_each(|k| showing[k].then(|| fit(&edges[k], counted, true, prior)).transpose());
@@ -172,14 +172,14 @@ impl Edge {
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
     pub(super) fn fit(
-        data: EdgeData,
+        data: &EdgeData,
         footprint: f64,
         own: bool,
         known: &ContrastDistribution,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let step = sampling.step;
-        let EdgeData { strip, side_face, lines, dithered, from, to, .. } = data;
+        let EdgeData { strip, lines, .. } = data;
         let (start, end) = strip.span();
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let prior = CurveFit::with_prior(axis, Roughness::Curvature, CURVATURE.0, CURVATURE.1);
@@ -198,7 +198,7 @@ impl Edge {
             beam.mixed_spread = mixed_spread(&used, &found);
             if own && footprint > 0.0 {
                 let at = |along| found.curve.at(along);
-                beam.footprint = footprint::at_edge(&lines, at, footprint, beam);
+                beam.footprint = footprint::at_edge(lines, at, footprint, beam);
             }
             // The same beams give the same curve, and that one the same beams.
             if beam.is_near(&last) {
@@ -211,14 +211,14 @@ impl Edge {
         let n = curve.n_coefficients();
         let contrasts =
             ContrastDistribution::of(&contrasts, |plane| covariance[(n + plane, n + plane)].sqrt());
-        let (from, to) = (strip.flatten(from).x, strip.flatten(to).x);
-        let posterior = if dithered {
+        let (from, to) = (strip.flatten(data.from).x, strip.flatten(data.to).x);
+        let posterior = if data.dithered {
             Posterior::laplace(curve, &covariance)
         } else {
             Posterior::sampled(
                 &curve,
                 &prior,
-                &lines,
+                lines,
                 [from, to],
                 BeamModel { footprint, ..beam },
                 known,
@@ -229,8 +229,9 @@ impl Edge {
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
         let told = lines.iter().filter(|line| line.tells_contrast()).count();
-        let contrast_known = dithered && beam.mixes_linearly() && told >= LEAST_PIXELS;
+        let contrast_known = data.dithered && beam.mixes_linearly() && told >= LEAST_PIXELS;
         let footprint = beam.footprint;
+        let (strip, side_face) = (strip.clone(), data.side_face);
         Ok(Self { strip, side_face, posterior, footprint, contrasts, contrast_known, seen, from, to })
     }
 

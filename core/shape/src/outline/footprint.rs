@@ -10,7 +10,7 @@ use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 const LEAST_LINES: usize = 100;
 
 /// Largest footprint of an edge in that of the others: those of 32 plates without a strip have 0.93 to 1.1 of their median, beside strips 1.1 to 2.5.
-const WIDEST: f64 = 1.4;
+const MOST_OF_OTHERS: f64 = 1.4;
 
 /// Returns true when enough lines show the footprint to estimate it at their edge.
 pub(super) fn is_shown(lines: &[LatticeLine]) -> bool {
@@ -26,7 +26,7 @@ pub(super) fn counted(edges: &[&[LatticeLine]], angle: f64) -> f64 {
 
 /// Returns the largest footprint that an edge may show beside those of the others.
 pub(super) fn most_of_an_edge(found: impl Iterator<Item = f64>) -> f64 {
-    lower_median(found).map_or(0.0, |median| median * WIDEST)
+    lower_median(found).map_or(0.0, |median| median * MOST_OF_OTHERS)
 }
 
 /// Returns the lower median, of two values the lesser: cells that pass for mixed pixels only make a footprint wider.

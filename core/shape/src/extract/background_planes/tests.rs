@@ -136,12 +136,17 @@ fn the_plane_of_a_table_is_between_the_plate_and_the_floor() {
     let (row, floor) = (20, 10);
     let beam = |column: usize| BackgroundCell::of(&window, &noise, 80 * column + row);
     let down = -beam(50).direction.z;
-    let [plate, before, behind, floor] =
-        [beam(50).at(3.5 / down), beam(50).at(3.7 / down), beam(50).at(4.0 / down), beam(floor)];
-    let planes = background.between(&plate, &floor);
+    let [plate, before, behind, floor] = [
+        beam(50).with_range(3.5 / down),
+        beam(50).with_range(3.7 / down),
+        beam(50).with_range(4.0 / down),
+        beam(floor),
+    ];
+    let between = |place, behind| background.between(place, behind).collect::<PlaneSet>();
+    let planes = between(plate, floor);
     assert!(!planes.is_empty());
     assert!(background.is_behind(planes, &behind) && !background.is_behind(planes, &before));
-    assert!(background.between(&behind, &floor).is_empty() && background.between(&plate, &before).is_empty());
+    assert!(between(behind, floor).is_empty() && between(plate, before).is_empty());
 }
 
 #[test]
