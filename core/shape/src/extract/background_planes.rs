@@ -10,6 +10,9 @@
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
 //! - A plane seen edge-on is none: the cells of one row of a round wall lie in a plane through the scanner, too.
 //!
+//! A strip narrower than a beam has no cell of its own. For each end of the face the planes are given that may be in front of what lies behind it; whether a strip of them
+//! shows there is told by the edge (`outline/background_strip`).
+//!
 //! Limits: a strip whose plane shows nowhere else stays mixed, as mixed pixels along an edge can lie on a plane, too; uneven ground is
 //! several planes. Own.
 
