@@ -24,7 +24,7 @@ mod survey;
 pub use apply::Columns;
 pub(crate) use decide::Plan;
 use decide::Unit;
-pub(crate) use spherical::{SphericalCell, ToSpherical};
+pub(crate) use spherical::{Converted, SphericalCells, ToSpherical};
 pub(crate) use survey::Survey;
 
 use platen_scan::{Direction, State};

@@ -2,7 +2,7 @@
 //!
 //! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
 //! the CRC-32C of all cells, which a thread of its own decodes. The second ([`ScanReader::columns`]) delivers every column once, as soon
-//! as the file has completed it. Up to 2.6 million cells (126 MB) are kept from the first pass; a larger file is decoded twice, so that
+//! as the file has completed it. Up to 2.6 million cells (107 MB) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
 mod cells;
@@ -17,14 +17,15 @@ mod window;
 pub(crate) mod xyb;
 mod xyz;
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use platen_scan::{Direction, ScanHeader};
+use platen_scan::ScanHeader;
 
 use crate::Format;
-use crate::orient::{Columns, Expected, Mirror, Plan, SphericalCell, Survey, ToSpherical};
+use crate::orient::{Columns, Expected, Mirror, Plan, SphericalCells, Survey};
 use cells::Cells;
 
 pub use error::ReadError;
@@ -54,8 +55,8 @@ struct About {
     notes: Vec<String>,
 }
 
-/// Cells as ranges and directions, in the order of the file. Nothing follows an error.
-pub(crate) type SphericalCells<'a> = Box<dyn Iterator<Item = Result<SphericalCell>> + 'a>;
+/// Cells in the order of the file. Nothing follows an error.
+pub(crate) type Batches<'a> = Box<dyn Iterator<Item = Result<Cow<'a, SphericalCells>>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
 trait Source: Send {
@@ -69,10 +70,10 @@ trait Source: Send {
 pub struct ScanReader<'a> {
     source: Box<dyn Source + 'a>,
     /// All cells, after a first pass over a small file.
-    kept: Vec<SphericalCell>,
+    kept: SphericalCells,
 }
 
-/// Largest number of cells that are kept, 126 MB.
+/// Largest number of cells that are kept, 107 MB.
 const MAX_KEPT: u64 = 5 << 19;
 /// Cells between two reports of progress.
 const PROGRESS_EVERY: u64 = 1 << 16;
@@ -111,7 +112,7 @@ impl<'a> ScanReader<'a> {
             Format::Xyz => Box::new(xyz::Xyz::open(file)?),
             Format::Xyb => Box::new(xyb::Xyb::open(file)?),
         };
-        Ok(Self { source, kept: Vec::new() })
+        Ok(Self { source, kept: SphericalCells::default() })
     }
 
     /// First pass: decides the orientation of the lattice. `known` is what the plant declares about the scanner;
@@ -129,28 +130,25 @@ impl<'a> ScanReader<'a> {
         // The declared number saves memory; the real one is decisive.
         let mut fits = about.cells <= MAX_KEPT;
         let kept = &mut self.kept;
-        *kept = Vec::with_capacity(if fits { about.cells as usize } else { 0 });
+        *kept = SphericalCells::with_capacity(if fits { about.cells as usize } else { 0 });
         let (mut bytes, mut told) = (Vec::new(), 0);
         decode_ahead::for_each(self.source.cells()?, |batch| {
-            fits &= (kept.len() + batch.len()) as u64 <= MAX_KEPT;
-            if fits {
-                kept.extend(batch.iter().map(|(cell, _)| *cell));
-            }
-            for (cell, parts) in batch {
-                survey.add(cell, *parts).map_err(ReadError::from)?;
-            }
+            survey.add(batch).map_err(ReadError::from)?;
             bytes.clear();
-            batch.iter().for_each(|(cell, _)| append_numbers(&mut bytes, cell));
+            append_numbers(&mut bytes, &batch.cells);
             checksum = crc32c::crc32c_append(checksum, &bytes);
+            fits &= survey.cells() <= MAX_KEPT;
+            if fits {
+                kept.append(&batch.cells, 0..batch.cells.len());
+            } else {
+                *kept = SphericalCells::default();
+            }
             if survey.cells() / PROGRESS_EVERY > told {
                 told = survey.cells() / PROGRESS_EVERY;
                 progress((survey.cells() as f64 / about.cells.max(1) as f64).min(1.0))?;
             }
             Ok::<(), E>(())
         })?;
-        if !fits {
-            *kept = Vec::new();
-        }
         let mirror = if known.mirror == Mirror::None { about.mirror } else { known.mirror };
         let expected = Expected { intensity: about.intensity, mirror, ..*known };
         let mut plan = survey.decide(&expected).map_err(ReadError::from)?;
@@ -169,13 +167,13 @@ impl<'a> ScanReader<'a> {
     /// # Errors
     /// When the file cannot be read from its start again.
     pub fn columns<'s>(&'s mut self, oriented: &'s Oriented) -> Result<Columns<'s>> {
-        let cells: SphericalCells<'s> = if self.kept.is_empty() {
-            let mut to_spherical = ToSpherical::default();
-            Box::new(cells::each(self.source.cells()?).map(move |cell| Ok(to_spherical.convert(&cell?).0)))
+        let batches: Batches<'s> = if self.kept.len() == 0 {
+            let batches = cells::batches(self.source.cells()?);
+            Box::new(batches.map(|batch| Ok(Cow::Owned(batch?.cells))))
         } else {
-            Box::new(self.kept.iter().copied().map(Ok))
+            Box::new(std::iter::once(Ok(Cow::Borrowed(&self.kept))))
         };
-        Ok(Columns::new(&oriented.plan, cells))
+        Ok(Columns::new(&oriented.plan, batches))
     }
 }
 
@@ -198,14 +196,18 @@ impl Oriented {
     }
 }
 
-/// Appends range, direction, intensity, row and column of a cell, the numbers of the checksum.
-fn append_numbers(bytes: &mut Vec<u8>, cell: &SphericalCell) {
-    let Direction { azimuth, elevation } = cell.direction;
-    let mut numbers = [0; 40];
-    for (slot, number) in numbers.chunks_exact_mut(8).zip([cell.range, azimuth, elevation, cell.intensity]) {
-        slot.copy_from_slice(&number.to_le_bytes());
+/// Appends range, direction, intensity, row and column of the cells, the numbers of the checksum.
+fn append_numbers(bytes: &mut Vec<u8>, cells: &SphericalCells) {
+    let angles = cells.azimuth.iter().zip(&cells.elevation);
+    let places = cells.row.iter().zip(&cells.column);
+    let numbers = cells.range.iter().zip(angles).zip(&cells.intensity).zip(places);
+    for (((range, (azimuth, elevation)), intensity), (row, column)) in numbers {
+        let mut numbers = [0; 40];
+        for (slot, number) in numbers.chunks_exact_mut(8).zip([range, azimuth, elevation, intensity]) {
+            slot.copy_from_slice(&number.to_le_bytes());
+        }
+        numbers[32..36].copy_from_slice(&row.to_le_bytes());
+        numbers[36..].copy_from_slice(&column.to_le_bytes());
+        bytes.extend_from_slice(&numbers);
     }
-    numbers[32..36].copy_from_slice(&cell.row.to_le_bytes());
-    numbers[36..].copy_from_slice(&cell.column.to_le_bytes());
-    bytes.extend_from_slice(&numbers);
 }

@@ -1,31 +1,25 @@
 //! Second pass: columns of the normalised lattice.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::ops::Range;
 
-use platen_scan::{Column, Direction, Face, Outcome, ScanEnd, State, wrap_azimuth};
+use platen_scan::{Column, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
-use super::{Mirror, OrientError, Plan, SphericalCell, Unit};
-use crate::read::{ReadError, SphericalCells};
-
-/// A normalised cell that waits for the rest of its column.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    row: u32,
-    range_m: f64,
-    direction: Direction,
-    intensity: u16,
-    state: State,
-}
+use super::{Mirror, OrientError, Plan, SphericalCells, Unit};
+use crate::read::{Batches, ReadError};
 
 /// Columns of an oriented lattice, each once, as soon as the file has completed it. Nothing follows an error.
 ///
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
 pub struct Columns<'a> {
     plan: &'a Plan,
-    cells: SphericalCells<'a>,
-    waiting: Vec<Vec<Sample>>,
-    /// Room of the last column delivered, for the next that begins.
-    spare: Vec<Sample>,
+    batches: Batches<'a>,
+    batch: Cow<'a, SphericalCells>,
+    /// Cells of the batch that were taken.
+    taken: usize,
+    /// Cells of every column that wait for the rest of it.
+    waiting: Vec<SphericalCells>,
     seen: u64,
     points: u64,
     /// First column not yet examined for having no stored cell.
@@ -34,12 +28,13 @@ pub struct Columns<'a> {
 
 impl<'a> Columns<'a> {
     /// Starts the second pass over the cells.
-    pub(crate) fn new(plan: &'a Plan, cells: SphericalCells<'a>) -> Self {
+    pub(crate) fn new(plan: &'a Plan, batches: Batches<'a>) -> Self {
         Self {
             plan,
-            cells,
-            waiting: vec![Vec::new(); plan.cells.len()],
-            spare: Vec::new(),
+            batches,
+            batch: Cow::default(),
+            taken: 0,
+            waiting: vec![SphericalCells::default(); plan.cells.len()],
             seen: 0,
             points: 0,
             rest: 0,
@@ -66,12 +61,16 @@ impl<'a> Columns<'a> {
     }
 
     fn next_column(&mut self) -> Result<Option<Column>, ReadError> {
-        while let Some(cell) = self.cells.next() {
-            if let Some(column) = self.add(&cell?)? {
-                return Ok(Some(column));
+        loop {
+            while self.taken < self.batch.len() {
+                if let Some(column) = self.take()? {
+                    return Ok(Some(column));
+                }
             }
+            let Some(batch) = self.batches.next() else { break };
+            (self.batch, self.taken) = (batch?, 0);
         }
-        if self.seen != self.expected() || self.waiting.iter().any(|samples| !samples.is_empty()) {
+        if self.seen != self.expected() || self.waiting.iter().any(|cells| cells.len() > 0) {
             return Err(self.changed().into());
         }
         let empty = self.plan.cells[self.rest..].iter().position(|cells| *cells == 0);
@@ -82,32 +81,35 @@ impl<'a> Columns<'a> {
         }))
     }
 
-    /// Adds a cell; returns the column that it completes.
-    fn add(&mut self, cell: &SphericalCell) -> Result<Option<Column>, OrientError> {
-        self.seen += 1;
-        let (column, row) = self.plan.place(cell).ok_or_else(|| self.changed())?;
-        let samples = &mut self.waiting[column as usize];
-        let expected = self.plan.cells[column as usize] as usize;
-        if samples.capacity() == 0 {
-            *samples = std::mem::take(&mut self.spare);
-            samples.reserve_exact(expected);
-        }
-        if samples.len() == expected {
+    /// Takes the next cells of one column; returns it when they complete it.
+    fn take(&mut self) -> Result<Option<Column>, OrientError> {
+        let some = self.plan.same_column(&self.batch, self.taken);
+        self.seen += some.len() as u64;
+        self.taken = some.end;
+        let column = self.plan.column(&self.batch, some.start).ok_or_else(|| self.changed())?;
+        let waiting = &mut self.waiting[column as usize];
+        let (n, expected) = (waiting.len() + some.len(), self.plan.cells[column as usize] as usize);
+        if n > expected {
             return Err(self.changed());
         }
-        samples.push(self.plan.sample(cell, row));
-        if samples.len() < expected {
+        if n < expected && waiting.len() == 0 {
+            *waiting = SphericalCells::with_capacity(expected);
+        }
+        if n < expected || waiting.len() > 0 {
+            waiting.append(&self.batch, some.clone());
+        }
+        if n < expected {
             return Ok(None);
         }
-        let face = match self.plan.header.seam_column {
-            Some(seam) if column >= seam => Face::Back,
-            _ => Face::Front,
+        let waited = std::mem::take(waiting);
+        let built = if waited.len() > 0 {
+            self.plan.build(column, &waited, 0..n)
+        } else {
+            self.plan.build(column, &self.batch, some)
         };
-        let column = Column { face, ..to_column(column, samples) };
-        self.spare = std::mem::take(samples);
-        self.spare.clear();
-        self.points += column.state.iter().filter(|state| **state == State::Valid).count() as u64;
-        Ok(Some(column))
+        let built = built.ok_or_else(|| self.changed())?;
+        self.points += built.state.iter().filter(|state| **state == State::Valid).count() as u64;
+        Ok(Some(built))
     }
 
     fn expected(&self) -> u64 {
@@ -128,58 +130,65 @@ impl Iterator for Columns<'_> {
 }
 
 impl Plan {
-    /// Returns normalised column and row of a stored cell, `None` outside of the lattice decided.
-    pub(crate) fn place(&self, cell: &SphericalCell) -> Option<(u32, u32)> {
-        let (row, column) = if self.swapped { (cell.column, cell.row) } else { (cell.row, cell.column) };
-        let (n_rows, n_columns) = (self.header.n_rows, self.header.n_columns);
-        let row = row.checked_sub(self.first_row).filter(|row| *row < n_rows)?;
-        let column = column.checked_sub(self.first_column).filter(|column| *column < n_columns)?;
-        let row = if self.rows_flipped { n_rows - 1 - row } else { row };
+    /// Returns the cells of a batch from one on that lie in its column.
+    fn same_column(&self, cells: &SphericalCells, from: usize) -> Range<usize> {
+        let columns = if self.swapped { &cells.row } else { &cells.column };
+        let column = columns[from];
+        let n = columns[from..].iter().take_while(|other| **other == column).count();
+        from..from + n
+    }
+
+    /// Returns the normalised column of a cell, `None` outside of the lattice decided.
+    fn column(&self, cells: &SphericalCells, cell: usize) -> Option<u32> {
+        let stored = if self.swapped { cells.row[cell] } else { cells.column[cell] };
+        let n_columns = self.header.n_columns;
+        let column = stored.checked_sub(self.first_column).filter(|column| *column < n_columns)?;
         let column = if self.columns_flipped { n_columns - 1 - column } else { column };
-        Some(((column + n_columns - self.cut) % n_columns, row))
+        Some((column + n_columns - self.cut) % n_columns)
     }
 
-    /// Returns a cell of the normalised lattice: right-handed, metres.
-    #[inline]
-    fn sample(&self, cell: &SphericalCell, row: u32) -> Sample {
-        let Direction { azimuth, elevation } = cell.direction;
-        let azimuth = match self.mirror {
-            Mirror::None => azimuth,
-            Mirror::X => wrap_azimuth(PI - azimuth),
-            Mirror::Y => wrap_azimuth(-azimuth),
-        };
-        Sample {
-            row,
-            range_m: if self.unit == Unit::Millimetre { cell.range / 1000.0 } else { cell.range },
-            direction: Direction { azimuth, elevation },
-            intensity: self.intensity.apply(cell.intensity),
-            state: cell.true_state(),
+    /// Returns a column of the normalised lattice from the first to the last row of known direction: right-handed, metres. `None` when a cell
+    /// lies outside of the lattice decided.
+    fn build(&self, index: u32, cells: &SphericalCells, some: Range<usize>) -> Option<Column> {
+        let stored = if self.swapped { &cells.column } else { &cells.row };
+        let stored = &stored[some.clone()];
+        let last = self.first_row + self.header.n_rows - 1;
+        if stored.iter().min()? < &self.first_row || stored.iter().max()? > &last {
+            return None;
         }
+        let row = |stored: u32| if self.rows_flipped { last - stored } else { stored - self.first_row };
+        let state: Vec<State> = some.clone().map(|cell| cells.true_state(cell)).collect();
+        let known = || (0..state.len()).filter(|cell| state[*cell] != State::NoReturn);
+        let rows = || known().map(|cell| row(stored[cell]));
+        let first_row = rows().min().unwrap_or(0);
+        let n = rows().max().map_or(0, |last| last + 1 - first_row) as usize;
+        let face = match self.header.seam_column {
+            Some(seam) if index >= seam => Face::Back,
+            _ => Face::Front,
+        };
+        let mut column = Column {
+            index,
+            face,
+            first_row,
+            range_m: vec![0.0; n],
+            azimuth: vec![0.0; n],
+            elevation: vec![0.0; n],
+            intensity: vec![0; n],
+            state: vec![State::NoReturn; n],
+        };
+        for cell in known() {
+            let (i, from) = ((row(stored[cell]) - first_row) as usize, some.start + cell);
+            let (range, azimuth) = (cells.range[from], cells.azimuth[from]);
+            column.range_m[i] = if self.unit == Unit::Millimetre { range / 1000.0 } else { range };
+            column.azimuth[i] = match self.mirror {
+                Mirror::None => azimuth,
+                Mirror::X => wrap_azimuth(PI - azimuth),
+                Mirror::Y => wrap_azimuth(-azimuth),
+            };
+            column.elevation[i] = cells.elevation[from];
+            column.intensity[i] = self.intensity.apply(cells.intensity[from]);
+            column.state[i] = state[cell];
+        }
+        Some(column)
     }
-}
-
-/// Returns the column from the first to the last row of known direction.
-fn to_column(index: u32, samples: &[Sample]) -> Column {
-    let known = || samples.iter().filter(|sample| sample.state != State::NoReturn);
-    let first_row = known().map(|sample| sample.row).min().unwrap_or(0);
-    let n = known().map(|sample| sample.row + 1 - first_row).max().unwrap_or(0) as usize;
-    let mut column = Column {
-        index,
-        first_row,
-        range_m: vec![0.0; n],
-        azimuth: vec![0.0; n],
-        elevation: vec![0.0; n],
-        intensity: vec![0; n],
-        state: vec![State::NoReturn; n],
-        ..Column::default()
-    };
-    for sample in known() {
-        let i = (sample.row - first_row) as usize;
-        column.range_m[i] = sample.range_m;
-        column.azimuth[i] = sample.direction.azimuth;
-        column.elevation[i] = sample.direction.elevation;
-        column.intensity[i] = sample.intensity;
-        column.state[i] = sample.state;
-    }
-    column
 }

@@ -35,30 +35,45 @@ pub(super) enum Inserted {
 
 impl Occupancy {
     /// Adds a cell.
+    #[inline]
     pub(super) fn insert(&mut self, row: u32, column: u32) -> Inserted {
-        let column = column as usize;
+        let (column, word, bit) = (column as usize, row as usize / 64, 1 << (row % 64));
+        let held =
+            self.columns.get_mut(column).and_then(|rows| rows.words.get_mut(word.wrapping_sub(rows.base)));
+        let inserted = match held {
+            Some(held) => set(held, bit),
+            None => match self.reach(column, word) {
+                Some(held) => set(held, bit),
+                None => Inserted::TooFar,
+            },
+        };
+        self.cells += u64::from(inserted == Inserted::New);
+        inserted
+    }
+
+    /// Extends a column to a word; `None` beyond the bound.
+    #[cold]
+    fn reach(&mut self, column: usize, word: usize) -> Option<&mut u64> {
         if column >= self.columns.len() {
             self.columns.resize_with(column + 1, Rows::default);
         }
-        let word = row as usize / 64;
         let rows = &mut self.columns[column];
-        let missing = rows.missing(word) as u64;
-        self.words += missing;
+        self.words += rows.missing(word) as u64;
         if self.words > FREE_WORDS + WORDS_PER_CELL * self.cells {
-            return Inserted::TooFar;
+            return None;
         }
-        if missing > 0 {
-            rows.reach(word);
-        }
-        let bit = 1 << (row % 64);
-        let held = &mut rows.words[word - rows.base];
-        if *held & bit != 0 {
-            return Inserted::Twice;
-        }
-        *held |= bit;
-        self.cells += 1;
-        Inserted::New
+        rows.reach(word);
+        rows.words.get_mut(word - rows.base)
     }
+}
+
+/// Sets a bit.
+fn set(held: &mut u64, bit: u64) -> Inserted {
+    if *held & bit != 0 {
+        return Inserted::Twice;
+    }
+    *held |= bit;
+    Inserted::New
 }
 
 impl Rows {

@@ -1,6 +1,7 @@
 //! Spherical coordinates (range, azimuth, elevation) of stored cells, the form in which both passes use them.
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 
 use platen_scan::{Direction, State, wrap_azimuth};
 
@@ -14,27 +15,75 @@ const NO_RANGE: f64 = 1e-6;
 /// Range above which a number is no measurement in any unit.
 pub(super) const NO_NUMBER: f64 = 1e12;
 
-/// A cell as range and direction, in the unit and frame of its file.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SphericalCell {
-    /// Row number in the file.
-    pub(crate) row: u32,
-    /// Column number in the file.
-    pub(crate) column: u32,
+/// Cells as ranges and directions, in the unit and frame of their file and in its order: arrays of one length.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SphericalCells {
+    /// Row numbers in the file.
+    pub(crate) row: Vec<u32>,
+    /// Column numbers in the file.
+    pub(crate) column: Vec<u32>,
     /// Not finite where the file holds no numbers.
-    pub(crate) range: f64,
-    /// A file's own direction is kept to the last bit.
-    pub(crate) direction: Direction,
-    /// Intensity in the scale of the file.
-    pub(crate) intensity: f64,
-    /// State as stored; see [`SphericalCell::true_state`].
-    pub(crate) state: State,
+    pub(crate) range: Vec<f64>,
+    /// A file's own directions are kept to the last bit.
+    pub(crate) azimuth: Vec<f64>,
+    pub(crate) elevation: Vec<f64>,
+    /// Intensities in the scale of the file.
+    pub(crate) intensity: Vec<f64>,
+    /// States as stored; see [`SphericalCells::true_state`].
+    pub(crate) state: Vec<State>,
 }
 
-impl SphericalCell {
-    /// Returns the state by the numbers of the cell.
-    pub(super) fn true_state(&self) -> State {
-        if (NO_RANGE..NO_NUMBER).contains(&self.range) { self.state } else { State::NoReturn }
+impl SphericalCells {
+    /// Returns none, with room for `n`.
+    pub(crate) fn with_capacity(n: usize) -> Self {
+        let numbers = || Vec::with_capacity(n);
+        let (row, column, state) = (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
+        let (range, azimuth, elevation, intensity) = (numbers(), numbers(), numbers(), numbers());
+        Self { row, column, range, azimuth, elevation, intensity, state }
+    }
+
+    /// Returns the number of cells.
+    pub(crate) fn len(&self) -> usize {
+        self.row.len()
+    }
+
+    /// Returns the state of a cell by its numbers.
+    pub(super) fn true_state(&self, cell: usize) -> State {
+        if (NO_RANGE..NO_NUMBER).contains(&self.range[cell]) { self.state[cell] } else { State::NoReturn }
+    }
+
+    /// Appends some of other cells.
+    pub(crate) fn append(&mut self, other: &Self, some: Range<usize>) {
+        self.row.extend_from_slice(&other.row[some.clone()]);
+        self.column.extend_from_slice(&other.column[some.clone()]);
+        self.range.extend_from_slice(&other.range[some.clone()]);
+        self.azimuth.extend_from_slice(&other.azimuth[some.clone()]);
+        self.elevation.extend_from_slice(&other.elevation[some.clone()]);
+        self.intensity.extend_from_slice(&other.intensity[some.clone()]);
+        self.state.extend_from_slice(&other.state[some]);
+    }
+
+    /// Removes all cells; keeps their room.
+    pub(crate) fn clear(&mut self) {
+        let Self { row, column, range, azimuth, elevation, intensity, state } = self;
+        [row, column].into_iter().for_each(Vec::clear);
+        [range, azimuth, elevation, intensity].into_iter().for_each(Vec::clear);
+        state.clear();
+    }
+}
+
+/// Cells, and the parts of their directions' unit vectors to the east, to the north and horizontal.
+#[derive(Debug, Default)]
+pub(crate) struct Converted {
+    pub(crate) cells: SphericalCells,
+    pub(crate) parts: Vec<[f64; 3]>,
+}
+
+impl Converted {
+    /// Removes all cells; keeps their room.
+    pub(crate) fn clear(&mut self) {
+        self.cells.clear();
+        self.parts.clear();
     }
 }
 
@@ -46,18 +95,53 @@ pub(crate) struct ToSpherical {
 }
 
 impl ToSpherical {
-    /// Returns the cell as range and direction, and the parts of the direction's unit vector to the east, to the north and horizontal.
+    /// Appends a cell.
     #[inline]
-    pub(crate) fn convert(&mut self, cell: &RawCell) -> (SphericalCell, [f64; 3]) {
-        let (range, direction, parts) = match cell.position {
-            Position::Cartesian(xyz) => self.of_cartesian(xyz),
-            Position::Spherical(range, direction) => self.of_spherical(range, direction),
-        };
-        let RawCell { row, column, intensity, state, .. } = *cell;
-        (SphericalCell { row, column, range, direction, intensity, state }, parts)
+    pub(crate) fn append(&mut self, cell: &RawCell, to: &mut Converted) {
+        let RawCell { row, column, position, intensity, state } = *cell;
+        let (range, direction, parts) = self.convert(position);
+        let cells = &mut to.cells;
+        cells.row.push(row);
+        cells.column.push(column);
+        cells.range.push(range);
+        cells.azimuth.push(direction.azimuth);
+        cells.elevation.push(direction.elevation);
+        cells.intensity.push(intensity);
+        cells.state.push(state);
+        to.parts.push(parts);
     }
 
+    /// Appends the ranges and directions of cells.
     #[inline]
+    pub(crate) fn append_positions(
+        &mut self,
+        positions: impl ExactSizeIterator<Item = Position>,
+        to: &mut Converted,
+    ) {
+        let Converted { cells: SphericalCells { range, azimuth, elevation, .. }, parts } = to;
+        let (start, end) = (range.len(), range.len() + positions.len());
+        [&mut *range, azimuth, elevation].into_iter().for_each(|numbers| numbers.resize(end, 0.0));
+        parts.resize(end, [0.0; 3]);
+        let angles = azimuth[start..].iter_mut().zip(&mut elevation[start..]);
+        let slots = range[start..].iter_mut().zip(angles).zip(&mut parts[start..]);
+        for (position, ((range, (azimuth, elevation)), parts)) in positions.zip(slots) {
+            let direction;
+            (*range, direction, *parts) = self.convert(position);
+            (*azimuth, *elevation) = (direction.azimuth, direction.elevation);
+        }
+    }
+
+    /// Returns range and direction, and the parts of its unit vector.
+    // Not inlined, the position goes through memory and is waited for; for speed only: `tests::speed`.
+    #[inline(always)]
+    fn convert(&mut self, position: Position) -> (f64, Direction, [f64; 3]) {
+        match position {
+            Position::Cartesian(xyz) => self.of_cartesian(xyz),
+            Position::Spherical(range, direction) => self.of_spherical(range, direction),
+        }
+    }
+
+    #[inline(always)]
     fn of_cartesian(&mut self, [x, y, z]: [f64; 3]) -> (f64, Direction, [f64; 3]) {
         let across = x * x + y * y;
         let (range, horizontal) = ((across + z * z).sqrt(), across.sqrt());
@@ -84,9 +168,13 @@ impl ToSpherical {
 mod tests {
     use super::*;
 
-    fn convert(position: Position) -> (SphericalCell, [f64; 3]) {
+    fn convert(position: Position) -> (f64, Direction, [f64; 3], State) {
         let cell = RawCell { row: 3, column: 4, position, intensity: 0.5, state: State::Valid };
-        ToSpherical::default().convert(&cell)
+        let mut converted = Converted::default();
+        ToSpherical::default().append(&cell, &mut converted);
+        let Converted { cells, parts } = converted;
+        let direction = Direction { azimuth: cells.azimuth[0], elevation: cells.elevation[0] };
+        (cells.range[0], direction, parts[0], cells.true_state(0))
     }
 
     #[test]
@@ -94,12 +182,13 @@ mod tests {
         let directions = [(0.3, 0.1), (-3.0, -1.5), (3.1, 1.57), (0.0, 0.0), (4.0, -0.7), (-9.0, 0.2)];
         for (azimuth, elevation) in directions {
             let direction = Direction { azimuth, elevation };
-            let (spherical, parts) = convert(Position::Spherical(7.5, direction));
-            let (cartesian, others) = convert(Position::Cartesian(direction.unit().map(|c| c * 7.5)));
-            assert_eq!((spherical.range, spherical.direction.elevation), (7.5, elevation));
-            assert!((cartesian.range - 7.5).abs() < 1e-14);
-            let turn = wrap_azimuth(cartesian.direction.azimuth - spherical.direction.azimuth);
-            assert!(turn.abs() < 1e-12 && (cartesian.direction.elevation - elevation).abs() < 1e-12);
+            let (range, same, parts, _) = convert(Position::Spherical(7.5, direction));
+            let (distance, found, others, _) =
+                convert(Position::Cartesian(direction.unit().map(|c| c * 7.5)));
+            assert_eq!((range, same.elevation), (7.5, elevation));
+            assert!((distance - 7.5).abs() < 1e-14);
+            let turn = wrap_azimuth(found.azimuth - same.azimuth);
+            assert!(turn.abs() < 1e-12 && (found.elevation - elevation).abs() < 1e-12);
             assert!(parts.iter().zip(others).all(|(a, b)| (a - b).abs() < 1e-14), "{parts:?} {others:?}");
         }
     }
@@ -107,9 +196,9 @@ mod tests {
     #[test]
     fn a_direction_beyond_the_zenith_is_that_of_its_point() {
         let beyond = Direction { azimuth: 0.2, elevation: 1.8 };
-        let (cell, _) = convert(Position::Spherical(2.0, beyond));
-        assert!(cell.direction.unit().iter().zip(beyond.unit()).all(|(a, b)| (a - b).abs() < 1e-15));
-        assert!((cell.direction.elevation - (std::f64::consts::PI - 1.8)).abs() < 1e-15);
+        let (_, found, ..) = convert(Position::Spherical(2.0, beyond));
+        assert!(found.unit().iter().zip(beyond.unit()).all(|(a, b)| (a - b).abs() < 1e-15));
+        assert!((found.elevation - (std::f64::consts::PI - 1.8)).abs() < 1e-15);
     }
 
     #[test]
@@ -125,7 +214,7 @@ mod tests {
             Position::Spherical(5.0, Direction { azimuth: f64::INFINITY, elevation: 0.0 }),
         ];
         for place in places {
-            assert_eq!(convert(place).0.true_state(), State::NoReturn, "{place:?}");
+            assert_eq!(convert(place).3, State::NoReturn, "{place:?}");
         }
     }
 }

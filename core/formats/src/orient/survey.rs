@@ -3,7 +3,7 @@
 use platen_scan::State;
 
 use super::occupancy::{Inserted, Occupancy};
-use super::spherical::{NO_NUMBER, SphericalCell};
+use super::spherical::{Converted, NO_NUMBER};
 use super::{OrientError, fit::Line};
 
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
@@ -35,12 +35,43 @@ pub(crate) struct Survey {
 }
 
 impl Survey {
-    /// Adds a cell, with the parts of its direction's unit vector to the east, to the north and horizontal.
+    /// Adds cells.
     ///
     /// # Errors
     /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
-    pub(crate) fn add(&mut self, cell: &SphericalCell, parts: [f64; 3]) -> Result<(), OrientError> {
-        let (row, column) = (cell.row, cell.column);
+    pub(crate) fn add(&mut self, converted: &Converted) -> Result<(), OrientError> {
+        let Converted { cells, parts } = converted;
+        for (&row, &column) in cells.row.iter().zip(&cells.column) {
+            self.add_place(row, column)?;
+        }
+        let mut from = 0;
+        for column in cells.column.chunk_by(u32::eq) {
+            let run = from..from + column.len();
+            from = run.end;
+            // The sums of a column stay at hand over its run of cells; for speed only: `tests::speed`.
+            let mut sums = self.columns[column[0] as usize];
+            for cell in run {
+                let (range, elevation) = (cells.range[cell], cells.elevation[cell]);
+                if cells.true_state(cell) == State::Valid {
+                    self.rows[cells.row[cell] as usize].add(parts[cell], elevation);
+                    sums.add(parts[cell], elevation);
+                    self.valid += 1;
+                    self.above_far += u64::from(range > FAR);
+                    self.above_far_mm += u64::from(range > FAR * 1000.0);
+                    self.below_near += u64::from(range < NEAR);
+                    self.intensity.add(cells.intensity[cell]);
+                } else if cells.state[cell] == State::Valid {
+                    let finite = range < NO_NUMBER;
+                    self.not_finite += u64::from(!finite);
+                    self.unflagged += u64::from(finite);
+                }
+            }
+            self.columns[column[0] as usize] = sums;
+        }
+        Ok(())
+    }
+
+    fn add_place(&mut self, row: u32, column: u32) -> Result<(), OrientError> {
         if row.max(column) > MAX_INDEX {
             return Err(OrientError::IndexOutOfRange { row, column, max: MAX_INDEX + 1 });
         }
@@ -50,24 +81,8 @@ impl Survey {
             Inserted::TooFar => return Err(self.too_sparse()),
         }
         self.cells += 1;
-        let row = line(&mut self.rows, row);
-        let column = line(&mut self.columns, column);
-        row.cells += 1;
-        column.cells += 1;
-        if cell.true_state() == State::Valid {
-            let SphericalCell { range, direction, .. } = *cell;
-            row.add(parts, direction.elevation);
-            column.add(parts, direction.elevation);
-            self.valid += 1;
-            self.above_far += u64::from(range > FAR);
-            self.above_far_mm += u64::from(range > FAR * 1000.0);
-            self.below_near += u64::from(range < NEAR);
-            self.intensity.add(cell.intensity);
-        } else if cell.state == State::Valid {
-            let finite = cell.range < NO_NUMBER;
-            self.not_finite += u64::from(!finite);
-            self.unflagged += u64::from(finite);
-        }
+        line(&mut self.rows, row).cells += 1;
+        line(&mut self.columns, column).cells += 1;
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! One lattice of known angles, stored in every way a file may store it: the same cells must come back.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use platen_scan::{Direction, Lattice};
@@ -96,20 +97,22 @@ fn xyz(cell: &RawCell) -> [f64; 3] {
     }
 }
 
+fn converted(cells: &[RawCell]) -> Converted {
+    let (mut to_spherical, mut converted) = (ToSpherical::default(), Converted::default());
+    cells.iter().for_each(|cell| to_spherical.append(cell, &mut converted));
+    converted
+}
+
 fn plan(cells: &[RawCell], expected: &Expected) -> Result<Plan, OrientError> {
-    let (mut survey, mut to_spherical) = (Survey::default(), ToSpherical::default());
-    cells.iter().try_for_each(|cell| {
-        let (cell, parts) = to_spherical.convert(cell);
-        survey.add(&cell, parts)
-    })?;
+    let mut survey = Survey::default();
+    survey.add(&converted(cells))?;
     survey.decide(expected)
 }
 
 fn assemble(plan: &Plan, cells: &[RawCell]) -> Result<Lattice, ReadError> {
     let mut lattice = Lattice::new(plan.header.clone());
-    let mut to_spherical = ToSpherical::default();
-    let cells = cells.iter().map(move |cell| Ok(to_spherical.convert(cell).0));
-    let mut columns = Columns::new(plan, Box::new(cells));
+    let cells = converted(cells).cells;
+    let mut columns = Columns::new(plan, Box::new(std::iter::once(Ok(Cow::Owned(cells)))));
     let mut n_columns = 0;
     for column in &mut columns {
         lattice.push(&column?).unwrap();

@@ -1,6 +1,6 @@
 //! Batches of cells in the order of the file: of a packet, or of a fixed number. One dynamic call a batch instead of one a cell; for speed only: `tests::speed`.
 
-use crate::orient::RawCell;
+use crate::orient::{Converted, RawCell, ToSpherical};
 
 use super::error::Result;
 
@@ -13,29 +13,29 @@ pub(crate) trait Cells: Send {
     ///
     /// # Errors
     /// That of the file, behind the cells before it.
-    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()>;
+    fn append(&mut self, to_spherical: &mut ToSpherical, batch: &mut Converted) -> Result<()>;
 }
 
 impl<I: Iterator<Item = Result<RawCell>> + Send> Cells for I {
-    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()> {
+    fn append(&mut self, to_spherical: &mut ToSpherical, batch: &mut Converted) -> Result<()> {
         self.take(BATCH).try_for_each(|cell| {
-            batch.push(cell?);
+            to_spherical.append(&cell?, batch);
             Ok(())
         })
     }
 }
 
-/// Returns the cells one by one.
-pub(super) fn each<'a>(mut cells: Box<dyn Cells + 'a>) -> impl Iterator<Item = Result<RawCell>> + use<'a> {
-    let (mut batch, mut next, mut error) = (Vec::new(), 0, None);
+/// Returns the cells batch by batch.
+pub(super) fn batches<'a>(
+    mut cells: Box<dyn Cells + 'a>,
+) -> impl Iterator<Item = Result<Converted>> + use<'a> {
+    let (mut to_spherical, mut error) = (ToSpherical::default(), None);
     std::iter::from_fn(move || {
-        if next == batch.len() && error.is_none() {
-            batch.clear();
-            next = 0;
-            error = cells.append(&mut batch).err();
+        if let Some(error) = error.take() {
+            return Some(Err(error));
         }
-        let cell = batch.get(next).copied();
-        next += usize::from(cell.is_some());
-        cell.map(Ok).or_else(|| error.take().map(Err))
+        let mut batch = Converted::default();
+        error = cells.append(&mut to_spherical, &mut batch).err();
+        if batch.parts.is_empty() { error.take().map(Err) } else { Some(Ok(batch)) }
     })
 }

@@ -5,13 +5,10 @@ use std::thread;
 
 use super::cells::Cells;
 use super::error::{ReadError, Result};
-use super::{SphericalCell, ToSpherical};
+use crate::orient::{Converted, ToSpherical};
 
 /// Batches that wait.
 const AHEAD: usize = 4;
-
-/// A cell, and the parts of its direction's unit vector to the east, to the north and horizontal.
-type Converted = (SphericalCell, [f64; 3]);
 
 /// Calls `take` with all cells, some at a time, in the order of the file; an error from it ends the pass.
 ///
@@ -19,7 +16,7 @@ type Converted = (SphericalCell, [f64; 3]);
 /// The error of `take`, or that of the file, after the cells before it.
 pub(super) fn for_each<E: From<ReadError>>(
     cells: Box<dyn Cells + '_>,
-    mut take: impl FnMut(&[Converted]) -> std::result::Result<(), E>,
+    mut take: impl FnMut(&Converted) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
     let (filled, batches) = sync_channel(AHEAD);
     let (used, spare) = channel();
@@ -28,7 +25,7 @@ pub(super) fn for_each<E: From<ReadError>>(
         let started = decoder.spawn_scoped(scope, move || decode(cells, &filled, &spare));
         started.map_err(ReadError::io("starting a thread"))?;
         for batch in batches {
-            let batch: Vec<Converted> = batch?;
+            let batch: Converted = batch?;
             take(&batch)?;
             // The decoder may have ended.
             let _ = used.send(batch);
@@ -40,23 +37,22 @@ pub(super) fn for_each<E: From<ReadError>>(
 /// Sends the cells in batches until the end or an error, or until nobody takes them.
 fn decode(
     mut cells: Box<dyn Cells + '_>,
-    filled: &SyncSender<Result<Vec<Converted>>>,
-    spare: &Receiver<Vec<Converted>>,
+    filled: &SyncSender<Result<Converted>>,
+    spare: &Receiver<Converted>,
 ) {
-    let (mut to_spherical, mut raw) = (ToSpherical::default(), Vec::new());
+    let mut to_spherical = ToSpherical::default();
     loop {
-        raw.clear();
-        let end = cells.append(&mut raw);
         let mut batch = spare.try_recv().unwrap_or_default();
         batch.clear();
-        batch.extend(raw.iter().map(|cell| to_spherical.convert(cell)));
+        let end = cells.append(&mut to_spherical, &mut batch);
+        let is_last = batch.parts.is_empty();
         let sent = filled.send(Ok(batch));
         if let Err(error) = end {
             // Nobody may be left to take it.
             let _ = filled.send(Err(error));
             return;
         }
-        if sent.is_err() || raw.is_empty() {
+        if sent.is_err() || is_last {
             return;
         }
     }

@@ -17,7 +17,7 @@ use super::cells::Cells;
 use super::error::{ReadError, Result};
 use super::{About, Source};
 use crate::header_text;
-use crate::orient::{Position, RawCell};
+use crate::orient::{Converted, Position, ToSpherical};
 use compressed_vector::{CompressedVector, Points};
 
 const FORMAT: &str = "E57";
@@ -58,11 +58,9 @@ impl<R: Read + Seek + Send> Source for E57<R> {
     }
 
     fn cells(&mut self) -> Result<Box<dyn Cells + '_>> {
-        let fields = &self.fields;
         let PointCloud { file_offset, prototype, records, .. } = &self.cloud;
-        let wanted = |index| fields.has(index);
-        let packets = CompressedVector::open(&mut self.file, *file_offset, prototype, *records, wanted)
-            .map_err(unsound)?;
+        let packets = CompressedVector::open(&mut self.file, *file_offset, prototype, *records);
+        let (packets, fields) = (packets.map_err(unsound)?, &self.fields);
         Ok(Box::new(PacketCells { packets, fields, values: Values::default(), before: 0 }))
     }
 }
@@ -77,17 +75,20 @@ struct PacketCells<'a, R> {
 }
 
 impl<R: Read + Seek + Send> Cells for PacketCells<'_, R> {
-    fn append(&mut self, batch: &mut Vec<RawCell>) -> Result<()> {
-        let wrong = |number: u64, what| unsound(format!("point {number}: {what}"));
-        let start = batch.len();
-        while batch.len() == start {
+    fn append(&mut self, to_spherical: &mut ToSpherical, batch: &mut Converted) -> Result<()> {
+        while batch.parts.is_empty() {
+            let wrong = |number: u64, what| unsound(format!("point {number}: {what}"));
             let packet = self.packets.next().map_err(|what| wrong(self.before, what))?;
             let Some(points) = packet else { return Ok(()) };
-            self.fields.read(points, &mut self.values);
-            for k in 0..points.len() {
-                let cell = self.fields.cell(&self.values, k);
-                batch.extend(cell.map_err(|what| wrong(self.before + k as u64, what))?);
+            let values = &mut self.values;
+            self.fields.read(points, values);
+            let sound = self.fields.check(values);
+            if let Err((point, _)) = &sound {
+                values.truncate(*point);
             }
+            values.keep_first_echoes();
+            self.fields.append(values, to_spherical, batch);
+            sound.map_err(|(point, what)| wrong(self.before + point as u64, what))?;
             self.before += points.len() as u64;
         }
         Ok(())
@@ -103,6 +104,30 @@ struct Values {
     column: Vec<i64>,
     state: Vec<i64>,
     echo: Vec<i64>,
+}
+
+impl Values {
+    /// Keeps the first points.
+    fn truncate(&mut self, n: usize) {
+        let Self { position, intensity, row, column, state, echo } = self;
+        position.iter_mut().chain([intensity]).for_each(|numbers| numbers.truncate(n));
+        [row, column, state, echo].into_iter().for_each(|numbers| numbers.truncate(n));
+    }
+
+    /// Removes the second and later echoes of beams.
+    fn keep_first_echoes(&mut self) {
+        let Self { position, intensity, row, column, state, echo } = self;
+        if echo.iter().any(|echo| *echo > 0) {
+            position.iter_mut().chain([intensity]).for_each(|numbers| retain_first_echoes(numbers, echo));
+            [row, column, state].into_iter().for_each(|numbers| retain_first_echoes(numbers, echo));
+        }
+    }
+}
+
+/// Keeps those of the values, if there are any, that are of first echoes.
+fn retain_first_echoes<T>(values: &mut Vec<T>, echo: &[i64]) {
+    let mut echoes = echo.iter();
+    values.retain(|_| echoes.next().is_some_and(|echo| *echo <= 0));
 }
 
 fn unsound(what: String) -> ReadError {
@@ -315,12 +340,6 @@ impl Fields {
         format!("{FORMAT}: {coordinates} coordinates, {numbers}, {gaps}")
     }
 
-    /// Returns true when the field at an index of the prototype is one of them.
-    fn has(&self, index: usize) -> bool {
-        let more = [&self.state, &self.intensity, &self.return_index].into_iter().flatten();
-        self.position.iter().chain([&self.row, &self.column]).chain(more).any(|field| field.index == index)
-    }
-
     /// Reads the fields of all points of a packet.
     fn read(&self, points: &Points, values: &mut Values) {
         let numbers = |field: &Field, into: &mut Vec<f64>| points.numbers(field.index, into);
@@ -333,30 +352,48 @@ impl Fields {
         self.return_index.iter().for_each(|field| wholes(field, &mut values.echo));
     }
 
-    /// Returns the cell of a point of a packet, `None` for the second and later echoes of a beam.
-    fn cell(&self, values: &Values, point: usize) -> std::result::Result<Option<RawCell>, String> {
-        if values.echo.get(point).is_some_and(|echo| *echo > 0) {
-            return Ok(None);
+    /// Checks indices and states.
+    ///
+    /// # Errors
+    /// The first point that is wrong, with the sentence.
+    fn check(&self, values: &Values) -> std::result::Result<(), (usize, String)> {
+        let [rows, columns] = self.bounds;
+        let lines = [("row", &values.row, rows), ("column", &values.column, columns)];
+        let outside = lines.into_iter().filter_map(|(name, numbers, (min, max))| {
+            let wanted = min.max(0)..=max.min(i64::from(u32::MAX));
+            let point = numbers.iter().position(|number| !wanted.contains(number))?;
+            let number = numbers[point];
+            Some((point, format!("{name} {number} lies outside of the declared {min} to {max}")))
+        });
+        let undefined = values.state.iter().position(|state| !(0..=2).contains(state));
+        let undefined = undefined
+            .map(|point| (point, format!("invalid state {}, 0 to 2 are defined", values.state[point])));
+        outside.chain(undefined).min_by_key(|(point, _)| *point).map_or(Ok(()), Err)
+    }
+
+    /// Appends the cells of points that were checked.
+    fn append(&self, values: &Values, to_spherical: &mut ToSpherical, batch: &mut Converted) {
+        let n = values.row.len();
+        let cells = &mut batch.cells;
+        cells.row.extend(values.row.iter().map(|row| *row as u32));
+        cells.column.extend(values.column.iter().map(|column| *column as u32));
+        cells.intensity.extend_from_slice(&values.intensity);
+        cells.intensity.resize(cells.row.len(), 0.0);
+        cells.state.extend(values.state.iter().map(|state| match state {
+            0 => State::Valid,
+            1 => State::DirectionOnly,
+            _ => State::NoReturn,
+        }));
+        cells.state.resize(cells.row.len(), State::Valid);
+        let [a, b, c] = values.position.each_ref().map(|numbers| &numbers[..n]);
+        if self.spherical {
+            let is_direction = |point: usize| values.state.get(point) == Some(&1);
+            let position = |point: usize| spherical(a[point], b[point], c[point], is_direction(point));
+            to_spherical.append_positions((0..n).map(position), batch);
+        } else {
+            let position = |point: usize| Position::Cartesian([a[point], b[point], c[point]]);
+            to_spherical.append_positions((0..n).map(position), batch);
         }
-        let index = |value: i64, name: &str, (min, max): (i64, i64)| {
-            u32::try_from(value)
-                .ok()
-                .filter(|_| (min..=max).contains(&value))
-                .ok_or_else(|| format!("{name} {value} lies outside of the declared {min} to {max}"))
-        };
-        let row = index(values.row[point], "row", self.bounds[0])?;
-        let column = index(values.column[point], "column", self.bounds[1])?;
-        let state = match values.state.get(point) {
-            None | Some(0) => State::Valid,
-            Some(1) => State::DirectionOnly,
-            Some(2) => State::NoReturn,
-            Some(other) => return Err(format!("invalid state {other}, 0 to 2 are defined")),
-        };
-        let [a, b, c] = values.position.each_ref().map(|numbers| numbers[point]);
-        let position =
-            if self.spherical { spherical(a, b, c, state) } else { Position::Cartesian([a, b, c]) };
-        let intensity = values.intensity.get(point).copied().unwrap_or(0.0);
-        Ok(Some(RawCell { row, column, position, intensity, state }))
     }
 }
 
@@ -368,9 +405,9 @@ fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
     declared.map_or([any, any], |b| [or_any(b.row_min, b.row_max), or_any(b.column_min, b.column_max)])
 }
 
-/// Returns a position by range and direction. A range that is not positive becomes 0, no measurement; without a range it is 1 m.
-fn spherical(range: f64, azimuth: f64, elevation: f64, state: State) -> Position {
-    let range = if state == State::DirectionOnly { 1.0 } else { range.max(0.0) };
+/// Returns a position by range and direction. A range that is not positive becomes 0, no measurement; of a direction alone it is 1 m.
+fn spherical(range: f64, azimuth: f64, elevation: f64, is_direction: bool) -> Position {
+    let range = if is_direction { 1.0 } else { range.max(0.0) };
     Position::Spherical(range, Direction { azimuth, elevation })
 }
 
@@ -404,11 +441,14 @@ mod tests {
                 streams.extend([bytes(number), widest(5)]);
                 let mut values = Values::default();
                 fields.read(&Points::of(&types, &streams), &mut values);
-                fields.cell(&values, 0).map(|cell| cell.map(|cell| cell.state))
+                let mut batch = Converted::default();
+                fields.check(&values)?;
+                fields.append(&values, &mut ToSpherical::default(), &mut batch);
+                Ok::<_, (usize, String)>(batch.cells.state[0])
             };
-            assert_eq!(read(0), Ok(Some(State::Valid)));
-            assert_eq!(read(1), Ok(Some(State::DirectionOnly)));
-            assert_eq!(read(2), Ok(Some(State::NoReturn)));
+            assert_eq!(read(0), Ok(State::Valid));
+            assert_eq!(read(1), Ok(State::DirectionOnly));
+            assert_eq!(read(2), Ok(State::NoReturn));
             assert!(read(3).is_err() && read(-1).is_err());
         }
     }

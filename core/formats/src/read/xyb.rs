@@ -9,11 +9,11 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use platen_scan::{Direction, State};
 
-use super::cells::{Cells, each};
+use super::cells::{Cells, batches};
 use super::error::{ReadError, Result};
 use super::scan_order::{self, Placed, Placer, Steps};
 use super::{About, Source};
-use crate::orient::{Expected, Position, RawCell, Survey, ToSpherical};
+use crate::orient::{Expected, Position, RawCell, Survey};
 
 const FORMAT: &str = "XYB";
 /// First line, without its version.
@@ -71,8 +71,8 @@ impl<R: Read + Seek + Send> Xyb<R> {
             let steps = xyb.steps()?;
             xyb.order = Order::Hits(steps.clone(), 0);
             let mut lowest = u32::MAX;
-            for cell in each(xyb.cells()?) {
-                lowest = lowest.min(cell?.row);
+            for batch in batches(xyb.cells()?) {
+                lowest = batch?.cells.row.into_iter().fold(lowest, u32::min);
             }
             xyb.order = Order::Hits(steps, lowest);
             let note = "the file holds hits without row and column: placed by the order of their angles";
@@ -86,10 +86,9 @@ impl<R: Read + Seek + Send> Xyb<R> {
         let mut first_error = None;
         for in_a_line in [rows, columns] {
             self.order = Order::Lines(in_a_line);
-            let (mut survey, mut to_spherical) = (Survey::default(), ToSpherical::default());
-            for cell in each(self.cells()?) {
-                let (cell, parts) = to_spherical.convert(&cell?);
-                survey.add(&cell, parts)?;
+            let mut survey = Survey::default();
+            for batch in batches(self.cells()?) {
+                survey.add(&batch?)?;
             }
             match survey.decide(&Expected::default()) {
                 Ok(_) => return Ok(()),

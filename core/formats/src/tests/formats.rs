@@ -80,6 +80,14 @@ fn azimuths_a_turn_off_are_the_same_directions() {
 }
 
 #[test]
+fn of_several_echoes_the_first_is_read() {
+    for spherical in [false, true] {
+        let lattice = check(&e57(E57Style { spherical, echoes: true, ..PLAIN }, 1), "scan.e57", EXACT);
+        assert!(notes(&lattice).contains("the first of each is used"), "{}", notes(&lattice));
+    }
+}
+
+#[test]
 fn a_pose_is_reported_and_not_applied() {
     let lattice = check(&e57(E57Style { posed: true, ..PLAIN }, 1), "scan.e57", EXACT);
     assert!(notes(&lattice).contains("at 100 -20 3 m) is not applied"), "{}", notes(&lattice));

@@ -54,6 +54,8 @@ pub(super) struct E57Style {
     pub(super) posed: bool,
     pub(super) scale: f64,
     pub(super) azimuth_turns: f64,
+    /// Every third beam has a second echo, 2 m behind.
+    pub(super) echoes: bool,
 }
 
 pub(super) fn double(name: RecordName) -> Record {
@@ -83,6 +85,7 @@ pub(super) const PLAIN: E57Style = E57Style {
     posed: false,
     scale: 1.0,
     azimuth_turns: 0.0,
+    echoes: false,
 };
 
 fn value(record: &Record, value: f64) -> RecordValue {
@@ -129,6 +132,9 @@ fn add_cloud(writer: &mut Writer<'_>, style: E57Style, number: usize, descriptio
     prototype.push(Record { name: RowIndex, data_type: RecordDataType::Integer { min: 0, max: 16383 } });
     prototype.push(Record { name: ColumnIndex, data_type: RecordDataType::Integer { min: 0, max: 16383 } });
     prototype.push(Record { name: Intensity, data_type: RecordDataType::Integer { min: 0, max: 2047 } });
+    if style.echoes {
+        prototype.extend([ReturnIndex, ReturnCount].map(narrow));
+    }
     let mut cloud = writer.add_pointcloud(&format!("cloud {number}"), prototype.clone()).unwrap();
     cloud.set_intensity_limits(Some(IntensityLimits {
         intensity_min: Some(RecordValue::Integer(0)),
@@ -148,23 +154,28 @@ fn add_cloud(writer: &mut Writer<'_>, style: E57Style, number: usize, descriptio
                 continue;
             }
             let (direction, range) = beam(row, column);
-            let position = if style.spherical {
-                let azimuth = direction.azimuth + style.azimuth_turns * std::f64::consts::TAU;
-                [range * style.scale, azimuth, direction.elevation]
-            } else {
-                point(row, column).map(|c| c * style.scale)
-            };
-            let (position, flag) = match style.gaps {
-                _ if !gap => (position, 0.0),
-                Gaps::Zero => ([0.0; 3], 0.0),
-                Gaps::Nan => ([f64::NAN; 3], 0.0),
-                Gaps::Flagged | Gaps::LeftOut => ([1.0; 3], 2.0),
-            };
-            let index = |i: u32| f64::from(i) + style.offset as f64;
-            let numbers =
-                position.into_iter().chain([flag, index(row), index(column), intensity(row, column)]);
-            let point = prototype.iter().zip(numbers).map(|(record, number)| value(record, number)).collect();
-            cloud.add_point(point).unwrap();
+            let n_echoes = if style.echoes && (row + column).is_multiple_of(3) { 2 } else { 1 };
+            for echo in 0..n_echoes {
+                let behind = 2.0 * f64::from(echo);
+                let position = if style.spherical {
+                    let azimuth = direction.azimuth + style.azimuth_turns * std::f64::consts::TAU;
+                    [(range + behind) * style.scale, azimuth, direction.elevation]
+                } else {
+                    direction.unit().map(|c| c * (range + behind) * style.scale)
+                };
+                let (position, flag) = match style.gaps {
+                    _ if !gap => (position, 0.0),
+                    Gaps::Zero => ([0.0; 3], 0.0),
+                    Gaps::Nan => ([f64::NAN; 3], 0.0),
+                    Gaps::Flagged | Gaps::LeftOut => ([1.0; 3], 2.0),
+                };
+                let index = |i: u32| f64::from(i) + style.offset as f64;
+                let numbers = position.into_iter().chain([flag, index(row), index(column)]);
+                let numbers = numbers.chain([intensity(row, column), f64::from(echo), f64::from(n_echoes)]);
+                let point =
+                    prototype.iter().zip(numbers).map(|(record, number)| value(record, number)).collect();
+                cloud.add_point(point).unwrap();
+            }
         }
     }
     cloud.finalize().unwrap();

@@ -35,17 +35,11 @@ pub(super) struct CompressedVector<R> {
 }
 
 impl<R: Read + Seek> CompressedVector<R> {
-    /// Opens the section at a physical offset of the file. Of the fields only those that `wanted` names are unpacked.
+    /// Opens the section at a physical offset of the file.
     ///
     /// # Errors
     /// The sentence for a section that cannot be read, or is none.
-    pub(super) fn open(
-        file: R,
-        offset: u64,
-        prototype: &[Record],
-        records: u64,
-        wanted: impl Fn(usize) -> bool,
-    ) -> Result<Self, String> {
+    pub(super) fn open(file: R, offset: u64, prototype: &[Record], records: u64) -> Result<Self, String> {
         let mut pages = Pages { file, content: Vec::new(), at: 0 };
         pages.seek(offset)?;
         let mut header = [0; HEADER];
@@ -54,8 +48,8 @@ impl<R: Read + Seek> CompressedVector<R> {
             return Err("its points do not begin with a header".to_owned());
         }
         pages.seek(header[16..24].iter().rev().fold(0, |offset, byte| offset << 8 | u64::from(*byte)))?;
-        let stream = |(k, record): (usize, &Record)| Stream::new(&record.data_type, wanted(k));
-        let points = Points { streams: prototype.iter().enumerate().map(stream).collect(), n: 0 };
+        let stream = |record: &Record| Stream::new(&record.data_type);
+        let points = Points { streams: prototype.iter().map(stream).collect(), n: 0 };
         Ok(Self { pages, points, left: records, packet: Vec::new() })
     }
 
@@ -67,7 +61,7 @@ impl<R: Read + Seek> CompressedVector<R> {
         if self.left == 0 {
             return Ok(None);
         }
-        self.points.n = 0;
+        self.points.skip();
         while self.points.n == 0 {
             self.next_packet()?;
         }
@@ -86,11 +80,11 @@ impl<R: Read + Seek> CompressedVector<R> {
         }
         self.packet.resize(length - head.len(), 0);
         self.pages.read(&mut self.packet)?;
-        if kind == DATA { self.points.unpack(&self.packet) } else { Ok(()) }
+        if kind == DATA { self.points.append(&self.packet) } else { Ok(()) }
     }
 }
 
-/// Unpacked points of one packet.
+/// Points of one packet; a field is unpacked when it is read.
 #[derive(Debug)]
 pub(super) struct Points {
     streams: Vec<Stream>,
@@ -105,34 +99,47 @@ impl Points {
 
     /// Reads a field of all points as numbers.
     pub(super) fn numbers(&self, field: usize, into: &mut Vec<f64>) {
-        let Stream { encoding, values, .. } = &self.streams[field];
-        into.clear();
-        into.extend(values.iter().take(self.n).map(|raw| encoding.number(*raw)));
-        into.resize(self.n, encoding.number(0));
+        let stream = &self.streams[field];
+        // A loop for each encoding.
+        match stream.encoding {
+            Encoding::Single => stream.read(self.n, |raw| Encoding::Single.number(raw), into),
+            Encoding::Double => stream.read(self.n, |raw| Encoding::Double.number(raw), into),
+            integer @ Encoding::Integer { .. } => stream.read(self.n, |raw| integer.number(raw), into),
+            scaled @ Encoding::Scaled { .. } => stream.read(self.n, |raw| scaled.number(raw), into),
+        }
     }
 
     /// Reads a field of all points as whole numbers; PDAL writes states as floats.
     pub(super) fn wholes(&self, field: usize, into: &mut Vec<i64>) {
-        let Stream { encoding, values, .. } = &self.streams[field];
-        into.clear();
-        into.extend(values.iter().take(self.n).map(|raw| encoding.whole(*raw)));
-        into.resize(self.n, encoding.whole(0));
+        let stream = &self.streams[field];
+        match stream.encoding {
+            integer @ Encoding::Integer { .. } => stream.read(self.n, |raw| integer.whole(raw), into),
+            other => stream.read(self.n, |raw| other.whole(raw), into),
+        }
     }
 
     /// One packet of bytestreams of these types.
     #[cfg(test)]
     pub(super) fn of(types: &[&RecordDataType], bytestreams: &[Vec<u8>]) -> Self {
-        let streams = types.iter().map(|data_type| Stream::new(data_type, true)).collect();
+        let streams = types.iter().map(|data_type| Stream::new(data_type)).collect();
         let mut points = Self { streams, n: 0 };
         let mut packet = (types.len() as u16).to_le_bytes().to_vec();
         packet.extend(bytestreams.iter().flat_map(|bytes| (bytes.len() as u16).to_le_bytes()));
         packet.extend(bytestreams.iter().flatten());
-        points.unpack(&packet).unwrap();
+        points.append(&packet).unwrap();
         points
     }
 
-    /// Unpacks the points that are complete with a data packet, given from behind its first four bytes.
-    fn unpack(&mut self, packet: &[u8]) -> Result<(), String> {
+    /// Goes on behind the points.
+    fn skip(&mut self) {
+        for stream in &mut self.streams {
+            stream.bit += self.n * stream.width;
+        }
+        self.n = 0;
+    }
+
+    /// Appends the points that are complete with a data packet, given from behind its first four bytes.
+    fn append(&mut self, packet: &[u8]) -> Result<(), String> {
         let n = self.streams.len();
         let broken = || "a packet is shorter than its bytestreams".to_owned();
         let u16_at = |k: usize| Some(usize::from(u16::from_le_bytes([*packet.get(k)?, *packet.get(k + 1)?])));
@@ -147,30 +154,25 @@ impl Points {
             from = to;
         }
         self.n = self.streams.iter().filter_map(Stream::complete).min().unwrap_or(0);
-        for stream in &mut self.streams {
-            stream.unpack(self.n);
-        }
         Ok(())
     }
 }
 
-/// Values of one field, of one packet and what the packet before left of an incomplete value.
+/// Values of one field: of one packet, and what the packet before left of an incomplete value.
 #[derive(Debug)]
 struct Stream {
     encoding: Encoding,
     /// Bits of a value, up to 64; 0 where all are equal.
     width: usize,
-    wanted: bool,
     bytes: Vec<u8>,
-    /// First bit not unpacked yet.
+    /// First bit of the first value.
     bit: usize,
-    values: Vec<u64>,
 }
 
 impl Stream {
-    fn new(data_type: &RecordDataType, wanted: bool) -> Self {
+    fn new(data_type: &RecordDataType) -> Self {
         let (encoding, width) = Encoding::new(data_type);
-        Self { encoding, width, wanted, bytes: Vec::new(), bit: 0, values: Vec::new() }
+        Self { encoding, width, bytes: Vec::new(), bit: 0 }
     }
 
     fn append(&mut self, more: &[u8]) {
@@ -184,31 +186,32 @@ impl Stream {
         (8 * self.bytes.len() - self.bit).checked_div(self.width)
     }
 
-    fn unpack(&mut self, n: usize) {
-        let (start, width) = (self.bit, self.width);
-        self.bit += n * width;
-        self.values.clear();
-        if !self.wanted || width == 0 {
-            return;
+    /// Reads the first `n` values, which must be complete.
+    fn read<T: Clone>(&self, n: usize, of: impl Fn(u64) -> T, into: &mut Vec<T>) {
+        into.clear();
+        let Self { width, bit: start, ref bytes, .. } = *self;
+        if width == 0 {
+            return into.resize(n, of(0));
         }
         let mask = u64::MAX >> (64 - width);
         // A value of up to 64 bits lies in nine bytes.
-        let at = |bit: usize, bytes: &[u8]| {
+        let at = |bit: usize| {
             let mut nine = [0; 16];
             let from = &bytes[bit / 8..];
             let held = from.len().min(9);
             nine[..held].copy_from_slice(&from[..held]);
             (u128::from_le_bytes(nine) >> (bit % 8)) as u64 & mask
         };
-        // All but the last few are read eight bytes at a time.
-        let fast = if width <= 56 { (8 * self.bytes.len()).saturating_sub(start + 64) / width } else { 0 };
-        let bytes = &self.bytes;
-        self.values.extend((0..n.min(fast)).map(|k| {
+        // Where eight are enough, all but the last few are read eight bytes at a time.
+        let in_eight = width <= 57 || width.is_multiple_of(8) && start.is_multiple_of(8);
+        let last = (8 * bytes.len()).saturating_sub(start + 64);
+        let fast = if in_eight { n.min(last / width) } else { 0 };
+        into.extend((0..fast).map(|k| {
             let bit = start + k * width;
             let eight = bytes[bit / 8..].first_chunk().map_or(0, |eight| u64::from_le_bytes(*eight));
-            eight >> (bit % 8) & mask
+            of(eight >> (bit % 8) & mask)
         }));
-        self.values.extend((n.min(fast)..n).map(|k| at(start + k * width, bytes)));
+        into.extend((fast..n).map(|k| of(at(start + k * width))));
     }
 }
 
@@ -334,15 +337,17 @@ mod tests {
             let max =
                 if width == 64 { i64::MAX } else { i64::MIN.wrapping_add_unsigned(u64::MAX >> (64 - width)) };
             let values: Vec<u64> = (0..300).map(|_| random.u64(..) & u64::MAX >> (64 - width)).collect();
-            let mut stream = Stream::new(&Type::Integer { min: i64::MIN, max }, true);
+            let mut stream = Stream::new(&Type::Integer { min: i64::MIN, max });
             assert_eq!(stream.width, width);
-            let (bytes, mut unpacked) = (packed(&values, width), Vec::new());
+            let (bytes, mut unpacked, mut some) = (packed(&values, width), Vec::new(), Vec::new());
             let mut from = 0;
             while from < bytes.len() {
                 let to = (from + random.usize(1..100)).min(bytes.len());
                 stream.append(&bytes[from..to]);
-                stream.unpack(stream.complete().unwrap());
-                unpacked.append(&mut stream.values);
+                let complete = stream.complete().unwrap();
+                stream.read(complete, |raw| raw, &mut some);
+                stream.bit += complete * width;
+                unpacked.append(&mut some);
                 from = to;
             }
             assert_eq!(unpacked[..values.len()], values, "{width} bits");
