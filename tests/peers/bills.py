@@ -46,7 +46,7 @@ def main():
     locked = {(p["name"], p["version"]) for p in lock["package"]}
     wrong = []
     for package, crate in ("platen", "platen"), ("platen-sim", "platen-sim"):
-        deb, = (ROOT / "target/package/debian").glob(f"{package}_*.deb")
+        deb, = (ROOT / "target/debian").glob(f"{package}_*.deb")
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             subprocess.run(["dpkg-deb", "-x", deb, folder / "files"], check=True)

@@ -19,7 +19,7 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
-PACKAGES = ROOT / "target/package/debian"
+PACKAGES = ROOT / "target/debian"
 
 PLANT = """[plant]
 name = "unit"
