@@ -203,7 +203,7 @@ struct Arm {
     /// The line of least squares through the edge's points within a square's arm; zero where there are none.
     direction: Vec3,
     /// Standard deviation of that direction, radians: both ends of the arm may be off, in opposite senses, by as much as the
-    /// edge is uncertain, its points scatter about the line, and a range error moves it aside.
+    /// edge is uncertain, its points scatter about the line, and a range error tilts it.
     tilt: f64,
 }
 
@@ -224,8 +224,9 @@ impl Arm {
         let direction = if sum.norm() > 0.0 { sum.normalize() } else { Vec3::zeros() };
         let aside = |p: &Vec3| (p - mean).cross(&direction).norm_squared();
         let scatter = near.iter().map(aside).sum::<f64>() / count;
-        let moved = range_error.along(&corner, &normal.cross(&direction));
-        Self { direction, tilt: (2.0 * (curve.sigma.powi(2) + scatter + moved * moved)).sqrt() / reach }
+        let own = (2.0 * (curve.sigma.powi(2) + scatter)).sqrt() / reach;
+        let moved = range_error.tilt(&corner, &(direction * reach), &normal.cross(&direction));
+        Self { direction, tilt: own.hypot(moved) }
     }
 }
 
