@@ -88,24 +88,22 @@ impl<'a> Columns<'a> {
         self.taken = some.end;
         let column = self.plan.column(&self.batch, some.start).ok_or_else(|| self.changed())?;
         let waiting = &mut self.waiting[column as usize];
-        let (n, expected) = (waiting.len() + some.len(), self.plan.cells[column as usize] as usize);
-        if n > expected {
+        let expected = self.plan.cells[column as usize] as usize;
+        if waiting.len() + some.len() > expected {
             return Err(self.changed());
         }
-        if n < expected && waiting.len() == 0 {
-            *waiting = SphericalCells::with_capacity(expected);
-        }
-        if n < expected || waiting.len() > 0 {
-            waiting.append(&self.batch, some.clone());
-        }
-        if n < expected {
-            return Ok(None);
-        }
-        let waited = std::mem::take(waiting);
-        let built = if waited.len() > 0 {
-            self.plan.build(column, &waited, 0..n)
-        } else {
+        let built = if some.len() == expected {
             self.plan.build(column, &self.batch, some)
+        } else {
+            if waiting.len() == 0 {
+                *waiting = SphericalCells::with_capacity(expected);
+            }
+            waiting.append(&self.batch, some);
+            if waiting.len() < expected {
+                return Ok(None);
+            }
+            let cells = std::mem::take(waiting);
+            self.plan.build(column, &cells, 0..expected)
         };
         let built = built.ok_or_else(|| self.changed())?;
         self.points += built.state.iter().filter(|state| **state == State::Valid).count() as u64;
@@ -130,9 +128,14 @@ impl Iterator for Columns<'_> {
 }
 
 impl Plan {
+    /// Returns rows and columns of cells as the lattice has them, before they are flipped.
+    fn lines<'c>(&self, cells: &'c SphericalCells) -> (&'c [u32], &'c [u32]) {
+        if self.swapped { (&cells.column, &cells.row) } else { (&cells.row, &cells.column) }
+    }
+
     /// Returns the cells of a batch from one on that lie in its column.
     fn same_column(&self, cells: &SphericalCells, from: usize) -> Range<usize> {
-        let columns = if self.swapped { &cells.row } else { &cells.column };
+        let (_, columns) = self.lines(cells);
         let column = columns[from];
         let n = columns[from..].iter().take_while(|other| **other == column).count();
         from..from + n
@@ -140,9 +143,9 @@ impl Plan {
 
     /// Returns the normalised column of a cell, `None` outside of the lattice decided.
     fn column(&self, cells: &SphericalCells, cell: usize) -> Option<u32> {
-        let stored = if self.swapped { cells.row[cell] } else { cells.column[cell] };
+        let (_, columns) = self.lines(cells);
         let n_columns = self.header.n_columns;
-        let column = stored.checked_sub(self.first_column).filter(|column| *column < n_columns)?;
+        let column = columns[cell].checked_sub(self.first_column).filter(|column| *column < n_columns)?;
         let column = if self.columns_flipped { n_columns - 1 - column } else { column };
         Some((column + n_columns - self.cut) % n_columns)
     }
@@ -150,8 +153,8 @@ impl Plan {
     /// Returns a column of the normalised lattice from the first to the last row of known direction: right-handed, metres. `None` when a cell
     /// lies outside of the lattice decided.
     fn build(&self, index: u32, cells: &SphericalCells, some: Range<usize>) -> Option<Column> {
-        let stored = if self.swapped { &cells.column } else { &cells.row };
-        let stored = &stored[some.clone()];
+        let (rows, _) = self.lines(cells);
+        let stored = &rows[some.clone()];
         let last = self.first_row + self.header.n_rows - 1;
         if stored.iter().min()? < &self.first_row || stored.iter().max()? > &last {
             return None;

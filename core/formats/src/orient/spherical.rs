@@ -36,10 +36,15 @@ pub(crate) struct SphericalCells {
 impl SphericalCells {
     /// Returns none, with room for `n`.
     pub(crate) fn with_capacity(n: usize) -> Self {
-        let numbers = || Vec::with_capacity(n);
-        let (row, column, state) = (Vec::with_capacity(n), Vec::with_capacity(n), Vec::with_capacity(n));
-        let (range, azimuth, elevation, intensity) = (numbers(), numbers(), numbers(), numbers());
-        Self { row, column, range, azimuth, elevation, intensity, state }
+        Self {
+            row: Vec::with_capacity(n),
+            column: Vec::with_capacity(n),
+            range: Vec::with_capacity(n),
+            azimuth: Vec::with_capacity(n),
+            elevation: Vec::with_capacity(n),
+            intensity: Vec::with_capacity(n),
+            state: Vec::with_capacity(n),
+        }
     }
 
     /// Returns the number of cells.
