@@ -40,15 +40,19 @@ impl Occupancy {
         let (column, word, bit) = (column as usize, row as usize / 64, 1 << (row % 64));
         let held =
             self.columns.get_mut(column).and_then(|rows| rows.words.get_mut(word.wrapping_sub(rows.base)));
-        let inserted = match held {
-            Some(held) => set(held, bit),
+        let held = match held {
+            Some(held) => held,
             None => match self.reach(column, word) {
-                Some(held) => set(held, bit),
-                None => Inserted::TooFar,
+                Some(held) => held,
+                None => return Inserted::TooFar,
             },
         };
-        self.cells += u64::from(inserted == Inserted::New);
-        inserted
+        if *held & bit != 0 {
+            return Inserted::Twice;
+        }
+        *held |= bit;
+        self.cells += 1;
+        Inserted::New
     }
 
     /// Extends a column to a word; `None` beyond the bound.
@@ -65,15 +69,6 @@ impl Occupancy {
         rows.reach(word);
         rows.words.get_mut(word - rows.base)
     }
-}
-
-/// Sets a bit.
-fn set(held: &mut u64, bit: u64) -> Inserted {
-    if *held & bit != 0 {
-        return Inserted::Twice;
-    }
-    *held |= bit;
-    Inserted::New
 }
 
 impl Rows {

@@ -9,6 +9,7 @@
 mod compressed_vector;
 
 use std::io::{Read, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 
 use e57::{E57Reader, IndexBounds, PointCloud, Record, RecordDataType, RecordName};
 use platen_scan::{Direction, State};
@@ -107,6 +108,13 @@ struct Values {
 }
 
 impl Values {
+    /// Returns the first point of a first echo whose number is not wanted, and that number.
+    fn first_outside(&self, numbers: &[i64], wanted: RangeInclusive<i64>) -> Option<(usize, i64)> {
+        let is_first = |point: usize| self.echo.get(point).is_none_or(|echo| *echo <= 0);
+        let mut outside = numbers.iter().enumerate().filter(|(_, number)| !wanted.contains(number));
+        outside.find(|(point, _)| is_first(*point)).map(|(point, number)| (point, *number))
+    }
+
     /// Keeps the first points.
     fn truncate(&mut self, n: usize) {
         let Self { position, intensity, row, column, state, echo } = self;
@@ -360,14 +368,12 @@ impl Fields {
         let [rows, columns] = self.bounds;
         let lines = [("row", &values.row, rows), ("column", &values.column, columns)];
         let outside = lines.into_iter().filter_map(|(name, numbers, (min, max))| {
-            let wanted = min.max(0)..=max.min(i64::from(u32::MAX));
-            let point = numbers.iter().position(|number| !wanted.contains(number))?;
-            let number = numbers[point];
+            let (point, number) = values.first_outside(numbers, min.max(0)..=max.min(i64::from(u32::MAX)))?;
             Some((point, format!("{name} {number} lies outside of the declared {min} to {max}")))
         });
-        let undefined = values.state.iter().position(|state| !(0..=2).contains(state));
-        let undefined = undefined
-            .map(|point| (point, format!("invalid state {}, 0 to 2 are defined", values.state[point])));
+        let undefined = values.first_outside(&values.state, 0..=2);
+        let undefined =
+            undefined.map(|(point, state)| (point, format!("invalid state {state}, 0 to 2 are defined")));
         outside.chain(undefined).min_by_key(|(point, _)| *point).map_or(Ok(()), Err)
     }
 
