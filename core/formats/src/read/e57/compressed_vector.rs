@@ -100,22 +100,13 @@ impl Points {
     /// Reads a field of all points as numbers.
     pub(super) fn numbers(&self, field: usize, into: &mut Vec<f64>) {
         let stream = &self.streams[field];
-        // A loop for each encoding.
-        match stream.encoding {
-            Encoding::Single => stream.read(self.n, |raw| Encoding::Single.number(raw), into),
-            Encoding::Double => stream.read(self.n, |raw| Encoding::Double.number(raw), into),
-            integer @ Encoding::Integer { .. } => stream.read(self.n, |raw| integer.number(raw), into),
-            scaled @ Encoding::Scaled { .. } => stream.read(self.n, |raw| scaled.number(raw), into),
-        }
+        stream.read(self.n, |raw| stream.encoding.number(raw), into);
     }
 
     /// Reads a field of all points as whole numbers; PDAL writes states as floats.
     pub(super) fn wholes(&self, field: usize, into: &mut Vec<i64>) {
         let stream = &self.streams[field];
-        match stream.encoding {
-            integer @ Encoding::Integer { .. } => stream.read(self.n, |raw| integer.whole(raw), into),
-            other => stream.read(self.n, |raw| other.whole(raw), into),
-        }
+        stream.read(self.n, |raw| stream.encoding.whole(raw), into);
     }
 
     /// One packet of bytestreams of these types.
