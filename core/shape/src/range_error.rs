@@ -15,8 +15,9 @@
 //! 100:2008 (GUM), 5.1.2. Limits: places closer than half a period are correlated, and figures of differences between them
 //! are better than stated; a sine is bounded by 1.41 s, so that an interval of 1.96 s holds it always where it dominates.
 //!
-//! The direction of a line of least squares through an arm of length L that spans x / pi periods is off by 6 j1(x) / L times what its places
-//! are off, rms over all phases, with the spherical Bessel function j1(x) = (sin x / x - cos x) / x: more than its ends alone, sqrt(2) / L, tell.
+//! A wave over the range tilts the line of least squares through an arm. The standard deviation of its direction, over all phases, is that of one place across
+//! the arm times 6 j1(x) / L for an arm of length L that spans x / pi periods, with the spherical Bessel function j1(x) = (sin x / x - cos x) / x: up to
+//! 2.6 / L, where two ends with independent errors give sqrt(2) / L.
 
 use std::f64::consts::{PI, SQRT_2};
 

@@ -1,4 +1,6 @@
-//! Second pass: columns of the normalised lattice.
+//! Second pass: columns of the normalised lattice, from the cells in the order of their file.
+//!
+//! A column whose cells are stored in one piece is built from them; those of any other wait until the last of them was read.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;

@@ -1,4 +1,4 @@
-//! Spherical coordinates (range, azimuth, elevation) of stored cells, the form in which both passes use them.
+//! Spherical coordinates (range, azimuth, elevation) of stored cells as arrays, the form in which both passes use them.
 
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;

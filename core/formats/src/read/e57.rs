@@ -7,9 +7,9 @@
 //! placed by their indices, never by their order.
 
 mod compressed_vector;
+mod values;
 
 use std::io::{Read, Seek, SeekFrom};
-use std::ops::RangeInclusive;
 
 use e57::{E57Reader, IndexBounds, PointCloud, Record, RecordDataType, RecordName};
 use platen_scan::{Direction, State};
@@ -20,6 +20,7 @@ use super::{About, Source};
 use crate::header_text;
 use crate::orient::{Converted, Position, ToSpherical};
 use compressed_vector::{CompressedVector, Points};
+use values::Values;
 
 const FORMAT: &str = "E57";
 const PAGE: u64 = 1024;
@@ -94,48 +95,6 @@ impl<R: Read + Seek + Send> Cells for PacketCells<'_, R> {
         }
         Ok(())
     }
-}
-
-/// Values of the fields of a packet, by point; none of those that the file does not have.
-#[derive(Debug, Default)]
-struct Values {
-    position: [Vec<f64>; 3],
-    intensity: Vec<f64>,
-    row: Vec<i64>,
-    column: Vec<i64>,
-    state: Vec<i64>,
-    echo: Vec<i64>,
-}
-
-impl Values {
-    /// Returns the first point of a first echo whose number is not wanted, and that number.
-    fn first_outside(&self, numbers: &[i64], wanted: RangeInclusive<i64>) -> Option<(usize, i64)> {
-        let is_first = |point: usize| self.echo.get(point).is_none_or(|echo| *echo <= 0);
-        let mut outside = numbers.iter().enumerate().filter(|(_, number)| !wanted.contains(number));
-        outside.find(|(point, _)| is_first(*point)).map(|(point, number)| (point, *number))
-    }
-
-    /// Keeps the first points.
-    fn truncate(&mut self, n: usize) {
-        let Self { position, intensity, row, column, state, echo } = self;
-        position.iter_mut().chain([intensity]).for_each(|numbers| numbers.truncate(n));
-        [row, column, state, echo].into_iter().for_each(|numbers| numbers.truncate(n));
-    }
-
-    /// Removes the second and later echoes of beams.
-    fn keep_first_echoes(&mut self) {
-        let Self { position, intensity, row, column, state, echo } = self;
-        if echo.iter().any(|echo| *echo > 0) {
-            position.iter_mut().chain([intensity]).for_each(|numbers| retain_first_echoes(numbers, echo));
-            [row, column, state].into_iter().for_each(|numbers| retain_first_echoes(numbers, echo));
-        }
-    }
-}
-
-/// Keeps those of the values, if there are any, that are of first echoes.
-fn retain_first_echoes<T>(values: &mut Vec<T>, echo: &[i64]) {
-    let mut echoes = echo.iter();
-    values.retain(|_| echoes.next().is_some_and(|echo| *echo <= 0));
 }
 
 fn unsound(what: String) -> ReadError {

@@ -225,8 +225,8 @@ impl Arm {
         let aside = |p: &Vec3| (p - mean).cross(&direction).norm_squared();
         let scatter = near.iter().map(aside).sum::<f64>() / count;
         let own = (2.0 * (curve.sigma.powi(2) + scatter)).sqrt() / reach;
-        let moved = range_error.tilt(&corner, &(direction * reach), &normal.cross(&direction));
-        Self { direction, tilt: own.hypot(moved) }
+        let by_range = range_error.tilt(&corner, &(direction * reach), &normal.cross(&direction));
+        Self { direction, tilt: own.hypot(by_range) }
     }
 }
 
