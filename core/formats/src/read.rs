@@ -1,7 +1,7 @@
 //! Two passes over the cells of a scan file, of any format.
 //!
 //! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
-//! the CRC-32C of all cells, which a thread of its own decodes. The second ([`ScanReader::columns`]) delivers every column once, as soon
+//! the CRC-32C of all ranges, which a thread of its own decodes. The second ([`ScanReader::columns`]) delivers every column once, as soon
 //! as the file has completed it. Up to 2.6 million cells (107 MB) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
@@ -134,9 +134,7 @@ impl<'a> ScanReader<'a> {
         let (mut bytes, mut told) = (Vec::new(), 0);
         decode_ahead::for_each(self.source.cells()?, |batch| {
             survey.add(batch).map_err(ReadError::from)?;
-            bytes.clear();
-            append_numbers(&mut bytes, &batch.cells);
-            checksum = crc32c::crc32c_append(checksum, &bytes);
+            checksum = checksum_behind(checksum, &batch.cells.range, &mut bytes);
             fits &= survey.cells() <= MAX_KEPT;
             if fits {
                 kept.append(&batch.cells, 0..batch.cells.len());
@@ -190,24 +188,16 @@ impl Oriented {
         &self.plan.header
     }
 
-    /// CRC-32C of the numbers of all cells; equal for copies of one scan, under any name.
+    /// CRC-32C of the ranges of all cells; equal for copies of one scan under any name, and for no two scans: their noise differs.
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
 }
 
-/// Appends range, direction, intensity, row and column of the cells, the numbers of the checksum.
-fn append_numbers(bytes: &mut Vec<u8>, cells: &SphericalCells) {
-    let angles = cells.azimuth.iter().zip(&cells.elevation);
-    let places = cells.row.iter().zip(&cells.column);
-    let numbers = cells.range.iter().zip(angles).zip(&cells.intensity).zip(places);
-    for (((range, (azimuth, elevation)), intensity), (row, column)) in numbers {
-        let mut numbers = [0; 40];
-        for (slot, number) in numbers.chunks_exact_mut(8).zip([range, azimuth, elevation, intensity]) {
-            slot.copy_from_slice(&number.to_le_bytes());
-        }
-        numbers[32..36].copy_from_slice(&row.to_le_bytes());
-        numbers[36..].copy_from_slice(&column.to_le_bytes());
-        bytes.extend_from_slice(&numbers);
-    }
+/// Returns the CRC-32C of numbers behind those of a CRC-32C; `bytes` is room for them.
+fn checksum_behind(checksum: u32, numbers: &[f64], bytes: &mut Vec<u8>) -> u32 {
+    bytes.resize(size_of_val(numbers), 0);
+    let (slots, _) = bytes.as_chunks_mut();
+    slots.iter_mut().zip(numbers).for_each(|(slot, number)| *slot = number.to_le_bytes());
+    crc32c::crc32c_append(checksum, bytes)
 }

@@ -100,13 +100,13 @@ impl Points {
     /// Reads a field of all points as numbers.
     pub(super) fn numbers(&self, field: usize, into: &mut Vec<f64>) {
         let stream = &self.streams[field];
-        stream.read(self.n, |raw| stream.encoding.number(raw), into);
+        stream.encoding.numbers(&stream.values(self.n), into);
     }
 
     /// Reads a field of all points as whole numbers; PDAL writes states as floats.
     pub(super) fn wholes(&self, field: usize, into: &mut Vec<i64>) {
         let stream = &self.streams[field];
-        stream.read(self.n, |raw| stream.encoding.whole(raw), into);
+        stream.encoding.wholes(&stream.values(self.n), into);
     }
 
     /// One packet of bytestreams of these types.
@@ -177,12 +177,11 @@ impl Stream {
         (8 * self.bytes.len() - self.bit).checked_div(self.width)
     }
 
-    /// Reads the first `n` values, which must be complete.
-    fn read<T: Clone>(&self, n: usize, of: impl Fn(u64) -> T, into: &mut Vec<T>) {
-        into.clear();
+    /// Unpacks the first `n` values, which must be complete.
+    fn values(&self, n: usize) -> Vec<u64> {
         let Self { width, bit: start, ref bytes, .. } = *self;
         if width == 0 {
-            return into.resize(n, of(0));
+            return vec![0; n];
         }
         let mask = u64::MAX >> (64 - width);
         // A value of up to 64 bits lies in nine bytes.
@@ -197,12 +196,14 @@ impl Stream {
         let in_eight = width <= 57 || width.is_multiple_of(8) && start.is_multiple_of(8);
         let last = (8 * bytes.len()).saturating_sub(start + 64);
         let fast = if in_eight { n.min(last / width) } else { 0 };
-        into.extend((0..fast).map(|k| {
+        let mut values = Vec::with_capacity(n);
+        values.extend((0..fast).map(|k| {
             let bit = start + k * width;
             let eight = bytes[bit / 8..].first_chunk().map_or(0, |eight| u64::from_le_bytes(*eight));
-            of(eight >> (bit % 8) & mask)
+            eight >> (bit % 8) & mask
         }));
-        into.extend((fast..n).map(|k| of(at(start + k * width))));
+        values.extend((fast..n).map(|k| at(start + k * width)));
+        values
     }
 }
 
@@ -240,21 +241,34 @@ impl Encoding {
         }
     }
 
-    #[inline]
-    fn number(self, raw: u64) -> f64 {
+    /// Replaces numbers by those of values.
+    fn numbers(self, values: &[u64], numbers: &mut Vec<f64>) {
+        numbers.clear();
+        // The encoding is told once, not for every value; for speed only: `tests::speed`.
         match self {
-            Self::Single => f64::from(f32::from_bits(raw as u32)),
-            Self::Double => f64::from_bits(raw),
-            Self::Integer { min } => min.wrapping_add_unsigned(raw) as f64,
-            Self::Scaled { min, scale, offset } => min.wrapping_add_unsigned(raw) as f64 * scale + offset,
+            Self::Single => {
+                numbers.extend(values.iter().map(|value| f64::from(f32::from_bits(*value as u32))))
+            }
+            Self::Double => numbers.extend(values.iter().map(|value| f64::from_bits(*value))),
+            Self::Integer { min } => {
+                numbers.extend(values.iter().map(|value| min.wrapping_add_unsigned(*value) as f64));
+            }
+            Self::Scaled { min, scale, offset } => {
+                let whole = values.iter().map(|value| min.wrapping_add_unsigned(*value) as f64);
+                numbers.extend(whole.map(|whole| whole * scale + offset));
+            }
         }
     }
 
-    #[inline]
-    fn whole(self, raw: u64) -> i64 {
-        match self {
-            Self::Integer { min } => min.wrapping_add_unsigned(raw),
-            _ => self.number(raw) as i64,
+    /// Replaces whole numbers by those of values, the fraction cut off.
+    fn wholes(self, values: &[u64], wholes: &mut Vec<i64>) {
+        wholes.clear();
+        if let Self::Integer { min } = self {
+            wholes.extend(values.iter().map(|value| min.wrapping_add_unsigned(*value)));
+        } else {
+            let mut numbers = Vec::new();
+            self.numbers(values, &mut numbers);
+            wholes.extend(numbers.iter().map(|number| *number as i64));
         }
     }
 }
@@ -330,15 +344,14 @@ mod tests {
             let values: Vec<u64> = (0..300).map(|_| random.u64(..) & u64::MAX >> (64 - width)).collect();
             let mut stream = Stream::new(&Type::Integer { min: i64::MIN, max });
             assert_eq!(stream.width, width);
-            let (bytes, mut unpacked, mut some) = (packed(&values, width), Vec::new(), Vec::new());
+            let (bytes, mut unpacked) = (packed(&values, width), Vec::new());
             let mut from = 0;
             while from < bytes.len() {
                 let to = (from + random.usize(1..100)).min(bytes.len());
                 stream.append(&bytes[from..to]);
                 let complete = stream.complete().unwrap();
-                stream.read(complete, |raw| raw, &mut some);
+                unpacked.extend(stream.values(complete));
                 stream.bit += complete * width;
-                unpacked.append(&mut some);
                 from = to;
             }
             assert_eq!(unpacked[..values.len()], values, "{width} bits");
@@ -347,10 +360,15 @@ mod tests {
 
     #[test]
     fn values_are_those_of_their_types() {
-        let scaled = Encoding::Scaled { min: -3, scale: 0.5, offset: 10.0 };
-        assert_eq!((scaled.number(1), scaled.whole(1)), (9.0, 9));
-        assert_eq!(Encoding::Integer { min: -3 }.whole(1), -2);
-        assert_eq!(Encoding::Single.whole(u64::from(2.0_f32.to_bits())), 2);
-        assert_eq!(Encoding::Double.number((-0.1_f64).to_bits()), -0.1);
+        let (mut numbers, mut wholes) = (Vec::new(), Vec::new());
+        let mut of = |encoding: Encoding, value: u64| {
+            encoding.numbers(&[value], &mut numbers);
+            encoding.wholes(&[value], &mut wholes);
+            (numbers[0], wholes[0])
+        };
+        assert_eq!(of(Encoding::Scaled { min: -3, scale: 0.5, offset: 10.2 }, 1), (9.2, 9));
+        assert_eq!(of(Encoding::Integer { min: -3 }, 1), (-2.0, -2));
+        assert_eq!(of(Encoding::Single, u64::from(2.5_f32.to_bits())), (2.5, 2));
+        assert_eq!(of(Encoding::Double, (-1.1_f64).to_bits()), (-1.1, -1));
     }
 }
