@@ -7,6 +7,9 @@ use super::error::{ReadError, Result};
 /// Longest line that is read; scan files stay below 300 bytes.
 const MAX_LINE: u64 = 4096;
 
+/// UTF-8's, as editors on Windows write it.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Number of fields kept of a line.
 pub(crate) const MAX_FIELDS: usize = 12;
 
@@ -43,8 +46,8 @@ impl<R: BufRead> Lines<R> {
             let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
             return Err(ReadError::Unsound("text", what));
         }
-        let mark: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
-        Ok(Some(self.line.strip_prefix(mark).unwrap_or(&self.line)))
+        let marked = self.number == 1 && self.line.starts_with(BYTE_ORDER_MARK);
+        Ok(Some(if marked { &self.line[BYTE_ORDER_MARK.len()..] } else { &self.line }))
     }
 }
 
