@@ -10,11 +10,14 @@
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
 //! - A plane seen edge-on is none: the cells of one row of a round wall lie in a plane through the scanner, too.
 //!
+//! A strip whose plane shows wider nowhere has a plane of its own: along an edge that crosses the lattice the mixing changes from line to line, so that its mixed pixels
+//! lie on no common plane, while those that a strip fills do.
+//!
 //! A strip narrower than a beam has no cell of its own. For each end of the face the planes are given that may be in front of what lies behind it; whether a strip of them
 //! shows there is told by the edge (`outline/background_strip`).
 //!
-//! Limits: a strip whose plane shows nowhere else stays mixed, as mixed pixels along an edge can lie on a plane, too; uneven ground is
-//! several planes. Own.
+//! Limits: a strip whose plane shows nowhere else stays mixed along an edge that hardly crosses the lattice, whose mixed pixels can lie on a plane, too; uneven
+//! ground is several planes. Own.
 
 use nalgebra::{Cholesky, Const, Matrix3};
 use platen_numerics::random::Random;
@@ -52,6 +55,10 @@ const FAR: usize = 12;
 
 /// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
 const FEW: usize = 20;
+
+/// The plane of a strip that shows nowhere else holds one of so many mixed pixels at least, over so many columns and rows.
+const MANY: usize = 8;
+const CROSSED: usize = 6;
 
 /// Planes of the background and the cells on them.
 #[derive(Debug, Clone)]
@@ -182,6 +189,8 @@ fn any_within(
 /// A measured cell off the component, as an observation of a plane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BackgroundCell {
+    /// Column and row.
+    place: [usize; 2],
     direction: Vec3,
     /// Inverse range, 1/m, and its standard deviation.
     inverse: f64,
@@ -192,7 +201,8 @@ impl BackgroundCell {
     pub(super) fn of(window: &Window, noise: &Noise, index: usize) -> Self {
         let inverse = f64::from(window.inverse[index]);
         let sigma = f64::from(noise.at(index)) * inverse * inverse;
-        Self { direction: Vec3::from(window.points[index]) * inverse, inverse, sigma }
+        let place = [index / window.n_rows, index % window.n_rows];
+        Self { place, direction: Vec3::from(window.points[index]) * inverse, inverse, sigma }
     }
 
     /// Returns the cell with another range, metres.
@@ -260,7 +270,7 @@ impl BackgroundPlane {
     }
 }
 
-/// Finds the planes of the sound cells, the one with most of them first.
+/// Finds the planes of the sound cells, the one with most of them first, then those of strips among the mixed.
 fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<BackgroundPlane> {
     let mut random = Random::new(1);
     let mut planes = Vec::new();
@@ -281,7 +291,31 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
             planes.push(plane);
         }
     }
+    while planes.len() < PLANES
+        && let Some(plane) = of_mixed(mixed, &planes, &mut random)
+    {
+        planes.push(plane);
+    }
     planes
+}
+
+/// Finds the plane of a strip that shows nowhere else: many mixed pixels that are on no plane yet lie on it.
+fn of_mixed(
+    mixed: &[BackgroundCell],
+    planes: &[BackgroundPlane],
+    random: &mut Random,
+) -> Option<BackgroundPlane> {
+    let is_new = |cell: &&BackgroundCell| !planes.iter().any(|plane| plane.holds(cell));
+    let rest: Vec<BackgroundCell> = mixed.iter().filter(is_new).copied().collect();
+    let common = most_common(&rest, random)?;
+    let plane = BackgroundPlane::fit(&rest, |cell| cell.is_on(&common))?;
+    let on: Vec<&BackgroundCell> = rest.iter().filter(|cell| plane.holds(cell)).collect();
+    let is_crossed = |axis: usize| {
+        let places = || on.iter().map(|cell| cell.place[axis]);
+        places().max().zip(places().min()).is_some_and(|(last, first)| last - first >= CROSSED)
+    };
+    let is_plane = plane.scatter < MOST_SCATTER && on.iter().any(|cell| plane.cosine(cell) > EDGE_ON);
+    (is_plane && MANY * on.len() >= mixed.len() && is_crossed(0) && is_crossed(1)).then_some(plane)
 }
 
 /// Returns the plane through three cells that holds most of them; RANSAC.

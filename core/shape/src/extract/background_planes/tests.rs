@@ -89,6 +89,21 @@ fn a_strip_of_one_cell_is_background_where_its_plane_shows_elsewhere() {
 }
 
 #[test]
+fn a_strip_of_two_cells_is_background_though_its_plane_shows_nowhere_else() {
+    let (window, kinds) = scene(0.25, |row| {
+        let end = 65.0 - 0.62 * row;
+        [end, end - 2.0]
+    });
+    assert_told(&window, &kinds);
+}
+
+#[test]
+fn an_edge_without_a_strip_stays_mixed() {
+    let (window, kinds) = scene(0.25, |row| [65.0 - 0.62 * row; 2]);
+    assert_told(&window, &kinds);
+}
+
+#[test]
 fn smooth_mixing_along_a_row_stays_mixed() {
     // The plate's edge crosses a column within 80 rows: the ranges down that column are straight.
     let (window, kinds) = scene(0.25, |row| [39.75 + 0.006 * row, -9.0]);
