@@ -48,7 +48,7 @@ use std::collections::BTreeMap;
 use platen_scan::{Column, ColumnError, ScanHeader};
 
 use crate::PlateSpec;
-pub(crate) use background_planes::PLANES as BACKGROUND_PLANES;
+pub(crate) use background_planes::{DITHERED, PLANES as BACKGROUND_PLANES};
 use column_store::{Cell, ColumnStore, Segment, StoredColumn, cells_of};
 use completed_components::Completed;
 use connected_components::{Components, Run};

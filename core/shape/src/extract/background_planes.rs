@@ -10,7 +10,7 @@
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
 //! - A plane seen edge-on is none: the cells of one row of a round wall lie in a plane through the scanner, too.
 //!
-//! A strip whose plane shows wider nowhere has a plane of its own: along an edge that crosses the lattice the mixing changes from line to line, so that its mixed pixels
+//! A strip whose plane shows wider nowhere has a plane of its own: along an edge that crosses the lattice (a dithered one) the mixing changes from line to line, so that its mixed pixels
 //! lie on no common plane, while those that a strip fills do.
 //!
 //! A strip narrower than a beam has no cell of its own. For each end of the face the planes are given that may be in front of what lies behind it; whether a strip of them
@@ -56,9 +56,11 @@ const FAR: usize = 12;
 /// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
 const FEW: usize = 20;
 
-/// The plane of a strip that shows nowhere else holds one of so many mixed pixels at least, over so many columns and rows.
+/// The plane of a strip that shows nowhere else holds one of so many mixed pixels at least.
 const MANY: usize = 8;
-const CROSSED: usize = 6;
+
+/// Columns and rows of the lattice that an edge must cross to be dithered, that is, to lie at random between them.
+pub(crate) const DITHERED: u32 = 6;
 
 /// Planes of the background and the cells on them.
 #[derive(Debug, Clone)]
@@ -190,7 +192,7 @@ fn any_within(
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BackgroundCell {
     /// Column and row.
-    place: [usize; 2],
+    place: [u32; 2],
     direction: Vec3,
     /// Inverse range, 1/m, and its standard deviation.
     inverse: f64,
@@ -201,7 +203,7 @@ impl BackgroundCell {
     pub(super) fn of(window: &Window, noise: &Noise, index: usize) -> Self {
         let inverse = f64::from(window.inverse[index]);
         let sigma = f64::from(noise.at(index)) * inverse * inverse;
-        let place = [index / window.n_rows, index % window.n_rows];
+        let place = [index / window.n_rows, index % window.n_rows].map(|number| number as u32);
         Self { place, direction: Vec3::from(window.points[index]) * inverse, inverse, sigma }
     }
 
@@ -263,6 +265,11 @@ impl BackgroundPlane {
         cell.inverse / self.vector.norm()
     }
 
+    /// Returns true when a cell shows that the plane is not seen edge-on.
+    fn is_seen(&self, cells: &[BackgroundCell]) -> bool {
+        cells.iter().any(|cell| self.holds(cell) && self.cosine(cell) > EDGE_ON)
+    }
+
     /// Returns how far a cell is behind the plane, in standard deviations of both.
     fn depth(&self, cell: &BackgroundCell) -> f64 {
         let sigma = cell.sigma * (self.scatter * self.scatter + self.leverage(cell)).sqrt();
@@ -285,14 +292,14 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
         else {
             break;
         };
-        let is_seen = sound.iter().any(|cell| plane.holds(cell) && plane.cosine(cell) > EDGE_ON);
+        let is_seen = plane.is_seen(&sound);
         sound.retain(|cell| !plane.holds(cell));
         if is_seen {
             planes.push(plane);
         }
     }
     while planes.len() < PLANES
-        && let Some(plane) = of_mixed(mixed, &planes, &mut random)
+        && let Some(plane) = find_among_mixed(mixed, &planes, &mut random)
     {
         planes.push(plane);
     }
@@ -300,7 +307,7 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
 }
 
 /// Finds the plane of a strip that shows nowhere else: many mixed pixels that are on no plane yet lie on it.
-fn of_mixed(
+fn find_among_mixed(
     mixed: &[BackgroundCell],
     planes: &[BackgroundPlane],
     random: &mut Random,
@@ -312,10 +319,10 @@ fn of_mixed(
     let on: Vec<&BackgroundCell> = rest.iter().filter(|cell| plane.holds(cell)).collect();
     let is_crossed = |axis: usize| {
         let places = || on.iter().map(|cell| cell.place[axis]);
-        places().max().zip(places().min()).is_some_and(|(last, first)| last - first >= CROSSED)
+        places().max().zip(places().min()).is_some_and(|(last, first)| last - first >= DITHERED)
     };
-    let is_plane = plane.scatter < MOST_SCATTER && on.iter().any(|cell| plane.cosine(cell) > EDGE_ON);
-    (is_plane && MANY * on.len() >= mixed.len() && is_crossed(0) && is_crossed(1)).then_some(plane)
+    let are_many = MANY * on.len() >= mixed.len() && is_crossed(0) && is_crossed(1);
+    (are_many && plane.scatter < MOST_SCATTER && plane.is_seen(&rest)).then_some(plane)
 }
 
 /// Returns the plane through three cells that holds most of them; RANSAC.

@@ -24,6 +24,7 @@ use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
 use super::{OutlineError, Sampling, of_each};
 use crate::Vec3;
+use crate::extract::DITHERED;
 
 /// Span of the curve, metres.
 const SPAN: f64 = 0.25;
@@ -49,9 +50,6 @@ const LEAST_PIXELS: usize = 20;
 const WIDENED_STEPS: i32 = 8;
 const STEPS: i32 = 32;
 const STILL: f64 = 1e-7;
-
-/// Columns and rows of the lattice that an edge must cross to be dithered, that is, to lie at random between them.
-const DITHERED: u32 = 6;
 
 /// Rounds of fitting the curve and estimating the beams' footprint and contrasts in turn.
 const ROUNDS: usize = 3;
