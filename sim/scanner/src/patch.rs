@@ -35,12 +35,12 @@ pub(crate) struct Patch {
     from: [f64; 2],
     to: [f64; 2],
     /// Where every search begins. For speed only: `platen demo`.
-    middle: Place,
+    middle: FacePoint,
 }
 
 /// Point of a face at parameters (a, b) with its derivatives by them.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct FacePoint {
     parameters: [f64; 2],
     point: Vec3,
     da: Vec3,
@@ -105,13 +105,13 @@ impl Face {
     }
 
     /// Returns the point and its derivatives at (a, b).
-    fn at(self, plate: &Plate, [a, b]: [f64; 2]) -> Place {
-        let place = |point: Vec3, da: Vec3, db: Vec3| Place { parameters: [a, b], point, da, db };
+    fn at(self, plate: &Plate, [a, b]: [f64; 2]) -> FacePoint {
+        let of = |point: Vec3, da: Vec3, db: Vec3| FacePoint { parameters: [a, b], point, da, db };
         let [x, y, h] = self.place(plate, a, b);
         let ([u, v], [[u_x, u_y], [v_x, v_y]]) = plate.material(x, y);
         let Jet { point, du, dv, normal, .. } = plate.jet(u, v, h);
         let (dx, dy) = (du * u_x + dv * v_x, du * u_y + dv * v_y);
-        let Self::Side(side, strip, _) = self else { return place(point, dx, dy) };
+        let Self::Side(side, strip, _) = self else { return of(point, dx, dy) };
         let (along, across, length) = match side {
             Side::Bottom => (dx, dy, plate.width()),
             Side::Top => (dx, -dy, plate.width()),
@@ -120,7 +120,7 @@ impl Face {
         };
         let compressed = 1.0 - 2.0 * strip.inset(h) / length;
         let slope = along * (1.0 - 2.0 * a / length) + across;
-        place(point, along * compressed, normal + slope * strip.slope)
+        of(point, along * compressed, normal + slope * strip.slope)
     }
 }
 
@@ -177,12 +177,12 @@ impl Patch {
             Some(root) if !self.leaves(&root, ray) => root,
             // Near a horizon: this root is the exit, or the ray lies in the tangent plane of the middle.
             _ => {
-                let Place { parameters: [a, b], da, db, .. } = first.map_or(self.middle, |root| root.place);
+                let FacePoint { parameters: [a, b], da, db, .. } = first.map_or(self.middle, |root| root.at);
                 let nearer = |x: f64, d: Vec3| x - PATCH * ray.direction.dot(&d) / d.norm_squared();
                 self.root(plate, ray, self.face.at(plate, [nearer(a, da), nearer(b, db)]))?
             }
         };
-        let [a, b] = root.place.parameters;
+        let [a, b] = root.at.parameters;
         let inside = |x: f64, k: usize| (self.from[k] - OVERLAP..=self.to[k] + OVERLAP).contains(&x);
         if !inside(a, 0) || !inside(b, 1) || root.range <= 0.0 || self.leaves(&root, ray) {
             return None;
@@ -197,10 +197,10 @@ impl Patch {
     }
 
     /// Runs Newton's method from `start`; a root that is not on this patch is found roughly, and not at all beyond two patch lengths.
-    fn root(&self, plate: &Plate, ray: &Ray, start: Place) -> Option<Root> {
-        let mut place = start;
+    fn root(&self, plate: &Plate, ray: &Ray, start: FacePoint) -> Option<Root> {
+        let mut at = start;
         for _ in 0..12 {
-            let Place { parameters: [a, b], point, da, db } = place;
+            let FacePoint { parameters: [a, b], point, da, db } = at;
             let normal = da.cross(&db);
             let slope = normal.dot(&ray.direction);
             if slope == 0.0 {
@@ -209,7 +209,7 @@ impl Patch {
             let range = normal.dot(&(point - ray.origin)) / slope;
             let residual = ray.at(range) - point;
             if residual.norm_squared() < CLOSE * CLOSE {
-                return Some(Root { range, place, normal });
+                return Some(Root { range, at, normal });
             }
             // The residual lies in the tangent plane: resolve it along da and db.
             let area = normal.norm_squared();
@@ -222,9 +222,9 @@ impl Patch {
             }
             // The rest of the way is no longer than this step, even to a double root; twice that is allowed.
             if !is_within(2.0 * steps[0].abs().max(steps[1].abs())) {
-                return Some(Root { range, place: Place { parameters: next, ..place }, normal });
+                return Some(Root { range, at: FacePoint { parameters: next, ..at }, normal });
             }
-            place = self.face.at(plate, next);
+            at = self.face.at(plate, next);
         }
         None
     }
@@ -233,6 +233,6 @@ impl Patch {
 /// Common point of a ray and the surface of a patch, with da x db there.
 struct Root {
     range: f64,
-    place: Place,
+    at: FacePoint,
     normal: Vec3,
 }
