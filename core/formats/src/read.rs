@@ -1,7 +1,7 @@
 //! Two passes over the cells of a scan file, of any format.
 //!
 //! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
-//! the CRC-32C of all ranges, which a thread of its own decodes. The second ([`ScanReader::columns`]) delivers every column once, as soon
+//! the CRC-32C of all ranges; a thread of its own decodes the cells. The second ([`ScanReader::columns`]) delivers every column once, as soon
 //! as the file has completed it. Up to 2.6 million cells (107 MB) are kept from the first pass; a larger file is decoded twice, so that
 //! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
@@ -134,7 +134,7 @@ impl<'a> ScanReader<'a> {
         let (mut bytes, mut told) = (Vec::new(), 0);
         decode_ahead::for_each(self.source.cells()?, |batch| {
             survey.add(batch).map_err(ReadError::from)?;
-            checksum = checksum_behind(checksum, &batch.cells.range, &mut bytes);
+            checksum = continued_checksum(checksum, &batch.cells.range, &mut bytes);
             fits &= survey.cells() <= MAX_KEPT;
             if fits {
                 kept.append(&batch.cells, 0..batch.cells.len());
@@ -188,14 +188,14 @@ impl Oriented {
         &self.plan.header
     }
 
-    /// CRC-32C of the ranges of all cells; equal for copies of one scan under any name, and for no two scans: their noise differs.
+    /// CRC-32C of the ranges of all cells; equal for copies of one scan under any name, while the noise of two scans differs.
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
 }
 
-/// Returns the CRC-32C of numbers behind those of a CRC-32C; `bytes` is room for them.
-fn checksum_behind(checksum: u32, numbers: &[f64], bytes: &mut Vec<u8>) -> u32 {
+/// Returns a CRC-32C continued over more numbers; `bytes` is room for them.
+fn continued_checksum(checksum: u32, numbers: &[f64], bytes: &mut Vec<u8>) -> u32 {
     bytes.resize(size_of_val(numbers), 0);
     let (slots, _) = bytes.as_chunks_mut();
     slots.iter_mut().zip(numbers).for_each(|(slot, number)| *slot = number.to_le_bytes());

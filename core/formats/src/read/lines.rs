@@ -46,8 +46,8 @@ impl<R: BufRead> Lines<R> {
             let what = format!("line {} is longer than {MAX_LINE} bytes", self.number);
             return Err(ReadError::Unsound("text", what));
         }
-        let marked = self.number == 1 && self.line.starts_with(BYTE_ORDER_MARK);
-        Ok(Some(if marked { &self.line[BYTE_ORDER_MARK.len()..] } else { &self.line }))
+        let behind_mark = (self.number == 1).then(|| self.line.strip_prefix(BYTE_ORDER_MARK)).flatten();
+        Ok(Some(behind_mark.unwrap_or(&self.line)))
     }
 }
 
