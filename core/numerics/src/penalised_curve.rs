@@ -102,6 +102,34 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
+    /// Starts without data: the curvature is an amplitude, known by its mean and standard deviation, times `profile`, and varies about that as white noise over
+    /// `length` with the standard deviation `spread`.
+    #[must_use]
+    pub fn with_curvature(
+        knots: UniformKnots,
+        profile: impl Fn(f64) -> f64,
+        [mean, amplitude]: [f64; 2],
+        spread: f64,
+        length: f64,
+    ) -> Self {
+        let mut fit = Self::with_prior(knots, Roughness::Curvature, spread, length);
+        let step = knots.step();
+        // The curvatures at the knots are D c / step^2 with the second differences D of the coefficients c. For their profile f this is D^T f.
+        let (mut functional, mut square) = (DVector::zeros(knots.n_coefficients()), 0.0);
+        for k in 0..=knots.n_spans() {
+            let value = profile(knots.start() + k as f64 * step);
+            [1.0, -2.0, 1.0].iter().enumerate().for_each(|(i, factor)| functional[k + i] += factor * value);
+            square += value * value;
+        }
+        // Their covariance S = s^2 I + a^2 f f^T has the inverse (I - f f^T a^2 / t) / s^2, and S^-1 f = f / t, with t = s^2 + a^2 f^T f
+        // (Sherman and Morrison 1950).
+        let variance = length * spread * spread / step;
+        let total = variance + square * amplitude * amplitude;
+        fit.hold(&functional, -amplitude * amplitude / (total * variance) * step.powi(-4));
+        fit.right += functional * (mean / total * step.powi(-2));
+        fit
+    }
+
     /// Appends one parameter for each normal prior, given by mean and standard deviation.
     #[must_use]
     pub fn with_parameters(mut self, priors: &[(f64, f64)]) -> Self {
@@ -144,7 +172,8 @@ impl CurveFit {
     /// Returns the negative log density of a curve under the prior, up to a constant, before any data were added.
     #[must_use]
     pub fn roughness(&self, spline: &SplineCurve) -> f64 {
-        0.5 * spline.coefficients.dot(&(&self.matrix * &spline.coefficients))
+        let coefficients = &spline.coefficients;
+        0.5 * coefficients.dot(&(&self.matrix * coefficients)) - self.right.dot(coefficients)
     }
 
     /// Adds the observation 0 of a functional with the weight `w` (one over its variance).
@@ -174,6 +203,39 @@ impl CurveFit {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Values of a parabola on its first half: where its curvature may be constant it goes on beyond them, else the curve goes on nearly straight.
+    #[test]
+    fn a_constant_curvature_goes_on_beyond_the_values() {
+        const CURVATURE: f64 = 0.01;
+        let knots = UniformKnots::new(0.0, 3.0, 12);
+        let parabola = |x: f64| 0.5 * CURVATURE * x * x;
+        let end = |constant: [f64; 2]| {
+            let mut fit = CurveFit::with_curvature(knots, |_| 1.0, constant, 0.003, 0.3);
+            (0..=150).map(|k| 0.01 * f64::from(k)).for_each(|x| fit.add(x, parabola(x), 1e10));
+            let (curve, precision) = fit.solve().unwrap();
+            let functional = curve.functional(3.0);
+            (curve.at(3.0) - parabola(3.0), functional.dot(&precision.solve(&functional)).sqrt())
+        };
+        let (straight, seen, known) = (end([0.0, 0.0]), end([0.0, 0.02]), end([CURVATURE, 0.0]));
+        assert!((-12e-3..-8e-3).contains(&straight.0), "{straight:?}");
+        assert!(seen.0.abs() < 4e-4 && (1.5e-3..3e-3).contains(&seen.1), "{seen:?}");
+        assert!(known.0.abs() < 1e-9 && (known.1 - straight.1).abs() < 1e-9, "{known:?}");
+    }
+
+    /// Two values on a line: the rest is the prior, a cubic of the mean amplitude and of its standard deviation.
+    #[test]
+    fn without_values_the_curvature_is_that_of_the_prior() {
+        let knots = UniformKnots::new(0.0, 3.0, 12);
+        let mut fit = CurveFit::with_curvature(knots, |x| 6.0 * x, [0.01, 0.02], 0.0003, 0.3);
+        [0.0, 1.0].iter().for_each(|x| fit.add(*x, 0.0, 1e10));
+        let (curve, precision) = fit.solve().unwrap();
+        let functional = curve.functional(2.0);
+        // x^3 - x = 6 at 2.
+        assert!((curve.at(2.0) - 0.06).abs() < 1e-5, "{}", curve.at(2.0));
+        let sigma = functional.dot(&precision.solve(&functional)).sqrt();
+        assert!((sigma - 0.12).abs() < 1e-4, "{sigma}");
+    }
 
     /// Values of a parabola, every other one off by three parts of a parameter: both are found, and the precision tells that the parameter is known.
     #[test]

@@ -141,6 +141,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         noise: patch.noise,
     };
     let side_face = SideFace::of(spec);
+    let curvature = edge_curvature(height_field.gaussian_curvature(&near), &near);
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * visible.step;
@@ -149,7 +150,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
             .filter_map(|crossing| ProjectedCrossing::of(crossing, patch, &height_field))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
-        EdgeData::new(crossings, [from, to], spec.thickness, side_face, sampling)
+        EdgeData::new(crossings, [from, to], spec.thickness, side_face, curvature, sampling)
     };
     let [a, b, c, d] = of_each(side);
     let mut edges = edge::fit_all([a?, b?, c?, d?], sampling)?;
@@ -176,6 +177,17 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     };
     let curve = |k: usize| curve(&edges[k], [points[k], points[(k + 1) % 4]]);
     Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), height_field })
+}
+
+/// Returns the mean geodesic curvature of the edges of a rectangular blank that was bent to a Gaussian curvature, 1/m, positive towards its middle.
+///
+/// The curvature of its boundary, its interior and the turns at its corners, right angles as they were cut, add up to a whole turn (Gauss and Bonnet): over
+/// the boundary it is minus the Gaussian curvature times the area.
+fn edge_curvature(gaussian: f64, corners: &[Vec3; 4]) -> f64 {
+    let [a, b, c, d] = corners;
+    let area = 0.5 * (c - a).cross(&(d - b)).norm();
+    let perimeter: f64 = [b - a, c - b, d - c, a - d].iter().map(Vec3::norm).sum();
+    -gaussian * area / perimeter
 }
 
 /// Evaluates `of` for the four edges, opposite ones on different threads: they are alike. For speed only: benchmark `outline_of_the_face`.
@@ -249,4 +261,26 @@ fn curve(edge: &Edge, ends: [Vec3; 2]) -> EdgeCurve {
     let mean_variance = places.iter().map(|&at| edge.sigma(at).powi(2)).sum::<f64>() / places.len() as f64;
     let seen = places.iter().map(|&at| edge.seen.at(at)).collect();
     EdgeCurve { points, seen, sigma: mean_variance.sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two meridians and two parallels of a sphere meet at right angles; a parallel at the latitude f turns by sin f per radian of longitude.
+    #[test]
+    fn the_edges_of_a_plate_turn_by_its_gaussian_curvature() {
+        let (radius, width, south, north) = (10.0, 0.3, -0.1_f64, 0.25_f64);
+        let at = |latitude: f64, longitude: f64| {
+            let ([sin, cos], [east, north]) =
+                ([latitude.sin(), latitude.cos()], [longitude.sin(), longitude.cos()]);
+            Vec3::new(cos * north, cos * east, sin) * radius
+        };
+        let corners = [at(south, 0.0), at(south, width), at(north, width), at(north, 0.0)];
+        let perimeter = radius * (2.0 * (north - south) + width * (north.cos() + south.cos()));
+        let turn = edge_curvature(1.0 / (radius * radius), &corners) * perimeter;
+        let expected = -width * (north.sin() - south.sin());
+        // The straight sides enclose a little less.
+        assert!((turn / expected - 1.0).abs() < 0.02, "{turn} {expected}");
+    }
 }

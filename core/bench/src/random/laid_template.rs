@@ -76,6 +76,8 @@ fn of_station(station: &Station, found: &Report, known: &Report) -> Option<State
     let figure = |report: &Report| report.findings.figures.iter().find(|f| f.name == name).cloned();
     let (found, known) = (figure(found)?, figure(known)?);
     let kind = match station.quantity {
+        // Under a contact of both seats the gap is zero by definition: no figure is measured.
+        Quantity::Gap if found.value == 0.0 && known.value == 0.0 => return None,
         Quantity::Gap => Kind::StationGap,
         Quantity::Deviation => Kind::StationDeviation,
         Quantity::CurvatureDeficit => Kind::StationDeficit,

@@ -10,7 +10,7 @@ use nalgebra::Vector2;
 use platen_numerics::median::robust_deviation;
 use platen_numerics::simd::dispatch_simd;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
-use platen_numerics::tensor_spline::TensorSpline;
+use platen_numerics::tensor_spline::{Jet, TensorSpline};
 use platen_numerics::uniform_knots::UniformKnots;
 
 use super::plane::Plane;
@@ -88,6 +88,21 @@ impl HeightField {
         let (along, across) = (corners[1] - corners[0], corners[3] - corners[0]);
         let plane = Plane::new(corners.iter().sum::<Vec3>() / 4.0, along.cross(&across));
         Self::fit(patch, plane.along(plane.direction(along)))
+    }
+
+    /// Returns the mean Gaussian curvature of the face between four corners, 1/m^2.
+    pub(super) fn gaussian_curvature(&self, corners: &[Vec3; 4]) -> f64 {
+        /// Places along and across.
+        const PLACES: usize = 16;
+        let [a, b, c, d] = corners.map(|corner| self.plane.project(corner));
+        let at = |k: usize| (k as f64 + 0.5) / PLACES as f64;
+        let place = |k: usize| a.lerp(&b, at(k % PLACES)).lerp(&d.lerp(&c, at(k % PLACES)), at(k / PLACES));
+        let curvature = |place: Vector2<f64>| {
+            let Jet { u: [u], v: [v], uu: [uu], uv: [uv], vv: [vv], .. } = self.height.jet(place.x, place.y);
+            (uu * vv - uv * uv) / (1.0 + u * u + v * v).powi(2)
+        };
+        let n = PLACES * PLACES;
+        (0..n).map(|k| curvature(place(k))).sum::<f64>() / n as f64
     }
 
     /// Intersects the beam through `point` with the face; also returns the unit normal there, towards the scanner. `None`
@@ -175,4 +190,24 @@ pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
     let columns = patch.samples.chunk_by(|a, b| a.column == b.column);
     let columns = columns.filter(move |samples| samples[0].column.is_multiple_of(every));
     columns.flatten().filter(move |sample| sample.row.is_multiple_of(every))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gaussian_curvature_is_that_of_a_sphere() {
+        let radius = 8.0;
+        let at = |x: f64, y: f64| Vec3::new(x, y, -6.0 - radius + (radius * radius - x * x - y * y).sqrt());
+        let sample = |k: u32| {
+            let (column, row) = (k / 120, k % 120);
+            let point = at(0.03 * f64::from(column) - 1.8, 0.025 * f64::from(row) - 1.5);
+            Sample { point, column, row, sigma: 1e-4, intensity: 0 }
+        };
+        let patch = Patch { samples: (0..120 * 120).map(sample).collect(), ..Patch::default() };
+        let corners = [at(-1.8, -1.5), at(1.75, -1.5), at(1.75, 1.45), at(-1.8, 1.45)];
+        let found = HeightField::between(corners, &patch).unwrap().gaussian_curvature(&corners);
+        assert!((found * radius * radius - 1.0).abs() < 0.005, "{found}");
+    }
 }
