@@ -1,11 +1,16 @@
-//! The boundary of the scanned face: four corners and four edge curves, by maximum likelihood of censored edge positions.
+//! Boundary of the scanned face: four corners and four edge curves, by interval-censored maximum likelihood.
 //!
-//! Input: the [`Patch`] of `extract`; output: the [`Outline`], on the scanned face, with standard deviations. In order:
+//! A lattice line that crosses an edge gives an interval for the edge's position: between the last sample on the plate
+//! and the first one beyond it (an interval-censored observation). Each edge is the smooth curve that is most likely
+//! given all intervals of its lattice lines.
+//!
+//! Input: the [`Patch`] of `extract`. Output: the [`Outline`], on the scanned face, with standard deviations. The steps
+//! in order:
 //!
 //! | module | step | source |
 //! |---|---|---|
 //! | `boundary_loop` | mesh of lattice neighbours, its longest boundary loop by shortest paths | Masuda et al., 3.2 |
-//! | `visible_boundary` | boundary crossings along the loop, without those at what hides the plate | own |
+//! | `visible_boundary` | boundary crossings along the loop, without those at objects that hide the plate | own |
 //! | `corners` | corners: angle to the k-th neighbours, RANSAC lines, intersections | Masuda et al., 3.2 |
 //! | `height_field` | the face as one smoothed height over its mean `plane` | own |
 //! | `projected_crossing` | crossings moved along their beams onto that height field | own |
@@ -15,14 +20,16 @@
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
-//! | `contrast` | where an edge crosses a mixed pixel, by its range and the contrast of plate and background (linear mixing model) | own |
+//! | `contrast` | position of an edge within a mixed pixel, by its range and the contrast of plate and background (linear mixing model) | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
-//! | `coverage` | where along an edge it was seen | own |
+//! | `coverage` | stretches along an edge where it was seen | own |
 //!
-//! Then the edges are intersected, named from the u axis hint and compared with the plate's size. Masuda et al. fit a spline
-//! to the boundary samples themselves, which lie up to a lattice step inside the plate; this module locates the edge
-//! between the samples. Limits: four smooth edges meeting at 60 to 120 degrees, no hole that reaches an edge.
+//! Finally the edges are intersected, named from the u axis hint and compared with the plate's size. Masuda et al. fit
+//! a spline to the boundary samples themselves, which lie up to a lattice step inside the plate; this module locates
+//! the edge between the samples.
+//!
+//! Limits: four smooth edges that meet at 60 to 120 degrees; no hole that reaches an edge.
 
 mod background_strip;
 mod boundary_loop;
@@ -63,7 +70,8 @@ pub struct Corner {
     pub point: Vec3,
     /// Standard deviation along the edge that leaves the corner and along the one that arrives, metres.
     pub sigma: [f64; 2],
-    /// Parts of these in which all edges of a plate are off to the same side, inwards or outwards: its contrast.
+    /// Parts of these that the contrast of plate and background causes: all edges of a plate are off to the same side,
+    /// inwards or outwards.
     pub contrast: [f64; 2],
     /// False when the corner's neighbourhood was hidden and its place was extrapolated from its edges.
     pub seen: bool,
@@ -74,7 +82,7 @@ pub struct Corner {
 pub struct EdgeCurve {
     /// Points on the edge at equal steps of arc length (at most 10 mm), first and last are the corners.
     pub points: Vec<Vec3>,
-    /// Per point: whether the edge was seen there, or bridged.
+    /// Per point: true where the edge was seen, false where it was bridged.
     pub seen: Vec<bool>,
     /// Standard deviation across the edge, in the surface, metres.
     pub sigma: f64,
@@ -89,7 +97,7 @@ pub struct Outline {
     pub corners: [Corner; 4],
     /// Edges v = 0, u = W, v = H, u = 0.
     pub edges: [EdgeCurve; 4],
-    /// The smoothed scanned face, on which they lie.
+    /// The smoothed scanned face, on which corners and edges lie.
     pub height_field: HeightField,
 }
 
@@ -113,20 +121,22 @@ const SEED: u64 = 0x706c_6174_656e;
 /// Spacing of the points of an edge curve, metres.
 const POINT_SPACING: f64 = 0.01;
 
-/// Largest angle between the hint and an edge, degrees: within 10 degrees of 45 it does not distinguish corners.
+/// Largest angle between the u axis hint and an edge, degrees: a hint within 10 degrees of 45 does not distinguish the
+/// corners.
 const LARGEST_HINT_ANGLE: f64 = 35.0;
 
-/// An edge that differs by more than this part from the plate file is that of another plate. Cut blanks differ by
-/// millimetres, bending changes edges of the mid-surface by up to 11 mm.
+/// Relative difference between the length of an edge and the plate file above which the scan is one of another plate.
+/// Cut blanks differ by millimetres, bending changes edges of the mid-surface by up to 11 mm.
 const SIZE_TOLERANCE: f64 = 0.01;
 
-/// A wrong size is reported as such where at least this part of the edges that make it was seen.
+/// A wrong size is reported as such where at least this part of the edge and of its two neighbours was seen; otherwise
+/// as a hidden edge.
 const REPORTED_PART: f64 = 0.75;
 
 /// Locates corners and edges of a plate's scanned face.
 ///
-/// They are those of the face as it is seen, not of the rectangle; the known size is used to refuse another plate, never
-/// to move an edge.
+/// Corners and edges are those of the face as it is seen, not of the nominal rectangle. The known size is used to
+/// refuse another plate, never to move an edge.
 ///
 /// # Errors
 /// [`OutlineError`]: the corner, edge or side that could not be located, and why.
@@ -179,10 +189,12 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
     Ok(Outline { corners: [0, 1, 2, 3].map(corner), edges: [0, 1, 2, 3].map(curve), height_field })
 }
 
-/// Returns the mean geodesic curvature of the edges of a rectangular blank that was bent to a Gaussian curvature, 1/m, positive towards its middle.
+/// Returns the mean geodesic curvature of the edges of a rectangular blank that was bent to a Gaussian curvature, 1/m,
+/// positive towards its middle.
 ///
-/// The curvature of its boundary, its interior and the turns at its corners, right angles as they were cut, add up to a whole turn (Gauss and Bonnet): over
-/// the boundary it is minus the Gaussian curvature times the area.
+/// The geodesic curvature of the boundary, the Gaussian curvature of the face and the turns at the corners add up to a
+/// whole turn (Gauss-Bonnet theorem). The corners are taken as right angles, as they were cut. Then the integral along the
+/// boundary is minus the Gaussian curvature times the area.
 fn edge_curvature(gaussian: f64, corners: &[Vec3; 4]) -> f64 {
     let [a, b, c, d] = corners;
     let area = 0.5 * (c - a).cross(&(d - b)).norm();
@@ -190,15 +202,17 @@ fn edge_curvature(gaussian: f64, corners: &[Vec3; 4]) -> f64 {
     -gaussian * area / perimeter
 }
 
-/// Evaluates `of` for the four edges, opposite ones on different threads: they are alike. For speed only: benchmark `outline_of_the_face`.
+/// Evaluates `of` for the four edges, two on each of two threads; opposite edges take about the same time and go to
+/// different threads. For speed only: benchmark `outline_of_the_face`.
 fn of_each<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 4] {
     let ([a, b], [c, d]) = join(|| [0, 1].map(&of), || [2, 3].map(&of));
     [a, b, c, d]
 }
 
-/// Intersects two edges: the point, and its place along each. Gauss-Newton on the distance of the two curves.
+/// Intersects two edges by Gauss-Newton steps on the distance of the two curves. Returns the point and its place along
+/// each.
 fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
-    /// Nearly straight curves: the third step is below rounding.
+    /// Number of steps: for nearly straight curves the third one is below rounding.
     const STEPS: usize = 5;
     const DIFFERENCE: f64 = 0.02;
     let (mut a, mut b) = (arriving.along(near), leaving.along(near));
@@ -218,8 +232,8 @@ fn meet(arriving: &Edge, leaving: &Edge, near: Vec3) -> (Vec3, f64, f64) {
     (0.5 * (arriving.point(a) + leaving.point(b)), a, b)
 }
 
-/// Selects the corner (0, 0): the start of the edge that runs most along the hint. Without a hint, u runs to the right as
-/// seen from the scanner.
+/// Selects the corner (0, 0): the start of the edge that runs most along the hint. Without a hint, u runs to the right
+/// as seen from the scanner.
 fn first_corner(points: &[Vec3; 4], plane: &Plane, hint: Option<Vec3>) -> Result<usize, OutlineError> {
     let hint = hint.map_or_else(nalgebra::Vector2::x, |hint| plane.direction(hint));
     let angle = |k: usize| plane.direction(points[(k + 1) % 4] - points[k]).angle(&hint).to_degrees();
@@ -238,7 +252,7 @@ fn check_size(edges: &[Edge; 4], spec: &PlateSpec) -> Result<(), OutlineError> {
         let found = edges[k].length_below(0.5 * spec.thickness);
         if (found - expected).abs() > SIZE_TOLERANCE * expected {
             let (found_mm, expected_mm) = (found * 1000.0, expected * 1000.0);
-            // An edge ends where those beside it cross it.
+            // The length of an edge depends on both neighbours: they cross it at its ends.
             let beside = [&edges[(k + 3) % 4], &edges[k], &edges[(k + 1) % 4]];
             let seen = beside.map(|edge| edge.seen.share(edge.from, edge.to)).into_iter().fold(1.0, f64::min);
             return Err(if seen < REPORTED_PART {

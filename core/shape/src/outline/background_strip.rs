@@ -1,20 +1,26 @@
-//! Strips of background beside an edge that are narrower than a beam: the foot of a wall, a table's top.
+//! Strips of background beside an edge that are narrower than a beam, such as the foot of a wall or a table's top.
 //!
-//! A mixed pixel behind the plane of such a strip sees the strip's far edge, and perhaps not the plate. Whether a strip shows at a place is told by the lattice
-//! lines around it that end on its plane, in columns or rows on both sides: a plane that shows on one side only ends there, but goes on around a corner.
+//! A mixed pixel behind the plane of such a strip sees the far edge of the strip, and not necessarily the plate. A
+//! strip is taken to be present at a lattice line if neighbouring lattice lines end on its plane, on both sides of that
+//! line along the columns or along the rows. If they do so on one side only, the strip ends there. Lines of other edges
+//! count too, since a strip may continue around a corner.
 //!
-//! In: the lattice lines of the edges and the planes that lie between face and background along each (`extract/background_planes`). Out: the lines beside a strip.
-//! Own. Limit: a strip so narrow that it fills no beam over more than [`REACH`] is told by the footprint of its edge alone (`edge`).
+//! In: the lattice lines of the edges, and the planes between face and background along each line
+//! (`extract/background_planes`). Out: the lines beside a strip. Own.
+//!
+//! Limit: where no beam lies fully on the strip over more than [`REACH`] columns or rows, the strip is detected by the
+//! footprint of its edge alone (`edge`).
 
 use super::lattice_line::LatticeLine;
 
-/// Columns and rows over which a strip is taken to go on.
+/// Number of columns and rows over which a strip is taken to continue.
 const REACH: u32 = 48;
 
-/// Lattice lines to either side that show it, at least: one in a hundred ends on a plane by chance.
+/// Least number of lattice lines on either side that end on the strip's plane: one line in a hundred ends on a plane by
+/// chance.
 const LEAST: usize = 3;
 
-/// Returns the numbers of the lines of each edge that are beside a strip.
+/// Returns, for each edge, the numbers of its lines that are beside a strip.
 pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
     let shows = |line: &LatticeLine, plane: u8| {
         let on_plane = edges.into_iter().flatten().filter(|other| other.background == Some(plane));
@@ -42,7 +48,8 @@ mod tests {
     use super::*;
     use crate::extract::PlaneSet;
 
-    /// Every second line has a mixed pixel that a strip of plane 2 may be in front of; some of the others end on that plane.
+    /// Lines of which every second has a mixed pixel that may be behind a strip of plane 2; some of the others end on
+    /// that plane.
     fn lines(ends_on_it: impl Fn(u32) -> bool) -> Vec<LatticeLine> {
         let line = |k: u32| {
             let is_mixed = k.is_multiple_of(2);
@@ -62,10 +69,10 @@ mod tests {
             let [shown, ..] = shown([&lines(ends_on_it), &[], &[], &[]]);
             shown
         };
-        // It shows up to line 60 and from line 100 on.
+        // The strip is visible up to line 60 and from line 100 on.
         let gap = shown(&|k| !(60..100).contains(&k));
         assert!((6..194).step_by(2).all(|k| gap.contains(&k)), "{gap:?}");
-        // It ends at line 60.
+        // The strip ends at line 60.
         let end = shown(&|k| k < 60);
         assert!((6..54).step_by(2).all(|k| end.contains(&k)) && !end.iter().any(|k| *k >= 60), "{end:?}");
         assert!(shown(&|k| k == 51 || k == 151).is_empty());

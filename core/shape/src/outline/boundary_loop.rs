@@ -1,7 +1,8 @@
-//! Mesh of lattice neighbours and its longest boundary loop, by shortest paths (Masuda et al., 3.2).
+//! Longest boundary loop of the mesh of lattice neighbours, by shortest paths (Masuda et al., 3.2).
 //!
 //! In: the cells of the face. Out: the loop as a cycle of cells, in whole lattice steps; later modules locate the edge
-//! between them. Gaps that something hides are filled first, so that a chain in front of the plate does not cut it.
+//! between the cells. Gaps caused by an object in front of the plate are filled first, so that a chain does not cut the
+//! plate in two.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -18,13 +19,13 @@ const DIAGONAL: u32 = 7;
 /// A lattice square with all four cells.
 const ALL: u8 = 0b1111;
 
-/// The cells of the face in their bounding rectangle, one empty column and row around them; index
-/// `column * n_rows + row`. Cells that something hides, or that did not return, between two cells of the face belong
-/// to it; holes in the plate do not.
+/// The cells of the face in their bounding rectangle, with one empty column and row around them; index `column * n_rows
+/// + row`. Hidden cells and cells without a return belong to the face when they lie between two cells of it; holes in
+/// the plate do not.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     n_rows: usize,
-    /// Number of the sample plus one, 0 where there is none.
+    /// Number of the sample plus one; 0 where there is none.
     sample: Vec<u32>,
     inside: Vec<bool>,
 }
@@ -52,7 +53,8 @@ impl Grid {
         grid
     }
 
-    /// Maps samples on a loop or next to it to their place on it: a cell that sticks out alone belongs to no triangle.
+    /// Maps samples on a loop or next to it to their place on the loop. Neighbours are included since a single
+    /// protruding cell belongs to no triangle, hence to no loop.
     pub(super) fn places(&self, cells: &[Cell]) -> BTreeMap<u32, u32> {
         let n_rows = self.n_rows as isize;
         let beside = [-n_rows - 1, -n_rows, -n_rows + 1, -1, 1, n_rows - 1, n_rows, n_rows + 1];
@@ -66,11 +68,11 @@ impl Grid {
             });
             places.collect::<Vec<(u32, u32)>>()
         };
-        // On the loop counts for more.
+        // A cell on the loop overrides one next to it.
         around(&beside).into_iter().chain(around(&[0])).collect()
     }
 
-    /// Fills gaps along columns and rows, unless the plate ends visibly at one side of them.
+    /// Fills gaps along columns and rows, unless the plate visibly ends at one side of the gap.
     fn fill_hidden(&mut self, patch: &Patch, cell: impl Fn(&Sample) -> usize) {
         let mut ends: Vec<[bool; 4]> = vec![[false; 4]; patch.samples.len()];
         for crossing in patch.crossings.iter().filter(|c| c.beyond != Beyond::InFront) {
@@ -99,8 +101,9 @@ impl Grid {
         }
     }
 
-    /// Returns the lattice squares by their corner at the least column and row, the four cells of each as bits: itself, below, next
-    /// below, next. 0 where fewer than three are inside: no triangle covers the square.
+    /// Returns the lattice squares, each at the index of its corner of least column and row, with its four cells as
+    /// bits in the order: that corner, below, next column below, next column. A square with fewer than three cells
+    /// inside is 0: no triangle covers it.
     fn squares(&self) -> Vec<u8> {
         let (inside, n_rows) = (&self.inside, self.n_rows);
         let (below, next_below, next) = (&inside[1..], &inside[n_rows + 1..], &inside[n_rows..]);
@@ -110,8 +113,8 @@ impl Grid {
         bits.map(|bits| if bits.count_ones() >= 3 { bits } else { 0 }).collect()
     }
 
-    /// Returns the edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives two
-    /// triangles, one with three cells gives one.
+    /// Returns the edges that belong to one triangle of the mesh only. Each lattice square with all four cells gives
+    /// two triangles, one with three cells gives one.
     fn boundary_edges(&self) -> Vec<(Cell, Cell)> {
         let (n_rows, squares) = (self.n_rows, self.squares());
         let mut edges = Vec::new();
@@ -140,8 +143,8 @@ impl Grid {
 
     /// Returns the first boundary loop of at least `enough` lattice steps, else the longest one.
     ///
-    /// As Masuda et al., 3.2: the shortest path along the boundary from one end of a boundary edge to the other closes a
-    /// loop; repeated for edges that are on no loop yet.
+    /// As Masuda et al., 3.2: the shortest path along the boundary from one end of a boundary edge to the other closes
+    /// a loop; repeated for edges that are on no loop yet.
     pub(super) fn longest_loop(&self, enough: f64) -> Vec<Cell> {
         let edges = self.boundary_edges();
         let mut neighbours: BTreeMap<Cell, Vec<(Cell, u32)>> = BTreeMap::new();

@@ -1,22 +1,28 @@
-//! Contrast of the plate and what lies behind it: where an edge crosses a mixed pixel, by linear mixing.
+//! Contrast of plate and background, and the position of an edge within a mixed pixel, by the linear mixing model.
 //!
-//! 1. Linear mixing model: the range of a mixed pixel is the mean of both sides weighted by their echoes. It tells the odds of the background, its echo
-//!    over that of the face: C s / (1 - s), where s is the part of the beam's power beyond the edge and C the contrast, the echo of the background alone over
-//!    that of the face alone.
-//! 2. So the range of one mixed pixel gives s, and s where in the beam the edge is, given the contrast: between where it is in a Gaussian beam, and in one
-//!    truncated at its radius (1/e^2).
-//! 3. The contrast, as the ratio of the reflectivities, is one unknown for each plane of the background, found together with the edge: the mixed pixels of one plane share it, those at the
-//!    ends of their row, where the beam sees nearly one side only, tell it. Along the plane it follows the cosines of the incidence on the face and on the
-//!    plane (Lambert's law) and the square of the ranges.
-//! 4. The edges before a plane share its contrast: each is fitted with what the others tell as its prior (belief propagation, exact for normal
-//!    distributions on a tree).
-//! 5. A receiver need not mix linearly: how far the mixed pixels of an edge scatter about it is estimated with it, and they count by that; not at all
-//!    where their ranges lie anywhere between the two surfaces.
-//! 6. A beam that sees so little of one side that its range stays within the detection limit is not found mixed. Where the background outshines the face
-//!    (C > 1) that side is the face: pixels are found mixed farther inside of the edge than outside.
+//! 1. **Linear mixing.** The range of a mixed pixel is the mean of the ranges of both sides, weighted by their echoes.
+//!    It determines the odds of the background, that is, its echo over that of the face: C s / (1 - s). Here s is the
+//!    part of the beam's power beyond the edge, and C the contrast: the echo of the background alone over that of the
+//!    face alone.
+//! 2. **Position in the beam.** Given the contrast, the range of one mixed pixel gives s, and s the position of the
+//!    edge in the beam. The position used is midway between that in a Gaussian beam and that in a beam truncated at its
+//!    radius (1/e^2).
+//! 3. **One unknown per plane.** The ratio of the reflectivities is one unknown for each plane of the background and is
+//!    found together with the edge. All mixed pixels before a plane share it; it is determined by those at the ends of
+//!    their row, where the beam sees nearly one side only. Along the plane the contrast follows from it by the cosines
+//!    of the incidence on the face and on the plane (Lambert's law) and the square of the ranges.
+//! 4. **Sharing between edges.** The edges before a plane share its contrast. Each is fitted with the results of the
+//!    others as its prior (belief propagation, exact for normal distributions on a tree).
+//! 5. **Receivers that do not mix linearly.** The scatter of the mixed pixels about their edge is estimated with the
+//!    edge and sets their weight. They have no weight where their ranges lie anywhere between the two surfaces.
+//! 6. **Detection limit.** A beam that sees so little of one side that its range stays within the detection limit is
+//!    not detected as mixed. Where the background is brighter than the face (C > 1) that side is the face: pixels are
+//!    detected as mixed farther inside of the edge than outside.
 //!
-//! In: one lattice line; out: [`Mixing`], what its likelihood needs. Own. Limits: how much power a beam has near its rim differs between instruments; a beam with
-//! wings is found mixed farther inside.
+//! In: one lattice line. Out: [`Mixing`], for the likelihood of that line. Own.
+//!
+//! Limits: the power of a beam near its rim differs between instruments; a beam with wings is detected as mixed farther
+//! inside.
 
 use platen_numerics::median::robust_deviation;
 
@@ -25,47 +31,53 @@ use super::height_field::LEAST_COSINE;
 use crate::Vec3;
 use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing, DETECTION_LIMIT};
 
-/// Place of an edge in a beam by the log odds l of the power beyond it, in radii: l / (A + B l^2). A Gaussian beam has A = 3.19, B = 0.034, one truncated at its radius
-/// 3.52 and 0.080 (each within 0.01 up to l = 5); these are midway.
+/// Position of an edge in a beam from the log odds l of the power beyond it, in radii: l / (A + B l^2). A Gaussian beam
+/// has A = 3.19 and B = 0.034, a beam truncated at its radius A = 3.52 and B = 0.080 (each within 0.01 up to l = 5).
+/// The values here are midway.
 const PLACE: (f64, f64) = (3.35, 0.057);
 
-/// Standard deviation of that place by the shape of the beam, over l^2: half the difference of both, and that by an error of the radius.
+/// Standard deviation of that position over l^2: half the difference of the two beam shapes, and the effect of an error
+/// of the radius.
 const PLACE_SPREAD: f64 = 0.01;
 
-/// Least standard deviation of the place by one pixel, in radii: the shape of the beam has all pixels of a row off alike, however little they scatter.
-/// With half of it corners of 40 plates of mill scale are up to 2.5 mm off instead of 1.8.
+/// Least standard deviation of the position by one pixel, in radii: a wrong beam shape shifts all pixels of a row
+/// alike, however little they scatter. With half this value corners of 40 plates of mill scale are up to 2.5 mm off
+/// instead of 1.8 mm.
 const LEAST_SPREAD: f64 = 0.2;
 
-/// Log odds beyond which a pixel tells no more.
+/// Log odds beyond which a pixel gives no further information.
 const MOST_ODDS: f64 = 5.0;
 
-/// Prior of the logarithm of the ratio of the reflectivities of background and plate: mean and standard deviation. Walls of 0.8 and floors of 0.3 behind plates
-/// of 0.1 to 0.6.
+/// Prior of the logarithm of the ratio of the reflectivities of background and plate: mean and standard deviation. It
+/// covers walls of reflectivity 0.8 and floors of 0.3 behind plates of 0.1 to 0.6.
 const PRIOR: (f64, f64) = (0.7, 0.7);
 
-/// Standard deviation of the logarithm of a contrast from one edge to another: planes are not evenly bright.
+/// Standard deviation of the logarithm of a contrast between two edges before the same plane: planes are not evenly
+/// bright.
 const BETWEEN_EDGES: f64 = 0.1;
 
-/// Part of the prior's precision above which an edge tells a contrast.
+/// Precision that an edge must add to a contrast to be used, in parts of the prior's precision.
 const LEAST_TOLD: f64 = 1e-3;
 
-/// Scatter of such places from one mixed pixel to the other that is expected, in radii, and how many pixels it counts for.
+/// Expected scatter of these positions between mixed pixels, in radii, and the number of pixels whose weight this
+/// expectation has.
 const SCATTER: (f64, f64) = (0.2, 10.0);
 
-/// Largest scatter of a receiver that mixes linearly, in radii: edges of 40 random scenes have 0.05 to 0.23. Ranges anywhere between the two surfaces scatter by 0.48
-/// where all beams have the edge at one place, by more elsewhere.
+/// Largest scatter of a receiver that mixes linearly, in radii: edges of 40 random scenes have 0.05 to 0.23. Ranges
+/// anywhere between the two surfaces give a scatter of 0.48 where all beams have the edge at one place, and more
+/// elsewhere.
 const MOST_SCATTER: f64 = 0.33;
 
-/// Scatter that stands for pixels which tell nothing, in radii.
+/// Scatter that stands for pixels without information, in radii.
 pub(super) const NOTHING_TOLD: f64 = 10.0;
 
-/// Least jump of the range from the face to the background whose mixed pixels are told from both, metres.
+/// Least jump of the range from the face to the background at which mixed pixels are distinguished from both, metres.
 const LEAST_JUMP: f64 = 0.05;
 
-/// Largest part of the jump at which a mixed pixel is told from a surface.
+/// Largest part of the jump by which a mixed pixel must differ from a surface to be detected.
 const MOST_LIMIT: f64 = 0.45;
 
-/// Least part of the radius at which a beam is found mixed.
+/// Least part of the radius up to which a beam is detected as mixed.
 const LEAST_SEEN: f64 = 0.05;
 
 /// Logarithms of the ratio of the reflectivities of each background plane and the plate.
@@ -78,12 +90,12 @@ impl Contrasts {
         self.0.iter().zip(&other.0).all(|(one, other)| (one - other).abs() < 0.01 * PLACE.0)
     }
 
-    /// Takes as many as there are planes.
+    /// Copies the first logarithms, one for each plane.
     pub(super) fn of(logarithms: &[f64]) -> Self {
         Self(std::array::from_fn(|plane| logarithms[plane]))
     }
 
-    /// Returns them in the order of the planes.
+    /// Returns the logarithms in the order of the planes.
     pub(super) fn logarithms(&self) -> &[f64] {
         &self.0
     }
@@ -94,15 +106,15 @@ impl Contrasts {
 pub(super) struct ContrastDistribution([(f64, f64); BACKGROUND_PLANES]);
 
 impl ContrastDistribution {
-    /// Before any mixed pixel is seen.
+    /// Distribution before any mixed pixel is seen.
     pub(super) const PRIOR: Self = Self([PRIOR; BACKGROUND_PLANES]);
 
-    /// Takes means and standard deviations in the order of the planes.
+    /// Builds the distribution from means and from standard deviations by the number of the plane.
     pub(super) fn of(contrasts: &Contrasts, spread: impl Fn(usize) -> f64) -> Self {
         Self(std::array::from_fn(|plane| (contrasts.0[plane], spread(plane))))
     }
 
-    /// Combines the prior with what edges tell that were fitted with that prior.
+    /// Combines the prior with the results of edges that were fitted with that prior, each less the prior itself.
     pub(super) fn told_by<'a>(edges: impl Iterator<Item = &'a Self>) -> Self {
         let prior = PRIOR.1.powi(-2);
         let mut sums = [(prior, prior * PRIOR.0); BACKGROUND_PLANES];
@@ -130,14 +142,15 @@ impl ContrastDistribution {
         self.off(0.0)
     }
 
-    /// Returns the contrasts that all are so many standard deviations above the mean.
+    /// Returns the contrasts that are all `deviations` standard deviations above the mean.
     pub(super) fn off(&self, deviations: f64) -> Contrasts {
         Contrasts(self.0.map(|(mean, spread)| mean + deviations * spread))
     }
 }
 
-/// Estimates how far the places of an edge by its mixed pixels scatter, in radii of the beam, from the sizes of its distances from them: a receiver need not mix
-/// linearly. Returns the scatter expected without any.
+/// Estimates the scatter of the edge positions by the mixed pixels, in radii of the beam, from the absolute distances
+/// of these positions from the edge: a receiver need not mix linearly. Returns the expected scatter when there are no
+/// distances.
 pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     let (expected, weight) = SCATTER;
     let n = sizes.len() as f64;
@@ -148,7 +161,8 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt()
 }
 
-/// Returns the place of an edge in a beam, in radii from its middle, by the log odds of the power beyond it, and the slope of it.
+/// Returns the position of an edge in a beam, in radii from its middle, from the log odds of the power beyond the edge,
+/// and the derivative by these log odds.
 fn place_in_beam(log_odds: f64) -> (f64, f64) {
     let (a, b) = PLACE;
     let l = log_odds.clamp(-MOST_ODDS, MOST_ODDS);
@@ -161,16 +175,17 @@ fn place_in_beam(log_odds: f64) -> (f64, f64) {
 pub(super) struct Mixing {
     /// Number of the plane.
     plane: usize,
-    /// Logarithm of the contrast by incidence and range.
+    /// Part of the logarithm of the contrast that is due to incidence and range.
     by_geometry: f64,
-    /// Largest log odds of either surface at which a pixel is found mixed.
+    /// Largest log odds of either surface at which a pixel is detected as mixed.
     most_odds: f64,
     /// Logarithm of the odds of the background in a single mixed pixel.
     odds: Option<f64>,
 }
 
 impl Mixing {
-    /// Measures the mixing of a crossing all of whose cells were measured; `None` without a background plane. `noise` is that of ranges, metres.
+    /// Determines the mixing of a crossing. `None` without a background plane, or where not all cells of the crossing
+    /// were measured. `noise` is that of the ranges, metres.
     pub(super) fn of(crossing: &Crossing, noise: f64) -> Option<Self> {
         let jump = f64::from(crossing.excess);
         let plane = crossing
@@ -192,25 +207,26 @@ impl Mixing {
         })
     }
 
-    /// Returns the same without what a mixed pixel tells: of a silhouette that is not the edge of the face.
+    /// Returns the same without the odds of a mixed pixel, for a silhouette that is not the edge of the face.
     pub(super) fn without_odds(self) -> Self {
         Self { odds: None, ..self }
     }
 
-    /// Returns the parts of the beam's radius inside and outside of the edge up to which it is found mixed.
+    /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its
+    /// radius.
     pub(super) fn seen(&self, contrasts: &Contrasts) -> [f64; 2] {
         let contrast = contrasts.0[self.plane] + self.by_geometry;
         [self.most_odds + contrast, self.most_odds - contrast]
             .map(|odds| place_in_beam(odds).0.clamp(LEAST_SEEN, 1.0))
     }
 
-    /// Returns true for a single mixed pixel.
+    /// Returns true when a single mixed pixel determines the position of the edge.
     pub(super) fn tells(&self) -> bool {
         self.odds.is_some()
     }
 
-    /// Returns the place of the edge by a single mixed pixel at `at`, of a beam of this radius on the face, linear about these contrasts; such places
-    /// scatter by `spread`, in radii.
+    /// Returns the position of the edge by a single mixed pixel at `at`, linearised about these contrasts. `radius` is
+    /// that of the beam on the face, metres, `spread` the scatter of such positions, in radii.
     pub(super) fn edge(
         &self,
         at: f64,
@@ -244,7 +260,8 @@ mod tests {
     const JUMP: f64 = 2.0;
     const RANGE: f64 = 8.0;
 
-    /// A crossing straight below the scanner, before a plane 2 m behind it whose echo is part of a mixed pixel's.
+    /// A crossing straight below the scanner, before a plane 2 m behind it; `background` is the part of that plane in
+    /// the echo of the mixed pixel.
     fn crossing(background: f64) -> Crossing {
         let at = |y: f64| Vec3::new(0.0, y, -RANGE);
         Crossing {
@@ -264,12 +281,12 @@ mod tests {
         }
     }
 
-    /// Contrasts of planes whose echo is so many times that of the face, seen as squarely.
+    /// Contrasts of planes whose echo is `times` that of the face at the same incidence.
     fn contrasts(times: f64) -> Contrasts {
         Contrasts::of(&[times.ln() + 2.0 * (1.0 + JUMP / RANGE).ln(); BACKGROUND_PLANES])
     }
 
-    /// Edges that tell the first plane's contrast and that of no other.
+    /// Edges that determine the contrast of the first plane only.
     #[test]
     fn edges_tell_each_other_the_contrast_of_a_plane() {
         let own = 0.2_f64;
@@ -291,7 +308,8 @@ mod tests {
         assert!((of.planes()[1].0 - PRIOR.0).abs() < 1e-12 && (of.planes()[1].1 - PRIOR.1).abs() < 1e-12);
     }
 
-    /// Part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by strips of equal width.
+    /// Part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by strips of
+    /// equal width.
     fn beyond(most: f64, off: f64) -> f64 {
         const STRIPS: i32 = 1000;
         let strip = |k: i32| {
@@ -328,7 +346,7 @@ mod tests {
             |times: f64, noise: f64| Mixing::of(&crossing(0.5), noise).unwrap().seen(&contrasts(times));
         assert_eq!(seen(1.0, 1e-3), [1.0; 2]);
         let [inside, outside] = seen(10.0, 2e-3);
-        // 24 mm of noise in 2 m: odds of 82, a tenth of them where the background is ten times as bright.
+        // A limit of 24 mm in 2 m: odds of 82, a tenth of that where the background is ten times as bright.
         let expected = place_in_beam((0.988_f64 / 0.012 / 10.0).ln()).0;
         assert!(inside == 1.0 && (outside - expected).abs() < 1e-6, "{outside}");
         assert!(seen(10.0, 4e-3)[1] < outside, "with more noise less is found");
@@ -340,7 +358,7 @@ mod tests {
     fn ranges_anywhere_between_the_surfaces_tell_nothing() {
         assert!((spread(Vec::new()) - SCATTER.0).abs() < 1e-12);
         let exact = spread(vec![0.0; 90]);
-        // The scatter of one in ten.
+        // Ten pixels in a hundred have the expected scatter, the others none.
         assert!((exact - (0.1 * SCATTER.0 * SCATTER.0).sqrt()).abs() < 1e-12, "{exact}");
         let anywhere =
             (1..1000).map(|k| f64::from(k) / 1000.0).map(|part| place_in_beam((part / (1.0 - part)).ln()).0);

@@ -1,9 +1,13 @@
-//! The four corners, to a millimetre: candidates by the angle to the k-th neighbours, straight lines on both sides by
-//! RANSAC (Fischler and Bolles 1981), intersections (Masuda et al., 3.2).
+//! Corners of the plate, to a millimetre, as intersections of straight lines fitted by RANSAC (Masuda et al., 3.2).
 //!
-//! In: places of the visible boundary in the mean plane. Out: four corners, the starting points of `edge`. Own: k scales with
-//! the lattice, hidden parts of the loop add nothing to its length, and of more than four candidates those four are taken whose quadrilateral
-//! holds most of the loop.
+//! 1. A boundary point is a candidate where the directions to its k-th neighbours on both sides enclose a small angle.
+//! 2. A straight line is fitted to the boundary on each side of a candidate by RANSAC (Fischler and Bolles 1981).
+//! 3. The two lines are intersected.
+//!
+//! In: points of the visible boundary in the mean plane. Out: four corners, the starting points of `edge`.
+//!
+//! Own: k scales with the lattice; hidden parts of the loop add nothing to its length; of more than four candidates the
+//! four are selected whose quadrilateral follows most of the loop.
 
 use nalgebra::Vector2;
 use platen_numerics::random::Random;
@@ -18,8 +22,9 @@ const CORNER_ANGLE: f64 = 150.0;
 /// k = 128 of Masuda et al. at 6.3 mm spans 0.8 m of a 4 m plate: this part of the shorter side.
 const NEIGHBOUR_PART: f64 = 0.2;
 
-/// RANSAC: pairs tried per line, and the distance of a point that supports it, in lattice steps. A pair is that many
-/// times as far apart, or that part of the points' reach.
+/// RANSAC: number of pairs tried per line, and the largest distance of a point that supports a line, in lattice steps.
+/// The points of a pair are at least `PAIR_SUPPORTS` such distances apart, or `PAIR_PART` of the reach where that is
+/// less.
 const TRIALS: usize = 96;
 const SUPPORT_STEPS: f64 = 1.5;
 const PAIR_SUPPORTS: f64 = 4.0;
@@ -28,15 +33,16 @@ const PAIR_PART: f64 = 0.4;
 /// Points to either side over which the loop is levelled before its length is measured.
 const LEVELLED: usize = 4;
 
-/// Neighbouring points farther apart than this many lattice steps have a hidden part between them: it adds nothing to the length, so that
-/// the points beyond a hidden corner are among its neighbours.
+/// Neighbouring points farther apart than this many lattice steps have a hidden part between them. It adds nothing to
+/// the length of the loop, so that the points beyond a hidden corner are among its neighbours.
 const GAP_STEPS: f64 = 8.0;
 
-/// Two edges meet at an angle within these, degrees, seen along the plate's mean normal: bending takes a right angle
-/// by a few degrees only.
+/// Angles at which two edges may meet, degrees, seen along the plate's mean normal: bending changes a right angle by a
+/// few degrees only.
 const CROSSING_ANGLE: std::ops::RangeInclusive<f64> = 60.0..=120.0;
 
-/// Seen along the mean normal, a bent plate's edge leaves the line between its corners by at most this part of it.
+/// Largest distance of a bent plate's edge from the straight line between its corners, seen along the mean normal, in
+/// parts of that line's length.
 const BULGE: f64 = 0.03;
 
 /// A corner in the plane, and the place on the loop where its two edges part.
@@ -70,7 +76,7 @@ pub(super) fn find(points: &[Vec2], step: f64, shorter: f64) -> Result<[Corner; 
     best_four(points, &candidates).ok_or(OutlineError::Corners { found: candidates.len() })
 }
 
-/// Selects four candidates, in their order, between which most of the loop lies along straight lines.
+/// Selects the four candidates, in their order, whose connecting straight lines follow most of the loop.
 fn best_four(points: &[Vec2], candidates: &[Corner]) -> Option<[Corner; 4]> {
     let n = candidates.len();
     let mut best: Option<(usize, [Corner; 4])> = None;
@@ -121,7 +127,7 @@ impl<'a> Loop<'a> {
             let step = points[(i + 1) % n] - points[i % n];
             if step.norm() > gap { Vec2::zeros() } else { step }
         };
-        // Points lie up to half a step to either side of the edge: from one to the next is farther than along it.
+        // Points lie up to half a step to either side of the edge: the way from point to point is longer than the edge.
         let levelled = |i: usize| {
             let around = (0..=2 * LEVELLED).map(|k| to_next(i + k + LEVELLED * (n - 1)));
             around.sum::<Vec2>() / (2 * LEVELLED + 1) as f64
@@ -203,7 +209,8 @@ struct Line {
     direction: Vec2,
 }
 
-/// Fits a line: the one through most of the points (RANSAC, from pairs at least `apart`), then least squares through those.
+/// Fits a line: the one through most of the points (RANSAC, from pairs at least `apart`), then least squares through
+/// those.
 fn line(points: &[Vec2], support: f64, apart: f64, random: &mut Random) -> Option<Line> {
     let off = |line: &Line, p: &Vec2| line.direction.perp(&(p - line.point)).abs();
     let mut best: Option<(usize, Line)> = None;

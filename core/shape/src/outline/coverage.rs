@@ -1,6 +1,6 @@
 //! Coverage of an edge: the stretches along it where it was seen.
 
-/// An edge counts as seen where a crossing lies within so many lattice steps.
+/// An edge counts as seen where a crossing lies within this many lattice steps.
 const STEPS: f64 = 6.0;
 
 /// Places along an edge of the crossings that belong to it.

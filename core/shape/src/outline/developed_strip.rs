@@ -1,9 +1,12 @@
 //! Development of the narrow strip of the face along an edge into the plane, by the geodesic curvature of a base curve.
 //!
-//! In: projected crossings of one edge. Out: a map between the strip and the plane, in which `edge` fits a stiff curve. A base
-//! curve near the edge is fitted robustly (Tukey's biweight) and developed as it runs on the mid-surface below it: its
-//! geodesic curvature is kept, the surface's own bending is not. In the plane a straight cut is straight however the
-//! plate is bent; on the face itself a bend band askew to the edge shifts it by half the thickness times the band's angle.
+//! In: the projected crossings of one edge. Out: a map between the strip and the plane, in which `edge` fits a stiff
+//! curve.
+//!
+//! A base curve near the edge is fitted robustly (Tukey's biweight). Its parallel on the mid-surface is developed into
+//! the plane: the geodesic curvature is kept, the bending of the surface is removed. In the plane a straight cut is
+//! straight however the plate is bent. The mid-surface is developed since on the face itself a bend band askew to the
+//! edge shifts the edge by half the thickness times the band's angle.
 
 use nalgebra::Vector2;
 use platen_numerics::penalised_curve::{CurveFit, Roughness, SplineCurve};
@@ -17,27 +20,30 @@ use crate::Vec3;
 /// Spacing of the base curve's points, metres.
 const SPACING: f64 = 0.005;
 
-/// The base curve goes on beyond the corners by this part of its length, to reach corners that are hidden.
+/// Part of its length by which the base curve continues beyond the corners, to reach corners that are hidden.
 const OVERHANG: f64 = 0.06;
 
-/// Spans of the base curve, metres, across the face and along its normal: the latter must follow narrow bend bands.
+/// Spans of the base curve, metres, for its positions across the edge and along the normal; the latter must follow
+/// narrow bend bands.
 const SPAN_ACROSS: f64 = 0.4;
 const SPAN_NORMAL: f64 = 0.1;
 
-/// Prior across the edge: seen along the mean normal has a curvature of at most about this, 1/m, over a length of, metres.
+/// Prior of the base curve across the edge: seen along the mean normal its curvature is at most about the first figure,
+/// 1/m, over a length of the second, metres.
 const CURVATURE_ACROSS: (f64, f64) = (0.1, 0.5);
 
-/// Along the normal: the curvature of a plate changes by at most about this, 1/m^2 (0.8 1/m over a bend band of
-/// 0.1 m), over a length of, metres.
+/// Prior of the base curve along the normal: the curvature of a plate changes by at most about the first figure, 1/m^2
+/// (0.8 1/m over a bend band of 0.1 m), over a length of the second, metres.
 const CURVATURE_CHANGE: (f64, f64) = (8.0, 0.1);
 
-/// Normals turn as the plate bends: second derivative of their components, 1/m^2, over a length of, metres.
+/// Prior of the normals along the base curve, which turn as the plate bends: second derivative of their components,
+/// 1/m^2, over a length, metres.
 const NORMAL_CHANGE: (f64, f64) = (8.0, 0.1);
 
-/// Crossings on a common curve, at least.
+/// Least number of crossings on a common curve (sum of their weights).
 const LEAST_WEIGHT: f64 = 8.0;
 
-/// Rounds of reweighting against crossings of other edges.
+/// Rounds of reweighting, which remove crossings of other edges.
 const ROUNDS: usize = 8;
 
 /// One point of the base curve.
@@ -59,7 +65,7 @@ pub(super) struct DevelopedStrip {
     along: Vec3,
     first: f64,
     stations: Vec<Station>,
-    /// Where crossings lie on the common curve, along the chord from its beginning to its end.
+    /// Coverage of the common curve by crossings, along the chord from its beginning to its end.
     seen: Coverage,
     length: f64,
 }
@@ -121,7 +127,7 @@ impl DevelopedStrip {
             fit.solve().map(|(spline, _)| spline)
         };
         for ((p, n), w) in data.iter().zip(&weights) {
-            // Along the face to the base curve.
+            // Height of the crossing moved along the face to the base curve.
             let moved = p.z - n.y / n.z * (across.at(p.x) - p.y);
             height.add(p.x, moved, w / (noise * noise));
         }
@@ -177,7 +183,7 @@ impl DevelopedStrip {
     }
 
     fn station(&self, place: Vector2<f64>) -> &Station {
-        // The plane's first axis is the chord of the developed base curve: places along it nearly are stations.
+        // The plane's first axis is the chord of the developed base curve: stations are sorted along it.
         let at = self.stations.partition_point(|s| (place - s.flat).dot(&s.flat_tangent) > 0.0);
         let near = |i: usize| (place - self.stations[i].flat).norm_squared();
         let at = at.min(self.stations.len() - 1);
@@ -216,8 +222,9 @@ fn too_few(seen: &Coverage, length: f64) -> OutlineError {
     OutlineError::Edge { seen_percent: 100.0 * seen.share(0.0, length) }
 }
 
-/// Develops the curve `depth` below one with the normals of its surface: the direction turns in the plane as it turns in
-/// the surface.
+/// Develops the curve that runs `depth` below the given one, against the normals: its direction turns in the plane as
+/// it turns in the surface (geodesic curvature). `points` are the points of the curve on the face and the normals
+/// there.
 fn develop(points: &[(Vec3, Vec3)], depth: f64) -> Vec<Station> {
     let n = points.len();
     let on_face = |i: usize| points[i + 1].0 - points[i].0;

@@ -1,11 +1,17 @@
-//! One edge as the penalised spline of largest likelihood in its developed strip, by Newton's method.
+//! Edge curve of maximum penalised likelihood in its developed strip, by Newton's method.
 //!
-//! In: projected crossings of one edge; out: the edge curve and its posterior. The likelihood of the curve is the product of
-//! the interval-censored likelihoods of its lattice lines (`edge_likelihood`), the prior a curvature like white noise. It is
-//! unbiased where the middle between two samples is not: along a lattice row all lines have the same interval but for the
-//! few cells where the edge changes rows, and those few locate it. Where it changes none, the posterior is sampled
-//! (`edge_posterior`). The beam's footprint is estimated from the mixed pixels and the edge in turn, the contrast of each plane of the background
-//! together with the edge and then once more with what the other edges tell of it (`contrast`).
+//! In: the projected crossings of one edge. Out: the edge as a spline curve, and its posterior.
+//!
+//! - The likelihood of the curve is the product of the interval-censored likelihoods of its lattice lines
+//!   (`edge_likelihood`). The prior is the curvature that the membrane strain of the plate gives its edges, and about it
+//!   a curvature like white noise.
+//! - The estimate is unbiased; the middle between two samples is not. Along a lattice row all lines have the same
+//!   interval except at the few cells where the edge changes rows, and these cells locate it. Where the edge changes no
+//!   row or column the posterior is sampled (`edge_posterior`).
+//! - An edge is dithered when it crosses so many columns and rows that its position between them is practically random.
+//! - The footprint of the beam and the curve are estimated in turn, the footprint from the mixed pixels (`footprint`).
+//! - The contrast of each plane of the background is estimated together with the edge, then once more with the results
+//!   of the other edges as its prior (`contrast`).
 
 use nalgebra::{Cholesky, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
@@ -29,28 +35,35 @@ use crate::extract::DITHERED;
 /// Span of the curve, metres.
 const SPAN: f64 = 0.25;
 
-/// Prior: a cut edge, developed, is straight but for the membrane strain of the plate and the bow and waviness of the cut:
-/// curvature, 1/m, over a length, metres. Over 3 m that is a bow of 1 mm.
+/// Prior of the curve: curvature, 1/m, over a length, metres. A cut edge, developed, is straight except for the
+/// membrane strain of the plate ([`strain_profile`]) and the bow and waviness of the cut, over 3 m a bow of 1 mm.
 const CURVATURE: (f64, f64) = (0.003, 0.3);
 
-/// Standard deviation of the membrane strain's curvature along an edge, in parts of its mean over all edges: along the long edges of a plate twice as long as
-/// wide it is a fifth more, along the others a fifth less; the rest is for corners that pressing took out of square.
+/// Standard deviation of the curvature by membrane strain along an edge, in parts of its mean over all edges. Along the
+/// long edges of a plate twice as long as wide this curvature is larger by a fifth, along the short ones smaller by a
+/// fifth; the rest is for corners that pressing took out of square.
 const STRAIN_SPREAD: f64 = 0.5;
 
-/// Standard deviation of errors that all lines of an edge share, metres: squareness of the cut, shape of the footprint. With 0.1 mm the standard deviations of
-/// the best seen edges of random scenes are half too large; corners of plates of an independent simulator are off by 0.4 of their stated 95 % intervals, rms.
+/// Standard deviation of errors that all lines of an edge share, metres: squareness of the cut, shape of the footprint.
+/// With 0.1 mm the standard deviations of the best seen edges of random scenes are half too large, and corners of
+/// plates of an independent simulator are off by 0.4 of their stated 95 % intervals, rms.
 const COMMON: f64 = 5e-5;
 
-/// Standard deviation of the bias that the contrast leaves, the same for all edges of a plate, in parts of half the footprint: where mixed pixels tell the contrast
-/// (with 0.025 those of the diagonals of mill scale hold in 92 %, with 0.04 those of all corners in 98 to 99 %) or ranges on a seen side face the edge;
-/// elsewhere per logarithm of one over the cosine of the incidence: a face is the darker the more obliquely it is seen.
+/// Standard deviation of the bias that the contrast leaves, the same for all edges of a plate, in parts of the
+/// footprint (half angle).
+///
+/// `CONTRAST_SPREAD` holds where mixed pixels determine the contrast, or ranges on a visible side face the edge. With
+/// 0.025 the intervals of the diagonals of mill scale hold in 92 %, with 0.04 those of all corners in 98 to 99 %.
+/// Elsewhere `UNKNOWN_SPREAD` is multiplied by the logarithm of one over the cosine of the incidence: the more
+/// obliquely a face is seen, the darker it is.
 const CONTRAST_SPREAD: f64 = 0.035;
 const UNKNOWN_SPREAD: f64 = 0.1;
 
-/// Fewest mixed pixels that tell the contrast.
+/// Least number of mixed pixels that determine the contrast.
 const LEAST_PIXELS: usize = 20;
 
-/// Newton steps with widened likelihoods, then further ones at most, and the movement that ends them, metres.
+/// Number of Newton steps with widened likelihoods, largest number of further steps, and the movement that ends them,
+/// metres.
 const WIDENED_STEPS: i32 = 8;
 const STEPS: i32 = 32;
 const STILL: f64 = 1e-7;
@@ -66,7 +79,7 @@ pub(super) struct EdgeData {
     crossings: Vec<ProjectedCrossing>,
     lines: Vec<LatticeLine>,
     dithered: bool,
-    /// Mean curvature of the plate's edges by its membrane strain, 1/m, positive inwards.
+    /// Mean curvature of the edges of the plate by its membrane strain, 1/m, positive inwards.
     strain: f64,
     from: Vec3,
     to: Vec3,
@@ -92,7 +105,7 @@ impl EdgeData {
         Ok(Self { strip, side_face, crossings, lines, dithered, strain, from, to })
     }
 
-    /// Takes lines, given by their numbers, as beside a strip of background narrower than a beam.
+    /// Replaces lines, given by their numbers, by those beside a strip of background narrower than a beam.
     fn take_for_strip(&mut self, lines: impl IntoIterator<Item = usize>, sampling: Sampling) {
         for at in lines {
             let crossing = self.crossings[at].beside_strip();
@@ -101,19 +114,22 @@ impl EdgeData {
     }
 }
 
-/// Fits the four edges, those that show the beam first and then all of them.
+/// Fits the four edges: first those at which the footprint can be estimated, then all of them.
 ///
-/// - Half the angle that a beam sees is counted from the mixed pixels, then estimated at each edge that shows it; their mean is what all start from in the second fit.
-///   It is the scanner's, not the edge's: an edge that shows far more than the others has a strip of background beside it whose far edge mixes the beams, too.
-///   It takes the footprint of the others, and only those mixed pixels that surely see the plate.
-/// - Each edge is fitted again with what the others tell of the contrasts.
+/// - The footprint is counted from the mixed pixels, then estimated at each edge that has enough suitable lines. The
+///   mean of these estimates is the start value of the second fit.
+/// - The footprint is a property of the scanner, not of the edge. An edge with a far larger one than the others has a
+///   strip of background beside it, whose far edge also mixes the beams. Such an edge is fitted with the footprint of
+///   the others, and only with the mixed pixels that certainly see the plate.
+/// - In the second fit, the contrasts found at the other edges are the prior of those of an edge.
 ///
 /// # Errors
 /// [`OutlineError::Edge`] when too little of one is seen.
 pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
     let shown = background_strip::shown(edges.each_ref().map(|edge| edge.lines.as_slice()));
     edges.iter_mut().zip(shown).for_each(|(edge, lines)| edge.take_for_strip(lines, sampling));
-    // Along an edge that is not dithered all beams may be mixed or none: it counts only where no other edge is.
+    // Along an edge that is not dithered all beams may be mixed, or none. Such edges count only where no edge is
+    // dithered.
     let any = edges.iter().any(|edge| edge.dithered);
     let counting: Vec<&[LatticeLine]> =
         edges.iter().filter(|edge| edge.dithered || !any).map(|edge| edge.lines.as_slice()).collect();
@@ -143,8 +159,8 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
     Ok([a?, b?, c?, d?])
 }
 
-/// Returns true when the edge, about at `base`, crosses so many columns and rows of the lattice that its place between them
-/// is practically random.
+/// Returns true when the edge, approximately at `base`, is dithered: it crosses so many columns and rows of the lattice
+/// that its position between them is practically random.
 fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> bool {
     let on_it = lines.iter().filter(|l| l.is_near(base(l.along), step));
     let (low, high) = on_it.fold(([u32::MAX; 2], [0; 2]), |(low, high), l| {
@@ -162,17 +178,17 @@ pub(super) struct Edge {
     /// Half the angle that a beam sees, radians.
     footprint: f64,
     contrasts: ContrastDistribution,
-    /// Whether its mixed pixels tell them.
+    /// True when its mixed pixels determine the contrasts.
     contrast_known: bool,
-    /// Coverage by the crossings that agree with it.
+    /// Coverage by the crossings that agree with the curve.
     pub(super) seen: Coverage,
     pub(super) from: f64,
     pub(super) to: f64,
 }
 
 impl Edge {
-    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians; with `own` that of this edge is estimated
-    /// from it. `known` is what is known of the contrasts.
+    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians; with `own` it is the
+    /// start value of an estimate at this edge. `known` is the prior of the contrasts.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
@@ -213,7 +229,7 @@ impl Edge {
                 let at = |along| found.curve.at(along);
                 beam.footprint = footprint::at_edge(lines, at, footprint, beam);
             }
-            // The same beams give the same curve, and that one the same beams.
+            // The same beams would give the same curve again: converged.
             if beam.is_near(&last) {
                 break;
             }
@@ -272,7 +288,8 @@ impl Edge {
         self.posterior.variance(along).sqrt().hypot(COMMON).hypot(self.contrast_sigma(along))
     }
 
-    /// Returns the part of it that the contrast has, in which all edges of a plate are off to the same side, metres.
+    /// Returns the part of the standard deviation that is due to the contrast, metres; its error has the same sign at
+    /// all edges of a plate.
     pub(super) fn contrast_sigma(&self, along: f64) -> f64 {
         let (point, normal, inward) = (self.point(along), self.strip.normal(along), self.strip.inward(along));
         let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
@@ -282,8 +299,10 @@ impl Edge {
     }
 }
 
-/// Returns the curvature by membrane strain at a place along an edge in its mean over the edge. The stress vanishes at the corners, and with it the strain; of plates
-/// of least membrane energy (spheres and tori of `sim/plate`) this parabola is right to a tenth of its height.
+/// Returns the curvature by membrane strain at a place along an edge, in parts of its mean over the edge.
+///
+/// The stress vanishes at the corners, and with it the strain. For plates of least membrane energy (spheres and tori of
+/// `sim/plate`) this parabola is right to a tenth of its height.
 fn strain_profile(along: f64, [from, to]: [f64; 2]) -> f64 {
     let from_middle = (2.0 * along - from - to) / (to - from);
     1.5 * (1.0 - from_middle * from_middle).max(0.0)
@@ -294,13 +313,15 @@ struct MostLikely {
     curve: SplineCurve,
     /// Logarithms of the contrasts of the background's planes.
     contrasts: Contrasts,
-    /// Cholesky factor of the precision of the curve's coefficients, then of those.
+    /// Cholesky factor of the precision of the curve's coefficients followed by the contrasts.
     precision: Cholesky<f64, Dyn>,
 }
 
-/// Maximises the likelihood by Newton's method from the middles of the intervals: first one step for each of ever less widened
-/// likelihoods (continuation), which have a slope far from the edge. It never starts from the curve of another footprint:
-/// with 2 mm of noise that one may lie at a lesser maximum, 1 mm off, and the footprint estimated there would keep it.
+/// Maximises the likelihood by Newton's method, starting from the middles of the intervals.
+///
+/// The first steps use likelihoods that are widened less and less (continuation); a widened likelihood has a slope far
+/// from the edge. The search never starts from the curve found with another footprint: with 2 mm of noise that curve
+/// may lie at a lesser maximum, 1 mm off, and the footprint estimated there would keep it.
 fn most_likely(prior: &CurveFit, lines: &[EdgeLikelihood], step: f64) -> Option<MostLikely> {
     let mut normal = prior.clone();
     for line in lines {
@@ -322,7 +343,7 @@ fn most_likely(prior: &CurveFit, lines: &[EdgeLikelihood], step: f64) -> Option<
     Some(found)
 }
 
-/// Estimates how far the places of the edge by its mixed pixels scatter, in radii of the beam.
+/// Estimates the scatter of the edge positions by the single mixed pixels about the curve, in radii of the beam.
 fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely) -> f64 {
     let size = |line: &EdgeLikelihood| {
         let shared = line.shared?;
@@ -332,7 +353,7 @@ fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely) -> f64 {
     contrast::spread(lines.iter().filter_map(size).collect())
 }
 
-/// One Newton step of a curve and the contrasts.
+/// Performs one Newton step of the curve and the contrasts.
 fn newton_step(
     prior: &CurveFit,
     lines: &[EdgeLikelihood],

@@ -1,21 +1,25 @@
-//! Likelihood of an edge position given one lattice line: terms for what the line tells, mixed with a constant for outliers.
+//! Likelihood of an edge position given one lattice line: an interval-censored observation with outliers.
 //!
-//! Both ends of a censored interval are probit-smoothed by the pointing noise of the beams. In: terms of `lattice_line`; out:
-//! [`EdgeLikelihood`], whose Newton steps `edge` adds up and whose values `edge_posterior` samples. All distances inwards, in metres.
+//! The likelihood is the product of independent terms, mixed with a constant for lines that are outliers. A term is a
+//! direct observation of the edge or one end of a censored interval; both ends of an interval are smoothed by the
+//! pointing noise of the beams (probit).
+//!
+//! In: the terms of `lattice_line`. Out: [`EdgeLikelihood`]; `edge` adds up its Newton steps and `edge_posterior`
+//! samples its values. All distances are positive inwards (into the plate), in metres.
 
 use platen_numerics::normal_distribution::{CERTAIN, cdf, log_cdf};
 
 /// Least curvature of a line's log likelihood in a Newton step, 1/m^2.
 const LEAST_BEND: f64 = 1e2;
 
-/// Part of the lines that are outliers, and the likelihood of an edge position given one of those.
+/// Part of the lines that are outliers, and the likelihood of an edge position given an outlier.
 pub(super) const OUTLIER_PART: f64 = 0.05;
 const OUTLIER_LIKELIHOOD: f64 = 0.1;
 
 /// Part of the beams that see both sides of an edge and are not detected as mixed.
 pub(super) const HIDDEN_PART: f64 = 0.25;
 
-/// Likelihood of an edge position given one lattice line: the product of independent terms, mixed with a constant for outliers.
+/// Likelihood of an edge position given one lattice line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EdgeLikelihood {
     pub(super) along: f64,
@@ -23,7 +27,8 @@ pub(super) struct EdgeLikelihood {
     pub(super) shared: Option<SharedObservation>,
 }
 
-/// Direct observation of an edge that depends on a parameter which it shares with other lines: the edge plus `factor` times the parameter is at `place`.
+/// Direct observation of an edge that depends on a parameter shared with other lines: the edge plus `factor` times the
+/// parameter is at `place`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SharedObservation {
     pub(super) place: f64,
@@ -37,12 +42,12 @@ pub(super) struct SharedObservation {
 }
 
 impl SharedObservation {
-    /// Returns how far inside of it an edge at `at` lies, metres.
+    /// Returns the distance by which an edge at `at` lies inside of the observation, metres.
     pub(super) fn off(&self, at: f64, parameters: &[f64]) -> f64 {
         at + self.factor * parameters[self.number] - self.place
     }
 
-    /// Returns its likelihood, given the edge and the parameters, and its weight.
+    /// Returns the likelihood of an edge at `at` and the parameters, and the weight of the observation.
     fn likelihood(&self, at: f64, parameters: &[f64], least_soft: f64) -> (f64, f64) {
         let soft = self.soft.max(least_soft);
         let off = self.off(at, parameters) / soft;
@@ -53,7 +58,7 @@ impl SharedObservation {
 /// One Newton step of the log likelihood of a line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NewtonStep {
-    /// Place that the terms lead to, and its weight (the curvature).
+    /// Position to which the terms lead, and its weight (the curvature).
     pub(super) to: f64,
     pub(super) weight: f64,
     /// Weight of the shared observation.
@@ -72,17 +77,17 @@ pub(super) struct Term {
 pub(super) enum EdgeObservation {
     /// A direct observation.
     At(f64),
-    /// Censored from below: the edge is inside of this.
+    /// Censored from below: the edge is inside of this bound.
     Above(Bound),
-    /// Censored from above: the edge is outside of this.
+    /// Censored from above: the edge is outside of this bound.
     Below(Bound),
-    /// The last cell of the face: the edge is outside of it, or it lies on the side face, `behind` outside of the edge by its
-    /// noisy range.
+    /// The last cell of the face: the edge is outside of the cell, or the cell lies on the side face, by its noisy
+    /// range `behind` outside of the edge.
     Last { cell: f64, behind: f64 },
 }
 
-/// Censoring bound as a mixture of two: at `likely` where the beam would have been detected as mixed, at `sure`, farther out,
-/// where not.
+/// Censoring bound as a mixture of two: at `likely` if a mixed beam would have been detected, at `sure`, farther out,
+/// if not.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bound {
     pub(super) sure: f64,
@@ -90,13 +95,13 @@ pub(super) struct Bound {
 }
 
 impl Bound {
-    /// Returns the likelihood of an edge by its distances inside of the two bounds, in standard deviations.
+    /// Returns the likelihood of an edge from its distances inside of the two bounds, in standard deviations.
     fn value(sure: f64, likely: f64) -> f64 {
         HIDDEN_PART * cdf(sure) + (1.0 - HIDDEN_PART) * cdf(likely)
     }
 
-    /// Returns the same with the slope of its logarithm and the negative second derivative of a lower bound of that (expectation
-    /// maximisation, so that a Newton step never meets a negative curvature).
+    /// Returns the same likelihood, the slope of its logarithm and the negative second derivative of a lower bound of
+    /// that logarithm (expectation maximisation; a Newton step never meets a negative curvature).
     fn likelihood(sure: f64, likely: f64) -> (f64, f64, f64) {
         if sure.min(likely) > CERTAIN {
             return (1.0, 0.0, 0.0);
@@ -116,7 +121,8 @@ impl EdgeObservation {
 }
 
 impl Term {
-    /// Returns the likelihood of an edge at `at`, the slope of its logarithm, per metre, and its negative second derivative.
+    /// Returns the likelihood of an edge at `at`, the slope of its logarithm, per metre, and the negative second
+    /// derivative of that.
     fn likelihood(&self, at: f64, least_soft: f64) -> (f64, f64, f64) {
         let soft = self.soft.max(least_soft);
         let (sign, (likelihood, slope, bend)) = match self.observation {
@@ -171,7 +177,8 @@ impl Term {
 }
 
 impl EdgeLikelihood {
-    /// Returns (place, weight) of the interval's middle, with the variance of a uniform distribution: the start of the search.
+    /// Returns the middle of the interval and its weight by the variance of a uniform distribution: the start of the
+    /// search.
     pub(super) fn middle(&self, step: f64) -> (f64, f64) {
         let [first, second] = &self.terms;
         if let EdgeObservation::At(place) = first.observation {
@@ -188,16 +195,17 @@ impl EdgeLikelihood {
         (1.0 - OUTLIER_PART) * a * b * shared + OUTLIER_PART * OUTLIER_LIKELIHOOD
     }
 
-    /// Returns one Newton step of the log likelihood from `at` and the shared parameters. Its weights fade where the line is more likely an outlier.
+    /// Returns one Newton step of the log likelihood from `at` and the shared parameters. The weights vanish where the
+    /// line is more likely an outlier.
     ///
-    /// `least_soft` widens the likelihood, to give it a slope far away.
+    /// `least_soft` widens the likelihood, to give it a slope far from the edge.
     pub(super) fn newton_step(&self, at: f64, parameters: &[f64], least_soft: f64) -> NewtonStep {
         let [a, b] = self.terms.map(|term| term.likelihood(at, least_soft));
         let (shared, shared_weight) =
             self.shared.map_or((1.0, 0.0), |shared| shared.likelihood(at, parameters, least_soft));
         let mine = (1.0 - OUTLIER_PART) * a.0 * b.0 * shared;
         let belongs = mine / (mine + OUTLIER_PART * OUTLIER_LIKELIHOOD);
-        // The middle of a wide interval is flat: a small curvature, of a tenth of a metre, keeps the step finite.
+        // The middle of a wide interval is flat: a small curvature, that of a tenth of a metre, keeps the step finite.
         let bend = (a.2 + b.2).max(LEAST_BEND);
         NewtonStep {
             to: at + (a.1 + b.1) / bend,
@@ -226,7 +234,7 @@ mod tests {
         assert!(to < 0.004 && weight > 0.0);
         let NewtonStep { to, weight, .. } = line.newton_step(0.001, &[], 0.0);
         assert!((to - 0.001).abs() < 1e-6 && weight < 1e5);
-        // Half a metre off it has nothing to do with the edge.
+        // A line half a metre off the edge has no weight.
         assert!(line.newton_step(0.5, &[], 0.0).weight < 1e-3);
     }
 }

@@ -1,8 +1,12 @@
-//! Posterior of an edge curve: mean and covariance.
+//! Posterior of an edge curve, mean and covariance, by Laplace's method or adaptive Metropolis.
 //!
-//! By Laplace's method (the normal distribution at the maximum) where the edge is dithered, that is, crosses many lines of the
-//! lattice. Along a lattice line the likelihood is flat between steep sides and Laplace's method fails: there the curve at four
-//! places, the footprint, the softness and the contrast are integrated over by adaptive Metropolis.
+//! - Laplace's method (the normal distribution at the maximum) serves where the edge is dithered, that is, crosses many
+//!   lines of the lattice.
+//! - Along a lattice line the likelihood is flat between steep sides, and Laplace's method fails. There the posterior
+//!   is integrated by adaptive Metropolis over the curve at four places, the footprint, the softness of the intervals'
+//!   ends and the contrast.
+//!
+//! In: the curve of `edge`, its prior and its lattice lines. Out: [`Posterior`], variances in m^2.
 
 use nalgebra::{DMatrix, SMatrix, SVector};
 use platen_numerics::adaptive_metropolis::mean_and_covariance;
@@ -12,20 +16,26 @@ use super::SEED;
 use super::contrast::ContrastDistribution;
 use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 
-/// Free places of the edge where its posterior is sampled: ends and thirds. Between them the prior leaves two tenths of a
-/// millimetre undetermined.
+/// Number of places along the edge at which its position is sampled: ends and thirds. Between them the prior leaves two
+/// tenths of a millimetre undetermined.
 const PLACES: usize = 4;
 
-/// Dimensions sampled: those places, then of each its distance from the prior mean in standard deviations: the footprint; the logarithm of the softness relative to
-/// that of a dithered edge (which includes what the curve of such an edge does not follow), of this prior mean and standard deviation one; the logarithm of the
-/// contrasts, the same for all planes.
+/// Number of dimensions sampled: the positions at those places, then three parameters, each as its distance from the
+/// prior mean in standard deviations:
+///
+/// 1. the footprint;
+/// 2. the logarithm of the softness relative to that of a dithered edge (which includes the deviations that the curve
+///    of such an edge does not follow), with the prior mean `LOG_SOFTNESS` and a standard deviation of one;
+/// 3. the logarithm of the contrasts, with the same deviation for all planes.
 const FREE: usize = PLACES + 3;
 const LOG_SOFTNESS: f64 = -1.2;
 
-/// Weight with which the places are held, 1/m^2, to find the prior given these places: as stiff as the prior's own.
+/// Weight with which the curve is held at the places, 1/m^2, to find the prior given its positions there: as stiff as
+/// the prior's own.
 const HELD: f64 = 1e8;
 
-/// First steps: of places in parts of the lattice's spacing, of the others in standard deviations.
+/// First steps of the sampler: of the positions in parts of the lattice's spacing, of the other parameters in standard
+/// deviations.
 const FIRST_STEP: f64 = 0.05;
 const FIRST_PART: f64 = 0.3;
 
@@ -40,19 +50,22 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Approximates the posterior by the normal distribution at its maximum (Laplace's method): for a dithered edge. `covariance` is that of the curve's
-    /// coefficients and of what was found with them.
+    /// Approximates the posterior of a dithered edge by the normal distribution at its maximum (Laplace's method).
+    /// `covariance` is that of the curve's coefficients followed by the contrasts.
     pub(super) fn laplace(curve: SplineCurve, covariance: &DMatrix<f64>) -> Self {
         let n = curve.n_coefficients();
         Self { curve, covariance: covariance.view((0, 0), (n, n)).into_owned() }
     }
 
-    /// Samples the posterior by adaptive Metropolis: for an edge along a line of the lattice, which lies anywhere between two of
-    /// them. Its likelihood is flat between steep sides; the place of its maximum and the curvature there do not give its
-    /// width, and where mixed pixels begin depends on the footprint as much as on the edge.
+    /// Samples the posterior of an edge along a lattice line by adaptive Metropolis.
     ///
-    /// `curve` is a likely one, its ends the places of the edge's corners along it, `beam` the beams of all edges,
-    /// `known` the contrasts by the other edges, `step` the spacing of the samples. `None` when the prior leaves the curve undetermined.
+    /// Such an edge may lie anywhere between two lattice lines. Its likelihood is flat between steep sides: the
+    /// position of the maximum and the curvature there do not give the width. The place where mixed pixels begin
+    /// depends on the footprint as much as on the edge.
+    ///
+    /// `curve` is a likely curve, `from` and `to` are the places of the corners along it, `beam` the properties of the
+    /// beams, `known` the prior of the contrasts from the other edges, `step` the spacing of the samples. `None` when
+    /// the prior leaves the curve undetermined.
     pub(super) fn sampled(
         curve: &SplineCurve,
         prior: &CurveFit,
@@ -64,7 +77,7 @@ impl Posterior {
     ) -> Option<Self> {
         let places: [_; PLACES] =
             std::array::from_fn(|k| curve.functional(from + (to - from) * k as f64 / (PLACES - 1) as f64));
-        // The prior given the places: its mean as a linear map of the places, and its covariance.
+        // The prior given the positions at the places: its mean as a linear map of these, and its covariance.
         let mut held = prior.clone();
         for place in &places {
             held.hold(place, HELD);

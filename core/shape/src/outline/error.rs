@@ -30,7 +30,7 @@ pub enum OutlineError {
          the edge along which u grows"
     )]
     Hint { angle_deg: f64 },
-    /// A side comes out wrong where an edge beside it is hidden.
+    /// A side has the wrong length, and one of the edges that determine it is hidden.
     #[error(
         "{seen_percent:.0} % of one edge of the plate is seen, too little to measure the plate's {side}: it comes out at \
          {found_mm:.0} mm, {expected_mm:.0} mm by the plate file; clear what hides it, or tilt it where it mirrors the beam"

@@ -1,44 +1,56 @@
-//! The beam's footprint at an edge: half the angle that it sees, from the mixed pixels, by counting and by maximum likelihood of which pixels are mixed and where in
-//! them their ranges have the edge (`contrast`). It is the scanner's: an edge that shows far more than the others has a strip of background beside it. Own.
+//! Footprint of the beam at an edge, estimated from the mixed pixels by counting, then by maximum likelihood.
+//!
+//! The footprint is half the angle, in radians, over which a beam sees both sides of an edge. In: the lattice lines of
+//! the edges.
+//!
+//! 1. Start value: the number of mixed pixels per lattice line ([`counted`]).
+//! 2. Maximum likelihood at one edge ([`at_edge`]), from two kinds of evidence: which pixels are mixed, and the
+//!    position of the edge in each of them by its range (`contrast`).
+//!
+//! The footprint is a property of the scanner. An edge with a far larger one than the others has a strip of background
+//! beside it. Own.
 
 use platen_numerics::normal_distribution::cdf;
 
 use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
 use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 
-/// Lines that give the number to a tenth.
+/// Number of lines that determine the number of mixed pixels per line to a tenth.
 const LEAST_LINES: usize = 100;
 
-/// Largest footprint of an edge in that of the others: those of 32 plates without a strip have 0.93 to 1.1 of their median, beside strips 1.1 to 2.5.
+/// Largest footprint of an edge relative to the median of the edges. On 32 plates edges without a strip have 0.93 to
+/// 1.1 of the median, edges beside strips 1.1 to 2.5.
 const MOST_OF_OTHERS: f64 = 1.4;
 
-/// Returns true when enough lines show the footprint to estimate it at their edge.
+/// Returns true when enough lines are suited to estimate the footprint at their edge.
 pub(super) fn is_shown(lines: &[LatticeLine]) -> bool {
     lines.iter().filter(|line| line.shows_footprint()).count() >= LEAST_LINES
 }
 
-/// Estimates half the angle over which a beam sees both sides of an edge from the number of mixed pixels: the lower median of the edges that show
-/// it, or all edges together where none does; 0 where too few lines show it. `angle` is that between beams.
+/// Estimates the footprint from the number of mixed pixels: the lower median of the edges that have enough suitable
+/// lines, or all edges together where none has. Returns 0 where there are too few lines in all. `angle` is that between
+/// beams, radians.
 pub(super) fn counted(edges: &[&[LatticeLine]], angle: f64) -> f64 {
     let each = edges.iter().map(|lines| by_number(lines.iter(), angle)).filter(|one| *one > 0.0);
     lower_median(each).unwrap_or_else(|| by_number(edges.iter().copied().flatten(), angle))
 }
 
-/// Returns the largest footprint that an edge may show beside those of the others.
+/// Returns the largest footprint that an edge may have, given those found at all edges.
 pub(super) fn most_of_an_edge(found: impl Iterator<Item = f64>) -> f64 {
     lower_median(found).map_or(0.0, |median| median * MOST_OF_OTHERS)
 }
 
-/// Returns the lower median, of two values the lesser: cells that pass for mixed pixels only make a footprint wider.
+/// Returns the lower median (of two values the lesser): cells wrongly taken for mixed pixels can only widen a
+/// footprint.
 fn lower_median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len().saturating_sub(1) / 2).copied()
 }
 
-/// Estimates it from the number of mixed pixels per line.
+/// Estimates the footprint from the number of mixed pixels per line.
 fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f64 {
-    /// A line that meets an edge at less than a third of a step per cell may not have reached its far side.
+    /// A line that approaches an edge by less than a third of a step per cell may not have reached its far side.
     const MOST_CELLS: f64 = 3.0;
     let (mut n, mut mixed, mut expected) = (0, 0.0, 0.0);
     for line in lines.filter(|l| l.shows_footprint() && l.per_radian * angle < MOST_CELLS * l.per_step) {
@@ -49,8 +61,11 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
     if n >= LEAST_LINES { mixed / expected } else { 0.0 }
 }
 
-/// Estimates the footprint at an edge of known place, near that of all edges, by maximum likelihood of its mixed and its sound
-/// pixels, and of where in the mixed ones their ranges have the edge; two nested grid searches. `beam` holds what else is known of the beams.
+/// Estimates the footprint at an edge of known position by maximum likelihood, in two nested grid searches about `all`,
+/// the footprint of all edges.
+///
+/// The likelihood has two factors per line: which pixels are mixed and which are not, and the position of the edge in a
+/// mixed pixel by its range. `beam` contains the other properties of the beams.
 pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64, beam: BeamModel) -> f64 {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
@@ -91,7 +106,7 @@ mod tests {
     use super::super::lattice_line::tests::open_line;
     use super::*;
 
-    /// Lines of an edge in the open of which every second has so many mixed pixels.
+    /// Lines of an edge whose side face is hidden; every second line has `mixed` mixed pixels.
     fn edge(mixed: f64) -> Vec<LatticeLine> {
         let per_step = open_line(None).per_step;
         let of = |k: usize| k.is_multiple_of(2).then_some((0.0, (mixed - 1.0) * per_step));

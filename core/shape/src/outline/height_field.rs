@@ -1,10 +1,13 @@
 //! Height field: the scanned face as one bicubic spline over the plate's mean plane, by robust penalised least squares.
 //!
-//! Smoothing by REML, then one reweighting by Tukey's biweight. Used by the outline and the mesh. An edge is located by
-//! directions (between two beams, across a mixed one); its position in space follows from the range of the face there.
-//! The range from the few cells about a crossing has half of a single beam's noise, which a beam at 60 degrees from the
-//! normal carries into the edge nearly twofold; that of the height field has a thirtieth. Single outliers have no effect,
-//! and holes are bridged. Own; Masuda et al. use the raw samples.
+//! In: the samples of the patch. Out: [`HeightField`], used by the outline and the mesh. The penalty is selected by
+//! REML; then the samples are reweighted once by Tukey's biweight. Single outliers have no effect, and holes are
+//! bridged.
+//!
+//! An edge is located by directions: between two beams, or across a mixed one. Its position in space follows from the
+//! range of the face in that direction. The range from the few cells about a crossing has half the noise of a single
+//! beam, which at 60 degrees of incidence is nearly doubled across the edge; the range of the height field has a
+//! thirtieth. Own; Masuda et al. use the raw samples.
 
 use nalgebra::Vector2;
 use platen_numerics::median::robust_deviation;
@@ -16,21 +19,21 @@ use platen_numerics::uniform_knots::UniformKnots;
 use super::plane::Plane;
 use crate::{Patch, Sample, Vec3};
 
-/// Length of a span, metres: bends of a press are three and more times as wide; finer detail is left to S, which is fitted to
-/// all samples.
+/// Length of a span, metres. Bends of a press are at least three times as wide. Finer detail is left to the surface S,
+/// which is fitted to all samples.
 pub(crate) const SPAN: f64 = 0.1;
 
-/// Samples used, at least, where there are as many: every n-th of every n-th column.
+/// Least number of samples used, where there are as many: every n-th sample of every n-th column.
 const ENOUGH: usize = 30_000;
 
-/// Residuals beyond this many standard deviations count for nothing (Tukey's biweight).
+/// Residuals beyond this many standard deviations have no weight (Tukey's biweight).
 const CUT_OFF: f64 = 5.0;
 
 /// Least cosine of the incidence in weights: that of 87 degrees.
 pub(super) const LEAST_COSINE: f64 = 0.05;
 
-/// Newton steps from a point near the face, at most; each squares an error of a few parts in a hundred, and one of less than
-/// this, metres, is the last.
+/// Largest number of Newton steps from a point near the face; each squares a relative error of a few parts in a
+/// hundred. A step shorter than `STILL`, metres, is the last.
 const STEPS: usize = 4;
 const STILL: f64 = 1e-8;
 
@@ -105,14 +108,14 @@ impl HeightField {
         (0..n).map(|k| curvature(place(k))).sum::<f64>() / n as f64
     }
 
-    /// Intersects the beam through `point` with the face; also returns the unit normal there, towards the scanner. `None`
-    /// where they do not meet.
+    /// Intersects the beam through `point` with the face. Also returns the unit normal there, towards the scanner.
+    /// `None` where they do not meet.
     pub(crate) fn meet(&self, point: Vec3) -> Option<(Vec3, Vec3)> {
         self.along(point, point.normalize())
     }
 
-    /// Intersects the line through `point` along a unit direction away from the scanner with the face, by Newton's method;
-    /// also returns the unit normal there. `None` where they do not meet.
+    /// Intersects the line through `point` along a unit direction away from the scanner with the face, by Newton's
+    /// method. Also returns the unit normal there. `None` where they do not meet.
     pub(crate) fn along(&self, point: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
         let mut at = point;
         let mut normal = self.plane.normal();
@@ -120,7 +123,7 @@ impl HeightField {
             let place = self.plane.project(at);
             let [[height], [by_x], [by_y]] = self.height.frame(place.x, place.y);
             normal = self.plane.normal() - self.plane.lift_direction(Vector2::new(by_x, by_y));
-            // Towards the face the line falls, against its normal.
+            // The line approaches the face against the normal: the product is negative.
             let approach = normal.dot(&direction);
             if approach.is_nan() || approach >= 0.0 {
                 return None;
@@ -149,12 +152,12 @@ impl Heights {
             .collect();
         let scale = robust_deviation(residuals.iter().map(|r| r.abs()).collect())
             .map_or(1.0, |scale| scale.max(1e-6));
-        // Weights relative to those of the first fit: the penalty chosen for it stays the right one.
+        // Weights relative to those of the first fit: the penalty selected for it remains valid.
         let robust = self.weighted(axes, |i| biweight(residuals[i] / scale) * self.per_sigmas[i].powi(2));
         Ok((robust.solve_with(penalty)?, scale))
     }
 
-    /// The heights as points of a fit, each with its weight.
+    /// Returns the fit of the heights, each with its weight.
     fn weighted(&self, axes: [UniformKnots; 2], weight: impl Fn(usize) -> f64) -> SplineFit<1> {
         let mut fit = SplineFit::new(axes[0], axes[1]);
         dispatch_simd(
@@ -169,7 +172,8 @@ impl Heights {
     }
 }
 
-/// Returns one over the standard deviation of a sample's distance from a surface with unit normal `normal`, from that of its range.
+/// Returns the reciprocal standard deviation of a sample's distance from a surface with unit normal `normal`, from the
+/// standard deviation of its range.
 #[inline(always)]
 pub(crate) fn per_sigma_across(sample: &Sample, normal: &Vec3) -> f64 {
     let range = sample.point.norm();
@@ -184,7 +188,7 @@ pub(crate) fn biweight(residual: f64) -> f64 {
     (1.0 - x * x).max(0.0).powi(2)
 }
 
-/// Thins the samples to as many as a smooth face needs.
+/// Thins the samples to the number that a smooth face requires.
 pub(crate) fn thinned(patch: &Patch) -> impl Iterator<Item = &Sample> {
     let every = ((patch.samples.len() / ENOUGH) as f64).sqrt().floor().max(1.0) as u32;
     let columns = patch.samples.chunk_by(|a, b| a.column == b.column);

@@ -1,20 +1,25 @@
 //! One lattice line (a row or a column of the lattice) where it crosses an edge, as an observation of the edge.
 //!
-//! The observation is interval-censored: the edge lies between the last sample on the face and the first beyond it. What narrows
-//! the interval:
+//! The observation is interval-censored: the edge lies between the last sample on the face and the first sample beyond
+//! it. A mixed pixel is a sample whose beam meets the plate and the background at once; its footprint is the radius of
+//! the beam's spot. Four effects narrow the interval:
 //!
-//! - A mixed pixel sees both sides: the edge is within a footprint of its beam. A beam that is not mixed has its centre on its
-//!   own side, and most likely a footprint away; a quarter of the mixed beams is mixed too little to be detected. Of three and more
-//!   in a row those that a footprint does not reach from the first see another edge, that of a strip of background.
-//! - Where the plate's side face is visible, its silhouette mixes the beams; the silhouette's place beside the edge follows from
-//!   thickness and bevel (`side_face`). A beam on a side face of a few millimetres falls behind the face's continuation in
-//!   proportion to its distance from the edge, on a bevel in the proportion of the strip it meets: a direct observation.
-//! - The last cell taken for one of the face may itself lie on the side face, within the noise: both its range and that of the
-//!   first cell not taken enter, else the selection would bias the edge outwards.
-//! - The range of a single mixed pixel tells how much it sees of either side, and so where in its footprint the edge is (`contrast`).
+//! - **Mixed pixels.** The edge is within one footprint of the beam of a mixed pixel. A beam that is not mixed has its
+//!   centre on its own side of the edge, most likely a footprint away from it; a quarter of the mixed beams is mixed
+//!   too little to be detected. Of three or more mixed pixels in a row, those farther from the first than the spot
+//!   is wide see another edge, that of a strip of background.
+//! - **Visible side face.** Where the plate's side face is visible, the beams are mixed at its silhouette. The distance
+//!   of the silhouette from the edge follows from thickness and bevel (`side_face`). A beam on a side face of a few
+//!   millimetres has a range behind the face's continuation in proportion to its distance from the edge; on a bevel the
+//!   ratio is that of the flank or root face it meets. Such a range is a direct observation of the edge.
+//! - **Last cell of the face.** The last cell assigned to the face may itself lie on the side face, within the noise.
+//!   The ranges of this cell and of the first cell not assigned both enter; otherwise the selection would bias the edge
+//!   outwards.
+//! - **Range of a single mixed pixel.** It determines the share of either side in the echo, hence the position of the
+//!   edge in the footprint (`contrast`).
 //!
-//! In: a projected crossing in its developed strip; out: its [`EdgeLikelihood`]. All distances inwards, in metres. Own; Masuda et al.
-//! take the boundary samples as the edge.
+//! In: a projected crossing in its developed strip. Out: its [`EdgeLikelihood`]. All distances are positive inwards
+//! (into the plate), in metres. Own; Masuda et al. take the boundary samples as the edge.
 
 use super::Sampling;
 use super::contrast::{self, Contrasts, Mixing};
@@ -26,27 +31,29 @@ use super::side_face::SideFace;
 use crate::Vec3;
 use crate::extract::{Beyond, PlaneSet};
 
-/// Standard deviation of an interval's ends in parts of the angle between beams: pointing of the beam, shape of the footprint.
+/// Standard deviation of an interval's ends, in parts of the angle between beams: from the pointing of the beam and the
+/// shape of the footprint.
 pub(super) const SOFTNESS: f64 = 0.03;
 
-/// Relative standard deviation between the footprint of one edge and that of all: it is not quite round.
+/// Relative standard deviation between the footprint at one edge and that of all edges: the footprint is not quite
+/// round.
 pub(super) const FOOTPRINT_SPREAD: f64 = 0.3;
 
-/// Noise of the smooth face near its edges in parts of that of a sample.
+/// Noise of the smooth face near its edges, in parts of the noise of a sample.
 const FACE_NOISE: f64 = 0.03;
 
-/// A beam less than this part of the seen side face outside of the edge is on it; tangent of the angle by which a cut
-/// may be out of square.
+/// A beam is on the side face when its distance outside of the edge is less than `SIDE_SLACK` times the visible width
+/// of the side face. `SIDE_SLOPE` is the tangent of the angle by which a cut may be out of square.
 const SIDE_SLACK: f64 = 1.1;
 const SIDE_SLOPE: f64 = 0.1;
 
-/// Standard deviations of its range by which the last cell of the face may lie farther out on the side face.
+/// Number of standard deviations of its range by which the last cell of the face may lie farther out on the side face.
 const LAST_BOUND: f64 = 4.0;
 
-/// Widest footprint at an edge, in halves of the estimated one: both halves, wider by their spread.
+/// Widest footprint at an edge, in parts of the estimated half footprint: both halves, wider by their spread.
 const WIDEST: f64 = 2.0 * (1.0 + FOOTPRINT_SPREAD);
 
-/// Largest difference of the scatter of mixed pixels that moves no edge, in radii.
+/// Largest difference of the scatter of mixed pixels that moves no edge, in radii of the beam.
 const NEAR_SPREAD: f64 = 0.02;
 
 /// Properties of the beams.
@@ -63,17 +70,17 @@ pub(super) struct BeamModel {
 }
 
 impl BeamModel {
-    /// Builds beams of the usual softness.
+    /// Builds a model of beams with the usual softness.
     pub(super) fn of(footprint: f64, contrasts: Contrasts) -> Self {
         Self { footprint, softness: SOFTNESS, contrasts, mixed_spread: contrast::spread(Vec::new()) }
     }
 
-    /// Returns true when the ranges of mixed pixels tell the place of the edge.
+    /// Returns true when the ranges of mixed pixels determine the position of the edge.
     pub(super) fn mixes_linearly(&self) -> bool {
         self.mixed_spread < contrast::NOTHING_TOLD
     }
 
-    /// Returns true when an edge located by these beams is where others of the same softness locate it.
+    /// Returns true when these beams and `other`, of the same softness, locate an edge at the same position.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         self.footprint == other.footprint
             && self.contrasts.are_near(&other.contrasts)
@@ -91,10 +98,11 @@ pub(super) struct LatticeLine {
     pub(super) high: f64,
     /// Lowest and highest mixed pixel.
     pub(super) mixed: Option<(f64, f64)>,
-    /// Planes of the background of which a strip may show here, and the one that shows beyond.
+    /// Planes of the background of which a strip may be visible here, and the plane visible beyond the edge.
     pub(super) strips: PlaneSet,
     pub(super) background: Option<u8>,
-    /// Mixing of the plate with a plane of the background; where the side face is seen, of its silhouette, which does not tell the edge of the face.
+    /// Mixing of the plate with a plane of the background. Where the side face is seen it is that of the silhouette,
+    /// which does not determine the edge of the face.
     mixing: Option<Mixing>,
     complete: bool,
     beyond: Beyond,
@@ -104,15 +112,17 @@ pub(super) struct LatticeLine {
     pub(super) per_angle: f64,
     /// Distance inwards per lattice step.
     pub(super) per_step: f64,
-    /// Distance outside of the edge at which the plate's silhouette is seen, on the face's continuation; 0 where the side face is hidden.
+    /// Distance of the plate's silhouette outside of the edge, on the face's continuation; 0 where the side face is
+    /// hidden.
     side: f64,
     /// Noise of the smooth face near its edges, inwards.
     face_noise: f64,
-    /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and the noise of that.
+    /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and the noise of
+    /// that distance.
     off: f64,
     on_side: f64,
     off_noise: f64,
-    /// The last cell of the face, and the same of it.
+    /// The last cell of the face; its distance and noise likewise.
     cell: f64,
     behind: f64,
     cell_noise: f64,
@@ -165,8 +175,8 @@ impl LatticeLine {
         }
     }
 
-    /// Returns true when the plate ends here in front of something and every cell up to there was measured: such lines show the
-    /// footprint.
+    /// Returns true when the plate ends here in front of a background, its side face is hidden and every cell up to the
+    /// background was measured. Such lines serve to estimate the footprint.
     pub(super) fn shows_footprint(&self) -> bool {
         self.complete && self.beyond == Beyond::Behind && self.side == 0.0
     }
@@ -176,26 +186,26 @@ impl LatticeLine {
         self.low - slack < at && at < self.high + slack
     }
 
-    /// Returns the distances inside and outside of the edge up to which a beam is found mixed.
+    /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed.
     pub(super) fn seen(&self, beam: BeamModel) -> [f64; 2] {
         let radius = beam.footprint * self.per_radian;
         self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts)).map(|part| part * radius)
     }
 
-    /// Returns true when its mixed pixel tells the place of the edge, given the contrast.
+    /// Returns true when its mixed pixel determines the position of the edge, given the contrast.
     pub(super) fn tells_contrast(&self) -> bool {
         self.mixing.is_some_and(|mixing| mixing.tells())
     }
 
-    /// Returns the place of the edge by its single mixed pixel.
+    /// Returns the position of the edge by its single mixed pixel.
     pub(super) fn edge_in_pixel(&self, beam: BeamModel) -> Option<SharedObservation> {
         let (at, _) = self.mixed?;
         let radius = beam.footprint * self.per_radian;
         self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, &beam.contrasts, beam.mixed_spread)
     }
 
-    /// Returns how many of the mixed pixels see another edge than the plate's, that of a strip of background beside it: of three in a
-    /// row and more those that are farther from the first than a footprint is wide.
+    /// Returns the number of mixed pixels that see the far edge of a strip of background instead of the plate's edge:
+    /// of three or more in a row, those farther from the first than a footprint is wide.
     fn others(&self, beam: BeamModel) -> u32 {
         let Some((lowest, highest)) = self.mixed else { return 0 };
         let width = WIDEST * beam.footprint * self.per_radian;
@@ -212,12 +222,12 @@ impl LatticeLine {
         let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
         let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(self.cell_noise);
         if self.beyond == Beyond::SideFace {
-            // Given as two standard deviations about the crease.
+            // The interval is that of two standard deviations to both sides of the crease.
             let soft = norm(soft, 0.25 * (self.high - self.low));
             return of([EdgeObservation::At(0.5 * (self.low + self.high)).within(soft), last]);
         }
         let on_side = self.on_side;
-        // Of a side face a few beams wide each may pass for mixed.
+        // Where the side face is a few beams wide, each of these beams may be taken for a mixed pixel.
         if self.side > 0.0
             && self.beyond == Beyond::Behind
             && (self.mixed.is_none() || on_side > -3.0 * self.off_noise)
@@ -227,8 +237,8 @@ impl LatticeLine {
             return of([EdgeObservation::At(self.off + on_side).within(soft), last]);
         }
         let mut above = Bound { sure: self.low, likely: self.low };
-        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that. The last cell of the face lies on
-        // the side face as far out as its range falls behind.
+        // A beam within a footprint of the edge sees beyond the plate if the side face is narrower than that. The last
+        // cell of the face may lie on the side face, as far out as its range is behind the face.
         let outside = (self.behind.max(0.0) + LAST_BOUND * self.cell_noise).min(self.side).min(seen);
         let mut below =
             Bound { sure: self.high + outside, likely: self.high - (seen_inside - self.side).max(0.0) };
@@ -253,8 +263,9 @@ impl LatticeLine {
     }
 }
 
-/// Returns the distance inwards on the face by which a beam to `point` moves when it turns, per radian; `normal` and `inward` are
-/// unit vectors there. Where an edge is bridged its face may turn away from the beams: it counts as seen at a small angle.
+/// Returns the distance inwards on the face by which a beam to `point` moves when it turns, per radian. `normal` and
+/// `inward` are unit vectors there. Where an edge is bridged the face may turn away from the beams; it then counts as
+/// seen at grazing incidence ([`LEAST_COSINE`]).
 pub(super) fn inwards_per_radian(point: Vec3, normal: Vec3, inward: Vec3) -> f64 {
     let beam = point.normalize();
     // A beam turned by an angle in the direction e meets the face r (e - beam (n e) / (n beam)) away: the
@@ -273,7 +284,8 @@ pub(super) mod tests {
     use super::super::contrast::ContrastDistribution;
     use super::*;
 
-    /// A line without mixed pixels at a side face that shows 1.35 mm beside the edge and falls 50 mm behind per millimetre; a beam sees 1.6 mm.
+    /// A line without mixed pixels at a side face that is visible over 1.35 mm beside the edge and recedes by 50 mm per
+    /// millimetre; the half footprint is 1.6 mm.
     fn line(behind: f64) -> LatticeLine {
         LatticeLine {
             along: 0.0,
@@ -300,12 +312,12 @@ pub(super) mod tests {
         }
     }
 
-    /// The same where the side face is hidden, with these mixed pixels.
+    /// The same line where the side face is hidden, with these mixed pixels.
     pub(crate) fn open_line(mixed: Option<(f64, f64)>) -> LatticeLine {
         LatticeLine { side: 0.0, mixed, ..line(0.0) }
     }
 
-    /// Likelihood of an edge so far inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
+    /// Likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
     fn inside(line: &LatticeLine, far: f64) -> f64 {
         let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
         of.value(line.high + far, &[]) / of.value(line.high, &[])
@@ -329,7 +341,7 @@ pub(super) mod tests {
     #[test]
     fn a_last_cell_whose_range_is_that_of_the_face_is_not_on_the_side_face() {
         assert!(inside(&line(0.0), 1e-3) < 0.1, "{}", inside(&line(0.0), 1e-3));
-        // One that falls behind by as much as the side face does may be.
+        // A cell whose range is as far behind as the side face may be on it.
         assert!(inside(&line(1.2e-3), 1e-3) > 0.3, "{}", inside(&line(1.2e-3), 1e-3));
     }
 }

@@ -1,4 +1,4 @@
-//! The plate's mean plane: projection of points to it and heights over it.
+//! Mean plane of the plate: projection of points to it and heights over it, metres.
 
 use nalgebra::Vector2;
 
@@ -12,8 +12,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Builds the plane through `origin` across `normal`. Seen against `normal` its axes turn
-    /// counter-clockwise.
+    /// Builds the plane through `origin` across `normal`. Seen against `normal`, the axes are counter-clockwise.
     pub(crate) fn new(origin: Vec3, normal: Vec3) -> Self {
         let along = if normal.z.abs() < 0.9 { Vec3::z() } else { Vec3::x() };
         let first = along.cross(&normal).normalize();

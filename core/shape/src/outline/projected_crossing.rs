@@ -1,19 +1,22 @@
 //! Boundary crossings projected along their beams onto the height field of the face.
 //!
-//! The local fit of a few cells has half a single beam's noise; the height field has a thirtieth. Ranges beyond the edge are
-//! restated as distances behind the height field.
+//! The local fit of a few cells has half the noise of a single beam, the height field a thirtieth of it. Ranges beyond
+//! the edge are converted to distances behind the height field.
+//!
+//! In: a crossing of the patch and the height field. Out: [`ProjectedCrossing`]. A crossing has none where a
+//! beam does not meet the height field.
 
 use super::height_field::HeightField;
 use crate::Vec3;
 use crate::extract::{Beyond, Crossing, MixedPixels, Patch};
 
-/// A crossing with its places on the height field.
+/// A crossing with its points on the height field.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ProjectedCrossing {
     pub(super) crossing: Crossing,
-    /// The last cell of the face, on the height field, ...
+    /// The last cell of the face, on the height field.
     pub(super) cell: Vec3,
-    /// ... and its own range behind it, metres.
+    /// The measured range of that cell less its range on the height field, metres.
     pub(super) residual: f64,
     /// Its column and row.
     pub(super) place: [u32; 2],
@@ -26,7 +29,8 @@ impl ProjectedCrossing {
         let (cell, _) = height_field.meet(sample.point)?;
         let (mut inside, normal) = height_field.meet(crossing.inside)?;
         let (mut outside, _) = height_field.meet(crossing.outside)?;
-        // Ranges beyond the edge lie farther behind the height field than behind the local continuation by the same amount.
+        // Ranges beyond the edge lie farther behind the height field than behind the local continuation by the same
+        // amount.
         let project = |pixels: MixedPixels| {
             let [near, far] = pixels.ends;
             let ends = [height_field.meet(near)?.0, height_field.meet(far)?.0];
@@ -51,8 +55,9 @@ impl ProjectedCrossing {
         })
     }
 
-    /// Returns the crossing as it is beside a strip of background that may be narrower than a beam: of a mixed pixel behind the strip's plane it is not
-    /// known whether it sees the plate, and of no mixed pixel which background.
+    /// Returns the crossing as it is beside a strip of background that may be narrower than a beam. A mixed pixel
+    /// behind the strip's plane need not see the plate, and the background that a mixed pixel sees is not known: only
+    /// mixed pixels that certainly see the plate are kept.
     pub(super) fn beside_strip(&self) -> Self {
         let crossing = self.crossing;
         let mixed = crossing.surely_mixed;

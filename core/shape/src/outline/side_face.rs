@@ -1,16 +1,19 @@
 //! Side face of the plate beside an edge: square, or a double-V bevel of two flanks and a root face.
 //!
-//! In: thickness, face inset and root face of the plate file. Out: for each lattice line how far outside of the edge a beam meets the face's
-//! continuation when it falls a given range behind it, and where the plate's silhouette lies ([`Sight`]).
+//! In: thickness, face inset and root face of the plate file. Out, for each lattice line ([`Sight`]): the distance
+//! outside of the edge, on the face's continuation, of a beam whose range is a given amount behind that continuation;
+//! and the distance of the plate's silhouette.
 //!
-//! Across the edge the side face is a polyline in (o, z): distance outside of the face's edge and depth below the face, with the corners
-//! (0, 0), (inset, flank), (inset, flank + root face), (0, thickness). A unit beam covers the depth c and the distance s inwards per
-//! range: one that ends on the side face at a range e behind the face's continuation has z = c e and met that continuation
-//! x = o + s e outside of the edge. On each strip o is linear in z, hence dx/de = s + c do/dz. A square side face has o = 0. Own.
+//! Across the edge the side face is a polyline in (o, z), where o is the distance outside of the face's edge and z the
+//! depth below the face. Its corners are (0, 0), (inset, flank), (inset, flank + root face), (0, thickness). Per unit
+//! of range a beam covers the depth c and the distance s inwards. A beam that ends on the side face, at a range e
+//! behind the face's continuation, has z = c e and met the continuation x = o + s e outside of the edge. On each strip
+//! of the polyline o is linear in z, hence dx/de = s + c do/dz. A square side face has o = 0. Own.
 
 use crate::{PlateSpec, Vec3};
 
-/// The direction of an edge is known to about this, radians: a side face visible under a smaller angle is taken as hidden.
+/// Accuracy to which the direction of an edge is known, radians: a side face visible under a smaller angle is taken as
+/// hidden.
 const DIRECTION: f64 = 0.02;
 
 /// Strips of a bevelled side face.
@@ -37,8 +40,8 @@ impl SideFace {
         Self { ends, thickness, slope: inset / flank }
     }
 
-    /// Returns true when the side face below the edge at `point` is seen: there the edge is located by the ranges on it. `normal` and
-    /// `inward` are unit vectors of the face.
+    /// Returns true when the side face below the edge at `point` is seen; the edge is then located by the ranges on the
+    /// side face. `normal` and `inward` are unit vectors of the face.
     pub(super) fn is_seen(&self, point: Vec3, normal: Vec3, inward: Vec3) -> bool {
         let height = -normal.dot(&point);
         inward.dot(&point) + self.slope * height > height * DIRECTION
@@ -56,7 +59,7 @@ impl SideFace {
             // The beam through (out, depth) meets the face's plane at height / (height + depth) of its way.
             let outside = (inwards * depth + out * height) / (height + depth);
             if k > 0 && outside <= silhouette {
-                // Turned away, as all that follow, or of no height.
+                // Turned away from the scanner, as are all strips that follow, or of no height.
                 continue;
             }
             silhouette = f64::max(silhouette, outside);
@@ -77,7 +80,8 @@ impl SideFace {
 /// A visible strip of the side face.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
-    /// Range behind the face's continuation where it begins, and the distance outside of the edge there, metres.
+    /// Range behind the face's continuation at which the strip begins, and the distance outside of the edge there,
+    /// metres.
     from: f64,
     outside: f64,
     /// Distance outside per range.
@@ -87,13 +91,15 @@ struct Piece {
 /// Side face as one beam meets it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sight {
-    /// Distance outside of the edge, on the face's continuation, at which the plate ends; 0 where its side face is hidden.
+    /// Distance outside of the edge, on the face's continuation, at which the plate ends; 0 where its side face is
+    /// hidden.
     pub(super) silhouette: f64,
     pieces: [Piece; STRIPS],
 }
 
 impl Sight {
-    /// Returns the distance outside of the edge of a beam that falls `excess` behind the face's continuation, and its derivative.
+    /// Returns the distance outside of the edge of a beam whose range is `excess` behind the face's continuation, and
+    /// its derivative by `excess`.
     pub(super) fn outside(&self, excess: f64) -> (f64, f64) {
         let [first, ..] = &self.pieces;
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= excess).unwrap_or(first);
@@ -117,7 +123,8 @@ mod tests {
         }
     }
 
-    /// The edge lies along y, the scanner `height` above the face; `inwards` from the scanner to the edge, positive if it is a near one.
+    /// Sight of an edge along y from `height` above the face; `inwards` is the distance from the scanner to the edge,
+    /// positive for a near edge.
     fn sight(side: &SideFace, inwards: f64, height: f64) -> Sight {
         side.seen_by(Vec3::new(inwards, 0.0, -height), Vec3::z(), Vec3::x())
     }
@@ -147,7 +154,8 @@ mod tests {
         let side = SideFace::of(&spec(0.009, 0.004));
         let flank = [[0.0045, 0.008], [0.009, 0.016]];
         let root = [[0.009, 0.018], [0.009, 0.02]];
-        // A near edge at 59 degrees of incidence shows all, a lateral and a far one of small incidence the upper flank alone.
+        // At a near edge, at 59 degrees of incidence, all strips are visible; at a lateral one and at a far one of
+        // small incidence the upper flank alone.
         check(&side, 6.0, &[flank.as_slice(), &root, &[[0.0045, 0.028], [0.0, 0.036]]].concat());
         check(&side, 0.0, &flank);
         check(&side, -1.0, &flank);

@@ -1,7 +1,8 @@
 //! Visible part of the boundary loop: the crossings along it where the plate itself ends.
 //!
-//! In: the loop of `boundary_loop` and the crossings of the patch. Out: their places in the mean plane, counter-clockwise, for
-//! `corners` and `edge`. Where something nearer hides the edge its crossings are left out.
+//! A crossing is the place between two neighbouring samples where the face ends. In: the loop of `boundary_loop` and
+//! the crossings of the patch. Out: the crossings along the loop and their points in the mean plane, counter-clockwise,
+//! for `corners` and `edge`. Crossings where a nearer object hides the edge are left out.
 
 use nalgebra::Vector2;
 use platen_numerics::median::median;
@@ -13,14 +14,14 @@ use super::plane::Plane;
 use crate::extract::{Beyond, Crossing, Patch};
 use crate::{PlateSpec, Vec3};
 
-/// The plate's loop is at least this part of its circumference long, counted in lattice steps.
+/// Least length of the plate's loop, counted in lattice steps, in parts of the plate's circumference.
 const LOOP_PART: f64 = 0.6;
 
-/// Places on the loop where the plate ends visibly, counter-clockwise seen from the scanner.
+/// Places on the loop where the plate visibly ends, counter-clockwise seen from the scanner.
 pub(super) struct VisibleBoundary<'a> {
     /// Crossings of each place.
     crossings: Vec<Vec<&'a Crossing>>,
-    /// Middle of the crossings of each place, and that in the plane.
+    /// Middle of the crossings of each place, in space and in the plane.
     points: Vec<Vec3>,
     pub(super) flat: Vec<Vector2<f64>>,
     pub(super) plane: Plane,
