@@ -1,7 +1,8 @@
-//! Extraction of the plate's scanned face from a scan that arrives column by column: connected components, segmentation by
-//! normals, region growing.
+//! Extraction of the plate's scanned face: connected components, segmentation by normals, region growing.
 //!
-//! Input: header and columns of a scan, and the [`PlateSpec`]; output: the [`Patch`], samples and boundary crossings.
+//! Input: header and columns of a scan, which arrive one by one, and the [`PlateSpec`]. Output: the [`Patch`], that is,
+//! the samples on the face and the crossings of its boundary. A component is a set of lattice cells joined by the
+//! continuity criterion; a face is a smooth part of a component.
 //!
 //! | module | step | source |
 //! |---|---|---|
@@ -11,16 +12,16 @@
 //! | `window`, `beam_directions` | one component as a dense grid with its margin | |
 //! | `range_noise` | noise of the range from third differences | own |
 //! | `mixed_pixels` | beams that straddle an edge | own |
-//! | `background_planes` | narrow strips of background told from mixed pixels, by sequential RANSAC | Fischler and Bolles 1981; own |
+//! | `background_planes` | narrow strips of background distinguished from mixed pixels, by sequential RANSAC | Fischler and Bolles 1981; own |
 //! | `smoothed_normals` | Taubin's low-pass filter of the inverse range and its normals | 3.1 |
 //! | `faces`, `segmented_component` | smooth faces: connected components of cells where the normal does not turn | 3.1 |
-//! | `occlusion` | faces joined across something nearer | own |
+//! | `occlusion` | faces joined across a nearer object | own |
 //! | `plate_selection` | the candidate of the plate's size | own; Masuda et al. leave it open |
 //! | `local_quadric`, `region_growing` | erosion of the face and region growing to the cell | own |
-//! | `crossings` | where rows and columns leave the face | own |
+//! | `crossings` | points where rows and columns leave the face | own |
 //!
-//! Limits: the plate is one smooth face of known size, all of it nearer than what lies behind its edges; a
-//! component whose area across the beams exceeds four times the plate's is never looked at.
+//! Limits: the plate is one smooth face of known size, nearer than the background along all its edges. A component
+//! whose area across the beams exceeds four times the plate's is never evaluated.
 
 mod background_planes;
 mod beam_directions;
@@ -62,11 +63,11 @@ use segmented_component::SegmentedComponent;
 /// A component that outgrows the plate's area by this factor is dropped.
 const OUTGROWN: f64 = 4.0;
 
-/// Area across the beams, in parts of the plate's area, from which a component is looked at: a strip of the plate
-/// beside a chain, seen at a grazing angle.
+/// Least area across the beams, in parts of the plate's area, of a component that is evaluated: that of a strip of the
+/// plate beside a chain, seen at a grazing angle.
 const LEAST_PART: f64 = 0.005;
 
-/// A plate that reaches out of the region of interest over less than this is not cut by it, metres.
+/// Length over which the region of interest may cut the plate's edge without refusal, metres.
 const CUT_TOLERANCE: f64 = 0.05;
 
 /// Extractor of the plate's scanned face from columns in any order.
@@ -82,14 +83,15 @@ pub struct Extractor {
     regions: Components,
     columns: ColumnStore,
     warm_up_columns: u32,
-    /// Columns that have come in order and without a gap from the first on, and from the last on.
+    /// Number of columns that have arrived in order and without a gap, counted from the first one and from the last
+    /// one.
     in_order: [u32; 2],
     /// Components of about the plate's size that no later column can reach, by their roots.
     closed: BTreeMap<u32, Completed>,
 }
 
 impl Extractor {
-    /// Prepares for the scan of a header.
+    /// Prepares the extraction from a scan with this header.
     pub fn new(header: &ScanHeader, spec: &PlateSpec) -> Self {
         let elevation = |row: u32| header.elevation_start - header.elevation_step * f64::from(row);
         Self {
@@ -105,7 +107,7 @@ impl Extractor {
         }
     }
 
-    /// Adds a column. One that was added before is ignored.
+    /// Adds a column. A column that was added before is ignored.
     ///
     /// # Errors
     /// As [`Column::check`]; the column is then not added.
@@ -145,14 +147,14 @@ impl Extractor {
         }
     }
 
-    /// Returns the number of cells held now, which determines the memory that a scan needs: those of the columns, as far as the
-    /// plate may lie in them, and those around the components that have been evaluated.
+    /// Returns the number of cells held now, which determines the memory in use: cells of columns in which the plate
+    /// may lie, and cells around the components that have been evaluated.
     #[must_use]
     pub fn cells_held(&self) -> usize {
         self.columns.n_cells() + self.closed.values().map(|c| c.surface.window.cells.len()).sum::<usize>()
     }
 
-    /// Returns the plate's face, once all columns were added.
+    /// Returns the plate's face, after all columns were added.
     ///
     /// # Errors
     /// [`Refusal`]: no plate, or more than one.
@@ -252,7 +254,7 @@ impl Extractor {
         first..self.regions.n_runs()
     }
 
-    /// Joins the runs of column `left` with those of the next one, when both are there.
+    /// Joins the runs of column `left` with those of the next one, if both have arrived.
     fn join(&mut self, left: u32) {
         let (Some(a), Some(b)) = (self.columns.get(left), self.columns.get(left + 1)) else { return };
         self.regions.join_columns(
@@ -270,7 +272,7 @@ impl Extractor {
         SegmentedComponent::of(roots[0], window, &self.continuity)
     }
 
-    /// Returns the notable faces of components that are numbered from `first` on.
+    /// Returns the faces of notable size of components that are numbered from `first` on.
     fn pieces(&self, surfaces: &[SegmentedComponent], first: usize) -> Vec<FacePiece> {
         let least = LEAST_PART * self.spec.width * self.spec.height;
         let numbered = surfaces.iter().zip(first..);

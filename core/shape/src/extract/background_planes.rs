@@ -1,23 +1,37 @@
-//! Background planes: table, floor and walls beside a component, by sequential RANSAC (Fischler and Bolles 1981) over its sound cells.
+//! Background planes (table, floor, walls) beside a component, by sequential RANSAC (Fischler and Bolles 1981).
 //!
-//! A strip of background that shows one or two cells wide beyond an edge, a table or the foot of a wall, has cells with neighbours of another range on
-//! both sides, as a mixed pixel has. Where its plane shows wider elsewhere beside the component, that tells them:
+//! In: the measured cells off the component, classified by `mixed_pixels`. Out: up to [`PLANES`] planes, the cells on
+//! them, and corrected classes: cells on a narrow strip of background become sound.
 //!
-//! - A plane n . x = 1 has the inverse range n . d along the unit direction d: linear in n, a fit by linear least squares at any incidence.
-//! - A cell on a plane is no mixed pixel, though its neighbours be others; a mixed pixel meets the range of a plane by chance in one of a hundred, more often
-//!   before a plane whose continuation is close behind the edge. A plane of a strip holds many of them; alone on one that holds few, it is there by chance.
-//!   One with mixed pixels before the plane to both sides stays mixed: along an edge parallel to a row some beams return the background's range.
-//! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip and not that of the plate.
-//! - A plane seen edge-on is none: the cells of one row of a round wall lie in a plane through the scanner, too.
+//! **Problem.** A strip of background may be visible over one or two cells beyond an edge, such as a table or the foot
+//! of a wall. Its cells have neighbours of another range on both sides, as a mixed pixel has, and are therefore
+//! classified as mixed. The plane of the strip distinguishes the two, if more of it is visible elsewhere beside the
+//! component.
 //!
-//! A strip whose plane shows wider nowhere has a plane of its own: along an edge that crosses the lattice (a dithered one) the mixing changes from line to line, so that its mixed pixels
-//! lie on no common plane, while those that a strip fills do.
+//! **Method.**
 //!
-//! A strip narrower than a beam has no cell of its own. For each end of the face the planes are given that may be in front of what lies behind it; whether a strip of them
-//! shows there is told by the edge (`outline/background_strip`).
+//! - A plane n . x = 1 has the inverse range n . d along the unit direction d. This is linear in n, so that a plane is
+//!   fitted by linear least squares at any incidence.
+//! - A cell on a plane is not a mixed pixel, whatever the ranges of its neighbours. There are two exceptions. About one
+//!   mixed pixel in a hundred has the range of a plane by chance (more before a plane whose continuation is close
+//!   behind the edge): a mixed pixel stays mixed if it is alone on a plane that holds few of them. It also stays mixed
+//!   if there are mixed pixels in front of the plane on both sides of it: along an edge parallel to a row some beams
+//!   return the range of the background.
+//! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip, not that of the plate. It
+//!   becomes sound.
+//! - A plane that is seen edge-on is discarded: the cells of one row of a round wall also lie in a plane, through the
+//!   scanner.
 //!
-//! Limits: a strip whose plane shows nowhere else stays mixed along an edge that hardly crosses the lattice, whose mixed pixels can lie on a plane, too; uneven
-//! ground is several planes. Own.
+//! **Strips visible nowhere else.** The plane of such a strip is searched among the mixed pixels. Along a dithered edge
+//! (one that crosses many lattice lines) the mixing changes from line to line: mixed pixels of the edge lie on no
+//! common plane, cells filled by a strip do.
+//!
+//! **Strips narrower than a beam.** No cell lies on them. For each end of the face the planes are listed that may lie
+//! between the face and its background; whether a strip of them is visible there is decided per edge
+//! (`outline/background_strip`).
+//!
+//! Limits: a strip that is visible nowhere else stays mixed along an edge that hardly crosses the lattice, since mixed
+//! pixels of such an edge can also lie on a plane. Uneven ground is represented by several planes. Own.
 
 use nalgebra::{Cholesky, Const, Matrix3};
 use platen_numerics::random::Random;
@@ -28,38 +42,43 @@ use super::range_noise::Noise;
 use super::window::Window;
 use crate::Vec3;
 
-/// Cells from which a plane is taken, at most, and fewest of them on it.
+/// Largest number of cells from which a plane is determined, and least number of them on it.
 const ENOUGH: usize = 1024;
 const LEAST_CELLS: usize = 24;
 
-/// Planes at most, and triples that are tried for each.
+/// Largest number of planes, and number of triples of cells tried for each.
 pub(crate) const PLANES: usize = 6;
 const TRIALS: usize = 300;
 
-/// The second and third cell of a triple are among so many before and behind the first.
+/// Number of cells before and behind the first cell of a triple among which the second and third are drawn.
 const NEAR: usize = 32;
 
-/// Largest departure from a plane, in standard deviations, and largest variance of a plane there, in that of a cell.
+/// Largest departure of a cell from a plane, in standard deviations, and largest variance of the plane there, in units
+/// of that of a cell.
 const BOUND: f64 = 5.0;
 const MOST_LEVERAGE: f64 = 9.0;
 
-/// Largest scatter of the cells on a plane that is flat, in the standard deviation of a cell.
+/// Largest scatter of the cells on a flat plane, in units of the standard deviation of a cell.
 const MOST_SCATTER: f64 = 1.5;
 
-/// Largest cosine of the incidence of a plane that no scanner sees: a row of a round wall lies in a plane through the scanner, too.
+/// Cosine of the incidence up to which a plane is taken as seen edge-on: a row of a round wall also lies in a plane,
+/// through the scanner.
 const EDGE_ON: f64 = 0.1;
 
-/// Cells from a mixed pixel to the strip at whose far edge it is: in any direction, and to both sides along its row or its column.
+/// Largest number of cells from a mixed pixel to the strip whose far edge it sees: `NEAREST` in any direction, `FAR` to
+/// both sides along its row or its column.
 const NEAREST: usize = 2;
 const FAR: usize = 12;
 
-/// A plane of a strip holds one of so many mixed pixels at least; of the planes beside 40 plates without a strip 3 % do.
+/// A plane of a strip holds at least one in this many mixed pixels; of the planes beside 40 plates without a strip 3 %
+/// do.
 const FEW: usize = 20;
 
-/// The plane of a strip that shows nowhere else holds one of so many mixed pixels at least.
+/// The plane of a strip that is visible nowhere else holds at least one in this many mixed pixels.
 const MANY: usize = 8;
 
-/// Columns and rows of the lattice that an edge must cross to be dithered, that is, to lie at random between them.
+/// Number of columns and of rows of the lattice that an edge must cross to be dithered, that is, to lie at random
+/// between them.
 pub(crate) const DITHERED: u32 = 6;
 
 /// Planes of the background and the cells on them.
@@ -70,14 +89,15 @@ pub(super) struct Background {
 }
 
 impl Background {
-    /// Returns the plane that holds a cell.
+    /// Returns the plane on which a cell lies.
     pub(super) fn at(&self, index: usize) -> Option<PlaneBehind> {
         let number = self.numbers[index]?;
         let vector = self.planes[usize::from(number)].vector;
         Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32 })
     }
 
-    /// Returns the numbers of the flat planes that, if they reach so far, are in front of a cell of the background and behind a place on the beam of another.
+    /// Returns the numbers of the flat planes that, if they extend so far, are in front of the background cell `behind`
+    /// and behind `place`, a place on the beam of another cell.
     pub(super) fn between(&self, place: BackgroundCell, behind: BackgroundCell) -> impl Iterator<Item = u8> {
         let is_between = move |plane: &BackgroundPlane| {
             plane.scatter < MOST_SCATTER && plane.depth(&place) < -BOUND && plane.depth(&behind) > BOUND
@@ -91,7 +111,8 @@ impl Background {
     }
 }
 
-/// Marks the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of it, as sound. Returns the planes and the cells on them.
+/// Marks as sound the mixed pixels that lie on a plane beside the component, and those at the far edge of a strip of
+/// such a plane. Returns the planes and the cells on them.
 pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -> Background {
     let off = off_component(window, pixels);
     let cell = |index: usize| BackgroundCell::of(window, noise, index);
@@ -111,7 +132,7 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -
     let is_strip = |index: &usize| {
         let mixed = |at: usize| (pixels[at] == Pixel::Mixed).then(|| cell(at));
         mixed(*index).is_some_and(|cell| match on[*index] {
-            // Amid mixed pixels of the edge a cell only happens to have the range of the plane.
+            // Between mixed pixels of the edge a cell has the range of the plane by chance.
             Some(plane) => {
                 let is_before = |at: usize| mixed(at).is_some_and(|other| depth(plane, &other) < -BOUND);
                 !lies_between(window, *index, [NEAREST, 0], is_before)
@@ -128,7 +149,7 @@ pub(super) fn mark_sound(window: &Window, noise: &Noise, pixels: &mut [Pixel]) -
     Background { planes, numbers: on }
 }
 
-/// Returns the mixed pixels that are alone on a plane which holds few of them.
+/// Returns the mixed pixels that are alone on a plane that holds few of them.
 fn by_chance(window: &Window, pixels: &[Pixel], off: &[usize], on: &[Option<u8>]) -> Vec<usize> {
     let mixed: Vec<usize> = off.iter().copied().filter(|index| pixels[*index] == Pixel::Mixed).collect();
     let mut held = [0; PLANES];
@@ -140,7 +161,7 @@ fn by_chance(window: &Window, pixels: &[Pixel], off: &[usize], on: &[Option<u8>]
     mixed.iter().copied().filter(|index| on[*index].is_some_and(is_few) && is_alone(*index)).collect()
 }
 
-/// Returns the classified cells off the component and off what may be its continuation.
+/// Returns the classified cells that belong neither to the component nor to a possible continuation of it.
 fn off_component(window: &Window, pixels: &[Pixel]) -> Vec<usize> {
     let header = &window.header;
     let strides = [(1, header.elevation_step), (window.n_rows, header.azimuth_step)];
@@ -162,7 +183,8 @@ fn off_component(window: &Window, pixels: &[Pixel]) -> Vec<usize> {
         .collect()
 }
 
-/// Returns true when a condition holds somewhere to both sides of a cell, along its row or its column, in arms of a length and half a width.
+/// Returns true when a condition holds somewhere on both sides of a cell, along its row or its column, in arms of the
+/// given length and half width.
 fn lies_between(
     window: &Window,
     index: usize,
@@ -174,7 +196,8 @@ fn lies_between(
         || (any([half; 2], [length, 0]) && any([half; 2], [0, length]))
 }
 
-/// Returns true when a condition holds for a cell of a box, given by its columns and rows before and behind a cell.
+/// Returns true when a condition holds for a cell of a box, given by the numbers of columns and rows before and behind
+/// a cell.
 fn any_within(
     window: &Window,
     index: usize,
@@ -212,7 +235,7 @@ impl BackgroundCell {
         Self { inverse: 1.0 / range, ..self }
     }
 
-    /// Returns true when the plane of this vector holds the cell.
+    /// Returns true when the cell lies on the plane of this vector.
     fn is_on(&self, plane: &Vec3) -> bool {
         (self.inverse - plane.dot(&self.direction)).abs() <= BOUND * self.sigma
     }
@@ -223,7 +246,7 @@ impl BackgroundCell {
 struct BackgroundPlane {
     vector: Vec3,
     information: Cholesky<f64, Const<3>>,
-    /// Scatter about it in the standard deviation of a cell, at least 1.
+    /// Scatter of the cells about the plane, in units of the standard deviation of a cell, at least 1.
     scatter: f64,
 }
 
@@ -254,7 +277,7 @@ impl BackgroundPlane {
         self.leverage(cell) <= MOST_LEVERAGE && self.depth(cell).abs() <= BOUND
     }
 
-    /// Returns the variance of the plane at a cell, in that of the cell.
+    /// Returns the variance of the plane at a cell, in units of that of the cell.
     fn leverage(&self, cell: &BackgroundCell) -> f64 {
         let row = cell.direction / cell.sigma;
         row.dot(&self.information.solve(&row)) * self.scatter * self.scatter
@@ -270,14 +293,14 @@ impl BackgroundPlane {
         cells.iter().any(|cell| self.holds(cell) && self.cosine(cell) > EDGE_ON)
     }
 
-    /// Returns how far a cell is behind the plane, in standard deviations of both.
+    /// Returns the distance of a cell behind the plane, in standard deviations of both.
     fn depth(&self, cell: &BackgroundCell) -> f64 {
         let sigma = cell.sigma * (self.scatter * self.scatter + self.leverage(cell)).sqrt();
         (self.vector.dot(&cell.direction) - cell.inverse) / sigma
     }
 }
 
-/// Finds the planes of the sound cells, the one with most of them first, then those of strips among the mixed.
+/// Finds the planes of the sound cells, the one with most cells first, then those of strips among the mixed pixels.
 fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<BackgroundPlane> {
     let mut random = Random::new(1);
     let mut planes = Vec::new();
@@ -286,7 +309,7 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
         let few: Vec<BackgroundCell> = sound.iter().step_by(every).copied().collect();
         let first = most_common(&few, &mut random)
             .and_then(|plane| BackgroundPlane::fit(&sound, |cell| cell.is_on(&plane)));
-        // The strips that it predicts make a plane sharp there.
+        // The strips that the plane predicts determine it more accurately there.
         let Some(plane) =
             first.and_then(|plane| BackgroundPlane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell)))
         else {
@@ -306,7 +329,8 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
     planes
 }
 
-/// Finds the plane of a strip that shows nowhere else: many mixed pixels that are on no plane yet lie on it.
+/// Finds the plane of a strip that is visible nowhere else: one on which many mixed pixels lie that are on no other
+/// plane.
 fn find_among_mixed(
     mixed: &[BackgroundCell],
     planes: &[BackgroundPlane],
@@ -325,7 +349,7 @@ fn find_among_mixed(
     (are_many && plane.scatter < MOST_SCATTER && plane.is_seen(&rest)).then_some(plane)
 }
 
-/// Returns the plane through three cells that holds most of them; RANSAC.
+/// Returns the plane through three cells that holds the most cells (RANSAC).
 fn most_common(cells: &[BackgroundCell], random: &mut Random) -> Option<Vec3> {
     if cells.len() < LEAST_CELLS {
         return None;

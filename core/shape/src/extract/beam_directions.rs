@@ -1,8 +1,10 @@
-//! Directions of beams by the sines and cosines of their angles, kept per row and per column: no trigonometry per cell (benchmark `columns`).
+//! Beam directions from sines and cosines stored per row and per column, without trigonometry per cell.
+//!
+//! For speed only: benchmark `columns`.
 
 use crate::Vec3;
 
-/// Up to here, radians, the series of [`AngleSinCos::by`] is exact to the last bits of an f64.
+/// Largest angle, radians, for which the series of [`AngleSinCos::by`] is exact to the last bits of an f64.
 const SMALL: f64 = 0.02;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +49,9 @@ impl BeamDirection {
         Vec3::new(elevation.cos * azimuth.cos, elevation.cos * azimuth.sin, elevation.sin)
     }
 
-    /// Returns the unit normal, towards the scanner, of a surface that is seen in this direction: `inverse` is its inverse range,
-    /// `by_azimuth` and `by_elevation` the derivatives of that by the angles. `None` on a surface without normal.
+    /// Returns the unit normal, towards the scanner, of a surface seen in this direction. `inverse` is its inverse
+    /// range, `by_azimuth` and `by_elevation` the derivatives of that by the angles. `None` on a surface without
+    /// normal.
     ///
     /// On the plane n . x = h the inverse range along the unit direction d is n . d / h: the normal is the gradient of
     /// the inverse range continued homogeneously, q d + q_el e_el + q_az / cos el e_az.

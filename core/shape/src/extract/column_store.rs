@@ -1,4 +1,7 @@
-//! Store of the columns that have arrived; cells that cannot belong to the plate are dropped to bound the memory.
+//! Store of the columns that have arrived, in bounded memory.
+//!
+//! Cells that cannot belong to the plate are dropped: those not near a component small enough to be the plate. In:
+//! columns in any order. Out: their cells and runs (consecutive cells of one surface).
 
 use std::ops::Range;
 
@@ -6,11 +9,11 @@ use platen_scan::{Column, ScanHeader, State, wrap_azimuth};
 
 use super::connected_components::{Components, Run};
 
-/// Cells kept around those of a component: a mixed pixel beside the face, and behind it a cell with its neighbours, so that the cell is
-/// told from a mixed one (two on either side); the face may reach one cell beyond its component.
+/// Number of cells kept around a component: a mixed pixel beside the face, and behind it a cell with two neighbours on
+/// either side, which distinguish it from a mixed pixel. The face may reach one cell beyond its component.
 pub(super) const MARGIN: u32 = 6;
 
-/// One cell as kept: 16 bytes.
+/// One stored cell: 16 bytes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cell {
     pub(super) range_m: f32,
@@ -38,9 +41,9 @@ impl Segment {
 
 #[derive(Debug, Clone)]
 pub(super) struct StoredColumn {
-    /// Its runs, by row.
+    /// Numbers of its runs, by row.
     pub(super) runs: Range<u32>,
-    /// By row, apart from each other.
+    /// Stored cells, by row; segments do not touch.
     pub(super) segments: Vec<Segment>,
 }
 
@@ -55,7 +58,7 @@ impl StoredColumn {
         self.segments.iter().map(|s| s.cells.len()).sum()
     }
 
-    /// Drops what is outside of `rows`, which are sorted and apart from each other.
+    /// Drops the cells outside of `rows`, which are sorted and do not touch.
     fn retain(&mut self, rows: &[Range<u32>]) {
         let mut kept = Vec::new();
         for segment in &self.segments {
@@ -73,7 +76,7 @@ impl StoredColumn {
     }
 }
 
-/// Copies a column into cells. `inside`: whether a sample, by row and range, is in the region of interest.
+/// Copies a column into cells. `inside` returns whether a sample, by row and range, is in the region of interest.
 pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32, f32) -> bool) -> Vec<Cell> {
     let azimuth = header.azimuth_start + header.azimuth_step * f64::from(column.index);
     let angles = column.azimuth.iter().zip(&column.elevation);
@@ -99,7 +102,7 @@ pub(super) fn cells_of(column: &Column, header: &ScanHeader, inside: impl Fn(u32
     cells.collect()
 }
 
-/// All columns, and the count of cells after which droppable ones are looked for.
+/// All columns, and the number of cells at which the next sweep takes place.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ColumnStore {
     kept: Vec<Option<StoredColumn>>,
@@ -107,7 +110,7 @@ pub(super) struct ColumnStore {
     sweep_at: usize,
 }
 
-/// Below this many cells (16 MB) nothing is dropped: it would save nothing that matters.
+/// Number of cells (16 MB) below which nothing is dropped: the saving would be negligible.
 const SWEEP_FROM: usize = 1 << 20;
 
 impl ColumnStore {
@@ -131,10 +134,10 @@ impl ColumnStore {
         self.kept[index as usize] = Some(column);
     }
 
-    /// Drops, once in a while, the cells that are not near a component of at most `limit_mm2`.
+    /// Drops the cells that are not near a component of at most `limit_mm2`, each time the store has doubled.
     ///
-    /// Each time the store has doubled it is swept, so that the work stays linear in the cells that arrive. A
-    /// component only grows: what is dropped now would be dropped at the end too, whatever the order of arrival.
+    /// The work is thereby linear in the number of cells that arrive. Components only grow: a cell dropped now would
+    /// also be dropped at the end, whatever the order of arrival.
     pub(super) fn sweep(&mut self, regions: &mut Components, n_columns: u32, limit_mm2: u64) {
         if self.n_cells < self.sweep_at.max(SWEEP_FROM) {
             return;
@@ -167,12 +170,13 @@ fn alive_rows(column: &StoredColumn, regions: &mut Components, limit_mm2: u64) -
     with_margin(alive.into_iter().map(|number| regions.run(number)))
 }
 
-/// Rows of the runs of a column and within [`MARGIN`] of them: hardly more than one range, as dropouts are bridged.
+/// Returns the rows of the runs of a column and those within [`MARGIN`] of them: rarely more than one range, since
+/// dropouts are bridged.
 pub(super) fn with_margin(runs: impl Iterator<Item = Run>) -> Vec<Range<u32>> {
     union(runs.map(|run| run.first_row.saturating_sub(MARGIN)..run.end_row + MARGIN))
 }
 
-/// Sorted, non-overlapping union of ranges.
+/// Returns the sorted, non-overlapping union of ranges.
 pub(super) fn union(ranges: impl Iterator<Item = Range<u32>>) -> Vec<Range<u32>> {
     let mut sorted: Vec<_> = ranges.collect();
     sorted.sort_unstable_by_key(|r| (r.start, r.end));

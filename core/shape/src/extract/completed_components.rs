@@ -1,5 +1,7 @@
-//! Candidate components by size, and early evaluation of those that have ended while columns still arrive: most of the work is
-//! done before the last column.
+//! Early evaluation of components that no later column can join, and selection of candidate components by size.
+//!
+//! A component of about the plate's size is evaluated as soon as it has ended, while columns still arrive, so that most
+//! of the work is done before the last column. Limit: columns arrive in order, ascending or descending.
 
 use std::collections::BTreeSet;
 
@@ -10,25 +12,26 @@ use super::segmented_component::SegmentedComponent;
 use super::{Extractor, LEAST_PART, OUTGROWN, Refusal, plate_selection};
 use crate::Patch;
 
-/// A component of at most this area and width, in parts of the plate's area and diagonal, holds little besides
-/// the plate. Larger ones are looked at only when no plate is found among these.
+/// Largest area and width, in parts of the plate's area and diagonal, of a component that contains little besides the
+/// plate. Larger components are evaluated only when no plate is found among these.
 const NEAR_SIZE: (f64, f64) = (1.15, 1.15);
 
-/// A component of at least this part of the plate's area is looked at as soon as it has ended. Smaller ones wait: looked
-/// at, every piece of furniture in a dome would hold memory until the end.
+/// Least area, in parts of the plate's area, of a component that is evaluated as soon as it has ended. Smaller ones are
+/// evaluated after the last column: otherwise every piece of furniture in a full-dome scan would hold memory until
+/// then.
 const CLOSED_PART: f64 = 0.3;
 
-/// A component evaluated before the last column has come.
+/// A component evaluated before the last column has arrived.
 #[derive(Debug, Clone)]
 pub(super) struct Completed {
     pub(super) surface: SegmentedComponent,
-    /// Label and outcome of the face that has the plate's size all by itself.
+    /// Label and result of the face that alone has the plate's size.
     pub(super) plate: Option<(u32, Result<Patch, Refusal>)>,
 }
 
 impl Extractor {
-    /// Evaluates the components that ended so many columns before `newest` that nothing more joins them: most of the
-    /// work on the plate is done before the last column comes, as long as columns come in order, of either sense.
+    /// Evaluates the components that ended so many columns before `newest` that no later column joins them, as long as
+    /// columns arrive in order, ascending or descending.
     pub(super) fn look_at_closed(&mut self, newest: u32) {
         let first = self.header.n_columns.saturating_sub(1);
         let before = [Some(newest), first.checked_sub(newest)];
@@ -57,7 +60,7 @@ impl Extractor {
         }
     }
 
-    /// Returns the face of a component that has the plate's size by itself, evaluated as if it were chosen.
+    /// Returns the face of a component that alone has the plate's size, evaluated as if it were the selected one.
     fn plate_of(&self, surface: &SegmentedComponent) -> Option<(u32, Result<Patch, Refusal>)> {
         let pieces = self.pieces(std::slice::from_ref(surface), 0);
         let candidates = plate_selection::candidates(&pieces);
@@ -66,12 +69,12 @@ impl Extractor {
         Some((label, self.patch(surface, &[surface.region(label, &surface.window)])))
     }
 
-    /// True when a component may hold a piece of the plate.
+    /// Returns true when a component may contain a piece of the plate.
     fn may_be_plate(&self, extent: Extent) -> bool {
         (self.plate_mm2(LEAST_PART)..=self.plate_mm2(OUTGROWN)).contains(&extent.area_mm2)
     }
 
-    /// True when a component holds little besides the plate.
+    /// Returns true when a component contains little besides the plate.
     fn is_near_size(&mut self, root: u32) -> bool {
         let extent = self.regions.extent(root);
         if extent.area_mm2 > self.plate_mm2(NEAR_SIZE.0) {
@@ -93,8 +96,8 @@ impl Extractor {
         spread.width() <= NEAR_SIZE.1 * self.spec.width.hypot(self.spec.height)
     }
 
-    /// Returns the components that may contain a piece of the plate, by their first cell: those of about its size, and larger
-    /// ones.
+    /// Returns the components that may contain a piece of the plate, in the order of their first cells: those of about
+    /// its size or smaller, then larger ones.
     pub(super) fn components(&mut self) -> (Vec<u32>, Vec<u32>) {
         let mut roots = Vec::new();
         for index in 0..self.columns.len() {

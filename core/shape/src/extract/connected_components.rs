@@ -1,7 +1,8 @@
 //! Connected components by union-find over runs of cells, in two uses.
 //!
-//! `streaming`: components of the whole lattice under the continuity criterion, joined while columns arrive in any order.
-//! `labels`: components of a mask inside a window, all at once.
+//! - `streaming`: components of the whole lattice under the continuity criterion, joined while columns arrive in any
+//!   order.
+//! - `labels`: components of a mask inside a window, all at once.
 
 mod labels;
 mod streaming;

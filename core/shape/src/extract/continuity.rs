@@ -1,4 +1,7 @@
 //! Continuity criterion between lattice neighbours (Masuda et al., 3.1, eq. 1 and 2), without trigonometry per cell.
+//!
+//! In: the ranges of two neighbouring samples, metres. Out: whether both lie on one surface. Limits: an incidence of 72
+//! degrees; down a column 82 degrees where the ranges change evenly.
 
 use platen_scan::ScanHeader;
 
@@ -6,13 +9,14 @@ use platen_scan::ScanHeader;
 /// each other than this factor times the sum of their ranges times the angle between them (Masuda et al., eq. 1).
 const FACTOR: f64 = 1.618_033_988_749_895;
 
-/// The same at 82 degrees: a strongly bent plate is seen so along the line of beam. Down a column two cells are joined
-/// up to there if the ranges before and behind them change at nearly the same rate, which they do not at an edge.
+/// The same factor at 82 degrees, an incidence at which a strongly bent plate may be seen. Down a column two cells are
+/// joined up to this incidence if the ranges before and behind them change at nearly the same rate, which they do not
+/// at an edge.
 const STEEP_FACTOR: f64 = 3.59;
 const STEEP_RATES: f32 = 2.0;
 
-/// Beams of neighbouring columns close up towards the zenith and the nadir, and with them the bound, until it
-/// falls below the range noise. It is not let below this part of the bound between rows.
+/// Least bound between columns, in parts of the bound between rows. Beams of neighbouring columns converge towards the
+/// zenith and the nadir; without this limit the bound would fall below the range noise.
 const LEAST_PART_OF_ROW_STEP: f64 = 0.25;
 
 /// The criterion between two beams a fixed angle t apart.
@@ -42,7 +46,7 @@ impl Link {
 /// The criterion in both directions of a lattice, each with its own step.
 #[derive(Debug, Clone)]
 pub(super) struct Continuity {
-    /// Between a cell and the one below it, at any incidence of the criterion and at steeper ones.
+    /// Between a cell and the one below it: up to 72 degrees of incidence, and up to 82 degrees.
     down: Link,
     steep: Link,
     /// Per row, between a cell and the one in the next column.
@@ -66,7 +70,8 @@ impl Continuity {
         }
     }
 
-    /// Returns true when two consecutive ranges down a column are on one surface; `beyond` gives the ones before and behind them.
+    /// Returns true when two consecutive ranges down a column are on one surface; `beyond` gives the ranges before and
+    /// behind them.
     #[inline]
     pub(super) fn joins_down(
         &self,
@@ -91,7 +96,7 @@ impl Continuity {
 mod tests {
     use super::*;
 
-    /// A plane seen at an incidence just below 0.4 pi holds together, just above it falls apart.
+    /// Neighbours on a plane are joined at an incidence just below 0.4 pi and not joined just above.
     #[test]
     fn the_limit_is_an_incidence_of_72_degrees() {
         let step = 8e-4_f64;

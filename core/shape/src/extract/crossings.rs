@@ -1,10 +1,12 @@
-//! Boundary crossings: where rows and columns of the lattice leave the face, and what lies beyond.
+//! Boundary crossings: the places where rows and columns of the lattice leave the face, and the objects beyond.
 //!
-//! Beside the face a cell may see so little of what lies behind that neither its neighbours tell it for a mixed pixel nor its range for one of the
-//! face. The face does not end there: the edge is up to a footprint farther out.
+//! In: the cells of the face, the mixed pixels, the noise. Out, per crossing: the last point inside and the first point
+//! outside, the mixed pixels between them, and the range beyond relative to the face's continuation (`local_quadric`).
+//! The crossings are the observations for the outline.
 //!
-//! In: the cells of the face, mixed pixels, noise. Out: per crossing the last point inside and the first outside, mixed pixels
-//! between them, and the range beyond against the face's continuation (`local_quadric`); observations for the outline.
+//! A cell beside the face may see so little of the background that it is classified neither as a mixed pixel (by its
+//! neighbours) nor as a cell of the face (by its range). The face does not end at such a cell: the edge is up to a
+//! footprint farther out.
 
 use std::collections::BTreeMap;
 
@@ -16,32 +18,35 @@ use super::range_noise::Noise;
 use super::window::Window;
 use crate::Vec3;
 
-/// Widest gap along a row or a column behind which the face may go on, cells.
+/// Widest gap along a row or a column behind which the face may continue, cells.
 const WIDEST_GAP: usize = 48;
 
-/// Cells beyond the face at which the local fit is evaluated. A row that runs along an edge meets many mixed pixels
-/// before it is off the plate; the first of them suffice.
+/// Number of cells beyond the face at which the local fit is evaluated. A row that runs along an edge meets many mixed
+/// pixels before it leaves the plate; the first of them suffice.
 const FAR: usize = 12;
 
-/// Cells beyond the face up to which a range is compared with its continuation, cells.
+/// Largest distance from the face at which a range is compared with the face's continuation, cells.
 const FIT_FAR: usize = 3;
 
-/// A range behind the face's continuation by less than the detection limit of a mixed pixel, and than so much, metres, is of a beam that sees little of what
-/// lies behind: no end of the face, though no mixed pixel by its neighbours.
+/// A beam whose range is behind the face's continuation by less than this, metres, and by less than the detection limit
+/// of a mixed pixel sees little of the background. It is not an end of the face, although its neighbours do not
+/// indicate a mixed pixel.
 const MOST_HARDLY_MIXED: f64 = 0.015;
 
-/// A range in front of the face's continuation by this many standard deviations belongs to something that hides it.
+/// A range in front of the face's continuation by more than this many standard deviations belongs to an object that
+/// hides the face.
 const FRONT_BOUND: f64 = 4.0;
 
-/// Returns all crossings of the face's cells, by cell, in the order up, down, back, next. `number` gives the place of a cell
-/// of the face among the samples. Also returns the length over which the region of interest cuts the face, metres.
+/// Returns all crossings of the face's cells, by cell, in the order up, down, previous column, next column, and the
+/// length over which the region of interest cuts the face, metres. `number` gives the index of a cell of the face among
+/// the samples.
 pub(super) fn find(scene: &Scene, number: impl Fn(usize) -> u32) -> (Vec<Crossing>, f64) {
     let Scene { window, face, .. } = *scene;
     let mut fits: BTreeMap<(usize, usize), Option<LocalQuadric>> = BTreeMap::new();
     let mut crossings = Vec::new();
     let mut cut = 0.0;
     let inside = |i: usize| face.get(i).is_some_and(|f| *f);
-    // Cells amid the face leave it nowhere.
+    // Cells whose four neighbours are on the face have no crossing.
     let is_rim = |i: &usize| {
         let i = *i;
         let n_rows = window.n_rows;
@@ -77,9 +82,9 @@ pub(super) fn find(scene: &Scene, number: impl Fn(usize) -> u32) -> (Vec<Crossin
 /// End of the face on a row or a column.
 #[derive(Debug, Clone, Copy)]
 enum End {
-    /// The first sound cell, so many steps away.
+    /// The first sound cell, this many steps away.
     Sound(usize),
-    /// Mixed pixels only, the last so many steps away.
+    /// Mixed pixels only, the last of them this many steps away.
     Mixed(usize),
     /// No return.
     Nothing,
@@ -88,7 +93,7 @@ enum End {
 /// A mixed pixel beside the face.
 struct MixedCell {
     cell: BackgroundCell,
-    /// Where its beam meets the continuation of the face.
+    /// Point where its beam meets the continuation of the face.
     on_face: Vec3,
     /// Its range minus that of the continuation, metres.
     excess: f32,
@@ -108,7 +113,7 @@ impl MixedCell {
     }
 }
 
-/// A face and what is beside it, cell by cell.
+/// A face and the cells beside it.
 pub(super) struct Scene<'a> {
     pub(super) window: &'a Window,
     pub(super) noise: &'a Noise,
@@ -127,8 +132,8 @@ impl Scene<'_> {
             .then_some(column * self.window.n_rows + row)
     }
 
-    /// Returns the end of the face; `None` where it goes on behind a gap of cells without return, mixed or unclassified ones, or only cells follow
-    /// that are hardly behind it.
+    /// Returns the end of the face. `None` where the face continues behind a gap of cells that are mixed, unclassified
+    /// or without return, or where only cells follow that are hardly behind the face.
     fn end_of_face(&self, fit: &LocalQuadric, index: usize, step: (isize, isize)) -> Option<End> {
         let sigma = f64::from(self.noise.at(index));
         let hardly = -FRONT_BOUND * sigma..(DETECTION_LIMIT * sigma).min(MOST_HARDLY_MIXED);
@@ -153,7 +158,7 @@ impl Scene<'_> {
         (last_mixed.is_some() || !hardly_mixed).then(|| last_mixed.map_or(End::Nothing, End::Mixed))
     }
 
-    /// Measures a crossing; also returns whether the face goes on beyond the region of interest.
+    /// Measures a crossing. Also returns whether the face continues beyond the region of interest.
     fn crossing(
         &self,
         fit: &LocalQuadric,
@@ -210,7 +215,7 @@ impl Scene<'_> {
         Some((crossing, cut))
     }
 
-    /// Returns the range of the cell `at` behind the face's continuation `far` steps from `index`.
+    /// Returns the range of the cell `at` minus that of the face's continuation `far` steps from `index`, metres.
     fn excess(
         &self,
         fit: &LocalQuadric,
@@ -225,8 +230,10 @@ impl Scene<'_> {
         Some(f64::from(self.window.cells[at].range_m) - predicted.range)
     }
 
-    /// Locates where the face meets a side face: its ranges fall behind the face's continuation in proportion to the way
-    /// from the common edge. Needs three sound cells in a row that do so, of a bevelled edge on its upper flank.
+    /// Locates the crease between the face and a side face, as an interval in steps from `index`.
+    ///
+    /// The ranges on a side face are behind the face's continuation in proportion to the distance from the common edge.
+    /// Three sound cells in a row must show this; on a bevelled edge they must lie on the upper flank.
     fn crease(
         &self,
         fit: &LocalQuadric,

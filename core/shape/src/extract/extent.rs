@@ -1,6 +1,6 @@
-//! Lower bound of the diameter of a point set: its widths along 13 fixed directions.
+//! Lower bound of the diameter of a point set: its widths along 13 fixed directions, metres.
 
-/// Directions to the faces, edges and corners of a cube: no direction is further than 28 degrees from one of them.
+/// Directions to the faces, edges and corners of a cube: no direction is farther than 28 degrees from one of them.
 const DIRECTIONS: [[f64; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],

@@ -1,17 +1,19 @@
-//! Smooth faces of a component: connected components of the cells around which the normal of the low-pass copy does not turn
-//! (Masuda et al., 3.1, region growing on normals).
+//! Smooth faces of a component, by region growing on normals (Masuda et al., 3.1).
+//!
+//! A face is a connected component of the cells around which the normal of the low-pass copy does not turn. In: the
+//! normals of a window. Out: the face of each cell, and the area of each face in square metres.
 
 use super::connected_components::{NO_LABEL, label_components};
 use super::smoothed_normals::{Normal, cos_between};
 use super::window::Window;
 use crate::Vec3;
 
-/// Largest angle between the normals some cells before and behind a cell of a face, radians. Across an edge
-/// between two faces the low-pass copy turns by 90 degrees over about six cells; a plate bent to R 2 m turns by less
-/// than 1 degree over four cells of 6 mm, by 5 at the most grazing sight; noise adds a few.
+/// Largest angle between the normals a few cells before and behind a cell of a face, radians. Across an edge between
+/// two faces the low-pass copy turns by 90 degrees over about six cells. A plate bent to R 2 m turns by less than 1
+/// degree over four cells of 6 mm, by 5 degrees at the most grazing incidence; noise adds a few degrees.
 const MAX_TURN: f32 = 0.2;
 
-/// Cells on each side over which the turn is taken, at least; as many as slopes are taken over.
+/// Least number of cells on each side over which the turn is taken; otherwise as many as slopes are taken over.
 const LEAST_STRIDE: usize = 2;
 
 /// A face of a component.

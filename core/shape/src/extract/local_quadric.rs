@@ -1,10 +1,13 @@
-//! Local quadric: least-squares quadratic function over the tangent plane of the face around a few cells, and its
-//! intersection with a beam by Newton's method.
+//! Local quadric: quadratic function over the tangent plane of the face around a few cells, by least squares.
 //!
-//! In space, not over the lattice: a bent plate is a quadratic there however obliquely it is seen and however far apart
-//! its samples are, while the range along a row grows without bound towards the horizon of a bend. Noise along the
-//! beam is noise across the face by the cosine of the incidence, the same for all cells of a fit. The second order is regularised (ridge) by
-//! a normal prior of the curvature: a crease is no part of a plate.
+//! In: the cells of the face in and around a tile, a square of [`TILE`] x [`TILE`] cells. Out: a function in space that
+//! continues the face, its intersection with a beam by Newton's method, and the variance of the range there.
+//!
+//! - The function is fitted in space, not over the lattice. In space a bent plate is a quadratic however obliquely it
+//!   is seen and however far apart its samples are; over the lattice the range along a row grows without bound towards
+//!   the horizon of a bend.
+//! - Noise along the beam times the cosine of the incidence is noise across the face, the same for all cells of a fit.
+//! - The second order is regularised (ridge) by a normal prior of the curvature, since a crease is not part of a plate.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 use platen_numerics::simd::dispatch_simd;
@@ -13,21 +16,22 @@ use super::range_noise::Noise;
 use super::window::Window;
 use crate::Vec3;
 
-/// Cells on a side of the square that shares one fit.
+/// Number of cells on a side of the square (tile) that shares one fit.
 pub(super) const TILE: usize = 4;
 
-/// Cells beyond the square on each side that enter the fit: 16 x 16 at most.
+/// Number of cells beyond the tile on each side that enter the fit: 16 x 16 cells at most.
 const REACH: usize = 6;
 
-/// Fewest cells that carry a fit of six coefficients.
+/// Least number of cells for a fit of six coefficients.
 const LEAST_CELLS: usize = 16;
 
-/// Prior of the curvatures, 1/m, one standard deviation: that of a plate bent to R 2 m. Over a square of 5 mm cells the crease of a bevel
-/// is twenty times as much: under 1.5 mm of noise a fit without it bends with the first rows of the bevel and then follows it.
+/// Prior of the curvatures, 1/m, one standard deviation: that of a plate bent to R 2 m. Over a square of 5 mm cells the
+/// crease of a bevel has twenty times this curvature. Under 1.5 mm of noise a fit without the prior bends with the
+/// first rows of the bevel and then follows it.
 const CURVATURE: f64 = 0.5;
 
-/// Newton steps to where a beam meets the face, at most; each squares an error of a few parts in a hundred, and one of less
-/// than this, metres, is the last.
+/// Largest number of Newton steps to the intersection of a beam with the face; each squares a relative error of a few
+/// parts in a hundred. A step shorter than `STILL`, metres, is the last.
 const STEPS: usize = 4;
 const STILL: f64 = 1e-8;
 
@@ -36,7 +40,7 @@ const STILL: f64 = 1e-8;
 #[derive(Debug, Clone)]
 pub(super) struct LocalQuadric {
     centre: Vec3,
-    /// Axes of the plane, each over its unit.
+    /// Axes of the plane, each divided by its unit of length.
     along: [Vec3; 2],
     /// Unit normal of the plane, towards the scanner.
     up: Vec3,
@@ -59,8 +63,8 @@ fn basis([x, y]: [f64; 2]) -> SVector<f64, 6> {
     SVector::from([1.0, x, y, x * x, x * y, y * y])
 }
 
-/// Which monomial is the product of two functions of the basis, of 1, x, y, x^2, x y, y^2, x^3, x^2 y, x y^2, y^3, x^4, x^3 y,
-/// x^2 y^2, x y^3, y^4.
+/// Index of the monomial that is the product of two functions of the basis, in the list 1, x, y, x^2, x y, y^2, x^3,
+/// x^2 y, x y^2, y^3, x^4, x^3 y, x^2 y^2, x y^3, y^4.
 const PRODUCTS: [[usize; 6]; 6] = [
     [0, 1, 2, 3, 4, 5],
     [1, 3, 4, 6, 7, 8],
@@ -70,13 +74,13 @@ const PRODUCTS: [[usize; 6]; 6] = [
     [5, 8, 9, 12, 13, 14],
 ];
 
-/// Points of a fit at most.
+/// Largest number of points of a fit.
 const MOST: usize = (TILE + 2 * REACH) * (TILE + 2 * REACH);
 
-/// Lanes of a sum, to fill vector registers.
+/// Number of lanes of a sum, to fill vector registers.
 const LANES: usize = 16;
 
-/// Sum of terms over whole lanes of two lists.
+/// Sums terms over two lists whose lengths are multiples of [`LANES`].
 #[inline(always)]
 fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
     let mut lanes = [0.0; LANES];
@@ -98,7 +102,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum(a, b, |a, b| a * b)
 }
 
-/// The points of a fit, by coordinate, with zeros up to whole lanes.
+/// The points of a fit, by coordinate, padded with zeros to a multiple of [`LANES`].
 struct Points {
     n: usize,
     by_axis: [[f64; MOST]; 3],
@@ -109,7 +113,8 @@ impl Points {
         Self { n: 0, by_axis: [[0.0; MOST]; 3] }
     }
 
-    /// Adds those points that are `wanted`: all are written, and the next one goes over one that is not.
+    /// Adds the points flagged `wanted`. Every point is written, and a point that is not wanted is overwritten by the
+    /// next one (no branch).
     #[inline(always)]
     fn extend<'p>(&mut self, points: impl Iterator<Item = (&'p [f64; 3], bool)>) {
         for (point, wanted) in points {
@@ -127,7 +132,7 @@ impl Points {
         self.by_axis.each_ref().map(|numbers| &numbers[..len])
     }
 
-    /// Moves the origin into the middle of the points, and returns where that was.
+    /// Moves the origin to the mean of the points and returns that mean.
     #[inline(always)]
     fn centre(&mut self) -> Vec3 {
         let n = self.n;
@@ -138,7 +143,7 @@ impl Points {
         centre
     }
 
-    /// Coordinate of each point along an axis.
+    /// Returns the coordinate of each point along an axis.
     #[inline(always)]
     fn along(&self, axis: &Vec3) -> [f64; MOST] {
         let mut along = [0.0; MOST];
@@ -150,7 +155,7 @@ impl Points {
     }
 }
 
-/// Products of two lists.
+/// Returns the elementwise products of two lists.
 #[inline(always)]
 fn times(a: &[f64], b: &[f64]) -> [f64; MOST] {
     let mut product = [0.0; MOST];
@@ -159,7 +164,7 @@ fn times(a: &[f64], b: &[f64]) -> [f64; MOST] {
 }
 
 impl LocalQuadric {
-    /// The square of cells that shares a fit with `index`.
+    /// Returns the tile of the cell `index`, whose cells share one fit.
     pub(super) fn tile(window: &Window, index: usize) -> (usize, usize) {
         (index / window.n_rows / TILE, index % window.n_rows / TILE)
     }
@@ -193,7 +198,7 @@ impl LocalQuadric {
         let [x, y, z] = [&x[..len], &y[..len], &z[..len]];
         let [xx, xy, yy] = [times(x, x), times(x, y), times(y, y)];
         let [xx, xy, yy] = [&xx[..len], &xy[..len], &yy[..len]];
-        // Of the first order nothing is left: the origin is the middle.
+        // The moments of first order vanish: the origin is the mean.
         let second = [dot(x, x), dot(x, y), dot(y, y)];
         let third = [dot(xx, x), dot(xx, y), dot(xy, y), dot(yy, y)];
         let fourth = [dot(xx, xx), dot(xx, xy), dot(xy, xy), dot(xy, yy), dot(yy, yy)];
@@ -204,7 +209,8 @@ impl LocalQuadric {
         moments[10..].copy_from_slice(&fourth);
         let b = SVector::from([0.0, dot(z, x), dot(z, y), dot(z, xx), dot(z, xy), dot(z, yy)]);
         let mut a = SMatrix::from_fn(|i, k| moments[PRODUCTS[i][k]]);
-        // A trace of ridge on the second order alone lets a narrow strip fall back to a plane; the rest is the prior.
+        // The 1 is a small ridge on the second order, so that the fit of a narrow strip becomes a plane; the rest is
+        // the prior.
         let across = sigma * up.dot(&centre.normalize());
         let [by_x, by_y] = along.map(|axis| axis.norm());
         for (k, per_curvature) in [(3, 2.0 * by_x * by_x), (4, by_x * by_y), (5, 2.0 * by_y * by_y)] {
@@ -215,7 +221,8 @@ impl LocalQuadric {
         Some(Self { centre, along, up, coefficients, normal_matrix })
     }
 
-    /// Intersects the face, or its continuation, with the beam in the direction (`column`, `row`) in lattice coordinates of the window.
+    /// Intersects the face, or its continuation, with the beam in the direction (`column`, `row`) in lattice
+    /// coordinates of the window.
     ///
     /// `None` where the continuation does not meet the beam.
     pub(super) fn at(&self, window: &Window, column: f64, row: f64) -> Option<OnFace> {
@@ -233,7 +240,7 @@ impl LocalQuadric {
                 self.up.dot(&beam) - by_x * self.along[0].dot(&beam) - by_y * self.along[1].dot(&beam);
             let step = above / approach;
             range -= step;
-            // Behind the horizon of a bend the beam passes above the face or meets it from below.
+            // Behind the horizon of a bend the beam passes above the face, or meets it from below.
             if approach.is_nan() || approach >= 0.0 || range.is_nan() || range <= 0.0 {
                 return None;
             }
@@ -246,15 +253,16 @@ impl LocalQuadric {
         Some(OnFace { range, point: beam * range, normal: normal.normalize(), at })
     }
 
-    /// Returns the variance of the range there (leverage), in units of that of a sample.
+    /// Returns the leverage at a place: the variance of the range there, in units of that of a sample.
     pub(super) fn leverage(&self, place: &OnFace) -> f64 {
         let f = basis(place.at);
         f.dot(&self.normal_matrix.solve(&f))
     }
 }
 
-/// Fits the plane through points about their centre, which is their origin: two axes at right angles, each over the mean spacing of points
-/// along it, and the unit normal towards the scanner. `None` when the points lie on a line.
+/// Fits a plane through points whose origin is their mean, `centre`. Returns two axes at right angles, each divided by
+/// the mean spacing of the points along it, and the unit normal towards the scanner. `None` when the points lie on a
+/// line.
 #[inline(always)]
 fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
     let [x, y, z] = points.axes();
@@ -276,7 +284,7 @@ fn plane(points: &Points, centre: Vec3) -> Option<([Vec3; 2], Vec3)> {
 mod tests {
     use super::*;
 
-    /// A bent plate's points as far apart as a coarse lattice has them at a grazing beam.
+    /// Points of a bent plate, spaced as in a coarse lattice at grazing incidence.
     #[test]
     fn a_bend_is_continued_beyond_its_points() {
         let radius = 5.0;
@@ -294,11 +302,12 @@ mod tests {
         let off = beyond - face.centre;
         let at = face.along.map(|axis| axis.dot(&off));
         let height = face.up.dot(&off) - basis(at).dot(&face.coefficients);
-        // Of 0.5 mm of noise one part in six is noise across the face here.
+        // One sixth of the 0.5 mm of noise is noise across the face here.
         assert!(height.abs() < 1e-4, "{height}");
     }
 
-    /// Six rows of a plane 5 mm apart and three of a bevel that falls by 50 degrees: how far is the next row below the fit?
+    /// Six rows of a plane 5 mm apart and three of a bevel that falls by 50 degrees; the figure tested is the height of
+    /// the fit above the next row.
     #[test]
     fn under_noise_a_fit_does_not_bend_into_a_bevel() {
         let point = |row: f64, column: f64| {

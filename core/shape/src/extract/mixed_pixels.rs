@@ -1,23 +1,27 @@
-//! Mixed pixels by second differences of the inverse range: beams that straddle an edge return a range between that of the
-//! plate and that of what lies behind it. Own; Masuda et al. do not treat them.
+//! Mixed pixels: classification of cells by second differences of the inverse range.
+//!
+//! A mixed pixel is a cell whose beam straddles an edge; its range lies between those of the plate and of the
+//! background. In: a window and the noise of its ranges. Out: the class of each cell ([`Pixel`]). Own; Masuda et al. do
+//! not treat mixed pixels.
 
 use super::range_noise::Noise;
 use super::window::Window;
 
-/// Bound of a second difference, in its standard deviations. A sound cell is lost with a probability of 6e-7 in one
-/// difference, and is only lost when none of those that explain it holds.
+/// Bound of a second difference, in its standard deviations. A sound cell exceeds it with a probability of 6e-7 in one
+/// difference, and is lost only when it exceeds it in all differences that could explain it.
 const BOUND: f32 = 5.0;
 
-/// The same in parts of the jump between the surfaces on both sides: what is farther away is often noisier than the plate.
+/// Least bound in parts of the jump between the surfaces on both sides: the background is often noisier than the plate.
 const LEAST_SHARE: f32 = 0.002;
 
-/// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: [`BOUND`] times that of a second difference, rounded.
+/// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: [`BOUND`] times that of a
+/// second difference, rounded.
 pub(crate) const DETECTION_LIMIT: f64 = 12.0;
 
 /// Steepest surface, metres of range per metre across the beam: that of an incidence of 85 degrees.
 pub(super) const STEEPEST: f32 = 12.0;
 
-/// Class of a cell by its neighbours.
+/// Class of a cell, determined from its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Pixel {
     /// No return, or too few neighbours.
@@ -29,12 +33,16 @@ pub(super) enum Pixel {
     Mixed,
 }
 
-/// Classifies the cells of a window. Mixed are cells whose range, along the row or along the column, departs by more than the noise allows
-/// from the straight continuation of the two cells on either side and from the middle between its neighbours. In the middle between two surfaces a mixed pixel
-/// lies by chance: it tells a surface no steeper than [`STEEPEST`].
+/// Classifies the cells of a window.
 ///
-/// Straight means in inverse range, so that no limit of the incidence enters. The noise is that of the surface which is continued: the
-/// little that a beam sees of a dark, noisy plate before a bright wall is told by the noise of the wall.
+/// A cell is mixed if its range, along the row or along the column, departs by more than the noise from three
+/// predictions: the straight continuations of the two cells on either side, and the middle between its neighbours. A
+/// mixed pixel may lie in the middle between two surfaces by chance; the middle therefore counts only for a surface no
+/// steeper than [`STEEPEST`].
+///
+/// Straight means in inverse range, so that there is no limit of the incidence. The noise is that of the surface that
+/// is continued: a beam that sees a small part of a dark, noisy plate before a bright wall is detected by the noise of
+/// the wall.
 pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Vec<Pixel> {
     let n_rows = window.n_rows;
     let mut pixels = vec![Pixel::Unknown; window.cells.len()];
@@ -44,7 +52,7 @@ pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Ve
             let here = window.inverse[index];
             if here > 0.0 {
                 let scale = BOUND * 6.0_f32.sqrt() * here * here;
-                // A background of steps seems noisier than it is.
+                // A stepped background seems noisier than it is.
                 let own = noise.of(column, row);
                 let bounds = [own, background.of(column, row).min(own)].map(|noise| scale * noise);
                 let down = along(window, index, (1, window.header.elevation_step), bounds);
@@ -60,8 +68,9 @@ pub(super) fn classify(window: &Window, noise: &Noise, background: &Noise) -> Ve
     pixels
 }
 
-/// Classifies a cell along one direction of the lattice, given by the stride of its cells and the angle between them: mixed when both sides were measured and
-/// nothing explains it. Bounds are those of the component and of the background.
+/// Classifies a cell along one direction of the lattice, given by the stride of its cells and the angle between them.
+/// The cell is mixed when both sides were measured and no prediction holds. The bounds are those of the component and
+/// of the background.
 #[inline]
 fn along(window: &Window, index: usize, (stride, angle): (usize, f64), [own, background]: [f32; 2]) -> Pixel {
     let inverse = &window.inverse;
@@ -102,7 +111,8 @@ mod tests {
 
     const FACE_ROWS: usize = 40;
 
-    /// A face of [`FACE_ROWS`] rows before a surface; `range` gives the range of a row and its standard deviation.
+    /// Window with a face of [`FACE_ROWS`] rows before a surface; `range` gives the range of a row and its standard
+    /// deviation.
     fn window(seed: u64, range: impl Fn(usize) -> (f64, f64)) -> Window {
         let header = ScanHeader {
             n_rows: 80,
@@ -119,7 +129,7 @@ mod tests {
         })
     }
 
-    /// A wall 2 m behind a face; the beams of one row see as much of either that their inverse range is the mean of both.
+    /// A wall 2 m behind a face; the inverse range of one row is the mean of both.
     #[test]
     fn halfway_between_two_surfaces_is_mixed() {
         let window = window(3, |row| match row {
@@ -134,7 +144,7 @@ mod tests {
         assert!(all(Pixel::Sound, FACE_ROWS + 1));
     }
 
-    /// A wall of little noise 2 m behind a face of much; the beams of one row see 1 % of the face, 20 mm of range.
+    /// A wall of low noise 2 m behind a face of high noise; the beams of one row see 1 % of the face, 20 mm of range.
     #[test]
     fn little_of_a_noisy_face_before_a_quiet_wall_is_mixed() {
         let window = window(11, |row| match row {

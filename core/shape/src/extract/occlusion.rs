@@ -1,29 +1,32 @@
-//! Faces joined across an occlusion: curve continuation on the lattice lines that cross both.
+//! Faces joined across an occlusion, by curve continuation on the lattice lines that cross both.
 //!
-//! A chain or the ram in front of the plate can cut its face into several components. Two pieces are one face when, on most
-//! rows or columns that contain both, one smooth curve leads from the one to the other, and what stands between them is nearer
-//! than both or was not measured. The same holds for the two sides of the seam of the scanner's faces, where warm-up columns
-//! are left out. Own; Masuda et al. assume an unobstructed plate.
+//! A chain or the ram in front of the plate can cut its face into several components. Two pieces are one face when, on
+//! most rows or columns that contain both, one smooth curve leads from one piece to the other, and the cells between
+//! them are nearer than both or were not measured. The same holds for the two sides of the seam of the scanner's faces,
+//! where warm-up columns are left out.
+//!
+//! In: the faces of the components. Out: whether two pieces belong to one face. Own; Masuda et al. assume an
+//! unobstructed plate.
 
 use super::faces::Face;
 use super::smoothed_normals::Normal;
 use super::window::Window;
 use crate::Vec3;
 
-/// Cells from a piece's end to where its normal is taken.
+/// Number of cells from a piece's end to the cell whose normal is taken.
 const INSET: usize = 3;
 
-/// Lines (rows or columns) that must hold both pieces, and the part of them that must agree.
+/// Least number of lines (rows or columns) that must contain both pieces, and the part of them that must agree.
 const LEAST_LINES: usize = 8;
 const AGREEING: f64 = 0.6;
 
-/// Smallest radius of curvature across a hidden strip, metres, and what noise may add to an angle, radians.
+/// Smallest radius of curvature across a hidden strip, metres, and the error of an angle due to noise, radians.
 const LEAST_RADIUS: f64 = 2.0;
 const ANGLE_NOISE: f64 = 0.06;
 
-/// Largest distance of an end from the curve, metres: the scanner's two faces disagree by millimetres, and where the
-/// columns left out at their seam are few, this and the noise of a single sample turn the chord far more than
-/// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far above.
+/// Largest distance of an end from the curve, metres. The scanner's two faces disagree by millimetres; where few
+/// columns are left out at their seam, this and the noise of a single sample turn the chord by far more than
+/// [`ANGLE_NOISE`]. The least thickness of a plate that lies on another one is far larger.
 const STEP: f64 = 3e-3;
 
 /// Widest hidden strip, metres.
@@ -36,23 +39,23 @@ struct End {
     place: u32,
     point: Vec3,
     normal: Vec3,
-    /// The cell next to it is nearer, or was not measured.
+    /// True when one of the next [`INSET`] cells is nearer, or none of them was measured.
     hidden: bool,
-    /// Cells next to it that were not measured, up to [`INSET`].
+    /// Number of cells directly next to it that were not measured, up to [`INSET`].
     unmeasured: u32,
 }
 
 /// A face of one component, with its ends on all rows and columns.
 #[derive(Debug, Clone)]
 pub(super) struct FacePiece {
-    /// Number of the surface that it is a face of.
+    /// Number of the component of which it is a face.
     pub(super) surface: usize,
     pub(super) label: u32,
     pub(super) area: f64,
     pub(super) n_cells: usize,
-    /// Share of its ends on rows and columns beside which something is nearer, or nothing was measured.
+    /// Share of its ends on rows and columns beside which an object is nearer, or nothing was measured.
     pub(super) hidden: f64,
-    /// Points on it for its extent: about one in 256 cells.
+    /// Points on the piece that give its extent: its ends on every fourth row and column.
     pub(super) outline: Vec<Vec3>,
     rows: Ends,
     columns: Ends,
@@ -85,7 +88,7 @@ impl FacePiece {
         Self { surface, label, area, n_cells, hidden, outline, rows, columns }
     }
 
-    /// Returns true when `other` continues this piece behind something nearer.
+    /// Returns true when `other` continues this piece behind a nearer object.
     pub(super) fn continues_in(&self, other: &Self) -> bool {
         agree(&self.rows, &other.rows) || agree(&self.columns, &other.columns)
     }
@@ -99,7 +102,7 @@ fn lines(window: &Window, labels: &[u32], label: u32, normals: &[Normal], rows: 
         (window.n_columns, n_rows, window.first_column, window.first_row)
     };
     let index = |line: usize, place: usize| if rows { place * n_rows + line } else { line * n_rows + place };
-    // First and last place of each line, from one pass through the cells as they lie.
+    // First and last place of each line, from one pass through the cells in their order in memory.
     let mut spans: Vec<Option<[usize; 2]>> = vec![None; n_lines];
     for (column, labels) in labels.chunks_exact(n_rows.max(1)).enumerate() {
         for (row, _) in labels.iter().enumerate().filter(|(_, of_cell)| **of_cell == label) {
@@ -149,8 +152,8 @@ fn agree(a: &Ends, b: &Ends) -> bool {
     together >= LEAST_LINES && agreeing as f64 >= AGREEING * together as f64
 }
 
-/// Returns true when a curve of nearly constant curvature leads from one end to the other, which lies farther on their line:
-/// the chord makes equal and opposite angles with the surface at both, as far as a small step between them lets it.
+/// Returns true when a curve of nearly constant curvature leads from end `a` to end `b` farther on the same line: the
+/// chord makes equal and opposite angles with the surface at both ends, within the noise and a small step between them.
 fn one_curve(a: &End, b: &End) -> bool {
     let chord = b.point - a.point;
     let length = chord.norm();

@@ -1,11 +1,13 @@
-//! Patch: the samples on the plate's scanned face and the crossings of its boundary, output of the extraction.
+//! Patch: samples on the plate's scanned face and crossings of its boundary, the output of the extraction.
+//!
+//! A crossing is the place where a row or a column of the lattice leaves the face.
 
 use crate::Vec3;
 
 /// One sample on the scanned face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Position, metres, scanner frame. The scanner stands in the origin.
+    /// Position, metres, scanner frame. The scanner is at the origin.
     pub point: Vec3,
     /// Column of the lattice.
     pub column: u32,
@@ -20,20 +22,20 @@ pub struct Sample {
 /// Kind of object next to a cell of the face along its row or column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beyond {
-    /// An object farther away than the face would be if it went on: the plate ends here.
+    /// An object farther away than the continuation of the face: the plate ends here.
     Behind,
-    /// The plate's side face: it ends here too.
+    /// The plate's side face: the face ends here too.
     SideFace,
-    /// A nearer object: it hides what lies behind it, the plate may go on.
+    /// A nearer object, behind which the plate may continue.
     InFront,
-    /// No return: the plate ends in front of nothing, or it is a patch without echo.
+    /// No return: the plate ends without a background, or the cell is part of a patch without echo.
     Nothing,
 }
 
 /// A plane of the background: a floor, a wall, a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneBehind {
-    /// Equal for all cells that see it.
+    /// Number of the plane, equal for all cells that see it.
     pub number: u8,
     /// Distance from the scanner, metres.
     pub distance: f32,
@@ -66,9 +68,10 @@ impl PlaneSet {
 /// Mixed pixels along a row or a column: their beams straddle the end of the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MixedPixels {
-    /// The nearest and the farthest of them, metres, scanner frame, on the continuation of the smoothed face.
+    /// The mixed pixels nearest to and farthest from the face, on the continuation of the smoothed face, metres,
+    /// scanner frame.
     pub ends: [Vec3; 2],
-    /// Range of the nearest minus that of the continuation there, metres.
+    /// Range of the nearest one minus that of the continuation there, metres.
     pub excess: f32,
 }
 
@@ -77,30 +80,30 @@ pub struct MixedPixels {
 pub struct Crossing {
     /// The last cell inside, as an index into [`Patch::samples`].
     pub sample: u32,
-    /// Step from it along the lattice: -1, 0 or 1 columns and rows, one of them 0.
+    /// Step from that cell along the lattice: -1, 0 or 1 columns and rows, one of the two 0.
     pub step: [i8; 2],
-    /// Cells from `inside` to `outside`; 0 where the place was found between two of them.
+    /// Number of cells from `inside` to `outside`; 0 where the end of the face was located between two cells.
     pub cells: u16,
-    /// The end of the face lies between this point, metres, scanner frame, ...
+    /// Last point inside, metres, scanner frame. The end of the face lies between `inside` and `outside`.
     pub inside: Vec3,
-    /// ... and this one. Both lie on the smoothed face and its continuation.
+    /// First point outside, metres, scanner frame. Both points lie on the smoothed face or its continuation.
     pub outside: Vec3,
     /// Unit normal of the face towards the scanner.
     pub normal: Vec3,
-    /// Mixed pixels between them.
+    /// Mixed pixels between `inside` and `outside`.
     pub mixed: Option<MixedPixels>,
-    /// Those of them in front of all planes of `strips`: they see the plate, whatever else they see.
+    /// Mixed pixels in front of all planes of `strips`: these certainly see the plate.
     pub surely_mixed: Option<MixedPixels>,
-    /// Planes of the background between the face and the cell at `outside` that the beams of the mixed pixels meet, if they reach so far:
-    /// a strip of them may show here.
+    /// Planes of the background between the face and the cell at `outside` that the beams of the mixed pixels would
+    /// meet if the planes extended so far: a strip of such a plane may be visible here.
     pub strips: PlaneSet,
-    /// True when every cell between them was measured: none but those is mixed.
+    /// True when every cell between `inside` and `outside` was measured, so that `mixed` contains all mixed pixels.
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
     pub excess: f32,
-    /// Plane of the background that holds that cell.
+    /// Plane of the background on which that cell lies.
     pub background: Option<PlaneBehind>,
-    /// Kind of object that ends it.
+    /// Kind of object next to the face.
     pub beyond: Beyond,
 }
 
@@ -109,7 +112,7 @@ pub struct Crossing {
 pub struct Patch {
     /// Samples, ordered by (column, row), each cell at most once.
     pub samples: Vec<Sample>,
-    /// Ends of the face along rows and columns, ordered by sample. Cells without return inside the face are none.
+    /// Ends of the face along rows and columns, ordered by sample. Cells without return inside the face are not ends.
     pub crossings: Vec<Crossing>,
     /// Angle between neighbouring columns, radians.
     pub azimuth_step: f64,

@@ -1,33 +1,38 @@
 //! Selection of the plate among the candidate faces, by area and by the sides of the smallest rectangle around each.
 //!
-//! Masuda et al. leave the selection open.
+//! In: the faces of all components, some of them in several pieces. Out: the one candidate of the plate's size, or a
+//! [`Refusal`] when none or several fit. Own; Masuda et al. leave the selection open.
 
 use super::occlusion::FacePiece;
 use super::refusal::Refusal;
 use crate::{PlateSpec, Vec3};
 
-/// Area of the plate's visible face in parts of W x H: below, too much of it is hidden; above, it is another plate. The face's own area differs from W x H by less than one part in a hundred.
+/// Area of the plate's visible face in parts of W x H. Below, too much of the face is hidden; above, it is another
+/// plate. The face's own area differs from W x H by less than one part in a hundred.
 const AREA: std::ops::Range<f64> = 0.5..1.1;
 
 /// Sides of the smallest rectangle around the face, in the plane, in parts of W and H. A plate bent to R 3 m over 5 m
-/// spans 0.89 of its length; something in front of an edge takes more.
+/// spans 0.89 of its length; an object in front of an edge reduces it further.
 const SIDE: std::ops::Range<f64> = 0.82..1.06;
 
 /// The widest spacing of samples on the plate, metres, at which its corners are located to some millimetres.
 const WIDEST_SPACING: f64 = 0.025;
 
-/// A face from this part of W x H on is reported as one of another size.
+/// Least area, in parts of W x H, of a face that is reported as one of another size.
 const NOTABLE: f64 = 0.15;
 
-/// Where several faces fit: the plate's own differs in area from W x H by less than this, as a logarithm (the rim of a face is lost over
-/// some cells), and one of another size differs from it by more than that.
+/// Bounds where several faces fit, as logarithms of a ratio of areas. The plate's own face differs from W x H by less
+/// than `OWN_AREA` (the rim of a face is lost over some cells); a face of another size differs from the plate's by more
+/// than `OTHER_AREA`.
 const OWN_AREA: f64 = 0.1;
 const OTHER_AREA: f64 = 0.08;
 
-/// A face with fewer of its ends hidden is seen whole.
+/// Share of hidden ends below which a face counts as seen whole.
 const WHOLE: f64 = 0.05;
 
-/// A face lies behind the plate when that hides this part of its rectangle, and of what is missing in it: what stands on a table hides more.
+/// A face lies behind the plate when the plate hides at least the part `BEHIND` of the face's rectangle, and at least
+/// `BEHIND_OF_MISSING` of the part of the rectangle in which the face is not seen. An object that stands on a table
+/// hides more.
 const BEHIND: f64 = 0.1;
 const BEHIND_OF_MISSING: f64 = 0.5;
 
@@ -39,7 +44,7 @@ pub(super) struct Candidate {
     area: f64,
     /// Side of the square of the face that a cell stands for, metres.
     spacing: f64,
-    /// Largest share of hidden ends of its pieces.
+    /// Largest share of hidden ends among its pieces.
     hidden: f64,
     centre: Vec3,
     rectangle: Rectangle,
@@ -63,8 +68,8 @@ impl Candidate {
             && (0..2).all(|k| SIDE.contains(&(self.rectangle.sides[k] / expected[k])))
     }
 
-    /// Returns true when this face, next to the plate's, is not the plate: it is seen whole and has another size, or it lies behind the
-    /// plate, as a table does, which hides the rest of it.
+    /// Returns true when this face, next to the plate's, is not the plate: it has another size and either is seen whole
+    /// or lies behind the plate, which hides the rest of it (a table).
     fn is_another_than(&self, plate: &Self) -> bool {
         let has_other_size = (self.area / plate.area).ln().abs() > OTHER_AREA;
         let missing = 1.0 - self.area / (self.rectangle.sides[0] * self.rectangle.sides[1]);
@@ -77,7 +82,7 @@ fn sides(spec: &PlateSpec) -> [f64; 2] {
     [spec.width.max(spec.height), spec.width.min(spec.height)]
 }
 
-/// Joins pieces that continue each other.
+/// Joins pieces that continue each other to candidates.
 pub(super) fn candidates(pieces: &[FacePiece]) -> Vec<Candidate> {
     let mut group: Vec<usize> = (0..pieces.len()).collect();
     for a in 0..pieces.len() {
@@ -92,10 +97,11 @@ pub(super) fn candidates(pieces: &[FacePiece]) -> Vec<Candidate> {
     (0..pieces.len()).map(members).filter(|m| !m.is_empty()).map(|m| Candidate::of(pieces, m)).collect()
 }
 
-/// Selects the one candidate that fits the plate, or the one of its size where the others can be told from it. `step` is the angle between beams, radians.
+/// Selects the one candidate that fits the plate, or the one nearest to its size where the others are distinguished
+/// from it. `step` is the angle between beams, radians.
 ///
 /// # Errors
-/// [`Refusal`] when none or several do, or its samples lie too far apart.
+/// [`Refusal`] when none or several fit, or the samples lie too far apart.
 pub(super) fn select<'a>(
     candidates: &'a [Candidate],
     spec: &PlateSpec,
@@ -117,7 +123,7 @@ pub(super) fn select<'a>(
     }
 }
 
-/// Refuses samples that lie `spacing` apart on the plate, metres, where that is too far.
+/// Refuses a spacing of the samples on the plate, metres, that is too wide.
 pub(super) fn check_spacing(spacing: f64, step: f64) -> Result<(), Refusal> {
     if spacing <= WIDEST_SPACING {
         return Ok(());
@@ -134,7 +140,7 @@ fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
     let closeness = |c: &&Candidate| (c.area / plate).ln().abs();
     let nearest = candidates.iter().min_by(|a, b| closeness(a).total_cmp(&closeness(b)));
     match nearest {
-        // The rim of a face is lost over some cells: one of few cells seems smaller than it is.
+        // The rim of a face is lost over some cells: a face of few cells seems smaller than it is.
         Some(face) if face.area > NOTABLE * plate => match check_spacing(face.spacing, step) {
             Err(too_coarse) => too_coarse,
             Ok(()) => Refusal::WrongSize {
@@ -154,8 +160,9 @@ fn why_none(candidates: &[Candidate], spec: &PlateSpec, step: f64) -> Refusal {
 /// The smallest rectangle around points in their principal plane.
 #[derive(Debug, Clone, Copy)]
 struct Rectangle {
-    /// Its middle, and unit vectors along its sides.
+    /// Middle of the rectangle.
     middle: Vec3,
+    /// Unit vectors along the sides.
     along: [Vec3; 2],
     /// Longer and shorter side, metres.
     sides: [f64; 2],
@@ -240,7 +247,7 @@ mod tests {
         let at = plate.centre.into();
         let stack = |part, hidden| face([6.0, 4.0, -3.5], [2.78, 2.32], part, hidden);
         assert_eq!(selected(&[stack(1.0, 0.0), plate.clone()]).ok(), Some(at));
-        // Hidden in part, it may be the plate; and of the same size too.
+        // A stack that is hidden in part may be the plate; so may one of the same size.
         assert!(matches!(selected(&[stack(1.0, 0.2), plate.clone()]), Err(Refusal::SeveralPlates { .. })));
         let same = face([6.0, 4.0, -3.5], [3.0, 2.5], 0.95, 0.0);
         assert!(matches!(selected(&[same, plate]), Err(Refusal::SeveralPlates { .. })));
@@ -253,9 +260,9 @@ mod tests {
         // Half a metre below; the plate hides a part of it.
         let table = |y, part| face([6.2, y, -4.0], [2.9, 2.4], part, 0.5);
         assert_eq!(selected(&[table(0.0, 0.55), plate.clone()]).ok(), Some(at));
-        // Beside it, something else hides it.
+        // Beside the plate: another object hides the table.
         assert!(matches!(selected(&[table(4.0, 0.55), plate.clone()]), Err(Refusal::SeveralPlates { .. })));
-        // The plate itself is hidden in part: none is of its size.
+        // The plate itself is hidden in part: no face has its size.
         let hidden = face([6.0, 0.0, -3.5], [3.0, 2.5], 0.8, 0.2);
         assert!(matches!(selected(&[table(0.0, 0.55), hidden]), Err(Refusal::SeveralPlates { .. })));
     }

@@ -1,18 +1,21 @@
 //! Range noise from the scan itself: median absolute third difference of the inverse range, block by block.
 //!
-//! Third differences of the inverse range down a column vanish on every smooth surface at any incidence; what
-//! is left is noise. Its median absolute value, block by block, is a robust standard deviation: heavy tails, mixed
-//! pixels and edges hardly move it.
+//! Third differences of the inverse range down a column vanish on every smooth surface at any incidence; the remainder
+//! is noise. Its median absolute value in a block gives a robust standard deviation, which heavy tails, mixed pixels
+//! and edges hardly change.
+//!
+//! In: the inverse ranges of a window. Out: the standard deviation of the range by cell, metres.
 
 use super::window::Window;
 
-/// Blocks of the estimate, columns and rows: small against a plate, large enough for a median.
+/// Size of a block, columns and rows: small compared with a plate, large enough for a median.
 const BLOCK: (usize, usize) = (16, 32);
 
-/// A block with fewer differences takes the pooled value.
+/// Least number of differences in a block; a block with fewer takes the pooled value.
 const LEAST_COUNT: usize = 64;
 
-/// Lower bound of the estimate, metres; a simulated one without noise would leave no room for a plate's curvature.
+/// Lower bound of the estimate, metres: zero, as in a simulated scan without noise, would leave no room for a plate's
+/// curvature.
 const LEAST: f32 = 1e-4;
 
 /// Median of |x| of a normal variable of unit variance.
@@ -24,7 +27,7 @@ const THIRD_DIFFERENCE_GAIN: f32 = 20.0;
 /// Standard deviation of the range over a window.
 #[derive(Debug, Clone)]
 pub(super) struct Noise {
-    /// Over all blocks, metres.
+    /// Standard deviation over all blocks, metres.
     pub(super) pooled: f32,
     block: Vec<f32>,
     blocks_down: usize,
@@ -32,7 +35,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Estimates the noise from the usable cells; without any, it is the lower bound.
+    /// Estimates the noise from the usable cells. Returns the lower bound when there are none.
     pub(super) fn estimate(window: &Window, usable: &[bool]) -> Self {
         let (n_columns, n_rows) = (window.n_columns, window.n_rows);
         let blocks_down = n_rows.div_ceil(BLOCK.1);
@@ -60,7 +63,7 @@ impl Noise {
         Self { pooled, block, blocks_down, n_rows }
     }
 
-    /// Estimates the noise of the background, all measured cells off the component.
+    /// Estimates the noise of the background, that is, of all measured cells off the component.
     pub(super) fn of_background(window: &Window) -> Self {
         let off = window.own.iter().zip(&window.inverse).map(|(own, inverse)| !own && *inverse > 0.0);
         Self::estimate(window, &off.collect::<Vec<bool>>())
@@ -71,7 +74,7 @@ impl Noise {
         self.of(index / self.n_rows, index % self.n_rows)
     }
 
-    /// Returns the same by column and row.
+    /// Returns the standard deviation at a cell given by column and row, metres.
     #[inline]
     pub(super) fn of(&self, column: usize, row: usize) -> f32 {
         self.block[column / BLOCK.0 * self.blocks_down + row / BLOCK.1]

@@ -17,10 +17,10 @@ pub enum Refusal {
         /// Radians.
         elevation_step: f64,
     },
-    /// The plate file gives no plate.
+    /// The plate file gives no size.
     #[error("the plate is {width_mm} x {height_mm} mm in the plate file; both must be above zero")]
     NoSize { width_mm: f64, height_mm: f64 },
-    /// Nothing in the scan comes near the plate's size.
+    /// No face in the scan is near the plate's size.
     #[error(
         "no plate in the scan: the largest connected face {} has {largest_m2:.2} m2, the plate {expected_m2:.2} m2; \
          check the scan window{}",
@@ -43,7 +43,7 @@ pub enum Refusal {
     WrongSize {
         /// Middle of the face, metres.
         at: Vec3,
-        /// Longer and shorter side of the smallest rectangle around it, millimetres.
+        /// Longer and shorter side of the smallest rectangle around the face, millimetres.
         found_mm: [f64; 2],
         /// Longer and shorter side of the plate, millimetres.
         expected_mm: [f64; 2],
@@ -70,7 +70,7 @@ pub enum Refusal {
     TooCoarse {
         /// Side of the square of the face that a sample stands for, millimetres.
         spacing_mm: f64,
-        /// The widest that is measured, millimetres.
+        /// Widest spacing that is measured, millimetres.
         widest_mm: f64,
         step_deg: f64,
     },

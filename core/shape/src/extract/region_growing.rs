@@ -1,8 +1,11 @@
-//! The chosen face to the cell: erosion, then region growing by the raw ranges.
+//! Cells of the selected face, by erosion and region growing on the raw ranges.
 //!
-//! Normals of the low-pass copy separate faces but do not locate where one ends: they turn over a few cells, and where a side
-//! face is only a few cells wide the region extends onto it. So the region is eroded first, and then grown cell by cell as
-//! far as the raw ranges continue the surface (`local_quadric`). Own; Masuda et al. keep the region of the normals.
+//! Normals of the low-pass copy separate faces but do not locate their ends: the normals turn over a few cells, and
+//! where a side face is only a few cells wide the region extends onto it. The region is therefore eroded first, then
+//! grown cell by cell as far as the raw ranges continue the surface (`local_quadric`).
+//!
+//! In: the region found by the normals. Out: the face, as a mask over the cells of the window. Own; Masuda et al. keep
+//! the region of the normals.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,30 +15,31 @@ use super::range_noise::Noise;
 use super::smoothed_normals::{Normal, cos_between};
 use super::window::Window;
 
-/// Cells by which the region is eroded beyond the reach of slopes: half of the widest bridge to a side face.
+/// Number of cells by which the region is eroded beyond the reach of slopes: half of the widest bridge to a side face.
 const WEAR: usize = 1;
 
 /// Largest residual of a cell of the face, in standard deviations of its prediction.
 const RESIDUAL_BOUND: f64 = 4.0;
 
-/// Last rings that the fit behind a judgement leaves out.
+/// Number of last rings that are left out of the fit used to test a cell.
 const UNTRUSTED_RINGS: usize = 1;
 
-/// Cosine of 72 degrees: a normal of the low-pass copy that differs by more is that of a side face, whatever the range.
+/// Cosine of 72 degrees: a cell whose normal in the low-pass copy differs by more belongs to a side face, whatever its
+/// range.
 const COS_OTHER_FACE: f32 = 0.3;
 
-/// Upper bound of the leverage (variance of a prediction in that of a sample) counted in the bound of a residual.
+/// Upper limit of the leverage (variance of a prediction in units of that of a sample) in the bound of a residual.
 const MOST_LEVERAGE: f64 = 0.5;
 
-/// Erodes `region` and keeps its largest connected component: the core of the face. `slope_reach` is that of the normals that
-/// the region was found by.
+/// Erodes `region` and returns its largest connected component: the core of the face. `slope_reach` is that of the
+/// normals by which the region was found.
 pub(super) fn erode(window: &Window, region: &[bool], slope_reach: usize) -> Vec<bool> {
     let near_edge = widen(&obstacles(window, region), window.n_rows, slope_reach + WEAR);
     let core: Vec<bool> = region.iter().zip(&near_edge).map(|(region, near)| *region && !*near).collect();
     largest_component(&core, window.n_rows)
 }
 
-/// Valid cells outside of the region, but for specks inside of it.
+/// Marks the valid cells outside of the region, except specks inside of it.
 fn obstacles(window: &Window, region: &[bool]) -> Vec<bool> {
     let n_rows = window.n_rows;
     let is_speck = |index: usize| {
@@ -44,13 +48,13 @@ fn obstacles(window: &Window, region: &[bool]) -> Vec<bool> {
             return false;
         }
         let around = (column - 2..=column + 2).flat_map(|c| (row - 2..=row + 2).map(move |r| c * n_rows + r));
-        // A straight edge leaves 10 of 25, a notch of a right angle 16.
+        // Beside a straight edge 10 of the 25 cells are in the region, in a notch of a right angle 16.
         around.filter(|&i| region[i]).count() > 16
     };
     (0..region.len()).map(|i| window.cells[i].valid && !region[i] && !is_speck(i)).collect()
 }
 
-/// Sets all cells within `by` rows and columns of a set one.
+/// Sets all cells within `by` rows and columns of a cell that is set.
 fn widen(mask: &[bool], n_rows: usize, by: usize) -> Vec<bool> {
     let along = |mask: &[bool], stride: usize| {
         let mut wide = mask.to_vec();
@@ -69,12 +73,13 @@ fn largest_component(mask: &[bool], n_rows: usize) -> Vec<bool> {
     let (label, n) = label_components(mask, n_rows);
     let mut sizes = vec![0_usize; n];
     label.iter().filter(|label| **label != NO_LABEL).for_each(|label| sizes[*label as usize] += 1);
-    // Of equal ones the first.
+    // Of components of equal size the first.
     let largest = (0..n as u32).rev().max_by_key(|label| sizes[*label as usize]);
     label.iter().map(|label| Some(*label) == largest).collect()
 }
 
-/// Returns the four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each other.
+/// Returns the four neighbours of a cell, as far as they exist. Windows have margins, so columns do not run into each
+/// other.
 fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize> {
     [at.checked_sub(n_rows), at.checked_sub(1), Some(at + 1), Some(at + n_rows)]
         .into_iter()
@@ -84,10 +89,10 @@ fn neighbours(at: usize, n_rows: usize, n: usize) -> impl Iterator<Item = usize>
 
 /// Grows `core`, ring by ring, over all neighbouring cells whose ranges continue it within the noise.
 ///
-/// A cell is judged when it first touches the face, by a quadratic fit to the face around it, and again when it touches
-/// it elsewhere if it was rejected by a fit of high leverage. The last rings have no part in the fit: a side
-/// face whose first cells lie within the noise must not bend it. And no cell may have the normal of another face than
-/// the cell of the core from which it was reached.
+/// - A cell is tested when it first touches the face, by a quadratic fit to the face around it. A cell rejected by a
+///   fit of high leverage is tested again when it touches the face elsewhere.
+/// - The last rings are left out of the fit: a side face whose first cells lie within the noise must not bend it.
+/// - A cell whose normal is that of another face than the cell of the core from which it was reached is rejected.
 pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec<bool>) -> Vec<bool> {
     let n_rows = window.n_rows;
     let mut rings: VecDeque<Vec<usize>> = VecDeque::new();
@@ -132,7 +137,8 @@ pub(super) fn grow(window: &Window, noise: &Noise, normals: &[Normal], core: Vec
     face
 }
 
-/// Returns true when a cell has the normal of another face than a cell of the core; cells beyond the component have none.
+/// Returns true when a cell has the normal of another face than a cell of the core; cells beyond the component have no
+/// normal.
 fn is_other_face(normals: &[Normal], cell: usize, core: usize) -> bool {
     cos_between(&normals[cell], &normals[core]).is_some_and(|cos| cos < COS_OTHER_FACE)
 }
@@ -141,12 +147,12 @@ fn is_other_face(normals: &[Normal], cell: usize, core: usize) -> bool {
 struct Judgement {
     /// Cells that continue the face.
     continuing: Vec<usize>,
-    /// Cells rejected where the prediction itself is uncertain: to be tested again.
+    /// Cells rejected where the prediction itself is uncertain; they are tested again.
     open: Vec<usize>,
 }
 
-/// Tests which cells continue a fit: each within its noise, and all together within theirs, since a side face whose
-/// first row is within the noise is not so as a row.
+/// Tests which cells continue a fit: each within its own noise, and their mean within the noise of the mean. Single
+/// cells in the first row of a side face may be within the noise, the row as a whole is not.
 fn judge(window: &Window, noise: &Noise, fit: &LocalQuadric, cells: &[usize]) -> Judgement {
     let residuals = cells.iter().filter_map(|&cell| {
         let (x, y) = window.place_of(cell);

@@ -1,4 +1,4 @@
-//! One component of the lattice with everything computed of it, in order: noise, mixed pixels, normals, faces.
+//! Component of the lattice with the results computed for it, in order: noise, mixed pixels, normals, faces.
 
 use super::background_planes::{self, Background};
 use super::continuity::Continuity;
@@ -12,13 +12,13 @@ use super::window::Window;
 /// A component with its noise, mixed pixels, normals and faces.
 #[derive(Debug, Clone)]
 pub(super) struct SegmentedComponent {
-    /// The component, or the first of several.
+    /// Root of the component, or of the first of several.
     pub(super) root: u32,
     pub(super) window: Window,
     pub(super) noise: Noise,
     pub(super) pixels: Vec<Pixel>,
     pub(super) background: Background,
-    /// Cells on each side over which the normals' slopes are taken.
+    /// Number of cells on each side over which the normals' slopes are taken.
     pub(super) slope_reach: usize,
     pub(super) normals: Vec<Normal>,
     labels: Vec<u32>,
@@ -39,7 +39,8 @@ impl SegmentedComponent {
         Self { root, window, noise, pixels, background, slope_reach, normals, labels, faces }
     }
 
-    /// Returns the faces of at least `least` square metres. `number` is the surface's own, for [`FacePiece::surface`].
+    /// Returns the faces of at least `least` square metres. `number` is that of this component, for
+    /// [`FacePiece::surface`].
     pub(super) fn pieces(&self, number: usize, least: f64) -> impl Iterator<Item = FacePiece> {
         let notable = self.faces.iter().filter(move |face| face.area >= least);
         notable.map(move |face| FacePiece::new(number, &self.window, &self.labels, face, &self.normals))
@@ -53,7 +54,7 @@ impl SegmentedComponent {
         sum / f64::from(n.max(1)) * (header.azimuth_step * header.elevation_step).sqrt()
     }
 
-    /// Returns the cells of a face as cells of another window that holds this one.
+    /// Returns the cells of a face as cells of another window that contains this one.
     pub(super) fn region(&self, label: u32, into: &Window) -> Vec<bool> {
         let mut region = vec![false; into.cells.len()];
         let columns = (self.window.first_column - into.first_column) as usize;

@@ -1,9 +1,11 @@
 //! Normals of a low-pass copy of the inverse range, by Taubin's filter (Masuda et al., 3.1).
 //!
-//! Taubin, "A signal processing approach to fair surface design" (1995), reference 7 of Masuda et al.: steps
-//! of diffusion with a positive and a slightly larger negative factor in turn. Filtering the inverse range and
-//! not the positions moves samples along their beams only and leaves planes where they are. The copy serves the
-//! normals and nothing else.
+//! The filter takes diffusion steps with a positive and a slightly larger negative factor in turn. The inverse range is
+//! filtered instead of the positions: samples then move along their beams only, and planes stay where they are. The
+//! filtered copy serves the normals only.
+//!
+//! In: a window and the cells to use. Out: unit normals towards the scanner. Source: Taubin, "A signal processing
+//! approach to fair surface design" (1995), reference 7 of Masuda et al.
 
 use std::ops::Range;
 
@@ -15,10 +17,11 @@ use super::window::Window;
 /// Factors of the two half steps; their pass band ends at 1 / 0.5 - 1 / 0.53 = 0.11.
 const FACTORS: [f32; 2] = [0.5, -0.53];
 
-/// Pairs of half steps. Ten bring the noise of a slope down to a quarter (flat, unit lattice).
+/// Number of pairs of half steps. Ten pairs reduce the noise of a slope to a quarter (flat, unit lattice).
 const PAIRS: usize = 10;
 
-/// Returns the smoothed inverse ranges of the cells where `usable` holds; those of the others are left as they are.
+/// Returns the inverse ranges, smoothed at the cells where `usable` is true; those of the other cells are left
+/// unchanged.
 pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity) -> Vec<f32> {
     let n_rows = window.n_rows;
     // The first and the last column are margin and stay as they are.
@@ -26,8 +29,8 @@ pub(super) fn low_pass(window: &Window, usable: &[bool], continuity: &Continuity
         (1..window.n_columns - 1).map(|c| (c, window.spans[c].clone())).collect();
     let links = Links::of(window, usable, continuity, &spans);
     let mut copies = [window.inverse.clone(), window.inverse.clone()];
-    // A half step of a column needs the one before of its two neighbours, so the half steps follow each other through
-    // the columns, one column apart: what a column needs is still in the cache.
+    // A half step of a column requires the previous half step of both neighbours. The half steps follow each other
+    // through the columns, one column apart, so that the values required are still in the cache.
     dispatch_simd(
         #[inline(always)]
         || {
@@ -54,7 +57,7 @@ struct Links {
 }
 
 impl Links {
-    /// The links of the usable cells of columns, each with its rows.
+    /// Determines the links of the usable cells of `columns`, given with their rows.
     fn of(
         window: &Window,
         usable: &[bool],
@@ -62,7 +65,7 @@ impl Links {
         columns: &[(usize, Range<usize>)],
     ) -> Self {
         let (n, n_rows) = (window.cells.len(), window.n_rows);
-        // A range of 0 is joined to none.
+        // A range of 0 is joined to no other.
         let mut ranges = vec![0.0_f32; n];
         for (column, rows) in columns {
             let cells = column * n_rows + rows.start..column * n_rows + rows.end;
@@ -102,7 +105,7 @@ impl Links {
         Self { down, across, per_link }
     }
 
-    /// One half step of some cells of a column.
+    /// Performs one half step on some cells of a column.
     #[inline(always)]
     fn diffuse(&self, from: &[f32], to: &mut [f32], cells: Range<usize>, n_rows: usize, factor: f32) {
         let (start, len) = (cells.start, cells.len());
@@ -123,11 +126,13 @@ impl Links {
     }
 }
 
-/// Noise of the range in parts of the spacing of samples from which slopes are taken over more cells; and most cells.
+/// Noise of the range, in parts of the spacing of samples, for which a slope is taken over one more cell; and the
+/// largest number of cells.
 const NOISE_PER_CELL: f32 = 0.1;
 const MOST_CELLS: usize = 4;
 
-/// Returns the cells on each side over which slopes are taken, so that noise turns normals by a few degrees at most.
+/// Returns the number of cells on each side over which slopes are taken, such that noise turns normals by a few degrees
+/// at most.
 pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
     let (sum, n) = window
         .inverse
@@ -143,7 +148,7 @@ pub(super) fn slope_reach(window: &Window, noise: f32) -> usize {
 /// A unit normal, zero where there is none.
 pub(super) type Normal = [f32; 3];
 
-/// Returns the cosine of the angle between two normals, where there are both.
+/// Returns the cosine of the angle between two normals; `None` where one is missing.
 #[inline]
 pub(super) fn cos_between(a: &Normal, b: &Normal) -> Option<f32> {
     let both = *a != Normal::default() && *b != Normal::default();
@@ -176,7 +181,7 @@ pub(super) fn normals(window: &Window, smooth: &[f32], usable: &[bool], reach: u
     normals
 }
 
-/// Difference per cell between the farthest usable neighbours within `reach`.
+/// Returns the difference per cell between the farthest usable neighbours within `reach`.
 #[inline]
 fn slope(values: &[f32], usable: &[bool], index: usize, stride: usize, reach: usize) -> Option<f32> {
     let behind = (1..=reach).rev().find(|k| usable[index + k * stride]).unwrap_or(0);

@@ -1,4 +1,6 @@
-//! Window: one component of the lattice and its margin as a dense grid.
+//! Window: one or more components of the lattice and their margin as a dense grid.
+//!
+//! In: the roots of the components and the stored columns. Out: ranges, inverse ranges and positions by cell.
 
 use std::ops::Range;
 
@@ -17,14 +19,14 @@ pub(super) struct Window {
     pub(super) n_columns: usize,
     pub(super) n_rows: usize,
     pub(super) cells: Vec<Cell>,
-    /// Inverse range, 1/m; 0 where a cell is not valid. Along rows and columns of the lattice that of a plane is
-    /// a sine of the angle, straight to within the square of the step, at any incidence.
+    /// Inverse range, 1/m; 0 where a cell is not valid. Along rows and columns of the lattice the inverse range of a
+    /// plane is a sine of the angle, hence straight to within the square of the step at any incidence.
     pub(super) inverse: Vec<f32>,
     /// Positions of the valid cells, metres.
     pub(super) points: Vec<[f64; 3]>,
     /// Cells of the component.
     pub(super) own: Vec<bool>,
-    /// Per column the rows between which cells are filled; a plate that lies askew leaves half of the window empty.
+    /// Rows between which cells are filled, per column; a plate that lies askew leaves half of the window empty.
     pub(super) spans: Vec<Range<usize>>,
     pub(super) header: ScanHeader,
     /// Nominal azimuth of each column and elevation of each row.
@@ -86,7 +88,8 @@ impl Window {
         window
     }
 
-    /// Builds a window of given ranges, 0 where there is none, and whether each cell is part of the component, by column and row.
+    /// Builds a window from a function of column and row: the range, 0 where there is none, and whether the cell is
+    /// part of the component.
     #[cfg(test)]
     pub(super) fn of_ranges(header: ScanHeader, range: impl Fn(usize, usize) -> (f32, bool)) -> Self {
         let (n_columns, n_rows) = (header.n_columns as usize, header.n_rows as usize);
@@ -165,7 +168,8 @@ impl Window {
         }
     }
 
-    /// ColumnStore and the rows of each where cells are filled, without the `margin` outermost ones of the window.
+    /// Returns the columns and, for each, the rows where cells are filled, without the `margin` outermost ones of the
+    /// window.
     pub(super) fn inner_spans(&self, margin: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
         let columns = margin..self.n_columns.saturating_sub(margin).max(margin);
         let last = self.n_rows.saturating_sub(margin);
@@ -179,7 +183,8 @@ impl Window {
         BeamDirection { azimuth: self.azimuths[column], elevation: self.elevations[row] }
     }
 
-    /// Returns the direction of a place in or near the window, in cells and parts of cells, on the nominal lattice.
+    /// Returns the direction of a place in or near the window, given in cells and parts of cells on the nominal
+    /// lattice.
     pub(super) fn beam_at(&self, column: f64, row: f64) -> BeamDirection {
         let nearest = |x: f64, n: usize| ((x + 0.5).max(0.0) as usize).min(n - 1);
         let (i, k) = (nearest(column, self.n_columns), nearest(row, self.n_rows));
@@ -189,7 +194,7 @@ impl Window {
         }
     }
 
-    /// Returns the true direction of a cell in cells and parts of cells, as (column, row).
+    /// Returns the true direction of a cell as (column, row), in cells and parts of cells of the nominal lattice.
     #[inline]
     pub(super) fn place(&self, column: usize, row: usize) -> (f64, f64) {
         let cell = &self.cells[column * self.n_rows + row];
@@ -199,7 +204,7 @@ impl Window {
         )
     }
 
-    /// Returns the same of a cell by its index.
+    /// Returns the same for a cell given by its index.
     pub(super) fn place_of(&self, index: usize) -> (f64, f64) {
         self.place(index / self.n_rows, index % self.n_rows)
     }

@@ -7,8 +7,8 @@ use super::*;
 const STEP: f64 = 9e-4;
 const NOISE: f64 = 3e-4;
 
-/// A level plate 3.5 m below the scanner, a table `below` it and the floor; `places` gives, by row, the columns at which the
-/// plate and the table end. A beam sees a quarter of a step around its middle.
+/// Scene of a level plate 3.5 m below the scanner, a table `below` it and the floor; `places` gives, by row, the
+/// columns at which the plate and the table end. A beam sees a quarter of a step around its middle.
 fn scene(below: f64, places: impl Fn(f64) -> [f64; 2]) -> (Window, Vec<Option<bool>>) {
     let header = ScanHeader {
         n_rows: 80,
@@ -41,7 +41,8 @@ fn scene(below: f64, places: impl Fn(f64) -> [f64; 2]) -> (Window, Vec<Option<bo
     (window, kinds.collect())
 }
 
-/// Counts the cells of the background that are taken for mixed, and those that see the plate's edge taken for sound, each beside all.
+/// Counts the background cells classified as mixed, and the cells at the plate's edge classified as sound, each with
+/// the total.
 fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
     let noise = Noise::estimate(window, &window.own);
     let mut pixels = mixed_pixels::classify(window, &noise, &Noise::of_background(window));
@@ -64,7 +65,7 @@ fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
     counts
 }
 
-/// Asserts that nearly no cell of the background passes for mixed, nor one that sees the edge for sound.
+/// Asserts that nearly no background cell is classified as mixed, and nearly no cell at the edge as sound.
 fn assert_told(window: &Window, kinds: &[Option<bool>]) {
     let [[mixed, background], [sound, edge]] = wrong(window, kinds);
     println!("background taken for mixed: {mixed} of {background}; edge taken for sound: {sound} of {edge}");
@@ -129,7 +130,7 @@ fn a_cell_amid_the_mixed_ones_of_an_edge_is_mixed() {
 
 #[test]
 fn a_part_of_the_plate_off_the_component_is_no_background() {
-    // The last columns of the plate were not joined to it; the table shows beyond.
+    // The last columns of the plate were not joined to it; the table is visible beyond.
     let (mut window, kinds) = scene(0.25, |row| [40.0 + 0.05 * row, -9.0]);
     for row in 0..80 {
         let end = (40.0 + 0.05 * row as f64) as usize;
@@ -140,7 +141,7 @@ fn a_part_of_the_plate_off_the_component_is_no_background() {
 
 #[test]
 fn the_plane_of_a_table_is_between_the_plate_and_the_floor() {
-    // Of the beams of a row that see the end of the table, one in front of its plane sees the plate, too.
+    // Of the beams of a row that see the end of the table, a beam in front of its plane also sees the plate.
     let (window, _) = scene(0.25, |row| {
         let end = 65.0 - 0.62 * row;
         [end, if row < 64.0 { end - 1.2 } else { end - 12.0 }]
@@ -168,7 +169,8 @@ fn the_plane_of_a_table_is_between_the_plate_and_the_floor() {
 fn alone_on_a_plane_of_few_is_by_chance() {
     let header = ScanHeader { n_rows: 8, n_columns: 50, ..ScanHeader::default() };
     let window = Window::of_ranges(header, |_, _| (9.0, false));
-    // Every second of 50 mixed pixels along a row is on a plane of a strip, two side by side and one alone on another.
+    // Every second of 50 mixed pixels along a row is on the plane of a strip; two side by side are on another plane,
+    // and one alone on a third.
     let mixed: Vec<usize> = (0..50).map(|column| 8 * column + 4).collect();
     let (mut pixels, mut on) = (vec![Pixel::Sound; 400], vec![None; 400]);
     mixed.iter().for_each(|index| pixels[*index] = Pixel::Mixed);
@@ -176,7 +178,7 @@ fn alone_on_a_plane_of_few_is_by_chance() {
     [11, 12].iter().for_each(|k| on[mixed[*k]] = Some(1));
     on[mixed[31]] = Some(2);
     assert_eq!(by_chance(&window, &pixels, &mixed, &on), [mixed[31]]);
-    // Beside a sound cell of its plane it is where that plane ends.
+    // Beside a sound cell of its plane it is the end of that plane.
     on[mixed[31] + 1] = Some(2);
     assert!(by_chance(&window, &pixels, &mixed, &on).is_empty());
 }

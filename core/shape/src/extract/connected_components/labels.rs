@@ -1,4 +1,4 @@
-//! Connected components of a mask inside a window, by runs.
+//! Connected components of a mask inside a window, by union-find over runs of cells.
 
 use std::ops::Range;
 
@@ -7,8 +7,8 @@ use platen_numerics::union_find::UnionFind;
 /// Label of a cell outside of the mask.
 pub(in crate::extract) const NO_LABEL: u32 = u32::MAX;
 
-/// Labels the components of the set cells (neighbours along rows and columns), numbered by their first cell. Returns the label
-/// per cell and the number of components. Margins are not set, so columns do not run into each other.
+/// Labels the components of the set cells (neighbours along rows and columns), numbered by their first cell. Returns
+/// the label per cell and the number of components. Margins are not set, so that columns do not run into each other.
 pub(in crate::extract) fn label_components(mask: &[bool], n_rows: usize) -> (Vec<u32>, usize) {
     let mut runs: Vec<Range<usize>> = Vec::new();
     let mut sets = UnionFind::default();
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn components_are_numbered_by_their_first_cell() {
-        // ColumnStore of five rows: a fork that closes, and a component of its own.
+        // Columns of five rows: a fork that closes, and a separate component.
         let picture = ["## # ", "#  # ", "#### ", "    #"];
         let mask: Vec<bool> = picture.iter().flat_map(|column| column.chars().map(|c| c == '#')).collect();
         let (label, n) = label_components(&mask, 5);

@@ -1,8 +1,9 @@
-//! Connected components of the lattice under the continuity criterion, joined while columns arrive (Masuda et al., 3.1).
+//! Connected components of the lattice under the continuity criterion, joined while columns arrive (Masuda et al.,
+//! 3.1).
 //!
-//! A column falls into *runs* of cells that are continuous downwards; runs of neighbouring columns are joined
-//! when any of their cells are continuous across. Components are sets of runs. What is summed over
-//! a component is integer, so that neither the sums nor the components depend on the order of arrival.
+//! A column is divided into *runs* of cells that are continuous downwards. Runs of neighbouring columns are joined when
+//! any of their cells are continuous across. Components are sets of runs. All sums over a component are integers, so
+//! that neither the sums nor the components depend on the order of arrival.
 
 use std::ops::Range;
 
@@ -10,7 +11,7 @@ use platen_numerics::union_find::UnionFind;
 
 use crate::extract::continuity::Link;
 
-/// Cells `rows` of one column, each continuous with the next.
+/// Consecutive cells of one column, each continuous with the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::extract) struct Run {
     pub(in crate::extract) column: u32,
@@ -67,7 +68,7 @@ impl Components {
         self.runs.len() as u32
     }
 
-    /// Returns those of `runs` that belong to a component given by its root.
+    /// Returns the members of `runs` that belong to components given by their roots.
     pub(in crate::extract) fn runs_of(&mut self, roots: &[u32], runs: Range<u32>) -> Vec<Run> {
         let mut own = Vec::new();
         for number in runs {
@@ -78,7 +79,7 @@ impl Components {
         own
     }
 
-    /// The component of a run, as the number of its root.
+    /// Returns the component of a run, as the number of its root.
     pub(in crate::extract) fn root(&mut self, number: u32) -> u32 {
         self.sets.find(number)
     }
@@ -87,7 +88,7 @@ impl Components {
         self.extent[root as usize]
     }
 
-    /// Extent of several components together.
+    /// Returns the extent of several components together.
     pub(in crate::extract) fn extent_of_all(&self, roots: &[u32]) -> Extent {
         let none = Extent { area_mm2: 0, cells: 0, columns: (u32::MAX, 0), rows: (u32::MAX, 0) };
         roots.iter().fold(none, |mut all, &root| {
@@ -105,8 +106,8 @@ impl Components {
 
     /// Joins the runs of a column and of the next one where their cells are continuous by `across`.
     ///
-    /// `range_a(row)` and `range_b(row)` give ranges inside the runs. Overlapping runs are joined at the first row
-    /// that links them; the rest of the overlap need not be looked at.
+    /// `range_a(row)` and `range_b(row)` give ranges inside the runs. Overlapping runs are joined at the first row that
+    /// links them; the rest of the overlap is skipped.
     pub(in crate::extract) fn join_columns(
         &mut self,
         a: Range<u32>,
