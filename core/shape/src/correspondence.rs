@@ -1,7 +1,9 @@
 //! Correspondence of material points between scans of one plate.
 //!
-//! `baseline`: the outline of the blank from a scan of it, to which the edges of all later scans are mapped.
-//! `reorientation`: whether the plate was put back turned or over, so that its corners carry the wrong names.
+//! - `baseline`: outline of the blank from a scan of it, to which the edges of all later scans are mapped.
+//! - `reorientation`: test whether the plate was put back turned or with its other face up, so that its corners have
+//!   the wrong names.
+//!
 //! Neither is in Masuda et al., who map to the nominal rectangle and keep the plate's orientation.
 
 mod baseline;

@@ -1,5 +1,4 @@
-//! Figures of a measured plate beside its surface: dimension checks, bending energy, painted markers, calibration of the
-//! scanner.
+//! Inspection figures of a measured plate: dimension checks, bending energy, painted markers, scanner calibration.
 
 mod bending_energy;
 pub mod calibration;

@@ -1,11 +1,13 @@
-//! Baseline: the outline of the blank from a scan of it, by development into the plane and a rigid least-squares fit.
+//! Baseline: outline of the blank from a scan of it, by development into the plane and a rigid least-squares fit.
 //!
-//! Flat or slightly curved, the blank is developed ([`lay_flat`]); a parabola is fitted to each of its edges, and adjacent ones
-//! are intersected in the corners. Waves shorter than a bow are an error of the scan, some tenths of a millimetre.
+//! 1. The blank, which is flat or slightly curved, is developed into the plane ([`lay_flat`]).
+//! 2. A parabola is fitted to each edge, and adjacent parabolas are intersected in the corners. Waves shorter than a
+//!    bow are an error of the scan, some tenths of a millimetre.
+//! 3. The nominal rectangle is fitted to the blank's corners by least squares (rigid): a plate cut 4 mm too long
+//!    overhangs by 2 mm on each side, as without a baseline.
 //!
-//! (u, v) are then metric on the real plate. The nominal rectangle is fitted to the blank's corners by least squares (rigid):
-//! a plate cut 4 mm too long overhangs by 2 mm on each side, as without a baseline. A blank that is already curved in two
-//! directions gives no outline; the error states the strain.
+//! (u, v) are then metric on the real plate. Limit: a blank that is already curved in two directions gives no outline;
+//! the error states the strain.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,12 +16,12 @@ use crate::measure::N_VERTICES;
 use crate::mesh::{DiskMesh, MeshError, SmoothFace};
 use crate::{Blank, Outline, Patch, PlateSpec};
 
-/// A corner or an edge further from its place as ordered than this, metres, is taken as mistaken, or another plate's, not as badly cut.
-/// S extends beyond its rectangle by as much without loss.
+/// Largest distance of a corner or an edge from its place as ordered, metres. A larger one is taken for a wrong corner
+/// or another plate, not for a bad cut. S extends beyond its rectangle by this much without loss.
 const MOST_OFF: f64 = 0.02;
-/// With more strain than this in the developed plate, the outline depends on the law of the material, which is unknown once it was
-/// pressed: on a sphere of 80 m radius (4 x 3 m, strain 3.6e-5) it is right to 0.02 mm for steel that was bent elastically, and
-/// off by up to 0.45 mm for fibres that kept their length one way.
+/// Largest strain of the developed plate. With more, the outline depends on the law of the material, which is unknown
+/// after pressing: on a sphere of 80 m radius (4 x 3 m, strain 3.6e-5) the outline is right to 0.02 mm for steel that
+/// was bent elastically, and off by up to 0.45 mm for fibres that kept their length in one direction.
 const MOST_STRAIN: f64 = 5e-5;
 
 /// Reason why a scan gives no outline of the blank.
@@ -29,16 +31,16 @@ pub enum BlankError {
     /// No mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// It cannot be laid flat.
+    /// The blank cannot be developed.
     #[error("the blank cannot be laid flat: {reason}; scan it again")]
     Rough { reason: String },
-    /// It is curved in two directions.
+    /// The blank is curved in two directions.
     #[error(
         "the blank is curved in two directions: laid flat it keeps a strain of {strain:.1e}, {MOST_STRAIN:.0e} at most; scan it before it \
          is pressed"
     )]
     Curved { strain: f64 },
-    /// It is not the plate of the plate file.
+    /// The blank is not the plate of the plate file.
     #[error(
         "the blank is {:.1} x {:.1} mm and up to {:.1} mm off its rectangle as ordered, {:.0} mm at most; check width_mm and \
          height_mm, or which plate was scanned",
@@ -85,7 +87,7 @@ impl Blank {
             corners: registered(corners, ordered.corners),
             bows: curves.each_ref().map(Curve::bow),
             corner_sigma: mesh.corner_sigma,
-            // Deviations of an edge from its parabola are uncertainty too.
+            // Deviations of an edge from its parabola also count as uncertainty.
             edge_sigma: [0, 1, 2, 3].map(|edge| mesh.edge_sigma[edge].max(curves[edge].rms)),
         };
         let blank = blank.rounded();
@@ -109,16 +111,16 @@ impl Blank {
 /// An edge in the plane: a parabola over the line from its first point to its last.
 struct Curve {
     middle: [f64; 2],
-    /// Half the way from end to end.
+    /// Half the vector from end to end.
     half: [f64; 2],
-    /// Height to the right of the line, metres, by powers of the place t, -1 to 1.
+    /// Coefficients of the height to the right of the line, metres, by powers of the place t, -1 to 1.
     height: [f64; 3],
-    /// Root mean square distance of the points from it.
+    /// Root mean square distance of the points from the parabola.
     rms: f64,
 }
 
 impl Curve {
-    /// Least squares; `None` for fewer than three points.
+    /// Fits a parabola to the points by least squares; `None` for fewer than three points.
     fn fit(points: &[[f64; 2]]) -> Option<Self> {
         let (from, to) = (points.first()?, points.last()?);
         let middle = [0, 1].map(|c| 0.5 * (from[c] + to[c]));
@@ -144,7 +146,7 @@ impl Curve {
         Some(Self { middle, half, height: height.into(), rms })
     }
 
-    /// Place and derivative by t.
+    /// Returns the place and its derivative by t.
     fn at(&self, t: f64) -> ([f64; 2], [f64; 2]) {
         let [h, k] = self.half;
         let [a, b, c] = self.height.map(|x| x / h.hypot(k));
@@ -152,7 +154,8 @@ impl Curve {
         ([self.middle[0] + t * h + out * k, self.middle[1] + t * k - out * h], [h + slope * k, k - slope * h])
     }
 
-    /// Intersects its end with the beginning of the next edge by Newton's method; edges are nearly straight.
+    /// Intersects the end of this edge with the beginning of the next one by Newton's method; edges are nearly
+    /// straight.
     fn meets(&self, next: &Self) -> [f64; 2] {
         const STEPS: usize = 4;
         let (mut s, mut t) = (1.0, -1.0);
@@ -172,7 +175,7 @@ impl Curve {
     }
 }
 
-/// Moves and turns the corners, as one, to the ordered ones by least squares.
+/// Registers the corners to the ordered ones by a rigid motion, by least squares.
 fn registered(corners: [[f64; 2]; 4], ordered: [[f64; 2]; 4]) -> [[f64; 2]; 4] {
     let middle = |of: &[[f64; 2]; 4]| [0, 1].map(|c| 0.25 * of.iter().map(|p| p[c]).sum::<f64>());
     let (from, to) = (middle(&corners), middle(&ordered));

@@ -1,39 +1,45 @@
-//! Reorientation test: whether a plate was put back turned between two scans, by comparing curvature maps under all symmetries
-//! of the rectangle.
+//! Reorientation test: comparison of the curvature maps of two scans under all symmetries of the rectangle.
 //!
-//! The corner (0, 0) follows from the scan before by direction: the edge along which u grew is the one that still runs that
-//! way. A plate that was put back turned by half a turn (a square one by a quarter), or with its other face up, then has the
-//! wrong corner names; under the right ones only what the stroke bent differs from the scan before.
+//! In: the surfaces of two scans of one plate. Out: the turn by which the plate was put back between them, or none.
 //!
-//! Curvature needs no alignment. As long as strokes only add bends, the names given by direction cannot lose by chance:
-//! another naming leaves at least what the stroke bent. Limits: a plate that looks the same either way (flat, a whole cylinder)
-//! cannot be tested; then nothing but the names differs. Curvatures below about 0.01 1/m are lost in the scanner's cyclic range error, which bends
-//! every scan differently.
+//! The names of the corners follow from the previous scan by direction: u runs along the edge that still has the
+//! direction in which u ran before. They are wrong for a plate that was put back after half a turn (a square one after
+//! a quarter turn), or with its other face up. Under the correct names the scans differ only by the bends of the
+//! stroke.
+//!
+//! Curvature requires no alignment. As long as strokes only add bends, another naming cannot fit better by chance,
+//! since it leaves at least the bends of the stroke unexplained.
+//!
+//! Limits: a plate with the same curvature under a symmetry (flat, a whole cylinder) cannot be tested; only the names
+//! differ then. Curvatures below about 0.01 1/m are lost in the scanner's cyclic range error, which bends every scan
+//! differently.
 
 use nalgebra::Matrix2;
 
 use crate::Surface;
 
-/// Places along each side at which curvatures are compared.
+/// Number of places along each side at which curvatures are compared.
 const PLACES: usize = 24;
 
 /// Share of each side left out along the edges, where curvature is least certain.
 const MARGIN: f64 = 0.05;
 
-/// Standard deviation of a curvature by the scanner's own error, 1/m: a cyclic range error of 0.3 mm and 1.5 m on the plate has curvatures
-/// of up to 5e-3 1/m.
+/// Standard deviation of a curvature due to the scanner's error, 1/m: a cyclic range error of amplitude 0.3 mm and
+/// period 1.5 m on the plate has curvatures of up to 5e-3 1/m.
 const SCANNER_SIGMA: f64 = 5e-3;
 
-/// Sum of three squared standard deviations from which a place counts as wholly changed: far beyond chance.
+/// Sum of three squared differences, in standard deviations, from which a place counts as wholly changed: far beyond
+/// chance.
 const CHANGED: f64 = 40.0;
 
-/// Another naming must explain at least this share of the plate better...
+/// Least share of the plate that another naming must explain in addition to the given one.
 const GAIN: f64 = 0.05;
 
-/// ... and leave less than this share of what the given one leaves.
+/// Largest unexplained share under another naming, in parts of that under the given one.
 const SHARE: f64 = 0.5;
 
-/// Sides that differ by less than this may be taken for each other: as much as a cut blank may differ from its file.
+/// Relative difference of sides below which they may be taken for each other: as much as a cut blank may differ from
+/// its file.
 const SQUARE: f64 = 0.01;
 
 /// Kind of turn between two scans.
@@ -43,7 +49,7 @@ pub enum Reorientation {
     Quarter,
     /// Half a turn.
     Half,
-    /// Its other face is up.
+    /// The plate's other face is up.
     Over,
 }
 
@@ -57,7 +63,8 @@ impl std::fmt::Display for Reorientation {
     }
 }
 
-/// Returns the turn under which `now` is the plate of the scan before, if that fits and the given orientation does not.
+/// Returns the turn under which `now` matches the plate of the previous scan, if that fits and the given orientation
+/// does not.
 #[must_use]
 pub fn reorientation(now: &Surface, before: &Surface) -> Option<Reorientation> {
     let left = |names: &Matrix2<f64>| unexplained(now, before, names);
@@ -79,8 +86,9 @@ pub fn reorientation(now: &Surface, before: &Surface) -> Option<Reorientation> {
     })
 }
 
-/// Returns the share of the plate whose curvature differs when a place of `now`, counted from the middle, is taken for `names` times
-/// it in the scan before. Under names that mirror, the other face is seen, on which every curvature has the other sign.
+/// Returns the share of the plate whose curvature differs when a place x of `now`, counted from the middle, is taken
+/// for the place `names` x of the previous scan. Under names that mirror, the other face is seen, on which every
+/// curvature has the opposite sign.
 fn unexplained(now: &Surface, before: &Surface, names: &Matrix2<f64>) -> f64 {
     let side = names.determinant();
     let along = |k: usize| (1.0 - 2.0 * MARGIN) * (2.0 * (k as f64 + 0.5) / PLACES as f64 - 1.0);
@@ -128,7 +136,8 @@ mod tests {
     /// Amplitude of the scanner's cyclic error along the normal and its period on the plate, metres.
     const CYCLIC: [f64; 2] = [0.3e-3, 1.5];
 
-    /// A plate of 2 m by `height`, bent along u by bands of 0.03 rad round the places given; `names` map (u, v) to the material place scanned there, counted from the middle, and mirrored ones show the other face.
+    /// A plate of 2 m by `height`, bent along u by bands of 0.03 rad around the places given. `names` map (u, v) to the
+    /// material place scanned there, counted from the middle; names that mirror show the other face.
     fn plate(height: f64, bands: &[f64], names: Matrix2<f64>, seed: u64) -> Surface {
         let n = 2000_usize;
         let h = SIDE / n as f64;
@@ -141,7 +150,7 @@ mod tests {
             let next = angle + h * curvature((i as f64 + 0.5) * h);
             profile.push((x + h * next.cos(), z + h * next.sin(), next));
         }
-        // Of an odd and an even seed one is the other turned by half a turn.
+        // The phases of an odd and an even seed are those of one error under half a turn.
         let wave = std::f64::consts::TAU / CYCLIC[1];
         let phase = if seed.is_multiple_of(2) { std::f64::consts::PI - wave * SIDE - 1.0 } else { 1.0 };
         let mut noise = Random::new(seed);

@@ -1,32 +1,34 @@
-//! Elastic bending energy between the measured and the target's curvature: one figure for what is left to bend, and the share
-//! of the plate that is bent beyond its target.
+//! Elastic bending energy between the measured curvature and that of the target.
+//!
+//! The energy, joules, is one figure for the forming that remains. The second figure is the share of the plate that is
+//! bent beyond its target.
 
 use crate::{Surface, TargetSurface};
 
 /// Young's modulus of structural steel, Pa (EN 1993-1-1, 3.2.6).
 const YOUNG: f64 = 210e9;
-/// Poisson's ratio of steel in the elastic range (the same).
+/// Poisson's ratio of steel in the elastic range (EN 1993-1-1, 3.2.6).
 const POISSON: f64 = 0.3;
-/// Places along each side over which is summed: 40 to 60 mm on the trade's plates, finer than a bend band.
+/// Number of places along each side for the sums: one every 40 to 60 mm on the trade's plates, finer than a bend band.
 const SIDE: usize = 81;
 
 /// Bending energy and shares of a measured plate against its target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BendingEnergy {
-    /// Energy that would bend the plate elastically from the measured to the target's curvature, joules:
-    /// U = D/2 int (dku + dkv)^2 - 2 (1 - nu) (dku dkv - dkuv^2) dA, D = E t^3 / 12 (1 - nu^2)
-    /// (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, strain energy in pure bending of plates).
-    /// Forming is plastic: as a measure of what is left, this counts missing and surplus curvature alike, by their squares.
+    /// Energy that would bend the plate elastically from the measured to the target's curvature, joules: U = D/2 int
+    /// (dku + dkv)^2 - 2 (1 - nu) (dku dkv - dkuv^2) dA, D = E t^3 / 12 (1 - nu^2) (Timoshenko and Woinowsky-Krieger,
+    /// Theory of Plates and Shells, strain energy in pure bending of plates). Forming is plastic; as a measure of the
+    /// remaining forming the energy counts missing and surplus curvature alike, by their squares.
     pub energy: f64,
-    /// Share of the seen area that is bent beyond the target by more than the tolerance given.
+    /// Share of the seen area that is bent beyond the target by more than the given tolerance.
     pub beyond_share: f64,
-    /// Share of the plate that was seen; the rest is in none of these figures.
+    /// Share of the plate that was seen; the rest does not enter these figures.
     pub seen_share: f64,
 }
 
 impl BendingEnergy {
-    /// Computes the figures of a measured plate. `tolerance` is the curvature by which a place may exceed the target's, 1/m.
-    /// `None` when nothing was seen.
+    /// Computes the figures of a measured plate. `tolerance` is the curvature by which a place may exceed the target's,
+    /// 1/m. `None` when no part was seen.
     #[must_use]
     pub fn new(surface: &Surface, target: &TargetSurface, tolerance: f64) -> Option<Self> {
         let (w, h, t) = (surface.width(), surface.height(), surface.thickness());
@@ -65,7 +67,7 @@ mod tests {
     const H: f64 = 2.0;
     const T: f64 = 0.04;
 
-    /// A mid-surface without noise, bent along u to the curvature k.
+    /// Builds a mid-surface without noise, bent along u to the curvature k.
     fn bent(k: f64, mut mask: Mask) -> Surface {
         let mut fit = SplineFit::new(UniformKnots::new(0.0, W, 15), UniformKnots::new(0.0, H, 10));
         for i in 0..120 * 80 {
@@ -79,7 +81,7 @@ mod tests {
                 mask.mark(u, v);
             }
         }
-        // REML needs noise: the penalty is given.
+        // REML requires noise: the penalty is given instead.
         let penalty = platen_numerics::reml::Penalty { u: 1e-6, v: 1e-6 };
         Surface::new(fit.solve_with(penalty).unwrap(), T, mask)
     }

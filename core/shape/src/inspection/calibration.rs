@@ -1,9 +1,13 @@
 //! Calibration of a scanner: estimators of the errors that are not in the covariance of a fit.
 //!
-//! Errors correlated over decimetres (range bias, lattice, pose) do not average out in a fit. Scans of an unchanged plate
-//! differ by more than their stated deviations: the excess, pooled over the plate and over pairs, is the correlated part of the
-//! level of detection. Errors that repeat in every scan cancel in such pairs; they show only on an artefact of known shape, as
-//! gaps under templates that ought to fit.
+//! Errors correlated over decimetres (range bias, lattice, pose) do not average out in a fit. There are two estimators:
+//!
+//! - Pairs of scans of an unchanged plate ([`Pooled`]). They differ by more than their stated deviations. The excess,
+//!   pooled over the plate and over pairs, is the correlated part of the level of detection.
+//! - An artefact of known shape ([`artefact_gaps`], [`covering`]). Errors that repeat in every scan cancel in pairs of
+//!   scans; on an artefact they appear as gaps under templates whose true gap is zero.
+//!
+//! All lengths in metres.
 
 use crate::target_surface::Placement;
 use crate::{EXPANDED, Surface, TargetSurface};
@@ -17,14 +21,14 @@ pub struct Pooled {
 }
 
 impl Pooled {
-    /// Takes one difference and its stated standard deviation.
+    /// Adds one difference and its stated standard deviation.
     pub fn add(&mut self, difference: f64, sigma: f64) {
         self.shown += difference * difference;
         self.stated += sigma * sigma;
         self.n += 1;
     }
 
-    /// Returns the standard deviation of the differences in excess of the stated ones, 0 where there is none.
+    /// Returns the standard deviation of the differences in excess of the stated ones; 0 where there is no excess.
     #[must_use]
     pub fn excess(&self) -> f64 {
         ((self.shown - self.stated).max(0.0) / self.n.max(1) as f64).sqrt()
@@ -34,18 +38,19 @@ impl Pooled {
 /// A gap whose true value is zero, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArtefactGap {
-    /// As measured, signed.
+    /// Gap as measured, signed.
     pub gap: f64,
     /// Its stated standard deviation.
     pub sigma: f64,
 }
 
-/// Share of the gaps that their expanded uncertainty is to cover.
+/// Share of the gaps that their expanded uncertainty covers.
 const COVERED: f64 = 0.95;
 
-/// Returns the systematic error, one sigma, with which the expanded uncertainty covers 95 % of the gaps. A scanner's range error
-/// is periodic: under templates of half a wave it shows twice, under those of a whole one not at all, and gaps scatter far less like normal
-/// errors than their root mean square suggests.
+/// Returns the systematic error, one standard deviation, with which the expanded uncertainty covers 95 % of the gaps.
+///
+/// A scanner's range error is periodic: under templates as long as half a wave it appears twice, under those as long as
+/// a whole wave not at all. The gaps therefore do not scatter like normal errors of their root mean square.
 #[must_use]
 pub fn covering(gaps: &[ArtefactGap]) -> f64 {
     let mut lacking: Vec<f64> =
@@ -55,15 +60,17 @@ pub fn covering(gaps: &[ArtefactGap]) -> f64 {
     last.checked_sub(1).map_or(0.0, |last| lacking[last])
 }
 
-/// Lines in each direction, and templates on each.
+/// Number of lines in each direction, and of templates on each line.
 const TEMPLATES: usize = 9;
 
-/// Places along each side that the artefact is fitted by.
+/// Number of places along each side by which the artefact is registered.
 const PLACES: usize = 41;
 
-/// Returns the gaps in the middle of templates of length `chord`, balanced on their ends, on an artefact that has its target's shape: they ought
-/// to be zero. `sigma_correlated` is that of a pair of scans, of which a single one has its share, as in a template's own
-/// uncertainty. Templates lie along u and along v all over the plate, where it was seen.
+/// Returns the gaps in the middle of templates of length `chord`, balanced on their ends, on an artefact that has its
+/// target's shape. Their true value is zero.
+///
+/// `sigma_correlated` is that of a pair of scans; a single scan has its share of it, as in the uncertainty of a
+/// template. The templates lie along u and along v all over the plate, where it was seen.
 #[must_use]
 pub fn artefact_gaps(
     artefact: &Surface,
@@ -123,7 +130,7 @@ mod tests {
         let sigma = covering(&gaps);
         let covered = |g: &&ArtefactGap| g.gap <= EXPANDED * g.sigma.hypot(sigma) * (1.0 + 1e-12);
         assert_eq!(gaps.iter().filter(covered).count(), 95);
-        // Gaps explained by noise are no systematic error.
+        // Gaps explained by noise are not a systematic error.
         assert_eq!(covering(&gaps[..19]), 0.0);
         assert_eq!(covering(&[]), 0.0);
     }

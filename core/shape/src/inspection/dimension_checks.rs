@@ -1,16 +1,20 @@
 //! Dimension checks as done with tape, square and sight line: edge lengths, diagonals, corner angles, twist.
 //!
-//! From the measured outline, not from the rectangle it is mapped to: they show by how many millimetres a cut blank differs
-//! from its order. Standard deviations follow from those of the corners (propagation of uncertainty, JCGM 100:2008): in the surface from
-//! the outline, across it from the fit, along the beam from the scanner's range error. Errors of different corners count as independent,
-//! but for the contrast of face and background (`outline::edge`): it has all edges of a plate too far inwards, or all too far outwards.
+//! The figures are those of the measured outline, not of the rectangle to which it is mapped. They show by how many
+//! millimetres a cut blank differs from its order. In: outline, surface, range error of the scanner. Out:
+//! [`ShapeChecks`], each figure with its standard deviation.
+//!
+//! Standard deviations follow from those of the corners (propagation of uncertainty, JCGM 100:2008): within the surface
+//! from the outline, across it from the fit, along the beam from the scanner's range error. Errors of different corners
+//! count as independent, except that due to the contrast of face and background (`outline::edge`), which shifts all
+//! edges of a plate inwards or all outwards.
 
 use crate::outline::{Corner, EdgeCurve};
 use crate::range_error::{RangeError, beam};
 use crate::{Outline, Surface, Vec3};
 
-/// Length of a square's arm, metres, or half the edge where that is shorter: corner angles are those between the lines
-/// that fit the edges there.
+/// Length of a square's arm, metres, or half the edge where that is shorter. Corner angles are those between the lines
+/// fitted to the edges over this length.
 const ARM: f64 = 1.0;
 
 /// Dimension checks of one plate. Edges in the order v = 0, u = W, v = H, u = 0; corners (0,0), (W,0), (W,H), (0,H).
@@ -18,43 +22,44 @@ const ARM: f64 = 1.0;
 pub struct ShapeChecks {
     /// The four edges.
     pub edges: [EdgeCheck; 4],
-    /// Straight from corner to corner, as a stretched string: from (0,0) to (W,H), from (W,0) to (0,H). Metres.
+    /// Straight distances from corner to corner, as by a stretched string: from (0,0) to (W,H), from (W,0) to (0,H).
+    /// Metres.
     pub diagonals: [Check; 2],
     /// The first diagonal less the second, metres: 0 on a plate that is square.
     pub diagonal_difference: Check,
     /// Inner angles between the edges in the plate's own surface, radians.
     pub angles: [Check; 4],
-    /// Looking along u, from u = 0 to u = W, and along v: how far the far edge is turned clockwise against the near one,
-    /// radians; 0 on a plate that lies flat on two winding sticks.
+    /// Angle by which the far edge is turned clockwise against the near one, seen along u (from u = 0 to u = W) and
+    /// along v, radians; 0 on a plate that lies flat on two winding sticks.
     pub twist: [Check; 2],
 }
 
 /// A figure and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Check {
-    /// Metres or radians.
+    /// Value, metres or radians.
     pub value: f64,
     /// Standard deviation.
     pub sigma: f64,
-    /// False when it rests on a corner that was extrapolated.
+    /// False when the figure depends on a corner that was extrapolated.
     pub seen: bool,
 }
 
 /// One edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeCheck {
-    /// A tape laid along the edge of the scanned face, metres.
+    /// Length of a tape laid along the edge of the scanned face, metres.
     pub face: Check,
-    /// The same on the mid-surface, which bending does not stretch: to be held against the cut size, of a bevelled plate less the face's inset
-    /// at both ends, metres.
+    /// The same length on the mid-surface, which bending does not stretch, metres. It is to be compared with the cut
+    /// size, for a bevelled plate less the face's inset at both ends.
     pub mid: Check,
-    /// Straight from corner to corner, metres.
+    /// Straight distance from corner to corner, metres.
     pub chord: Check,
 }
 
 impl ShapeChecks {
-    /// Computes the figures of a measured outline, with its corners on the surface: a corner of the outline has the height of a few cells,
-    /// one of the surface that of all. `range_error` is the scanner's own.
+    /// Computes the figures of a measured outline with its corners projected to the surface: the height of an outline's
+    /// corner is that of a few cells, the height of the surface that of all. `range_error` is that of the scanner.
     #[must_use]
     pub fn new(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
         let mut corners = outline.corners;
@@ -65,7 +70,8 @@ impl ShapeChecks {
         Self::of_corners(&corners, outline, surface, range_error)
     }
 
-    /// Computes the figures of an outline as it is, such as the true one of a simulated plate; the surface gives normals and thickness.
+    /// Computes the figures of an outline without projection, such as the true outline of a simulated plate. The
+    /// surface gives normals and thickness.
     #[must_use]
     pub fn of_outline(outline: &Outline, surface: &Surface, range_error: RangeError) -> Self {
         Self::of_corners(&outline.corners, outline, surface, range_error)
@@ -82,7 +88,8 @@ impl ShapeChecks {
         Self::with(corners, &outline.edges, 0.5 * surface.thickness(), &normal, &sigma, range_error)
     }
 
-    /// `normal` and `sigma`, the standard deviation along it, at shares of the plate's sides.
+    /// Computes the figures from functions of the shares of the plate's sides: `normal`, and `sigma`, the standard
+    /// deviation along it.
     fn with(
         outlined: &[Corner; 4],
         curves: &[EdgeCurve; 4],
@@ -141,7 +148,7 @@ struct Known {
     axes: [Vec3; 4],
     /// Standard deviations along them.
     sigma: [f64; 4],
-    /// Where the corner is by the standard deviation of the contrast, which all corners have together.
+    /// Displacement of the corner by one standard deviation of the contrast, which all corners have in common.
     contrast: Vec3,
     /// Standard deviations of the two edges' directions, radians.
     tilt: [f64; 2],
@@ -149,7 +156,7 @@ struct Known {
 }
 
 impl Known {
-    /// A corner with the edges that leave it and arrive at it.
+    /// Builds a corner from the edges that leave it and arrive at it.
     fn new(
         corner: &Corner,
         edges: [&EdgeCurve; 2],
@@ -168,14 +175,14 @@ impl Known {
         Self { at: point, axes, sigma, contrast, tilt: arms.map(|arm| arm.tilt), seen }
     }
 
-    /// Variance of the place along a direction of any length, without the contrast.
+    /// Returns the variance of the place along a direction of any length, without that of the contrast.
     fn variance(&self, way: Vec3) -> f64 {
         let unit = way / way.norm().max(f64::MIN_POSITIVE);
         (0..4).map(|i| (unit.dot(&self.axes[i]) * self.sigma[i]).powi(2)).sum()
     }
 }
 
-/// Returns the variance of the way from one corner to another along a direction of any length.
+/// Returns the variance of the vector from one corner to another along a direction of any length.
 fn variance_apart(from: &Known, to: &Known, along: Vec3) -> f64 {
     let unit = along / along.norm().max(f64::MIN_POSITIVE);
     from.variance(along) + to.variance(along) + unit.dot(&(to.contrast - from.contrast)).powi(2)
@@ -190,7 +197,7 @@ fn check(value: f64, variance: f64, corners: &[&Known]) -> Check {
     Check { value, sigma: variance.sqrt(), seen: corners.iter().all(|corner| corner.seen) }
 }
 
-/// Length of an edge, `depth` below the face.
+/// Returns the length of an edge, `depth` below the face.
 fn arc(curve: &EdgeCurve, normal: &dyn Fn(f64) -> Vec3, depth: f64) -> f64 {
     let last = (curve.points.len().max(2) - 1) as f64;
     let below: Vec<Vec3> =
@@ -198,12 +205,12 @@ fn arc(curve: &EdgeCurve, normal: &dyn Fn(f64) -> Vec3, depth: f64) -> f64 {
     below.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
 }
 
-/// Direction in which an edge leaves a corner, in the plane that touches the plate there.
+/// Direction in which an edge leaves a corner, in the tangent plane of the plate there.
 struct Arm {
-    /// The line of least squares through the edge's points within a square's arm; zero where there are none.
+    /// Direction of the least-squares line through the edge's points within a square's arm; zero where there are none.
     direction: Vec3,
-    /// Standard deviation of that direction, radians: both ends of the arm may be off, in opposite senses, by as much as the
-    /// edge is uncertain, its points scatter about the line, and a range error tilts it.
+    /// Standard deviation of that direction, radians. It includes the edge's uncertainty, by which the ends of the arm
+    /// may be off in opposite senses, the scatter of the points about the line, and the tilt by a range error.
     tilt: f64,
 }
 
@@ -230,13 +237,14 @@ impl Arm {
     }
 }
 
-/// Angle between the edges of a corner.
+/// Computes the angle between the edges of a corner.
 fn angle(corner: &Known) -> Check {
     let ([leaving, arriving, ..], [a, b]) = (corner.axes, corner.tilt);
     check(leaving.angle(&arriving), a * a + b * b, &[corner])
 }
 
-/// Turn from the near edge to the far one about the line from middle to middle, clockwise as seen along it.
+/// Computes the turn from the near edge to the far one about the line from middle to middle, clockwise as seen along
+/// it.
 fn twist(corners: &[Known; 4], near: [usize; 2], far: [usize; 2]) -> Check {
     let middle = |[a, b]: [usize; 2]| (corners[a].at + corners[b].at) * 0.5;
     let sight = (middle(far) - middle(near)).normalize();
@@ -263,7 +271,7 @@ mod tests {
     const H: f64 = 2.5;
     const HALF: f64 = 0.02;
 
-    /// The outline of a face over shares of the sides, and its normals by differences.
+    /// Computes the checks of a face given over shares of the sides, with its normals by differences.
     fn checks(face: impl Fn(f64, f64) -> Vec3, sigma: f64) -> ShapeChecks {
         checks_with(face, [sigma, 0.0], RangeError::default())
     }
@@ -339,13 +347,13 @@ mod tests {
         assert!(flat.diagonals[1].seen && !flat.twist[0].seen);
     }
 
-    /// Both ends of an edge are off to the same side by it.
+    /// The contrast displaces both ends of an edge to the same side.
     #[test]
     fn a_contrast_is_that_of_all_corners() {
         let contrast = 1e-4;
         let flat =
             checks_with(|u, v| Vec3::new(u * W, v * H, 0.0), [contrast, contrast], RangeError::default());
-        // Along the leaving edge all is contrast; along the arriving one three quarters of the variance are not.
+        // Along the leaving edge the whole variance is that of the contrast, along the arriving one a quarter of it.
         near(flat.edges[0].chord.sigma, contrast * (3.0_f64 + 4.0).sqrt(), 1e-9);
         let unit = Vec3::new(W, H, 0.0) / W.hypot(H);
         // The arriving edges run along v at both ends.
@@ -353,8 +361,8 @@ mod tests {
         near(flat.diagonals[0].sigma, contrast * (own + (2.0 * (unit.x + unit.y)).powi(2)).sqrt(), 1e-9);
     }
 
-    /// A plate far below the scanner is moved along its normal: its twist is uncertain, its lengths are not. Far aside the beam
-    /// runs along u, and the lengths along u are.
+    /// A plate far below the scanner is moved along its normal: its twist is uncertain, its lengths are not. For a
+    /// plate far to the side the beam runs along u, and the lengths along u are uncertain.
     #[test]
     fn a_range_error_counts_along_the_beam() {
         let range_error = RangeError::new(1e-3);

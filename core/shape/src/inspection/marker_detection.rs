@@ -1,25 +1,29 @@
 //! Marker detection: dark discs painted on the plate, located by their intensity (Masuda et al., marker experiment).
 //!
-//! Every beam near the expected place is taken to where it meets the fitted surface there, so that noise of the range
-//! does not move a disc; the disc's middle is that of the circle whose rim parts dark cells from bright ones best. Its
-//! uncertainty follows from the size of the cells against the disc's: a cell locates the rim to its own width.
+//! In: samples, fitted surface, expected place (u, v). Out: the middle of the disc on the scanned face, metres, with
+//! its standard deviation.
+//!
+//! Every beam near the expected place is intersected with the tangent plane of the fitted surface there, so that noise
+//! of the range does not move a disc. The middle of the disc is that of the circle whose rim best separates dark cells
+//! from bright ones. The uncertainty follows from the size of the cells relative to the disc: a cell locates the rim to
+//! its own width.
 
 use nalgebra::Matrix3;
 use platen_numerics::median::median;
 
 use crate::{Patch, Surface, Vec3};
 
-/// A cell is dark below this share of the median intensity round it: paint returns a seventh of what mill scale does, and
-/// intensities are at least its root.
+/// Share of the median intensity around it below which a cell is dark: paint returns a seventh of the power that mill
+/// scale returns, and the ratio of intensities is at most the root of that of powers.
 const DARK: f64 = 0.7;
 
-/// Fewer dark cells are no disc: dropouts and rust come in ones and twos.
+/// Least number of dark cells of a disc: dropouts and rust affect one or two cells.
 const LEAST_CELLS: usize = 6;
 
-/// A second spot of more than this share of the first one's cells leaves open which one is meant.
+/// Share of the largest spot's cells above which a second spot makes the detection ambiguous.
 const RIVAL: f64 = 0.5;
 
-/// A disc's longest spread is at most this many times its shortest.
+/// Largest ratio of a disc's longest to its shortest spread.
 const ROUND: f64 = 2.0;
 
 /// A detected disc and its offset from the expected place.
@@ -27,13 +31,13 @@ const ROUND: f64 = 2.0;
 pub struct DetectedMarker {
     /// Middle, on the scanned face, metres, scanner frame.
     pub centre: Vec3,
-    /// From the expected place along u and along v of the surface there, metres.
+    /// Offset from the expected place along u and along v of the surface there, metres.
     pub offset: [f64; 2],
-    /// Standard deviation of the middle along any direction in the surface, metres, as the cells' spacing allows.
+    /// Standard deviation of the middle along any direction in the surface, metres, due to the cells' spacing.
     pub sigma: f64,
-    /// Dark cells.
+    /// Number of dark cells.
     pub cells: usize,
-    /// Intensity of the disc as a share of that of the plate round it.
+    /// Intensity of the disc as a share of that of the plate around it.
     pub contrast: f64,
 }
 
@@ -43,22 +47,22 @@ pub enum NoMarker {
     /// The place was not seen.
     #[error("not seen")]
     Unseen,
-    /// Nothing dark there.
+    /// No dark cells there.
     #[error("no dark disc")]
     Bright,
-    /// Two spots, or one that is no disc.
+    /// Two spots, or one that is not a disc.
     #[error("dark, but not one round disc")]
     Ambiguous,
 }
 
-/// A beam's place in the tangent plane of the expected one.
+/// Place of a beam in the tangent plane at the expected place.
 struct Cell {
     at: [f64; 2],
     lattice: [u32; 2],
     intensity: f64,
 }
 
-/// Detects the disc that is expected at (u, v), within `reach` metres of there.
+/// Detects the disc that is expected at (u, v), within `reach` metres of that place.
 ///
 /// # Errors
 /// [`NoMarker`].
@@ -110,16 +114,17 @@ pub fn detect_marker(
     Ok(DetectedMarker { centre, offset, sigma, cells: spot.len(), contrast: dark / plate })
 }
 
-/// Standard deviation of the middle of a disc that is so many columns and rows of the lattice wide, the mean over directions.
+/// Returns the standard deviation of the middle of a disc that is `cells` columns and rows of the lattice wide, mean
+/// over directions.
 ///
-/// Columns are a apart and rows b. Along a row the rim is known to a / sqrt 12 at either end, and there are 2 radius / b
-/// rows; likewise along columns. Over a round rim that makes a b (a + b) / (12 pi radius) for both variances together.
+/// Columns are a apart and rows b. Along a row the rim is known to a / sqrt 12 at either end, and there are 2 radius /
+/// b rows; likewise along columns. Over a round rim the sum of both variances is a b (a + b) / (12 pi radius).
 fn sampled(radius: f64, cells: [u32; 2]) -> f64 {
     let [a, b] = cells.map(|n| 2.0 * radius / f64::from(n));
     (0.5 * a * b * (a + b) / (12.0 * std::f64::consts::PI * radius)).sqrt()
 }
 
-/// Dark cells that hang together on the lattice.
+/// Returns the connected sets of dark cells on the lattice.
 fn spots(cells: &[Cell], below: f64) -> Vec<Vec<usize>> {
     let mut left: Vec<usize> = (0..cells.len()).filter(|i| cells[*i].intensity < below).collect();
     let touch = |a: usize, b: usize| {
@@ -150,10 +155,10 @@ struct Circle {
 }
 
 impl Circle {
-    /// The circle inside which cells are dark: least squares of their darkness against 1 / (1 + exp((distance - radius) / blur))
-    /// by Gauss and Newton.
+    /// Fits the circle inside which cells are dark: least squares of their darkness against 1 / (1 + exp((distance -
+    /// radius) / blur)) by the Gauss-Newton method.
     fn fitted(mut self, cells: &[([f64; 2], f64)], blur: f64) -> Self {
-        /// More than enough: steps shrink by half or more.
+        /// Number of steps, more than sufficient: steps shrink by half or more.
         const ROUNDS: usize = 12;
         for _ in 0..ROUNDS {
             let (mut normal, mut right) = (Matrix3::zeros(), Vec3::zeros());
@@ -167,7 +172,7 @@ impl Circle {
                 right += row * (darkness - expected);
             }
             let Some(step) = normal.cholesky().map(|factor| factor.solve(&right)) else { return self };
-            // Beyond the blur the slopes are not valid.
+            // A step is limited to the blur, beyond which the slopes are not valid.
             let step = step * (blur / step.norm().max(blur));
             self.centre = [self.centre[0] + step.x, self.centre[1] + step.y];
             self.radius += step.z;
@@ -176,7 +181,7 @@ impl Circle {
     }
 }
 
-/// Mean of places, and their standard deviations along the shortest and the longest axis.
+/// Returns the mean of places, and their standard deviations along the shortest and the longest axis.
 fn moments(places: impl Iterator<Item = [f64; 2]> + Clone) -> ([f64; 2], [f64; 2]) {
     let n = places.clone().count().max(1) as f64;
     let mean = [0, 1].map(|k| places.clone().map(|at| at[k]).sum::<f64>() / n);
@@ -212,7 +217,7 @@ mod tests {
         Surface::new(fit.solve([0.0, 0.0, 1.0]).expect("determined"), 0.04, mask)
     }
 
-    /// Its scan, 1 mrad between beams and 1 mm of noise, with spots of a radius painted round (u, v).
+    /// Returns a scan of that plate with 1 mm of noise and with spots painted around (u, v), each with its radius.
     fn scan(spots: &[([f64; 2], f64)]) -> Patch {
         let mut noise = Random::new(5);
         let mut samples = Vec::new();

@@ -7,7 +7,8 @@ fn real() -> Blank {
     Blank { corners, bows: [0.0, 2e-3, -1e-3, 0.0], ..Blank::rectangle(4.0, 3.0) }
 }
 
-/// The mesh of a plate cut as `blank`, bent by `surface`; its boundary lies on the blank's outline, evenly.
+/// Returns the mesh of a plate cut as `blank` and bent by `surface`; its boundary vertices are evenly spaced on the
+/// blank's outline.
 fn bent(blank: &Blank, surface: impl Fn([f64; 2]) -> [f64; 3]) -> ClosedForm {
     let mut plate = ClosedForm::new(|[u, v]| [u, v, 0.0], [4.0, 3.0], [100, 75], 0.3, 1);
     let (n, places) = (plate.parts.boundary.len(), plate.parts.places.clone());
@@ -19,7 +20,7 @@ fn bent(blank: &Blank, surface: impl Fn([f64; 2]) -> [f64; 3]) -> ClosedForm {
     plate
 }
 
-/// From the rectangle to the blank: the four edges blended (Coons).
+/// Maps the rectangle to the blank by blending the four edges (Coons).
 fn stretched(blank: &Blank, [u, v]: [f64; 2]) -> [f64; 2] {
     let (s, t) = (u / 4.0, v / 3.0);
     let [bottom, right, top, left] =
@@ -31,7 +32,7 @@ fn stretched(blank: &Blank, [u, v]: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// The largest distance between two outlines.
+/// Returns the largest distance between two outlines.
 fn apart(a: &Blank, b: &Blank) -> f64 {
     let at = |k: usize| (k % 4, (k / 4) as f64 / 100.0);
     let distance = |k: usize| {
@@ -74,7 +75,7 @@ fn flat_and_rolled_blanks_tell_their_outline() {
     check("cone", &cone([-7.0, 1.0], 0.6), 3e-5);
 }
 
-/// Fibres that keep their length one way are as far from least energy as a law can be.
+/// Fibres that keep their length in one direction are as far from least energy as a material law can be.
 #[test]
 fn a_blank_curved_two_ways_is_refused_when_the_law_of_the_material_matters() {
     let sphere = |radius: f64| {
