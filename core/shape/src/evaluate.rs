@@ -1,29 +1,31 @@
 //! Evaluation of the fitted surface at material points: markers, reference lines and a grid, with standard deviations.
 //!
-//! Masuda et al., 4.4, map reference lines in the same way; the uncertainties are own.
+//! In: the surface S and the uncertainties of its edges and of the flattening. Out: positions, curvatures and their
+//! standard deviations. (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
 //!
-//! (u, v) are coordinates of the mid-surface; every position is that of the scanned face above it.
+//! Masuda et al., 4.4, map reference lines in the same way; the uncertainties are own.
 
 use crate::flatten::Misplacement;
 use crate::range_error::RangeError;
 use crate::surface::{Curvature, Surface};
 use crate::{Chart, DiskMesh, Vec3};
 
-/// Distance of the points of a reference line, metres.
+/// Spacing of the points of a reference line, metres.
 pub const LINE_STEP: f64 = 0.05;
-/// Places of the grid along u and along v.
+/// Number of places of the grid along u and along v.
 pub const GRID: [usize; 2] = [21, 21];
 
 /// Uncertainty of material points within the surface.
 ///
-/// A point's u follows from the edges u = 0 and u = W, each with its own standard deviation, and from the flattening's
-/// own uncertainty; likewise v. The scanner's range error moves the edges in the surface, and the surface itself along the normal.
+/// A point's u follows from the edges u = 0 and u = W, each with its own standard deviation, and from the flattening
+/// with its uncertainty; likewise v. The scanner's range error moves the edges within the surface, and the surface
+/// itself along the normal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Location {
     width: f64,
     height: f64,
     edge_sigma: [f64; 4],
-    /// Cells of the rectangle with the flattening's largest standard deviations of u and v among their vertices.
+    /// Largest standard deviations of u and v by the flattening among the vertices of each cell of the rectangle.
     cells: Vec<[f64; 2]>,
     range_error: RangeError,
 }
@@ -65,11 +67,12 @@ pub struct Grid {
     pub nodes: Vec<Node>,
 }
 
-/// Cells of [`Location`] along each side.
+/// Number of cells of [`Location`] along each side.
 const CELLS: usize = 16;
 
 impl Location {
-    /// Collects the uncertainties of the mesh's edges, of the chart by its own word, and its misplacement, which counts as a standard deviation.
+    /// Collects the uncertainties of the mesh's edges, those stated by the chart, and the chart's misplacement, which
+    /// counts as a standard deviation.
     #[must_use]
     pub fn new(mesh: &DiskMesh, chart: &Chart, misplacement: &Misplacement) -> Self {
         let mut cells = vec![[0.0_f64; 2]; CELLS * CELLS];
@@ -101,7 +104,7 @@ impl Location {
         let (x, y) = ((u / self.width).clamp(0.0, 1.0), (v / self.height).clamp(0.0, 1.0));
         let [bottom, right, top, left] = self.edge_sigma;
         let flattening = self.cells[cell(u, self.width) + CELLS * cell(v, self.height)];
-        // An edge, `at` a place on it, across the direction `along`, with its share in the place.
+        // Contribution of an edge, `at` a place on it, along the direction `along`, weighted by its share in the place.
         let edge = |share: f64, sigma: f64, at: [f64; 2], along: &Vec3| {
             let moved = self.range_error.along(&surface.face(at[0], at[1]), along);
             (share * sigma).hypot(share * moved)
@@ -127,7 +130,7 @@ pub fn place(surface: &Surface, location: &Location, u: f64, v: f64) -> Place {
     Place { u, v, position: surface.face(u, v), sigma, seen: surface.mask().seen(u, v) }
 }
 
-/// Evaluates points of a straight line of the rectangle, every [`LINE_STEP`] from `from`, and its end.
+/// Evaluates points of a straight line of the rectangle: one every [`LINE_STEP`] from `from`, and the end.
 #[must_use]
 pub fn reference_line(surface: &Surface, location: &Location, from: [f64; 2], to: [f64; 2]) -> Vec<Place> {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);

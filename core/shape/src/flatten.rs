@@ -1,8 +1,12 @@
 //! Flattening (parameterization) of the mid-surface mesh: every vertex gets its place (u, v) on the original rectangle.
 //!
-//! [`Flatten`] is the interface to the methods, which are plugins (Masuda et al., 4.3: angle based and harmonic maps). Here are
-//! the parts they share: `domain` checks what can be flattened, `fixed_boundary` solves for a map with its boundary held
-//! (the harmonic map), `free_boundary` develops a nearly developable plate with free edges, for the outline of a blank.
+//! [`Flatten`] is the interface to the methods, which are plugins (Masuda et al., 4.3: angle based and harmonic maps).
+//! This module contains the parts that they share:
+//!
+//! - `domain`: checks whether a mesh can be flattened;
+//! - `fixed_boundary`: solves for a map with its boundary held (the harmonic map);
+//! - `free_boundary`: develops a nearly developable plate with free edges, for the outline of a blank;
+//! - `misplacement`: compares a chart with the equilibrium of an elastic membrane.
 
 #[cfg(any(test, feature = "closed-form"))]
 pub mod closed_form;
@@ -20,11 +24,12 @@ pub use misplacement::{MOST_STRAIN, Misplacement};
 
 use crate::mesh::DiskMesh;
 
-/// A flattening's result: the place of every mesh vertex on the original rectangle.
+/// Result of a flattening: the place of every mesh vertex on the original rectangle.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
-    /// Per vertex: (u, v), metres, on the rectangle `[0, W] x [0, H]`. A method that holds the edges only as firmly as
-    /// they are known may place vertices of the boundary outside of it by about `edge_sigma` of the mesh.
+    /// Per vertex: (u, v), metres, on the rectangle `[0, W] x [0, H]`. A method that holds the edges by springs
+    /// according to their uncertainty may place vertices of the boundary outside of it by about `edge_sigma` of the
+    /// mesh.
     pub uv: Vec<[f64; 2]>,
     /// Per vertex, where the method computes it: standard deviation of u and of v, metres.
     pub sigma: Option<Vec<[f64; 2]>>,
@@ -49,20 +54,20 @@ pub enum FlattenError {
     /// The deadline passed, or the stroke was cancelled.
     #[error("flattening: stopped: {reason}; the scan is kept, measure it again")]
     Stopped { reason: String },
-    /// The method answered with something that is no chart of this mesh: its author must act.
+    /// The method's result is not a chart of this mesh: its author must act.
     #[error("flattening: not a chart: {what}; report this scan to the author of the flattening")]
     NotAChart { what: String },
 }
 
-/// Standard deviations of an edge by which a chart may place it elsewhere than the mesh.
+/// Number of standard deviations of an edge by which its place in a chart may differ from that in the mesh.
 const EDGE_SIGMAS: f64 = 4.0;
-/// Beyond that, metres: edges of a plate that is not of its size give way to each other. Found: 0.9 mm where the standard deviation is
-/// 0.2 mm; blanks are cut off their size by up to 4 mm.
+/// Further allowance, metres: edges of a plate that differs from its nominal size give way to each other. Found: 0.9 mm
+/// where the standard deviation is 0.2 mm; blanks are cut off their size by up to 4 mm.
 const EDGE_SLACK: f64 = 5e-3;
 
 impl Chart {
-    /// Checks that this is a chart of `mesh`: one finite place per vertex, the boundary where the material's edges are known to lie, no
-    /// triangle turned over, uncertainties that are some.
+    /// Checks that this is a chart of `mesh`: one finite place per vertex, the boundary where the material's edges are
+    /// known to lie, no triangle turned over, and uncertainties that are finite and not negative.
     ///
     /// # Errors
     /// [`FlattenError::NotAChart`] with the first fault.

@@ -1,10 +1,10 @@
-//! The geometry of platen, from the lattice of a scan to the fitted surface of the plate: pure functions.
+//! Geometry of platen: pure functions from the lattice of a scan to the fitted surface of the plate.
 //!
-//! The method is that of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks" (in
-//! short "Masuda et al."), with the departures listed in this crate's README. The rooms in the order of the data; none
-//! uses one below it:
+//! The method is that of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks"
+//! (in short "Masuda et al."), with the departures listed in this crate's README. The table lists the modules in the
+//! order of the data; no module uses one below it:
 //!
-//! | room | in -> out | method |
+//! | module | in -> out | method |
 //! |---|---|---|
 //! | [`plate`] | - -> [`PlateSpec`], [`Blank`] | nominal size, outline of the blank as cut |
 //! | [`extract`] | columns of a scan -> [`Patch`] | connected components, normals of a low-pass copy, region growing |
@@ -20,10 +20,11 @@
 //! | [`correspondence`] | two scans of a plate | outline of the blank by a baseline scan; test for a plate put back turned |
 //! | [`inspection`] | outline, surface -> figures | dimension checks, bending energy, marker detection, calibration |
 //!
-//! Without the feature `measure` there are `plate`, `surface`, `target_surface` and `template_seat` alone: what a comparison evaluates.
+//! Without the feature `measure` the crate contains only `plate`, `surface`, `target_surface` and `template_seat`,
+//! which a comparison evaluates.
 //!
-//! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket, and works on one
-//! thread at a time: the same columns give the same result to the last bit.
+//! Frames and units: scanner frame, metres, radians. This crate never reads a clock, a file or a socket. Every kernel
+//! runs on one thread: the same columns give the same result to the last bit.
 
 #[cfg(feature = "measure")]
 pub mod correspondence;
@@ -69,7 +70,8 @@ pub use range_error::RangeError;
 pub use surface::{Surface, SurfaceParts};
 pub use target_surface::{Placement, TargetError, TargetSurface};
 
-/// Half width of a 95 % interval in standard deviations: every stated uncertainty and level of detection is expanded by it.
+/// Half width of a 95 % interval in standard deviations; every stated uncertainty and level of detection is expanded by
+/// this factor.
 pub const EXPANDED: f64 = 1.96;
 
 /// A point or vector in space, metres, scanner frame unless stated otherwise.

@@ -1,4 +1,4 @@
-//! The stages from the plate's samples and outline to its surface S(u, v), in one call.
+//! Measurement of a plate: the stages from its samples and outline to its surface S(u, v) in one call.
 //!
 //! ```text
 //! Patch, Outline -> SmoothFace (smooth face and mid-surface) -> DiskMesh -> Chart (the flattening) -> Surface
@@ -23,7 +23,7 @@ use crate::mesh::{MeshError, SmoothFace};
 use crate::surface::{FitToSamples, Quality, Surface, fit_surface};
 use crate::{Blank, Chart, DiskMesh, Flatten, FlattenError, Outline, Patch, PlateSpec, Vec3};
 
-/// Vertices of the mesh: about as many as in Masuda et al. (10,188).
+/// Number of vertices of the mesh: about as many as in Masuda et al. (10,188).
 pub const N_VERTICES: usize = 10_000;
 
 /// One measured plate.
@@ -33,9 +33,9 @@ pub struct Measurement {
     pub surface: Surface,
     /// The mesh that was flattened.
     pub mesh: DiskMesh,
-    /// Its flattening.
+    /// The flattening of the mesh.
     pub chart: Chart,
-    /// Its distance from an elastic membrane.
+    /// Distance of the chart from an elastic membrane.
     pub misplacement: Misplacement,
     /// Uncertainty of material points.
     pub location: Location,
@@ -54,7 +54,7 @@ pub struct Timings {
     pub mesh: Duration,
     /// Flattening, and the check of its chart.
     pub flatten: Duration,
-    /// S(u, v) with its covariance, and beside it the chart's distance from an elastic membrane.
+    /// S(u, v) with its covariance and, at the same time, the chart's distance from an elastic membrane.
     pub surface: Duration,
 }
 
@@ -72,10 +72,11 @@ pub enum MeasureError {
     Surface(#[from] Undetermined),
 }
 
-/// Measures the plate, whose edges lie on the outline of `blank`. `clock` returns the time since some fixed moment; it is read between the stages.
+/// Measures a plate whose edges lie on the outline of `blank`. `clock` returns the time since a fixed moment and is
+/// read between the stages.
 ///
 /// # Errors
-/// [`MeasureError`]: too few samples, a mesh that is no disk, or the flattening's own refusal.
+/// [`MeasureError`]: too few samples, a mesh that is not a disk, or a refusal by the flattening.
 pub fn measure(
     patch: &Patch,
     outline: &Outline,
@@ -91,7 +92,7 @@ pub fn measure(
     let chart = flatten.flatten(&mesh)?;
     chart.check(&mesh)?;
     let flattened = clock();
-    // Neither needs the other. For speed only: benchmark `measure_but_flattening`.
+    // The two are independent. On two threads for speed only: benchmark `measure_but_flattening`.
     let (misplacement, fit) =
         join(|| Misplacement::of(&mesh, &chart), || fit_surface(patch, &face, &places, &chart, spec));
     let (misplacement, FitToSamples { surface, quality }) = (misplacement?, fit?);

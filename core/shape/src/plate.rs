@@ -1,4 +1,4 @@
-//! Input of a measurement: nominal size and position of the plate ([`PlateSpec`]) and the outline it was cut to ([`Blank`]).
+//! Plate data of a measurement: nominal size and position ([`PlateSpec`]) and the outline as cut ([`Blank`]).
 
 mod blank;
 mod spec;

@@ -1,9 +1,12 @@
-//! The plate's mid-surface S(u, v): a bicubic spline over the original rectangle with the covariance of its control values.
+//! Mid-surface S(u, v) of the plate: a bicubic spline over the original rectangle with the covariance of its control
+//! values.
 //!
-//! Fitted by penalised least squares to all samples, moved by half the thickness against the scanner (`fit_surface`;
-//! Masuda et al., 4.4, fit the scanned face without penalty). Here: positions, normals, curvatures and their standard
-//! deviations at one place. The samples' noise acts along the normal, so every standard deviation is that of the normal
-//! direction; the uncertainty of material points within the surface comes from the flattening.
+//! S is fitted by penalised least squares to all samples, moved by half the thickness away from the scanner
+//! (`fit_surface`; Masuda et al., 4.4, fit the scanned face without penalty). This module evaluates positions, normals,
+//! curvatures and their standard deviations at a place.
+//!
+//! Limits: the samples' noise acts along the normal, so that every standard deviation is that in the normal direction.
+//! The uncertainty of material points within the surface follows from the edges and the flattening (`evaluate`).
 
 #[cfg(feature = "measure")]
 mod fit_surface;
@@ -31,7 +34,7 @@ use platen_numerics::uniform_knots::LocalBasis;
 
 /// The mid-surface S(u, v), (u, v) in `[0, W] x [0, H]`, metres, scanner frame.
 ///
-/// Beyond the rectangle the outermost spans go on: a few millimetres outside are as good as the edge.
+/// Beyond the rectangle the outermost spans are continued: S is as accurate a few millimetres outside as at the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     spline: TensorSpline<3>,
@@ -47,15 +50,15 @@ pub struct Surface {
 pub struct Derivatives {
     /// Position, metres.
     pub p: Vec3,
-    /// By u.
+    /// Derivative by u.
     pub u: Vec3,
-    /// By v.
+    /// Derivative by v.
     pub v: Vec3,
-    /// By u twice, 1/m.
+    /// Second derivative by u, 1/m.
     pub uu: Vec3,
-    /// By u and v, 1/m.
+    /// Mixed derivative by u and v, 1/m.
     pub uv: Vec3,
-    /// By v twice, 1/m.
+    /// Second derivative by v, 1/m.
     pub vv: Vec3,
 }
 
@@ -66,7 +69,7 @@ pub struct Curvature {
     pub u: f64,
     /// Normal curvature across u (along v where u and v are at right angles, as on every unstretched plate).
     pub v: f64,
-    /// Twist: change of the normal towards v on the way along u.
+    /// Twist: rate at which the normal turns towards v on the way along u.
     pub uv: f64,
     /// Larger principal curvature.
     pub max: f64,
@@ -77,7 +80,7 @@ pub struct Curvature {
 }
 
 impl Surface {
-    /// Builds the surface of a fit over the original rectangle, which starts in (0, 0).
+    /// Builds the surface from a fit over the original rectangle, which starts at (0, 0).
     #[cfg(feature = "measure")]
     #[must_use]
     pub fn new(fitted: FittedSpline<3>, thickness: f64, mask: Mask) -> Self {
@@ -163,9 +166,10 @@ impl Surface {
         self.variance(&su, &sv, |i, k| su.value[i] * sv.value[k]).sqrt()
     }
 
-    /// Returns the standard deviation of the position along the normal over scans of the same shape, metres: less than
-    /// [`Self::sigma_point`] by what smoothing takes from the shape, which is the same in every scan. For changes of a
-    /// shape, not for the shape itself.
+    /// Returns the standard deviation of the position along the normal between scans of the same shape, metres.
+    ///
+    /// It is smaller than [`Self::sigma_point`], since the part of the shape that smoothing removes is the same in
+    /// every scan. It holds for changes of a shape, not for the shape itself.
     #[must_use]
     pub fn sigma_repeat(&self, u: f64, v: f64) -> f64 {
         self.sigma_point(u, v) * f64::from(self.noise_share).sqrt()
@@ -173,8 +177,8 @@ impl Surface {
 
     /// Returns the standard deviations of the curvatures u, v and uv, 1/m.
     ///
-    /// First order: noise along the normal changes S_uu . n, while n and the lengths of S_u and S_v change by
-    /// tangential parts only, which meet nothing but other tangential parts.
+    /// To first order: noise along the normal changes S_uu . n, while n and the lengths of S_u and S_v change by
+    /// tangential parts only, whose products with the normal noise are of second order.
     #[must_use]
     pub fn sigma_curvature(&self, u: f64, v: f64) -> [f64; 3] {
         let (su, sv) = (self.spline.u.local_basis(u), self.spline.v.local_basis(v));
@@ -189,8 +193,8 @@ impl Surface {
 
     /// Returns the standard deviation of a weighted sum of heights along the normal: terms ((u, v), weight), metres.
     ///
-    /// Unlike the figures of one place this includes the correlation of errors at different places. Costs one sweep over the
-    /// factor (0.2 ms for 50 x 40 spans), however many terms.
+    /// Unlike the figures of one place this includes the correlation of errors at different places. Cost: one sweep
+    /// over the factor (0.2 ms for 50 x 40 spans), whatever the number of terms.
     #[must_use]
     pub fn sigma_of_heights(&self, terms: &[([f64; 2], f64)]) -> f64 {
         let mut functional = vec![0.0; self.spline.control.len()];
@@ -264,17 +268,17 @@ impl Curvature {
         x * x * self.u + 2.0 * x * y * self.uv + y * y * self.v
     }
 
-    /// Returns the principal curvature that is larger in size.
+    /// Returns the principal curvature of larger absolute value.
     #[must_use]
     pub fn strongest(&self) -> f64 {
         if self.max.abs() >= self.min.abs() { self.max } else { self.min }
     }
 
-    /// Returns the unit direction of that curvature; u where every direction is alike.
+    /// Returns the unit direction of [`Self::strongest`]; u where all directions are equal.
     #[must_use]
     pub fn strongest_direction(&self) -> [f64; 2] {
         let strongest = self.strongest();
-        // An eigenvector in the two ways to write it: the longer one is the sharper one.
+        // Two expressions of one eigenvector: the longer one is the more accurate.
         let (a, b) = ([self.uv, strongest - self.u], [strongest - self.v, self.uv]);
         let [x, y] = if a[0].hypot(a[1]) > b[0].hypot(b[1]) { a } else { b };
         let length = x.hypot(y);
@@ -282,7 +286,7 @@ impl Curvature {
     }
 }
 
-/// The change from one curvature to another, in the same frame.
+/// Change from one curvature to another, in the same frame.
 impl std::ops::Sub for Curvature {
     type Output = Self;
     fn sub(self, other: Self) -> Self {

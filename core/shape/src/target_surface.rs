@@ -1,10 +1,16 @@
-//! Target surface: closed-form position, normal and curvature of every material point on the target shape, and the rigid
-//! registration of a measured plate to it (`placement`). Not in Masuda et al.
+//! Target surface: closed-form position, normal and curvature of every material point on the target shape.
 //!
-//! Frame: origin in the middle of the plate's mid-surface, x along u and y along v there, z towards the scanner.
-//! Flat, cylinder and cone are isometric images of the rectangle. A sphere carries (u, v) along its great circles
-//! from the middle; a torus is a circle along the axis direction swept along a circle across it. The stretching of a
-//! real plate differs from these by millimetres within the surface, which does not change the deviation along the normal.
+//! `placement` is the rigid registration of a measured plate to it. In: the target of the plate file and the size of
+//! the plate. Out: functions of (u, v). Not in Masuda et al.
+//!
+//! Frame: origin at the middle of the plate's mid-surface, x along u and y along v there, z towards the scanner.
+//!
+//! - Flat, cylinder and cone are isometric images of the rectangle.
+//! - A sphere has (u, v) along its great circles from the middle.
+//! - A torus is a circle along the axis direction swept along a circle across it.
+//!
+//! Limit: the stretching of a real plate differs from that of a sphere or torus by millimetres within the surface,
+//! which does not change the deviation along the normal.
 
 mod cone;
 mod placement;
@@ -30,7 +36,7 @@ pub struct TargetSurface {
     half_thickness: f64,
 }
 
-/// A shape of the mid-surface in the coordinates along the axis and across it, its centre above.
+/// A shape of the mid-surface in the coordinates along the axis and across it, with its centre above.
 #[derive(Debug, Clone, Copy)]
 enum Form {
     Flat,
@@ -48,13 +54,13 @@ struct Place {
     curvature: [f64; 3],
 }
 
-/// The numbers of a target describe no surface that this plate can take.
+/// Reason why the numbers of a target describe no surface that this plate can take.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TargetError {
     /// A radius is zero, negative, or not a number.
     #[error("target: a radius of {mm} mm is no radius; give one above 0", mm = radius * 1000.0)]
     NoRadius {
-        /// As given, metres.
+        /// Radius as given, metres.
         radius: f64,
     },
     /// The plate would roll up.
@@ -63,12 +69,12 @@ pub enum TargetError {
         radius_mm = radius * 1000.0, side_mm = side * 1000.0
     )]
     RollsUp {
-        /// As given, metres.
+        /// Radius as given, metres.
         radius: f64,
         /// The plate's shorter side, metres.
         side: f64,
     },
-    /// A cone as good as flat.
+    /// A cone that is nearly flat.
     #[error(
         "target: the radius changes by {change_mm:.0} mm along a straight line of {length_mm:.0} mm, a cone as good as flat; \
          give the radii of curvature at the two ends of that line",
@@ -91,13 +97,13 @@ impl TargetSurface {
         Self::new(target, plate.width, plate.height, plate.thickness)
     }
 
-    /// The target of a plate of `width` x `height` x `thickness` metres.
+    /// Returns the target of a plate of `width` x `height` x `thickness` metres.
     ///
-    /// Radii become those of the mid-surface: half a thickness more than inside, less than outside. A cone's radii are
-    /// those of normal curvature, as a template shows them that stands upright on the plate.
+    /// Radii are converted to those of the mid-surface: half a thickness more than inside, less than outside. The radii
+    /// of a cone are those of normal curvature, as measured by a template that stands upright on the plate.
     ///
     /// # Errors
-    /// [`TargetError`] when a radius is none, would roll the plate up, or a cone is as good as flat.
+    /// [`TargetError`] when a radius is not valid or would roll the plate up, or a cone is nearly flat.
     pub fn new(target: &Target, width: f64, height: f64, thickness: f64) -> Result<Self, TargetError> {
         let to_mid = match target.radius_of {
             RadiusOf::Inside => 0.5 * thickness,
@@ -138,27 +144,27 @@ impl TargetSurface {
         Ok(Self { form, side, middle, axis: [cos, sin], half_thickness: 0.5 * thickness })
     }
 
-    /// Position on the mid-surface.
+    /// Returns the position on the mid-surface.
     #[must_use]
     pub fn point(&self, u: f64, v: f64) -> Vec3 {
         self.turned(self.place(u, v).point)
     }
 
-    /// Unit normal, towards the scanner.
+    /// Returns the unit normal, towards the scanner.
     #[must_use]
     pub fn normal(&self, u: f64, v: f64) -> Vec3 {
         self.turned(self.place(u, v).normal) * self.side
     }
 
-    /// Position on the scanned face.
+    /// Returns the position on the scanned face.
     #[must_use]
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
         let place = self.place(u, v);
         self.turned(place.point + place.normal * (self.side * self.half_thickness))
     }
 
-    /// Curvature of the mid-surface along the plate's own u and v, positive towards the scanner. On a torus, whose
-    /// lines stretch, the directions are those of its circles.
+    /// Returns the curvature of the mid-surface along the plate's own u and v, positive towards the scanner. On a
+    /// torus, whose lines stretch, the directions are those of its circles.
     #[must_use]
     pub fn curvature(&self, u: f64, v: f64) -> Curvature {
         let [along, across, twist] = self.place(u, v).curvature.map(|k| k * self.side);
@@ -169,7 +175,7 @@ impl TargetSurface {
         Curvature::from_form(along_u, along_v, twist)
     }
 
-    /// Direction on the plate in which the target bends most, `None` where no direction is special.
+    /// Returns the direction on the plate in which the target bends most; `None` where all directions are equal.
     #[must_use]
     pub fn bending(&self, u: f64, v: f64) -> Option<[f64; 2]> {
         let k = self.curvature(u, v);
@@ -177,8 +183,11 @@ impl TargetSurface {
         (k.max - k.min > 1e-9).then(|| k.strongest_direction())
     }
 
-    /// Target's curvature minus the measured one, 1/m: positive where the plate has to bend more the target's way. In the
-    /// direction in which the target bends most; where none is special, in the direction that lacks or exceeds most.
+    /// Returns the target's curvature minus the measured one, 1/m: positive where the plate has to bend more in the
+    /// target's sense.
+    ///
+    /// The direction is that in which the target bends most; where all directions are equal, that of the largest
+    /// difference.
     #[must_use]
     pub fn deficit(&self, measured: &Curvature, u: f64, v: f64) -> f64 {
         let goal = self.curvature(u, v);
@@ -189,7 +198,7 @@ impl TargetSurface {
         lacking * self.side
     }
 
-    /// 1 when the centre of the (main) curvature lies on the scanner's side, else -1.
+    /// Returns 1 when the centre of the (main) curvature lies on the scanner's side, else -1.
     #[must_use]
     pub fn side(&self) -> f64 {
         self.side
@@ -200,7 +209,7 @@ impl TargetSurface {
         self.form.place(c * x + s * y, c * y - s * x)
     }
 
-    /// From along, across, up on the centre's side to x, y, z towards the scanner.
+    /// Converts (along, across, up on the centre's side) to (x, y, z towards the scanner).
     fn turned(&self, p: Vec3) -> Vec3 {
         let [c, s] = self.axis;
         Vec3::new(c * p.x - s * p.y, s * p.x + c * p.y, self.side * p.z)

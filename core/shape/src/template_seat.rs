@@ -1,15 +1,19 @@
 //! Seat of a template: one-sided contact of a rigid edge with a profile.
 //!
-//! x runs along the template from its middle, d is the height of the plate over the template's edge, both metres. The
-//! template rests on the plate from above on a line a + b x >= d(x); the gap is a + b x - d(x). The gravity seat minimises a,
-//! a linear program in two unknowns whose solution is an edge of the upper convex hull of d.
+//! In: the profile d(x). x runs along the template from its middle, d is the height of the plate over the template's
+//! edge, both in metres. Out: the seat, a line a + b x, and the gaps a + b x - d(x).
+//!
+//! - Gravity seat: the template rests on the plate from above, a + b x >= d(x), with the least a. This linear program
+//!   in two unknowns has an edge of the upper convex hull of d as its solution.
+//! - Balanced seat: one contact, with equal gaps at both ends.
+//! - Held seat: both ends are set on the profile; gaps may be negative.
 
 use platen_model::Seat;
 
 /// Height profile of the plate over the template's edge.
 #[derive(Debug, Clone)]
 pub struct Profile {
-    /// Increasing, from one end of the template to the other, 0 at its middle.
+    /// Places along the template, increasing from one end to the other, 0 at its middle.
     pub x: Vec<f64>,
     /// Height of the plate over the edge at each x.
     pub d: Vec<f64>,
@@ -34,14 +38,14 @@ enum Support {
     Held,
 }
 
-/// Share of the chord that the contacts must span; with less the template rocks.
+/// Share of the chord that the contacts must span; with a smaller span the template rocks.
 const ROCKS: f64 = 0.25;
-/// Contacts lie on a grid, so that their span often is that share: rounding must not decide, metres.
+/// Allowance for rounding, metres: contacts lie on a grid, so that their span often equals that share exactly.
 const ROUNDING: f64 = 1e-9;
 
 impl Profile {
-    /// Returns the seating to judge of a template `chord` metres long, and whether it rocks in the gravity seat: then the balanced
-    /// seat is judged.
+    /// Returns the seating to be judged of a template `chord` metres long, and whether the template rocks in the
+    /// gravity seat. Where it rocks, the balanced seat is judged.
     #[must_use]
     pub fn seat(&self, seat: Seat, chord: f64) -> (Seating, bool) {
         let rocks = |gravity: &Seating| gravity.span(self) < ROCKS * chord - ROUNDING;
@@ -55,8 +59,9 @@ impl Profile {
         }
     }
 
-    /// Returns the gravity seat: the line above d that is lowest at x = 0, the edge of the upper hull of d over x = 0. A contact at x = 0
-    /// itself ends two such edges; the shorter one is taken, so that a mirrored profile has the mirrored seat.
+    /// Returns the gravity seat: the line above d that is lowest at x = 0, which is the edge of the upper hull of d
+    /// over x = 0. Where a contact at x = 0 itself ends two such edges the shorter one is selected, so that a mirrored
+    /// profile has the mirrored seat.
     #[must_use]
     pub fn gravity(&self) -> Seating {
         let hull = self.upper_hull();
@@ -92,8 +97,8 @@ impl Profile {
         self.x.iter().zip(&self.d).map(|(x, d)| seating.offset + seating.tilt * x - d).collect()
     }
 
-    /// Returns the gap at place `k` as a weighted sum of heights of the plate: (place, weight), each place once. The gap is smallest at the
-    /// contacts, so it does not change to first order when they move.
+    /// Returns the gap at place `k` as a weighted sum of heights of the plate: (place, weight), each place once. The
+    /// gap is smallest at the contacts; to first order it does not change when they move.
     #[must_use]
     pub fn functional(&self, seating: &Seating, k: usize) -> Vec<(usize, f64)> {
         let share = |i: usize, j: usize, m: usize| (self.x[k] - self.x[m]) / (self.x[j] - self.x[i]);
@@ -132,7 +137,7 @@ impl Profile {
         }
     }
 
-    /// Returns the range of tilts while the template touches, from one end touching to the other, radians.
+    /// Returns the range of tilts of the touching template, from contact at one end to contact at the other, radians.
     #[must_use]
     pub fn rocking(&self) -> f64 {
         let hull = self.upper_hull();
@@ -205,7 +210,7 @@ mod tests {
         let gaps = p.gaps(&seating);
         assert_eq!(p.contacts(&seating), [100]);
         assert!((gaps[0] - 0.004).abs() < 1e-12 && (gaps[200] - 0.004).abs() < 1e-12);
-        // From one end touching to the other: twice the slope of 2 * 0.004 at the ends, a half step short.
+        // From contact at one end to contact at the other: twice the slope of 2 * 0.004 at the ends, half a step short.
         assert!((p.rocking() - 2.0 * 0.008 * 0.995).abs() < 1e-12, "{}", p.rocking());
     }
 
@@ -262,7 +267,7 @@ mod tests {
             let functional = p.functional(&seating, k);
             let sum: f64 = functional.iter().map(|(i, w)| w * p.d[*i]).sum();
             assert!((sum - p.gaps(&seating)[k]).abs() < 1e-15);
-            // Constants and slopes are the template's own freedom.
+            // Constants and slopes of the profile do not change a gap.
             assert!(functional.iter().map(|(_, w)| w).sum::<f64>().abs() < 1e-12);
             assert!(functional.iter().map(|(i, w)| w * p.x[*i]).sum::<f64>().abs() < 1e-12);
         }

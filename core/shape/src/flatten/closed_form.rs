@@ -1,4 +1,4 @@
-//! Meshes of closed-form plates whose material coordinates are known: for tests and benchmarks only.
+//! Meshes of closed-form plates with known material coordinates, for tests and benchmarks only.
 
 use crate::mesh::{DiskMesh, DiskParts, MeshError};
 use crate::{Blank, Vec3};
@@ -10,13 +10,14 @@ use spade::{DelaunayTriangulation, Point2, Triangulation};
 pub struct ClosedForm {
     /// Material coordinates per vertex, metres.
     pub uv: Vec<[f64; 2]>,
-    /// The mesh, to be spoilt or checked.
+    /// The mesh, to be modified or checked.
     pub parts: DiskParts,
 }
 
 impl ClosedForm {
-    /// The plate `size` bent by `surface` (material coordinates to space), with `cells` cells along u and v; interior
-    /// vertices are moved by up to `jitter` of a cell, after `seed`, and joined by Delaunay's criterion.
+    /// Builds the plate `size` bent by `surface` (material coordinates to space), with `cells` cells along u and v.
+    /// Interior vertices are moved by up to `jitter` of a cell, at random by `seed`, and joined by Delaunay's
+    /// criterion.
     pub fn new(
         surface: impl Fn([f64; 2]) -> [f64; 3],
         size: [f64; 2],
@@ -56,7 +57,7 @@ impl ClosedForm {
         Self { uv, parts }
     }
 
-    /// Adds noise of standard deviation `sigma` along z to the interior vertices, after `seed`.
+    /// Adds noise of standard deviation `sigma` along z to the interior vertices, at random by `seed`.
     #[must_use]
     pub fn with_noise(mut self, sigma: f64, seed: u64) -> Self {
         let mut random = Random::new(seed);
@@ -65,7 +66,7 @@ impl ClosedForm {
         self
     }
 
-    /// The checked mesh.
+    /// Returns the checked mesh.
     ///
     /// # Errors
     /// [`MeshError`].
@@ -73,14 +74,14 @@ impl ClosedForm {
         DiskMesh::new(self.parts.clone())
     }
 
-    /// Mean and largest distance of a chart from the known material coordinates, metres.
+    /// Returns the mean and largest distance of a chart from the known material coordinates, metres.
     pub fn errors(&self, uv: &[[f64; 2]]) -> [f64; 2] {
         let errors = || self.uv.iter().zip(uv).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
         [errors().sum::<f64>() / self.uv.len() as f64, errors().fold(0.0, f64::max)]
     }
 }
 
-/// Rolled to a cylinder whose straight lines make the angle `axis` (radians) with u.
+/// Returns a plate rolled to a cylinder whose straight lines make the angle `axis` (radians) with u.
 pub fn cylinder(radius: f64, axis: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     let (sin, cos) = axis.sin_cos();
     move |[u, v]| {
@@ -89,7 +90,8 @@ pub fn cylinder(radius: f64, axis: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     }
 }
 
-/// Rolled to a cone with its apex at material point `apex`; its surface makes the angle `half_angle` with its axis.
+/// Returns a plate rolled to a cone with its apex at the material point `apex`; its surface makes the angle
+/// `half_angle` with its axis.
 pub fn cone(apex: [f64; 2], half_angle: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     let (sin, cos) = half_angle.sin_cos();
     move |[u, v]| {
@@ -99,7 +101,7 @@ pub fn cone(apex: [f64; 2], half_angle: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     }
 }
 
-/// Flat up to u = `from`, rolled to a cylinder beyond.
+/// Returns a plate that is flat up to u = `from` and rolled to a cylinder beyond.
 pub fn half_bent(radius: f64, from: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     move |[u, v]| {
         let bent = (u - from).max(0.0) / radius;
@@ -107,7 +109,8 @@ pub fn half_bent(radius: f64, from: f64) -> impl Fn([f64; 2]) -> [f64; 3] {
     }
 }
 
-/// Pressed to a sphere so that the fibres along u keep their length and lie on great circles across the middle line.
+/// Returns a plate pressed to a sphere such that the fibres along u keep their length and lie on great circles across
+/// the middle line.
 pub fn sphere_of_fibres(radius: f64, size: [f64; 2]) -> impl Fn([f64; 2]) -> [f64; 3] {
     move |[u, v]| {
         let (a, b) = ((u - size[0] / 2.0) / radius, (v - size[1] / 2.0) / radius);
@@ -115,7 +118,7 @@ pub fn sphere_of_fibres(radius: f64, size: [f64; 2]) -> impl Fn([f64; 2]) -> [f6
     }
 }
 
-/// The boundary loop from (0,0), then the interior row by row.
+/// Returns the material points: the boundary loop from (0,0), then the interior row by row.
 fn material_points(size: [f64; 2], [nu, nv]: [u32; 2], jitter: f64, seed: u64) -> Vec<[f64; 2]> {
     let mut random = Random::new(seed);
     let at = |i: f64, j: f64| [size[0] * i / f64::from(nu), size[1] * j / f64::from(nv)];
@@ -134,7 +137,8 @@ fn material_points(size: [f64; 2], [nu, nv]: [u32; 2], jitter: f64, seed: u64) -
     uv
 }
 
-/// Length of the image of the straight piece from `a` to `b`: 64 chords, one part in 10^8 short at 100 mm on R 5 m.
+/// Returns the length of the image of the straight segment from `a` to `b`, by 64 chords: one part in 10^8 short at 100
+/// mm on R 5 m.
 fn arc_length(point: &impl Fn([f64; 2]) -> Vec3, a: [f64; 2], b: [f64; 2]) -> f64 {
     const PIECES: u32 = 64;
     let on = |k: u32| {
@@ -147,7 +151,7 @@ fn arc_length(point: &impl Fn([f64; 2]) -> Vec3, a: [f64; 2], b: [f64; 2]) -> f6
 fn delaunay(uv: &[[f64; 2]]) -> Vec<[u32; 3]> {
     let mut triangulation = DelaunayTriangulation::<Point2<f64>>::new();
     for p in uv {
-        // Only coordinates that are not finite are refused, and none are made above.
+        // Only coordinates that are not finite are refused; none are generated above.
         if triangulation.insert(Point2::new(p[0], p[1])).is_err() {
             return Vec::new();
         }

@@ -2,11 +2,12 @@
 
 use crate::mesh::DiskMesh;
 
-/// A triangle lower than this share of its longest side has no angles to speak of: at 40 mm sides it is 40 nm high.
+/// Least height of a triangle in parts of its longest side: below, the angles are meaningless. At 40 mm sides it is 40
+/// nm.
 const MIN_HEIGHT: f64 = 1e-6;
 
-/// The edges of a bent plate keep their length to parts of a percent; a larger misfit means wrong corners or a wrong
-/// size.
+/// Largest relative difference between an edge and its side of the rectangle. The edges of a bent plate keep their
+/// length to parts of a percent; a larger misfit means wrong corners or a wrong size.
 const MAX_LENGTH_MISFIT: f64 = 0.1;
 
 /// Reason why a disk cannot be flattened onto its rectangle.
@@ -48,8 +49,8 @@ impl UnfitMesh {
     }
 }
 
-/// Checks the requirements of a flattening beyond a disk: triangles with area, in space and on the rectangle, and edges about as
-/// long as the rectangle's sides.
+/// Checks the requirements of a flattening beyond those of a disk: triangles with area, in space and on the rectangle,
+/// and edges about as long as the rectangle's sides.
 ///
 /// # Errors
 /// [`UnfitMesh`], with the first fault found.
@@ -77,7 +78,8 @@ pub fn check_fit(mesh: &DiskMesh) -> Result<(), UnfitMesh> {
     Ok(())
 }
 
-/// Returns per vertex the edges it lies on: bit k is set for edge k. A corner lies on two, an interior vertex on none.
+/// Returns, per vertex, the edges on which it lies: bit k is set for edge k. A corner lies on two edges, an interior
+/// vertex on none.
 pub fn edges_of_vertices(mesh: &DiskMesh) -> Vec<u8> {
     let mut edges = vec![0; mesh.vertices.len()];
     for edge in 0..4 {
@@ -88,7 +90,8 @@ pub fn edges_of_vertices(mesh: &DiskMesh) -> Vec<u8> {
     edges
 }
 
-/// Projects the vertices along the plate's mean u and v: a rough plane picture to order eliminations by.
+/// Projects the vertices onto the plate's mean u and v directions: approximate plane coordinates to order eliminations
+/// by.
 pub fn plane_picture(mesh: &DiskMesh) -> Vec<[f64; 2]> {
     let corner = mesh.corners.map(|at| mesh.vertices[mesh.boundary[at as usize] as usize]);
     let u = corner[1] - corner[0] + corner[2] - corner[3];
@@ -97,7 +100,7 @@ pub fn plane_picture(mesh: &DiskMesh) -> Vec<[f64; 2]> {
     mesh.vertices.iter().map(|p| [p.dot(&u), p.dot(&v)]).collect()
 }
 
-/// Numbers the interior vertices; returns the number of each vertex among them, and those vertices.
+/// Numbers the interior vertices. Returns the number of each vertex among them, and the interior vertices.
 pub fn interior(mesh: &DiskMesh) -> (Vec<Option<u32>>, Vec<u32>) {
     let edges = edges_of_vertices(mesh);
     let inner: Vec<u32> = (0..edges.len() as u32).filter(|&v| edges[v as usize] == 0).collect();
@@ -108,7 +111,7 @@ pub fn interior(mesh: &DiskMesh) -> (Vec<Option<u32>>, Vec<u32>) {
     (node_of, inner)
 }
 
-/// Returns the first triangle that lies turned over or without area in the chart `uv`.
+/// Returns the first triangle that is turned over or has no area in the chart `uv`.
 pub fn first_turned(triangles: &[[u32; 3]], uv: &[[f64; 2]]) -> Option<usize> {
     let upright = |t: &[u32; 3]| signed_area(t.map(|v| uv[v as usize])) > 0.0;
     triangles.iter().position(|t| !upright(t))

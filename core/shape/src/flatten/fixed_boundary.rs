@@ -1,4 +1,7 @@
-//! Maps with a fixed boundary: minimum of sum k_ij |p_i - p_j|^2 over the interior vertices (Masuda et al., 4.3, eq. 4).
+//! Maps with a fixed boundary: minimum of sum k_ij |p_i - p_j|^2 over the interior vertices (Masuda et al., 4.3, eq.
+//! 4).
+//!
+//! In: a mesh, its boundary places (u, v) and one weight per triangle corner. Out: (u, v) of all vertices, metres.
 
 use platen_numerics::sparse::{Graph, SparseError, Spd};
 
@@ -15,11 +18,12 @@ pub fn cotangents(mesh: &DiskMesh) -> Vec<[f64; 3]> {
     mesh.triangles.iter().map(of_triangle).collect()
 }
 
-/// Computes the map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, the boundary being held at its places; metres.
+/// Computes the map that minimises sum k_ij |p_i - p_j|^2 over the interior vertices, with the boundary held at its
+/// places, metres.
 ///
-/// `weights` has three numbers per triangle, one per corner; k_ij is the sum over the one or two triangles at the edge
-/// ij of the number at the corner opposite to it. Cotangents give the harmonic map (Masuda et al., eq. 4), ones Tutte's.
-/// Cost: one sparse Cholesky factorisation, two right-hand sides.
+/// `weights` contains three numbers per triangle, one per corner. k_ij is the sum, over the one or two triangles at the
+/// edge ij, of the number at the corner opposite to it. Cotangents give the harmonic map (Masuda et al., eq. 4), ones
+/// Tutte's map. Cost: one sparse Cholesky factorisation, two right-hand sides.
 ///
 /// # Errors
 /// [`SparseError::NotPositiveDefinite`] when the weights do not hold the interior.

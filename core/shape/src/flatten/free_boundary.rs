@@ -1,16 +1,20 @@
-//! Development of a curved plate with free edges: minimum of the membrane energy by Newton steps with a constant stiffness.
+//! Development of a curved plate with free edges: minimum of the membrane energy by Newton steps with a constant
+//! stiffness.
 //!
-//! The unknowns are the plane places x of the vertices; with G a triangle's metric in space and M = [x1 - x0, x2 - x0],
+//! In: the mesh. Out: plane places of its vertices, metres, and the remaining strain ([`LaidFlat`]).
+//!
+//! The unknowns are the plane places x of the vertices. With G a triangle's metric in space and M = [x1 - x0, x2 - x0],
 //! E = (M^-T G M^-1 - I) / 2 is its Green strain. Moving the places by d changes E by -(grad d + grad d') / 2 as long
-//! as E is small, so that each step is one of linear elasticity (plane stress), and the stiffness of the start serves for all:
+//! as E is small. Each step is therefore one of linear elasticity (plane stress), and the stiffness at the start serves
+//! for all steps:
 //!
 //! ```text
 //! sum over triangles of A e(d) : D : e(h) = sum of A E : D : e(h)   for all h,   e(d) = (grad d + grad d') / 2
 //! ```
 //!
-//! A developable plate has a development without strain, which is found whatever the law: to second order of the mesh's
-//! sides, 10 um on 5 m at R 5 m. On double curvature the law matters: what another one does to the outline is of the order of the
-//! strain that is left, times the plate's size.
+//! A developable plate has a development without strain, which is found with any material law, to second order of the
+//! mesh's sides: 10 um on 5 m at R 5 m. On double curvature the law matters: another one changes the outline by the
+//! order of the remaining strain times the plate's size.
 
 use platen_numerics::sparse::{Graph, SparseError, Spd};
 
@@ -20,28 +24,29 @@ use crate::mesh::DiskMesh;
 
 /// Poisson's ratio of steel.
 pub(super) const POISSON: f64 = 0.3;
-/// The last step is shorter than this, metres.
+/// Length of a step, metres, below which it is the last.
 const TOLERANCE: f64 = 1e-7;
-/// Steps allowed; three or four are usual, each shorter by the strain or the turn that is left.
+/// Largest number of steps; three or four are usual, each shorter by the strain or the rotation that is left.
 const MAX_STEPS: usize = 20;
-/// Stiffness that holds the plate in its place; no force acts there, so that any does.
+/// Stiffness that holds the plate in its place. No force acts there, so that any value serves.
 const HELD: f64 = 1.0;
 
 /// The plate laid flat.
 #[derive(Debug, Clone)]
 pub struct LaidFlat {
-    /// Per vertex: place in the plane, metres; corner (0,0) in the origin, corner (W,0) on the u axis.
+    /// Per vertex: place in the plane, metres; corner (0,0) at the origin, corner (W,0) on the u axis.
     pub uv: Vec<[f64; 2]>,
-    /// Root mean square of the strain that is left, over the plate.
+    /// Root mean square over the plate of the remaining strain.
     pub strain: f64,
 }
 
-/// Develops the mesh into the plane, its edges free; `None` when it folds over on the way.
+/// Develops the mesh into the plane with free edges; `None` when a triangle folds over during the steps or they do not
+/// converge.
 ///
 /// Cost: two sparse Cholesky factorisations.
 ///
 /// # Errors
-/// [`SparseError`] when the mesh is too rough to be solved for.
+/// [`SparseError`] when the equations of the mesh cannot be solved.
 pub fn lay_flat(mesh: &DiskMesh) -> Result<Option<LaidFlat>, SparseError> {
     let mut uv = fixed_boundary(mesh, &cotangents(mesh))?;
     if first_turned(&mesh.triangles, &uv).is_some() {
@@ -107,28 +112,28 @@ pub fn plane_stress(a: [f64; 2], b: [f64; 2], poisson: f64) -> [[f64; 2]; 2] {
     ]
 }
 
-/// Metric of a triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
+/// Returns the metric of a triangle in space: (e1.e1, e1.e2, e2.e2) of its sides from the first corner.
 pub(super) fn metric(mesh: &DiskMesh, t: &[u32; 3]) -> [f64; 3] {
     let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
     let (e1, e2) = (b - a, c - a);
     [e1.dot(&e1), e1.dot(&e2), e2.dot(&e2)]
 }
 
-/// Area of a plane triangle and the gradients of its three hat functions.
+/// Returns the area of a plane triangle and the gradients of its three hat functions.
 pub(super) fn hats([a, b, c]: [[f64; 2]; 3]) -> (f64, [[f64; 2]; 3]) {
     let area = signed_area([a, b, c]);
     let hat = |p: [f64; 2], q: [f64; 2]| [(p[1] - q[1]) / (2.0 * area), (q[0] - p[0]) / (2.0 * area)];
     (area, [hat(b, c), hat(c, a), hat(a, b)])
 }
 
-/// Green's strain 11, 22, 12: the rows of M^-1 are the gradients of the second and third hat function.
+/// Returns Green's strain 11, 22, 12: the rows of M^-1 are the gradients of the second and third hat function.
 pub(super) fn strain([_, p, q]: &[[f64; 2]; 3], [g11, g12, g22]: &[f64; 3]) -> [f64; 3] {
     let stretch =
         |i: usize, j: usize| g11 * p[i] * p[j] + g12 * (p[i] * q[j] + q[i] * p[j]) + g22 * q[i] * q[j];
     [0.5 * (stretch(0, 0) - 1.0), 0.5 * (stretch(1, 1) - 1.0), 0.5 * stretch(0, 1)]
 }
 
-/// Forces of a triangle's strain on its corners, plane stress, Young's modulus 1.
+/// Returns the forces of a triangle's strain on its corners, plane stress, Young's modulus 1.
 pub(super) fn forces(area: f64, hats: &[[f64; 2]; 3], [e11, e22, e12]: [f64; 3]) -> [[f64; 2]; 3] {
     let lateral = POISSON * (e11 + e22);
     let [s11, s22, s12] =

@@ -1,21 +1,27 @@
-//! Misplacement of a chart, whatever method made it: the distance of its material points from the equilibrium of an elastic membrane
-//! between the chart's own edges, and the strain that goes with it.
+//! Misplacement of a chart: distance of its material points from the equilibrium of an elastic membrane.
+//!
+//! The check applies to a chart of any flattening method. The membrane is held at the chart's own edges. In: mesh and
+//! chart. Out: the distance d per vertex, metres, and two root mean square strains ([`Misplacement`]).
 //!
 //! With E the Green strain that the chart leaves, the first Newton step d of the membrane energy solves
 //!
 //! ```text
-//! sum over triangles of A e(d) : D : e(h) = sum of A E : D : e(h)   for all h that leave the boundary,   e(d) = (grad d + grad d') / 2
+//! sum over triangles of A e(d) : D : e(h) = sum of A E : D : e(h)   for all h that vanish on the boundary,
+//! e(d) = (grad d + grad d') / 2
 //! ```
 //!
-//! E - e(d) is what the plate's double curvature explains: no map of the plane is without it. e(d) is the chart's own, and d how far
-//! it moved the material. On a developable plate both vanish for a right chart.
+//! E - e(d) is the explained strain: it is due to the plate's double curvature, and every map to the plane has it. e(d)
+//! is the chart's own strain, and d the distance by which the chart displaces the material. On a developable plate both
+//! vanish for a correct chart.
 //!
-//! A chart whose own strain is above [`MOST_STRAIN`] and twice the explained one is refused; else d counts in the uncertainty of
-//! material points. Found over the sample plates and 40 random scenes: 1e-6 for the elastic flattening; up to 8.5e-4 and 0.6 mm, about as
-//! much as the explained strain, for the harmonic map and angle based flattening on double curvature.
+//! A chart whose own strain exceeds [`MOST_STRAIN`] plus twice the explained strain is refused; otherwise d counts in
+//! the uncertainty of material points. Found over the sample plates and 40 random scenes: 1e-6 for the elastic
+//! flattening; up to 8.5e-4 and 0.6 mm, about as much as the explained strain, for the harmonic map and angle based
+//! flattening on double curvature.
 //!
-//! Limits: d is exact to first order, so that a chart far off is measured too short; it is refused all the same. What is common to the
-//! chart and its boundary is not seen here: the boundary is compared with the mesh's `places`.
+//! Limits: d is exact to first order, so that the distance of a chart that is far off is underestimated; such a chart
+//! is refused all the same. An error common to the chart and its boundary is not detected here; [`Chart::check`]
+//! compares the boundary with the mesh's `places`.
 
 use platen_numerics::sparse::{Graph, SparseError, Spd};
 
@@ -23,17 +29,18 @@ use super::domain::{interior, plane_picture};
 use super::free_boundary::{POISSON, forces, hats, metric, plane_stress, strain};
 use super::{Chart, DiskMesh, FlattenError};
 
-/// Largest strain of a chart's own beside twice the explained one.
+/// Largest own strain of a chart in addition to twice the explained strain.
 pub const MOST_STRAIN: f64 = 2e-3;
 
-/// Where a chart puts the material, against an elastic membrane.
+/// Distance of a chart from the equilibrium of an elastic membrane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misplacement {
-    /// Per vertex: how far it lies from its equilibrium along u and v, metres; 0 on the boundary.
+    /// Per vertex: distance from its equilibrium along u and v, metres; 0 on the boundary.
     pub by: Vec<[f64; 2]>,
-    /// Root mean square strain of `by`: the chart's own.
+    /// Root mean square of the strain of `by`: the chart's own strain.
     pub strain: f64,
-    /// Root mean square strain that is left in equilibrium: what the plate's double curvature explains.
+    /// Root mean square of the strain that remains in equilibrium: the strain explained by the plate's double
+    /// curvature.
     pub explained: f64,
 }
 
@@ -41,7 +48,7 @@ impl Misplacement {
     /// Returns the misplacement of a chart that [`Chart::check`] accepts. Cost: one sparse Cholesky factorisation.
     ///
     /// # Errors
-    /// [`FlattenError::NotAChart`]: it strains the plate more than its curvature explains.
+    /// [`FlattenError::NotAChart`]: the chart strains the plate by more than the plate's curvature explains.
     pub fn of(mesh: &DiskMesh, chart: &Chart) -> Result<Self, FlattenError> {
         let not_a_chart = |what| FlattenError::NotAChart { what };
         let found = misplacement(mesh, chart)
@@ -106,7 +113,7 @@ fn misplacement(mesh: &DiskMesh, chart: &Chart) -> Result<Misplacement, SparseEr
     Ok(Misplacement { by, strain: (own / total).sqrt(), explained: (left / total).sqrt() })
 }
 
-/// Symmetric gradient 11, 22, 12 of a displacement, linear over a triangle.
+/// Returns the symmetric gradient 11, 22, 12 of a displacement that is linear over a triangle.
 fn gradient(hats: &[[f64; 2]; 3], by: [[f64; 2]; 3]) -> [f64; 3] {
     let sum = |c: usize, axis: usize| (0..3).map(|k| by[k][c] * hats[k][axis]).sum::<f64>();
     [sum(0, 0), sum(1, 1), 0.5 * (sum(0, 1) + sum(1, 0))]

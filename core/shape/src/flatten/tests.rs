@@ -77,7 +77,7 @@ fn a_right_chart_of_a_bent_plate_is_where_a_membrane_puts_it() {
     let plate = ClosedForm::new(cylinder(6.0, 0.4), [3.0, 2.0], [60, 40], 0.3, 7);
     let mesh = plate.mesh().unwrap();
     let found = Misplacement::of(&mesh, &chart_of(&plate, &cotangents(&mesh))).unwrap();
-    // Found: 3.2 um, strains of 1.2e-5 and 4.5e-6, of the mesh.
+    // Found: 3.2 um, strains of 1.2e-5 and 4.5e-6, caused by the mesh.
     assert!(found.largest() < 6.4e-6 && found.strain < 2.4e-5 && found.explained < 9e-6, "{found:?}");
 }
 

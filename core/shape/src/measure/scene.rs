@@ -1,4 +1,4 @@
-//! Exact plates before the scanner: samples and outline with noise, and what a measurement got wrong.
+//! Exact plates in front of the scanner: noisy samples and outline, and the errors of a measurement of them.
 
 use nalgebra::{Matrix3, Rotation3};
 use platen_numerics::random::Random;
@@ -22,7 +22,7 @@ impl Flatten for Harmonic {
     }
 }
 
-/// A bent plate before the scanner in the origin.
+/// A bent plate in front of the scanner, which is at the origin.
 pub(super) struct Scene {
     /// Mid-surface over material coordinates, in any frame.
     pub(super) mid: Box<dyn Fn([f64; 2]) -> [f64; 3]>,
@@ -30,22 +30,22 @@ pub(super) struct Scene {
     pub(super) thickness: f64,
     /// Distance from the mid-surface's edge inwards to that of the face.
     pub(super) inset: f64,
-    /// Turn about the vertical, radians.
+    /// Rotation about the vertical, radians.
     pub(super) yaw: f64,
-    /// Where the plate's middle lies.
+    /// Position of the plate's middle, metres, scanner frame.
     pub(super) middle: Vec3,
     /// Noise of the range; the edges' points have the same, in every direction.
     pub(super) sigma: f64,
     /// Share of samples that are 20 times as noisy.
     pub(super) wild: f64,
-    /// Distance of samples on the plate.
+    /// Spacing of the samples on the plate, metres.
     pub(super) pitch: f64,
     /// Material rectangle that is hidden: from (u, v) to (u, v).
     pub(super) hidden: Option<[[f64; 2]; 2]>,
     pub(super) seed: u64,
 }
 
-/// A plate in its place: level in its middle, there where the scene puts it.
+/// A plate placed in its scene: level at its middle, which lies at the position that the scene gives.
 pub(super) struct Placed<'a> {
     scene: &'a Scene,
     turn: Matrix3<f64>,
@@ -96,7 +96,7 @@ impl Scene {
         self.hidden.is_some_and(|[a, b]| u > a[0] && u < b[0] && v > a[1] && v < b[1])
     }
 
-    /// Samples over the scanned face, one per cell of a grid, anywhere in it.
+    /// Returns samples of the scanned face, one at a random place in each cell of a grid.
     pub(super) fn patch(&self) -> Patch {
         let (placed, mut random) = (self.placed(), Random::new(self.seed));
         let size = self.size.map(|length| length - 2.0 * self.inset);
@@ -116,7 +116,7 @@ impl Scene {
         Patch { samples, azimuth_step: 1e-3, elevation_step: 1e-3, noise: self.sigma, ..Patch::default() }
     }
 
-    /// The face's edges, a point every 10 mm, hidden parts bridged by a straight line.
+    /// Returns the face's edges with a point every 10 mm; hidden parts are bridged by a straight line.
     pub(super) fn outline(&self) -> Outline {
         let (placed, mut random) = (self.placed(), Random::new(self.seed + 1000));
         let ([w, h], i) = (self.size, self.inset);
@@ -168,7 +168,7 @@ impl Placed<'_> {
         self.turn * (Vec3::from((self.scene.mid)([u, v])) - self.centre) + self.scene.middle
     }
 
-    /// The scanned face over the mid-surface.
+    /// Returns the point of the scanned face over the mid-surface.
     pub(super) fn face(&self, u: f64, v: f64) -> Vec3 {
         let d = 1e-4;
         let along_u = self.mid(u + d, v) - self.mid(u - d, v);
@@ -176,7 +176,7 @@ impl Placed<'_> {
         self.mid(u, v) + 0.5 * self.scene.thickness * along_u.cross(&along_v).normalize()
     }
 
-    /// Derivatives of the mid-surface by central differences.
+    /// Returns derivatives of the mid-surface by central differences.
     pub(super) fn mid_derivatives(&self, u: f64, v: f64) -> Derivatives {
         let (s, d) = (|u, v| self.mid(u, v), 1e-3);
         let (p, e, w, n, f) = (s(u, v), s(u + d, v), s(u - d, v), s(u, v + d), s(u, v - d));
@@ -195,7 +195,7 @@ impl Placed<'_> {
 /// Errors: mm, and 1/m for the curvature.
 #[derive(Debug, Default)]
 pub(super) struct Errors {
-    /// Mean distance of nine markers from where they are.
+    /// Mean distance of nine markers from their true positions.
     pub(super) markers: f64,
     /// Normal distance, rms, at least 100 mm from every edge.
     pub(super) inside: f64,
@@ -225,7 +225,7 @@ impl Mean {
 }
 
 impl Errors {
-    /// Errors of `measured` on a 50 mm grid; hidden parts and their surroundings do not count.
+    /// Determines the errors of `measured` on a 50 mm grid; hidden parts and their surroundings do not count.
     pub(super) fn of(measured: &Measurement, scene: &Scene) -> Self {
         let (placed, surface, [w, h]) = (scene.placed(), &measured.surface, scene.size);
         let [mut inside, mut edge, mut bend, mut ratio] = [(); 4].map(|()| Mean::default());

@@ -8,20 +8,20 @@ use super::Measurement;
 use crate::outline::Outline;
 use crate::{Blank, Patch};
 
-/// A plate after its scan: the scanned face, and facts about the scan.
+/// A plate after its scan: the scanned face and properties of the scan.
 #[derive(Debug)]
 pub struct Scanned {
     /// Header of the scan, as the driver sent it.
     pub header: ScanHeader,
-    /// Valid cells of the whole scan.
+    /// Number of valid cells of the whole scan.
     pub n_valid: u64,
-    /// Columns before the laser was warm; they are not used.
+    /// Number of columns before the laser was warm; they are not used.
     pub warm_up_columns: u32,
     /// The plate's scanned face.
     pub patch: Patch,
-    /// From the start to the last column.
+    /// Time from the start to the last column.
     pub acquire: Duration,
-    /// From the last column to the patch.
+    /// Time from the last column to the patch.
     pub extract: Duration,
 }
 
@@ -30,10 +30,10 @@ pub struct Scanned {
 pub struct Measured {
     /// Corners and edges.
     pub outline: Outline,
-    /// The blank's outline, which (u, v) refer to; without one it is the rectangle as ordered.
+    /// The blank's outline, to which (u, v) refer; without one they refer to the rectangle as ordered.
     pub blank: Option<Blank>,
     /// Mid-surface, mesh, chart, S(u, v).
     pub measurement: Measurement,
-    /// From patch to outline.
+    /// Time from patch to outline.
     pub outline_time: Duration,
 }

@@ -12,8 +12,9 @@ fn errors(name: &str, scene: &Scene) -> Errors {
     errors
 }
 
-/// Bounds, at about twice what is found: markers, normal distance inside and near an edge (mm), curvature (1/m). Markers move
-/// with the edges, whose noise is that of a few hundred crossings; curvature errors are the smoothing of bends.
+/// Checks the errors against bounds of about twice the figures found: markers, normal distance inside and near an edge
+/// (mm), curvature (1/m). Markers move with the edges, whose noise is that of a few hundred crossings; curvature errors
+/// are due to the smoothing of bends.
 fn check(name: &str, scene: &Scene, [markers, inside, edge, curvature]: [f64; 4]) {
     let e = errors(name, scene);
     assert!(
@@ -27,7 +28,7 @@ fn plates_of_constant_curvature_are_met() {
     check("cylinder", &Scene::new(cylinder(9.0, 1.2), [3.0, 2.5]), [0.2, 0.0045, 0.008, 7e-5]);
     check("convex", &Scene::new(cylinder(-5.0, 0.3), [4.0, 2.5]), [0.18, 0.0065, 0.014, 2.5e-4]);
     check("cone", &Scene::new(cone([-7.0, 1.0], 0.6), [3.0, 2.0]), [0.18, 0.0075, 0.0165, 2.6e-4]);
-    // The harmonic map is wrong on a sphere: the markers lie elsewhere within the surface, which itself is met.
+    // The harmonic map is wrong on a sphere: the markers are displaced within the surface, but the surface is correct.
     let sphere = sphere_of_fibres(11.0, [3.0, 2.5]);
     check("sphere", &Scene::new(sphere, [3.0, 2.5]), [0.8, 0.0066, 0.0115, 1.9e-4]);
 }
@@ -76,7 +77,7 @@ fn holes_are_bridged_and_marked() {
     assert!(!mask.seen(1.25, 1.0) && !mask.seen(1.05, 1.15) && mask.seen(0.9, 1.0) && mask.seen(1.25, 1.3));
     let hidden = 0.5 * 0.4 / (3.0 * 2.5);
     assert!((measured.quality.coverage - (1.0 - hidden)).abs() < 0.005, "{:?}", measured.quality);
-    // In the hole the surface is interpolated, and says how uncertain it is.
+    // In the hole the surface is interpolated, with a larger stated uncertainty.
     let (surface, placed) = (&measured.surface, scene.placed());
     let off = (surface.face(1.25, 1.0) - placed.face(1.25, 1.0)).norm();
     assert!(off < 0.3e-3, "{off}");
@@ -97,7 +98,7 @@ fn a_bevelled_plate_is_mapped_by_its_mid_surface_edges() {
     check("bevelled", &scene, [0.2, 0.0065, 0.014, 2.6e-4]);
 }
 
-/// Smoothing of the heights moves no place within the surface: 0.7 mm in the corners without `place_by_chart`.
+/// Smoothing of the heights moves no place within the surface; without `place_by_chart` corners move by 0.7 mm.
 #[test]
 fn a_noisy_curved_plate_has_its_corners_where_the_outline_has_them() {
     let scene = Scene { sigma: 1.5e-3, pitch: 0.016, ..Scene::new(cylinder(-11.0, 0.0), [2.45, 1.75]) };
@@ -114,7 +115,7 @@ fn a_noisy_curved_plate_has_its_corners_where_the_outline_has_them() {
 
 #[test]
 fn stated_deviations_are_those_observed() {
-    // Pooled over plates: errors of one plate go together over long distances.
+    // Pooled over plates: errors of one plate are correlated over long distances.
     let mut square = 0.0;
     for seed in 0..6 {
         let scene = Scene { seed, pitch: 0.012, ..Scene::new(cylinder(8.0, 0.7), [3.0, 2.0]) };

@@ -1,6 +1,8 @@
-//! Coons patch of the four edge curves (Coons 1967): first approximation of the plate's face, and its coordinates (a, b).
+//! Coons patch of the four edge curves (Coons 1967): first approximation of the plate's face, and its coordinates (a,
+//! b).
 //!
-//! The edges are smoothing splines through their ends (Masuda et al., 3.2, fit B-spline curves to the edges).
+//! The edges are smoothing splines through their ends (Masuda et al., 3.2, fit B-spline curves to the edges). In: the
+//! outline. Out: a bicubic spline over the rectangle, metres.
 
 use nalgebra::{DMatrix, DVector};
 use platen_numerics::tensor_spline::{TensorSpline, approximate_curve};
@@ -8,14 +10,14 @@ use platen_numerics::uniform_knots::UniformKnots;
 
 use crate::{EdgeCurve, Outline, Vec3};
 
-/// Spans of an edge's spline are about this long, metres: the cut edge of a plate has no finer detail *within* its
+/// Approximate length of a span of an edge's spline, metres: the cut edge of a plate has no finer detail *within* its
 /// surface. Detail across the surface (narrow bends) is added later, from the samples inside.
 const SPAN: f64 = 0.25;
-/// Wavelength, metres, below which an edge is taken for noise.
+/// Wavelength, metres, below which detail of an edge is taken for noise.
 const SMOOTH_BELOW: f64 = 1.0;
-/// A bridged point of an edge counts this much: enough to guide the curve, not to bend it against seen points.
+/// Weight of a bridged point of an edge: sufficient to guide the curve, too small to bend it against seen points.
 const BRIDGED: f64 = 0.01;
-/// The corners are fixed by this weight.
+/// Weight that fixes the corners.
 const CORNER: f64 = 1e6;
 
 /// An edge as a smooth curve over [0, 1].
@@ -25,7 +27,7 @@ struct Edge {
 }
 
 impl Edge {
-    /// Penalised least squares on the points of the curve, through both of its ends.
+    /// Fits a spline to the points of the curve by penalised least squares, through both of its ends.
     fn fit(curve: &EdgeCurve) -> Self {
         let n = curve.points.len();
         let length: f64 = curve.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
@@ -51,7 +53,7 @@ impl Edge {
                 (0..3).for_each(|d| rhs[(first + a, d)] += weight * x * point[d]);
             }
         }
-        // Where the penalty's weight at a wavelength equals that of the points: n / (2 pi / wavelength)^6.
+        // At this wavelength the penalty's weight equals that of the points: n / (2 pi / wavelength)^6.
         let penalty = n as f64 * (SMOOTH_BELOW / length / std::f64::consts::TAU).powi(6);
         for (i, row) in axis.roughness().iter().enumerate() {
             for (k, value) in row.iter().enumerate().filter(|(k, _)| i + k < n_coefficients) {
@@ -72,9 +74,9 @@ impl Edge {
     }
 }
 
-/// Spans the Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum reproduces every
-/// surface of second order, however it is bent or turned. With an inset the outline lies that far inside of the
-/// rectangle, and the patch goes on beyond it.
+/// Computes the Coons patch of the outline over `[0, width] x [0, height]`: bilinearly blended edges, whose sum
+/// reproduces every surface of second order, however it is bent or turned. With an inset the outline lies that far
+/// inside the rectangle, and the patch continues beyond the outline.
 pub(crate) fn coons_patch(
     outline: &Outline,
     width: f64,
@@ -91,7 +93,7 @@ pub(crate) fn coons_patch(
         approximate_curve(axes[k % 2], |at| edge.point(share(at)))
     };
     let [bottom, right, top, left] = [0, 1, 2, 3].map(control);
-    // Blending is linear: so are the control values, in the abscissas of the B-splines.
+    // Blending is linear; so the control values are blended, at the abscissas of the B-splines.
     let mut patch = TensorSpline::zeros(axes[0], axes[1]);
     let n_u = axes[0].n_coefficients();
     for (c, slot) in patch.control.iter_mut().enumerate() {

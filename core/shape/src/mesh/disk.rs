@@ -17,14 +17,15 @@ pub struct DiskParts {
     pub boundary: Vec<u32>,
     /// Positions of the corners (0,0), (W,0), (W,H), (0,H) in `boundary`; the first is 0.
     pub corners: [u32; 4],
-    /// Per corner: standard deviation of its place along the edge that leaves it and along the one that arrives, metres.
+    /// Per corner: standard deviation of its place along the edge that leaves it and along the one that arrives,
+    /// metres.
     pub corner_sigma: [[f64; 2]; 4],
     /// Per edge: standard deviation across the edge, in the surface, metres.
     pub edge_sigma: [f64; 4],
     /// Per boundary vertex: arc length from the first corner of its edge, metres; 0 in the corners.
     pub arc: Vec<f64>,
-    /// Per boundary vertex: (u, v) of the material there, metres. Across its edge known to `edge_sigma`; along it, between
-    /// the corners, only as well as material keeps its share of the edge's length.
+    /// Per boundary vertex: (u, v) of the material there, metres. Across its edge it is known to `edge_sigma`; along
+    /// the edge, between the corners, only as well as material keeps its share of the edge's length.
     pub places: Vec<[f64; 2]>,
     /// Arc length of the edges v = 0, u = W, v = H, u = 0, metres.
     pub edge_length: [f64; 4],
@@ -38,7 +39,7 @@ pub struct DiskParts {
 
 /// A mesh that is one disk: connected, manifold, evenly oriented, with a single simple boundary loop.
 ///
-/// Read-only access to the [`DiskParts`] it was made of.
+/// Gives read-only access to the [`DiskParts`] of which it was built.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiskMesh(DiskParts);
 
@@ -46,7 +47,8 @@ impl DiskMesh {
     /// Checks the parts.
     ///
     /// # Errors
-    /// [`MeshError::Malformed`] for indices, lengths or numbers out of range, [`MeshError::NotADisk`] for wrong topology.
+    /// [`MeshError::Malformed`] for indices, lengths or numbers out of range, [`MeshError::NotADisk`] for wrong
+    /// topology.
     pub fn new(parts: DiskParts) -> Result<Self, MeshError> {
         check_numbers(&parts)?;
         check_loop(&parts)?;
@@ -182,7 +184,7 @@ mod tests {
             p.triangles.extend([[5, 6, 7], [5, 8, 6], [6, 8, 7], [7, 8, 5]]);
         };
         assert!(refused(shell).contains("9 vertices"));
-        // A torus of seven vertices leaves V - E + F as it is: it only does not hang together with the square.
+        // A torus of seven vertices does not change V - E + F; it is only not connected with the square.
         let torus = |p: &mut DiskParts| {
             p.vertices.extend([Vec3::zeros(); 7]);
             let at = |k: u32| 5 + k % 7;

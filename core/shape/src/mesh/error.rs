@@ -1,10 +1,10 @@
 //! Errors of a mesh.
 
-/// Reason why a set of parts is no disk.
+/// Reason why a set of parts is not a disk.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum MeshError {
-    /// A length, index or number is outside what the type allows.
+    /// A length, index or number is out of range.
     #[error("mesh: {what}; the program that made this mesh is at fault, report it")]
     Malformed { what: String },
     /// The triangles do not form a disk.

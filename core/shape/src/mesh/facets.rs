@@ -1,17 +1,20 @@
-//! Orthogonal projection of samples onto a surface in closed form: foot point, height and normal from the surface's Taylor
-//! expansion of second order around the places of a fine grid.
+//! Orthogonal projection of samples onto a surface, by Taylor expansion of second order at the places of a fine grid.
 //!
-//! Newton's method on the spline takes several dependent steps per sample. Around a place with tangents S_a, S_b,
-//! dual tangents g1, g2 and unit normal N it is closed form to second order: with x = g1 . d, y = g2 . d, z = N . d of the
-//! point's offset d and the second fundamental form f = (L x^2 + 2 M x y + K y^2) / 2,
+//! In: a spline surface and samples. Out, per sample ([`Foot`]): foot point, normal and height over the surface,
+//! metres. A facet is the Taylor expansion around one place of the grid.
+//!
+//! Newton's method on the spline takes several dependent steps per sample. The expansion gives the projection in closed
+//! form, to second order. At a place with tangents S_a, S_b, dual tangents g1, g2 and unit normal N, let d be the
+//! point's offset, x = g1 . d, y = g2 . d, z = N . d, and f = (L x^2 + 2 M x y + K y^2) / 2 the second fundamental
+//! form. Then
 //!
 //! ```text
 //! height h = z - f        normal n = N - f_x g1 - f_y g2
 //! foot a = x - G1(x, y) / 2 + h (g1.g1 f_x + g1.g2 f_y),   b likewise,    G: Christoffel's terms g . (S_aa x^2 + ...)
 //! ```
 //!
-//! The error is of third order: on the flank of a narrow bend, where the curvature changes by 1.5 1/m per metre, the
-//! height is wrong by 0.5 um and the normal by 2e-4 rad where two facets meet, 12 mm from either's middle.
+//! Limit: the error is of third order. On the flank of a narrow bend, where the curvature changes by 1.5 1/m per metre,
+//! the height is wrong by 0.5 um and the normal by 2e-4 rad where two facets meet, 12 mm from the middle of either.
 
 use platen_numerics::simd::dispatch_simd;
 use platen_numerics::tensor_spline::{Jet, TensorSpline};
@@ -19,9 +22,10 @@ use platen_numerics::uniform_knots::UniformKnots;
 
 use crate::Vec3;
 
-/// A facet serves points up to this share of its size from its middle; beyond, the next one does.
+/// Largest distance of a point from a facet's middle, in parts of the facet's size; farther points belong to the next
+/// facet.
 const REACH: f64 = 0.6;
-/// Facets tried for a point, one after the other, before all are looked at.
+/// Largest number of facets tried for a point, one after the other, before the whole grid is searched.
 const MOST_TRIED: usize = 12;
 /// Largest distance of a foot point outside the surface's rectangle, metres.
 const MARGIN: f64 = 0.05;
@@ -29,9 +33,9 @@ const MARGIN: f64 = 0.05;
 /// Projection of a point onto a surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Foot {
-    /// Value of the carried pair of functions in the foot point.
+    /// Value of the carried pair of functions at the foot point.
     pub(crate) value: [f64; 2],
-    /// Unit normal in the foot, along S_a x S_b.
+    /// Unit normal at the foot point, along S_a x S_b.
     pub(crate) normal: Vec3,
     /// Height of the point over the surface, along the normal, metres.
     pub(crate) height: f64,
@@ -48,7 +52,7 @@ struct Facet {
     normal: Vec3,
     /// L, M, K.
     form: [f64; 3],
-    /// The carried pair: its value, and its coefficients of x, y, x^2, x y, y^2, h x, h y.
+    /// The carried pair of functions: its value, and its coefficients of x, y, x^2, x y, y^2, h x, h y.
     value: [f64; 2],
     slopes: [[f64; 2]; 7],
 }
@@ -57,7 +61,7 @@ struct Facet {
 type Offset = [f64; 3];
 
 impl Facet {
-    /// From the surface's and the carried pair's derivatives at (a, b).
+    /// Builds a facet from the derivatives of the surface and of the carried pair at (a, b).
     #[inline(always)]
     fn of(at: [f64; 2], s: &Jet<3>, c: &Jet<2>) -> Self {
         let [p, s_a, s_b, s_aa, s_ab, s_bb] = [s.p, s.u, s.v, s.uu, s.uv, s.vv].map(Vec3::from);
@@ -67,7 +71,8 @@ impl Facet {
         let per_area = 1.0 / (e * g - f * f);
         let dual = [(s_a * g - s_b * f) * per_area, (s_b * e - s_a * f) * per_area];
         let form = [s_aa, s_ab, s_bb].map(|second| normal.dot(&second));
-        // Christoffel's terms bend the coordinates, the form tilts the way from the sample to its foot.
+        // Christoffel's terms bend the coordinates, the second fundamental form tilts the line from the sample to its
+        // foot.
         let bend = |second: Vec3| [dual[0].dot(&second), dual[1].dot(&second)];
         let metric = [per_area * g, -per_area * f, per_area * e];
         let tilt = |[by_a, by_b]: [f64; 2]| {
@@ -117,14 +122,15 @@ impl Facet {
 pub(crate) struct Facets {
     axes: [UniformKnots; 2],
     n: [usize; 2],
-    /// Size of a facet in (a, b), and one over it.
+    /// Size of a facet in (a, b), and its reciprocal.
     size: [f64; 2],
     per_size: [f64; 2],
     facets: Vec<Facet>,
 }
 
 impl Facets {
-    /// The facets of `surface`, `per_span` along each span each way, which carry its own coordinates (a, b).
+    /// Builds the facets of `surface`, `per_span` along each span in both directions, which carry its own coordinates
+    /// (a, b).
     pub(crate) fn of(surface: &TensorSpline<3>, per_span: usize) -> Self {
         let own = |at: [f64; 2]| {
             let zero = [0.0; 2];
@@ -133,7 +139,7 @@ impl Facets {
         Self::carrying(surface, per_span, own)
     }
 
-    /// The facets of `surface`, which carry a pair given with its derivatives by (a, b).
+    /// Builds the facets of `surface`, which carry a pair of functions given with its derivatives by (a, b).
     pub(crate) fn carrying(
         surface: &TensorSpline<3>,
         per_span: usize,
@@ -155,8 +161,9 @@ impl Facets {
         Self { axes, n, size, per_size: size.map(|size| 1.0 / size), facets }
     }
 
-    /// Visits samples in lattice order with their foot points: within a column each search starts at the facet of the sample before,
-    /// at a new column at the first one of the column before. Samples beyond the margin are left out.
+    /// Visits samples in lattice order with their foot points. Within a column each search starts at the facet of the
+    /// previous sample, at a new column at the first facet of the previous column. Samples beyond the margin are left
+    /// out.
     #[inline(always)]
     pub(crate) fn walk<'s>(
         &self,
@@ -186,7 +193,7 @@ impl Facets {
         );
     }
 
-    /// The facet that serves `p` and the offset from it, tried from `start` on.
+    /// Finds the facet of `p` and the offset from it, starting at `start`.
     #[inline(always)]
     fn find(&self, p: &Vec3, start: usize) -> Option<(usize, Offset)> {
         let mut at = start;
@@ -208,7 +215,7 @@ impl Facets {
         None
     }
 
-    /// The facet around (a, b), or the nearest one.
+    /// Returns the facet around (a, b), or the nearest one.
     #[inline(always)]
     fn facet_at(&self, to: [f64; 2]) -> usize {
         let cell = [0, 1].map(|d| {
@@ -218,7 +225,7 @@ impl Facets {
         cell[1] * self.n[0] + cell[0]
     }
 
-    /// The same, tried from the nearest of every fourth facet each way.
+    /// Finds the facet of `p`, starting at the nearest of every fourth facet in both directions.
     #[cold]
     #[inline(never)]
     fn find_afresh(&self, p: &Vec3) -> Option<(usize, Offset)> {
@@ -245,7 +252,7 @@ mod tests {
         let axes = [UniformKnots::new(0.0, 4.0, 40), UniformKnots::new(0.0, 2.0, 20)];
         let r = 5.0;
         let point = |u: f64, v: f64| [r * (u / r).sin(), v, r * (1.0 - (u / r).cos())];
-        // Coordinates that are not those of the arc: a = u + 0.02 u^2.
+        // Coordinates that differ from the arc length: a = u + 0.02 u^2.
         let arc = |a: f64| ((1.0 + 0.08 * a).sqrt() - 1.0) / 0.04;
         let cylinder = TensorSpline::approximate(axes[0], axes[1], |a, b| point(arc(a), b));
         let facets = Facets::of(&cylinder, 4);

@@ -1,8 +1,12 @@
-//! The scanned face and the mid-surface as bicubic splines over one pair of coordinates.
+//! Smooth scanned face and mid-surface as bicubic splines over one pair of coordinates (a, b).
 //!
-//! The edges span a Coons patch over the rectangle; its coordinates (a, b) are nearly those of the plate. From each place of
-//! it the height field of the outline is met along the patch's normal: the edges' own noise across the surface drops out. Half the thickness
-//! below the face, along its normal, lies the mid-surface, right up to its edges: cuts are square to it.
+//! 1. The edges span a Coons patch over the rectangle; its coordinates (a, b) are nearly those of the plate.
+//! 2. The face is the intersection of the patch's normals with the height field of the outline. The edges' own noise
+//!    across the surface is thereby eliminated.
+//! 3. The mid-surface lies half the thickness below the face along its normal, up to the edges, since cuts are square
+//!    to it.
+//!
+//! In: patch and outline. Out: both splines, metres, scanner frame.
 
 use platen_numerics::tensor_spline::TensorSpline;
 use platen_numerics::uniform_knots::UniformKnots;
@@ -12,7 +16,7 @@ use super::facets::Facets;
 use crate::outline::{SPAN, thinned};
 use crate::{Outline, Patch, PlateSpec, Vec3};
 
-/// Facets along a span of the Coons patch: 50 mm; it has no finer detail than its edges.
+/// Number of facets along a span of the Coons patch: 50 mm each; the patch has no finer detail than its edges.
 const FACETS: usize = 2;
 
 /// The smooth scanned face and mid-surface over (a, b) in `[0, W] x [0, H]`.

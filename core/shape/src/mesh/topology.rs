@@ -1,11 +1,17 @@
-//! Test whether triangles form a disk, by their indices alone: Euler characteristic, connectedness, boundary loop.
+//! Topology test of a disk by the indices of its triangles: Euler characteristic, connectedness, boundary loop.
 
 use platen_numerics::union_find::UnionFind;
 
 use super::error::{MeshError, malformed, not_a_disk};
 
-/// Checks that the triangles form one disk: every directed edge once, the edges without an opposite are the boundary loop, the triangles hang
-/// together through edges, and V - E + F = 1. Together these exclude pinched vertices and handles.
+/// Checks that the triangles form one disk:
+///
+/// - every directed edge occurs once;
+/// - the edges without an opposite are the boundary loop;
+/// - the triangles are connected through edges;
+/// - V - E + F = 1.
+///
+/// Together these conditions exclude pinched vertices and handles.
 pub(super) fn check_topology(
     triangles: &[[u32; 3]],
     boundary: &[u32],
@@ -46,7 +52,7 @@ pub(super) fn check_topology(
     Ok(())
 }
 
-/// A triangle from one of its vertices: counter-clockwise, the vertex, `next`, `last`.
+/// A triangle as seen from one of its vertices: counter-clockwise the vertex, `next`, `last`.
 #[derive(Clone, Copy, Default)]
 struct Side {
     next: u32,

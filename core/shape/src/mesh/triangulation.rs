@@ -1,23 +1,24 @@
 //! Delaunay triangulation of about 10,000 vertices on the mid-surface (Masuda et al., 4.2).
 //!
-//! Vertices are chosen and joined in the coordinates (a, b) of the [`SmoothFace`], nearly those of the plate: there the
-//! boundary is the rectangle itself, exactly straight, so the convex hull is the plate and no slivers hang on its edges.
+//! Vertices are selected and joined in the coordinates (a, b) of the [`SmoothFace`], which are nearly those of the
+//! plate. There the boundary is exactly the rectangle, so that the convex hull is the plate and there are no slivers
+//! along its edges.
 
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 use super::{DiskMesh, DiskParts, MeshError, SmoothFace};
 use crate::{Blank, Outline, PlateSpec, Vec3};
 
-/// A cell's vertex is the sample nearest to its middle, within this share of the cell's size; else the middle itself.
-/// It keeps vertices apart, above all from the boundary.
+/// Largest distance, in parts of a cell's size, of the sample that becomes the cell's vertex from the cell's middle;
+/// without such a sample the middle is the vertex. The limit keeps vertices apart, above all from the boundary.
 const NEAR_MIDDLE: f64 = 0.3;
 /// Gauss-Legendre places and weights on [0, 1], for arc lengths.
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 impl SmoothFace {
-    /// Meshes the mid-surface with about `n_vertices`, its boundary mapped to the outline of `blank`; also returns the vertices'
-    /// coordinates (a, b).
+    /// Meshes the mid-surface with about `n_vertices`, with its boundary mapped to the outline of `blank`. Also returns
+    /// the vertices' coordinates (a, b).
     ///
     /// # Errors
     /// [`MeshError::NotADisk`] when the vertices could not be joined.
@@ -55,7 +56,8 @@ impl SmoothFace {
         Ok((mesh, places))
     }
 
-    /// Selects the coordinates (a, b) of the vertices of [`SmoothFace::mesh`] inside the boundary: one per cell of a grid.
+    /// Selects the coordinates (a, b) of the vertices of [`SmoothFace::mesh`] inside the boundary: one per cell of a
+    /// grid.
     fn interior(&self, spec: &PlateSpec, n: [usize; 2]) -> Vec<[f64; 2]> {
         let size = [spec.width / n[0] as f64, spec.height / n[1] as f64];
         let middle = |cell: [usize; 2]| [0, 1].map(|d| (cell[d] as f64 + 0.5) * size[d]);
@@ -91,7 +93,7 @@ impl SmoothFace {
         (arc, edge_length)
     }
 
-    /// Returns the length on the mid-surface of the straight piece of coordinates between two places.
+    /// Returns the length on the mid-surface of the straight segment in (a, b) between two places.
     fn arc(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         let d = [to[0] - from[0], to[1] - from[1]];
         GAUSS
@@ -105,7 +107,8 @@ impl SmoothFace {
     }
 }
 
-/// The loop around `[0, width] x [0, height]` with `n` equal steps per side, and the positions of the corners in it.
+/// Returns the loop around `[0, width] x [0, height]` with `n` equal steps per side, and the positions of the corners
+/// in it.
 fn boundary(width: f64, height: f64, n: [usize; 2]) -> (Vec<[f64; 2]>, [usize; 4]) {
     let along = |k: usize, n: usize, length: f64| if k == n { length } else { length * k as f64 / n as f64 };
     let mut places = Vec::with_capacity(2 * (n[0] + n[1]));

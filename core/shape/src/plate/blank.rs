@@ -1,20 +1,19 @@
 //! Blank: the outline of the plate as it was cut, in its own plane.
 //!
-//! As ordered it is a rectangle, exactly; a scan of the blank refines it (`correspondence`): each of its edges is a line with a bow, a
-//! parabola. It is the outline that all later strokes of the same plate are mapped to. S(u, v) keeps the rectangle as ordered, and
-//! goes on beyond it where the plate is larger by millimetres.
+//! The outline as ordered is an exact rectangle. A scan of the blank refines it (`correspondence`): each edge is then a
+//! line with a bow, that is, a parabola. All later strokes of the same plate are mapped to this outline. S(u, v) keeps
+//! the rectangle as ordered, and continues beyond it where the plate is larger by millimetres.
 
-/// Steps of a rounded outline.
+/// Number of steps per metre of a rounded outline.
 const PER_METRE: f64 = (1_u64 << 30) as f64;
-/// Material coordinates (u, v) of the four edges.
+/// Outline of the blank in material coordinates (u, v).
 ///
-/// Edges v = 0, u = W, v = H, u = 0, each from corner to corner counter-clockwise as the boundary of a
-/// mesh.
+/// The edges are v = 0, u = W, v = H, u = 0, each from corner to corner, counter-clockwise like the boundary of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Corners (0,0), (W,0), (W,H), (0,H), metres.
     pub corners: [[f64; 2]; 4],
-    /// Per edge: how far its middle lies outside the straight line between its corners, metres; a parabola.
+    /// Per edge: distance of its middle outside the straight line between its corners, metres; the edge is a parabola.
     pub bows: [f64; 4],
     /// Per corner: standard deviation along the edge that leaves it and along the one that arrives, metres.
     pub corner_sigma: [[f64; 2]; 4],
@@ -23,7 +22,7 @@ pub struct Blank {
 }
 
 impl Blank {
-    /// Builds the rectangle as ordered, metres: known exactly.
+    /// Builds the rectangle as ordered, metres, without uncertainty.
     #[must_use]
     pub fn rectangle(width: f64, height: f64) -> Self {
         Self {
@@ -34,7 +33,8 @@ impl Blank {
         }
     }
 
-    /// Rounds to whole nanometres (2^-30 m): a rounded outline survives text in millimetres to the last bit, rounded again.
+    /// Rounds to multiples of 2^-30 m (about a nanometre): a rounded outline that is written as text in millimetres,
+    /// read and rounded again is the same to the last bit.
     #[must_use]
     pub fn rounded(mut self) -> Self {
         let sigmas = self.corner_sigma.iter_mut().flatten().chain(&mut self.edge_sigma);
@@ -50,7 +50,8 @@ impl Blank {
         [(0, 1), (1, 2), (2, 3), (3, 0)].map(|(a, b)| self.distance(a, b))
     }
 
-    /// Returns the lengths of the scanned face's edges on the flat plate: those of a bevelled one are `inset` shorter at both ends, metres.
+    /// Returns the lengths of the scanned face's edges on the flat plate, metres; on a bevelled plate they are `inset`
+    /// shorter at both ends.
     #[must_use]
     pub fn face_edge_lengths(&self, inset: f64) -> [f64; 4] {
         self.edge_lengths().map(|length| length - 2.0 * inset)
@@ -78,7 +79,7 @@ impl Blank {
     #[must_use]
     pub fn place(&self, edge: usize, share: f64) -> [f64; 2] {
         let next = (edge + 1) % 4;
-        // Opposite edges are both walked towards growing u or v: on a rectangle they then agree to the last bit.
+        // Opposite edges are both evaluated towards growing u or v: on a rectangle they then agree to the last bit.
         let (from, to, along) = if edge < 2 { (edge, next, share) } else { (next, edge, 1.0 - share) };
         let (from, to) = (self.corners[from], self.corners[to]);
         let way = [to[0] - from[0], to[1] - from[1]];
@@ -91,9 +92,9 @@ impl Blank {
         [on_line[0] + way[1] * out, on_line[1] - way[0] * out]
     }
 
-    /// Places the vertices of a boundary loop by their share of their edge's arc length (Masuda et al., 4.3): one place a
-    /// vertex, metres. `corners` are the corners' positions in the loop, `arc` the vertices' arc lengths from the first
-    /// corner of their edge.
+    /// Places the vertices of a boundary loop by their share of their edge's arc length (Masuda et al., 4.3): one place
+    /// per vertex, metres. `corners` are the corners' positions in the loop, `arc` the vertices' arc lengths from the
+    /// first corner of their edge.
     #[must_use]
     pub fn places(&self, corners: [usize; 4], arc: &[f64], edge_length: [f64; 4]) -> Vec<[f64; 2]> {
         let edge_of = |at: usize| (0..4).rev().find(|&edge| corners[edge] <= at).unwrap_or(0);

@@ -15,7 +15,7 @@ pub struct PlateSpec {
     pub face_inset: f64,
     /// Height of the square root face in the middle of a bevelled edge, metres.
     pub root_face: f64,
-    /// Rough direction of growing u, scanner frame, any length. Decides which corner is (0, 0).
+    /// Rough direction of growing u, scanner frame, any length. It determines which corner is (0, 0).
     pub u_axis: Option<Vec3>,
     /// Box that contains the plate, scanner frame.
     pub region: Option<RegionOfInterest>,

@@ -1,9 +1,13 @@
-//! Fit of S(u, v) to all samples by robust penalised least squares, once the mesh is flattened (Masuda et al., 4.4).
+//! Fit of S(u, v) to all samples by robust penalised least squares, after the mesh is flattened (Masuda et al., 4.4).
 //!
-//! A spline through the vertices' (u, v) carries the chart from the vertices to every place (a, b) of the face. Each
-//! sample then has its (u, v), its own mid-surface point (half the thickness below it along the face's normal) and its
-//! weight: one over its variance along the normal, less where it is an outlier from the smooth face. The fit gives the heights,
-//! the chart the places within the surface (`place_by_chart`).
+//! 1. A spline through the vertices' (u, v) extends the chart from the vertices to every place (a, b) of the smooth
+//!    face.
+//! 2. Each sample gets its (u, v), its mid-surface point (half the thickness below it along the face's normal) and its
+//!    weight: one over its variance along the normal, less where it is an outlier from the smooth face.
+//! 3. The fit determines the heights along the normal; the chart determines the places within the surface
+//!    (`place_by_chart`).
+//!
+//! In: samples, smooth face, chart. Out: S with its covariance, the mask of seen parts and the [`Quality`] of the scan.
 
 use platen_numerics::reml::Penalty;
 use platen_numerics::spline_fit::{FittedSpline, SplineFit, Undetermined};
@@ -16,21 +20,22 @@ use crate::surface::place_by_chart::place_by_chart;
 use crate::surface::{Mask, Surface};
 use crate::{Chart, Patch, PlateSpec, Sample, Vec3};
 
-/// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without one gets spans of twice the length.
+/// Length of a span of S, metres: a fifth of the width of a narrow bend. A plate without a narrow bend gets spans of
+/// twice the length.
 const SPAN: f64 = 0.06;
-/// Facets along a span of the smooth face: 25 mm.
+/// Number of facets along a span of the smooth face: 25 mm each.
 const FACETS: usize = 4;
-/// Cells of the mask, metres.
+/// Size of a cell of the mask, metres.
 const MASK_CELL: f64 = 0.025;
-/// Rows up to this far apart are neighbours: a single dropout is no hole.
+/// Largest distance of neighbouring rows: a single dropout is not a hole.
 const NEIGHBOUR_ROWS: u32 = 2;
 
 /// Quality of the scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
-    /// Samples on the plate.
+    /// Number of samples on the plate.
     pub n_samples: usize,
-    /// Samples used: not rejected as outliers.
+    /// Number of samples used, that is, not rejected as outliers.
     pub n_used: usize,
     /// Share of the plate that was seen.
     pub coverage: f64,
@@ -57,9 +62,9 @@ pub(crate) fn fit_surface(
     spec: &PlateSpec,
 ) -> Result<FitToSamples, Undetermined> {
     let carried = carry(face, places, chart)?;
-    // Around its middle the plate's coordinates are small, and so are the rounding errors of their squares.
+    // Relative to its middle the plate's coordinates are small, and so are the rounding errors of their squares.
     let middle = Vec3::from(face.mid.point(0.5 * spec.width, 0.5 * spec.height));
-    // Of even numbers of spans the fit may join two each.
+    // Even numbers of spans, so that the fit may join them in pairs.
     let [u, v] = [spec.width, spec.height].map(|length| {
         let n_spans = UniformKnots::of_length(length, SPAN).n_spans();
         UniformKnots::new(0.0, length, n_spans.next_multiple_of(2))
@@ -120,14 +125,14 @@ fn moved(mut fitted: FittedSpline<3>, by: Vec3) -> FittedSpline<3> {
     fitted
 }
 
-/// Marks what lies at and between neighbouring samples: at grazing sight they are further apart than cells.
+/// Mask of the places at and between neighbouring samples, which at grazing incidence are farther apart than cells.
 struct Seen {
     mask: Mask,
     column: u32,
     /// Rows and places of the last column and of this one.
     before: Vec<(u32, [f64; 2])>,
     current: Vec<(u32, [f64; 2])>,
-    /// Where in the last column the search for a sample's neighbour stands.
+    /// Place in the last column at which the search for a sample's neighbour continues.
     cursor: usize,
 }
 

@@ -1,4 +1,5 @@
-//! Draws of the fit's errors, for the propagation of distributions by a Monte Carlo method (JCGM 101:2008, section 5.9).
+//! Draws of the fit's errors, for the propagation of distributions by a Monte Carlo method (JCGM 101:2008, section
+//! 5.9).
 
 use platen_numerics::random::Random;
 
@@ -13,7 +14,8 @@ pub struct HeightDraws<'a, const D: usize> {
 }
 
 impl Surface {
-    /// Draws errors of the fit. Costs one sweep over the factor (2 ms for 25 x 20 spans and 64 draws); the same seed gives the same draws.
+    /// Draws errors of the fit; the same seed gives the same draws. Cost: one sweep over the factor (2 ms for 25 x 20
+    /// spans and 64 draws).
     #[must_use]
     pub fn draw_heights<const D: usize>(&self, seed: u64) -> HeightDraws<'_, D> {
         let mut random = Random::new(seed);

@@ -1,6 +1,6 @@
-//! Mask of the parts of the plate that were seen.
+//! Mask of the parts of the plate that were seen, as cells of the original rectangle.
 
-/// Cells of the original rectangle, and whether samples lie in them.
+/// Cells of the original rectangle, each marked if samples lie in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mask {
     n_u: usize,
@@ -11,7 +11,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Builds a mask with nothing seen, in cells of about `cell` metres.
+    /// Builds a mask without any part seen, in cells of about `cell` metres.
     #[must_use]
     pub fn unseen(width: f64, height: f64, cell: f64) -> Self {
         let count = |length: f64| ((length / cell).ceil() as usize).clamp(1, 4096);
@@ -37,7 +37,7 @@ impl Mask {
         [self.n_u, self.n_v]
     }
 
-    /// Returns per cell, v outer, u inner, whether it was seen.
+    /// Returns, per cell, whether it was seen; v outer, u inner.
     #[must_use]
     pub fn seen_cells(&self) -> &[bool] {
         &self.seen

@@ -1,4 +1,4 @@
-//! A surface as plain numbers, to be stored or sent across a library boundary.
+//! Surface as plain numbers, to be stored or sent across a library boundary.
 
 use platen_numerics::block_banded::BlockBandedFactor;
 use platen_numerics::tensor_spline::TensorSpline;
@@ -22,9 +22,10 @@ pub struct SurfaceParts {
     /// are equal) the blocks that couple it to itself and to the three rows before, each square over the shorter axis,
     /// column-major.
     pub precision_factor: Vec<f64>,
-    /// Per control value: covariances with those up to three away, 7 x 7, v outer, u inner, metres squared.
+    /// Per control value: covariances with the control values up to three away, 7 x 7, v outer, u inner, metres
+    /// squared.
     pub covariance: Vec<[f64; 49]>,
-    /// Share of the covariance that is scatter of the scan, above 0 to 1, the mean over the plate.
+    /// Share of the covariance that is scatter of the scan, mean over the plate; above 0, at most 1.
     pub noise_share: f32,
     /// Number of mask cells along u and along v.
     pub mask_cells: [usize; 2],

@@ -1,10 +1,12 @@
-//! Places within the surface: S is moved within itself to where the chart has them.
+//! Correction of S within the surface: material points are moved to the places that the chart gives them.
 //!
-//! The penalty of the fit is selected for the heights of the samples. The places within the surface need none: they are exact, but of a curved plate they
-//! have third derivatives, too, which the penalty takes (x = R sin(u / R) of a cylinder becomes a straight line). Without this step 2.5 m of radius 11 m,
-//! scanned with 1.5 mm of noise, come out 2 mm too long, at their ends by 4 mm/m, with the heights unchanged.
+//! The penalty of the fit is selected for the heights of the samples. The tangential components of S are exact and
+//! require no penalty; on a curved plate, however, they have third derivatives as well, which the penalty suppresses (x
+//! = R sin(u / R) of a cylinder becomes a straight line). Without this correction a plate of 2.5 m with a radius of 11
+//! m, scanned with 1.5 mm of noise, is 2 mm too long, at its ends by 4 mm/m, with the heights unchanged.
 //!
-//! In: the fitted S, the mid-surface over (a, b), the chart as a spline from (a, b) to (u, v). Own; Masuda et al., 4.4, fit without penalty.
+//! In: the fitted S, the mid-surface over (a, b), the chart as a spline from (a, b) to (u, v). Out: S with corrected
+//! control values. Own; Masuda et al., 4.4, fit without penalty.
 
 use nalgebra::{Matrix2, Vector2};
 use platen_numerics::tensor_spline::TensorSpline;
@@ -25,9 +27,10 @@ pub(super) fn place_by_chart(surface: &mut TensorSpline<3>, mid: &TensorSpline<3
     }
 }
 
-/// Returns the (a, b) that the chart takes to (u, v), by Newton's method.
+/// Returns the (a, b) that the chart maps to (u, v), by Newton's method.
 fn inverse(chart: &TensorSpline<2>, uv: [f64; 2]) -> [f64; 2] {
-    /// The chart moves places by millimetres, nearly alike: a second step already changes nothing.
+    /// Number of steps. The chart moves neighbouring places by nearly the same few millimetres: a second step already
+    /// changes nothing.
     const STEPS: usize = 3;
     let uv = Vector2::from(uv);
     let mut at = uv;
@@ -45,7 +48,7 @@ mod tests {
 
     use super::*;
 
-    /// A cylinder whose places a fit has spread apart keeps its shape and gets those of the chart.
+    /// A cylinder whose material points a fit has spread apart keeps its shape and gets the places of the chart.
     #[test]
     fn a_surface_moves_within_itself_to_the_places_of_the_chart() {
         const R: f64 = 5.0;
@@ -60,7 +63,7 @@ mod tests {
         for [a, b] in [[0.0, 0.0], [0.1, 1.9], [1.3, 0.7], [3.0, 2.0]] {
             let [u, v] = moved(a, b);
             let off = Vec3::from(surface.point(u, v)) - at(a, b);
-            // Moved along the tangent by 4 mm at most: on a radius of 5 m 1.6 um off the cylinder.
+            // A movement of at most 4 mm along the tangent, on a radius of 5 m, leads 1.6 um off the cylinder.
             assert!(off.norm() < 2e-6, "{off:?}");
         }
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A surface without noise over 3 x 2 m, with points `f(u, v)` of the mid-surface.
+/// Builds a surface without noise over 3 x 2 m, with points `f(u, v)` of the mid-surface.
 fn exact(spans: [usize; 2], f: impl Fn(f64, f64) -> Vec3) -> Surface {
     let (u, v) = (UniformKnots::new(0.0, 3.0, spans[0]), UniformKnots::new(0.0, 2.0, spans[1]));
     let mut fit = SplineFit::new(u, v);
@@ -16,7 +16,7 @@ fn exact(spans: [usize; 2], f: impl Fn(f64, f64) -> Vec3) -> Surface {
     Surface::new(fit.solve_with(penalty).expect("determined"), 0.04, Mask::unseen(3.0, 2.0, 0.1))
 }
 
-/// Cylinder of radius r, bending along a direction psi from u, centre on the side of +z.
+/// Returns a cylinder of radius r that bends along a direction psi from u, with its centre on the side of +z.
 fn cylinder(r: f64, psi: f64) -> impl Fn(f64, f64) -> Vec3 {
     let (s, c) = psi.sin_cos();
     move |u, v| {
@@ -54,7 +54,7 @@ fn a_saddles_principal_curvatures_have_both_signs() {
 
 #[test]
 fn curvature_converges_with_the_second_order() {
-    // The second derivative of a cubic spline: error of order step^2 on a shape that is no polynomial.
+    // The second derivative of a cubic spline has an error of order step^2 on a shape that is not a polynomial.
     let error = |n: usize| {
         let surface = exact([3 * n, 2 * n], |u, v| Vec3::new(u, v, 0.02 * (4.0 * u).sin()));
         (0..60)
@@ -115,7 +115,8 @@ fn one_place_and_many_places_state_the_same_deviation() {
     let drawn = (0..4000).map(|k| before[k] - 2.0 * at[k] + after[k]);
     let rms = (drawn.map(|quotient| quotient.powi(2)).sum::<f64>() / 4000.0).sqrt() / (d * d);
     assert!((rms / quotient - 1.0).abs() < 0.03, "{rms} {quotient}");
-    // Noise of 0.1 mm on 1920 points, 9 per coefficient: below the noise inside, larger in the corner.
+    // Noise of 0.1 mm on 1920 points, 9 per coefficient: the deviation is below the noise inside and larger in the
+    // corner.
     assert!(
         surface.sigma_point(1.3, 0.8) < 1e-4 && surface.sigma_point(0.0, 0.0) > surface.sigma_point(1.3, 0.8)
     );

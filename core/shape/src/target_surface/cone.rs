@@ -1,12 +1,12 @@
-//! A cone, developed about its apex.
+//! Cone, developed about its apex.
 
 use super::Place;
 use crate::Vec3;
 
-/// A cone over the coordinates along its middle straight line and across it, its axis above.
+/// A cone over the coordinates along its middle straight line and across it, with its axis above.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cone {
-    /// From the apex to the middle of the plate, along the straight line.
+    /// Distance from the apex to the middle of the plate, along the straight line.
     slant: f64,
     sin: f64,
     cos: f64,
@@ -15,7 +15,8 @@ pub(super) struct Cone {
 }
 
 impl Cone {
-    /// `radius` of normal curvature in the middle, growing by `growth` per metre; `None` when it does not grow.
+    /// Builds a cone from the `radius` of normal curvature in the middle, which grows by `growth` per metre; `None`
+    /// when it does not grow.
     pub(super) fn new(radius: f64, growth: f64) -> Option<Self> {
         // Below this the apex is farther than 1e9 radii: a cylinder to the last bit that matters.
         const CYLINDER: f64 = 1e-9;
@@ -29,7 +30,8 @@ impl Cone {
         })
     }
 
-    /// The angle about the axis is the polar angle of the development divided by the sine of the half angle.
+    /// Evaluates a place. The angle about the axis is the polar angle of the development divided by the sine of the
+    /// half angle.
     pub(super) fn place(&self, a: f64, b: f64) -> Place {
         let along = self.slant + self.way * a;
         let (rho, polar) = (along.hypot(b), b.atan2(along));

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3};
 use super::TargetSurface;
 use crate::{Surface, Vec3};
 
-/// A rigid motion, as from the scanner's frame to the target's.
+/// A rigid motion, such as that from the scanner's frame to the target's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     rotation: Rotation3<f64>,
@@ -13,14 +13,15 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Finds the motion that brings the material points of the places (u, v) closest to the target's, on the scanned face.
+    /// Finds the motion that brings the material points of the places (u, v) closest to the target's, on the scanned
+    /// face.
     #[must_use]
     pub fn best(now: &Surface, target: &TargetSurface, places: impl Iterator<Item = [f64; 2]>) -> Self {
         Self::of_pairs(places.map(|[u, v]| (now.face(u, v), target.face(u, v))))
     }
 
-    /// Finds the motion that brings the first points of the pairs closest to the second ones (Kabsch, by the singular vectors of
-    /// the covariance).
+    /// Finds the motion that brings the first points of the pairs closest to the second ones (Kabsch, by the singular
+    /// vectors of the covariance).
     #[must_use]
     pub fn of_pairs(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Self {
         let pairs: Vec<(Vec3, Vec3)> = pairs.collect();

@@ -19,7 +19,7 @@ fn shapes() -> Vec<TargetShape> {
     ]
 }
 
-/// Normal curvature along a direction from points and normals alone: -(dn . dp) / |dp|^2.
+/// Returns the normal curvature along a direction from points and normals alone: -(dn . dp) / |dp|^2.
 fn curvature_by_differences(t: &TargetSurface, at: [f64; 2], direction: [f64; 2]) -> f64 {
     let h = 1e-4;
     let [from, to] = [-h, h].map(|s| [at[0] + s * direction[0], at[1] + s * direction[1]]);
