@@ -1,8 +1,10 @@
-//! Time of each stage from columns to S(u, v): a 4 x 4 m plate rolled to R 12 m among 1.6 million cells, 1 mm range
-//! noise, 2 % dropouts, about 300,000 samples on the plate. `cargo bench -p platen-shape`; one thread.
+//! Benchmark of each stage from columns to S(u, v).
 //!
-//! `finish`, `outline` and what `measure` does follow the last column; `lattice_in_memory` is everything, with the
-//! harmonic map.
+//! Scene: a 4 x 4 m plate rolled to R 12 m among 1.6 million cells, 1 mm range noise, 2 % dropouts, about 300,000
+//! samples on the plate. `cargo bench -p platen-shape`; one thread.
+//!
+//! `finish`, `outline` and the stages of `measure` follow the last column; `lattice_in_memory` comprises all stages,
+//! with the harmonic map.
 #![allow(clippy::expect_used, reason = "a benchmark without its scene is none")]
 
 #[path = "../tests/support/harmonic.rs"]
@@ -29,7 +31,7 @@ fn main() {
     divan::main();
 }
 
-/// The scan and what each stage makes of it.
+/// The scan and the result of each stage.
 struct Stages {
     spec: PlateSpec,
     header: ScanHeader,
@@ -72,7 +74,7 @@ fn whole(patch: &Patch, outline: &Outline, spec: &PlateSpec, flatten: &mut dyn F
     measure(patch, outline, spec, &spec.rectangle(), flatten, &mut Duration::default).expect("a measurement")
 }
 
-/// A flattening that is known already.
+/// A flattening whose chart is given.
 struct Known(Chart);
 
 impl Flatten for Known {
@@ -114,7 +116,7 @@ fn mesh(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// Smooth face, mesh and S, the flattening given.
+/// Measures smooth face, mesh and S, with the flattening given.
 #[divan::bench(sample_count = 10)]
 fn measure_but_flattening(bencher: Bencher<'_, '_>) {
     let s = &*STAGES;
@@ -133,7 +135,7 @@ fn lattice_in_memory(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// The bicubic spline of scattered points, smoothing chosen: (points, spans a side).
+/// Fits the bicubic spline to scattered points and selects the penalty: (points, spans per side).
 #[divan::bench(args = [(10_000, 16), (280_000, 32), (280_000, 64)], sample_count = 10)]
 fn fit(bencher: Bencher<'_, '_>, (n_points, n_spans): (usize, usize)) {
     let mut random = Random::new(1);

@@ -1,4 +1,4 @@
-//! Writes closed-form meshes with their harmonic charts to a folder, one JSON file each, for `tests/peers/flattening.py`.
+//! Closed-form meshes with their harmonic charts, written to a folder as JSON files for `tests/peers/flattening.py`.
 //!
 //! ```text
 //! cargo run --release -p platen-shape --features closed-form --example harmonic_charts -- DIR

@@ -1,4 +1,4 @@
-//! Edges that run along a line of the lattice: nothing tells where between two columns they lie, and they must say so.
+//! Edges that run along a lattice line: their position between two columns is undetermined, and must be stated so.
 
 #![allow(clippy::unwrap_used, reason = "test code")]
 
@@ -19,8 +19,8 @@ fn outline_of(scene: &Scene, around: f64) -> Outline {
     outline(&extractor.finish().unwrap(), &scene.spec()).unwrap()
 }
 
-/// Errors across edge `edge` at its two ends over their stated standard deviations, for an edge at every place between
-/// two lines of the lattice.
+/// Returns the errors across edge `edge` at its two ends over their stated standard deviations, for an edge at several
+/// places between two lines of the lattice.
 fn ratios(name: &str, scene: &Scene, edge: usize) -> Vec<[f64; 2]> {
     const PLACES: u32 = 12;
     let plate = scene.plates[0];
@@ -48,7 +48,8 @@ fn ratios(name: &str, scene: &Scene, edge: usize) -> Vec<[f64; 2]> {
 }
 
 fn check(name: &str, scene: &Scene, edge: usize) {
-    // Contrast and shape of a beam that mixes linearly are off alike at every place, by up to the stated deviation.
+    // Where beams mix linearly, contrast and beam shape cause the same error at every place, up to the stated
+    // deviation.
     let most_mean = if scene.receiver == Receiver::Anywhere { 0.5 } else { 1.0 };
     let ratios = ratios(name, scene, edge);
     for end in [0, 1] {
@@ -64,7 +65,7 @@ fn plate() -> Plate {
     Plate { centre: Vec3::new(6.0, 1.25, -3.6), turn: 0.0, ..Plate::rolled() }
 }
 
-/// Plates that are less bright than the prior of the contrast takes them for.
+/// Receiver with plates that are less bright than the prior of the contrast assumes.
 const LINEAR: Receiver = Receiver::Linear { plates: 0.3 };
 
 fn check_along_columns(receiver: Receiver) {

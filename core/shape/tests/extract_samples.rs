@@ -6,7 +6,7 @@ use platen_shape::Vec3;
 use platen_shape::extract::{Extractor, Refusal};
 use platen_tests::samples;
 
-/// The mixed pixels that the truth counts are no loss, and a few samples of the side face no harm.
+/// Mixed pixels counted by the truth are not a loss, and a few samples of the side face are allowed.
 #[test]
 fn the_face_is_found_to_the_sample() {
     for folder in samples::plates() {
@@ -31,14 +31,14 @@ fn the_order_of_arrival_does_not_matter() {
         let n = sample.columns.len();
         let forwards = support::extract(&sample, 0..n).unwrap();
         assert_eq!(forwards, support::extract(&sample, (0..n).rev()).unwrap());
-        // 397 has no factor in common with the number of columns: every column comes once, far from the last.
+        // 397 has no factor in common with the number of columns: every column comes once, far from the previous one.
         assert_ne!(n % 397, 0);
         assert_eq!(forwards, support::extract(&sample, (0..n).map(|i| i * 397 % n)).unwrap());
     }
 }
 
-/// An evaluated component is held beside the columns: as many cells whichever way they came. Of the plate that the project ships, the
-/// first one, no cell is dropped.
+/// An evaluated component is held in addition to the columns, with the same number of cells in either order of arrival.
+/// Of the plate that the project ships, the first one, no cell is dropped.
 #[test]
 fn a_plate_is_evaluated_before_the_last_column_in_either_order() {
     let sample = support::read(&samples::each("plates/p1_cylinder")[0]);

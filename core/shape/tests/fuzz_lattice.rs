@@ -1,4 +1,4 @@
-//! Thousands of small random scans: whatever is in them, no panic, no hang, and no number that is not finite.
+//! Fuzz test with thousands of small random scans: no panic, no hang, and no number that is not finite.
 
 #[path = "support/harmonic.rs"]
 mod harmonic;
@@ -58,7 +58,7 @@ fn nothing_panics_and_all_numbers_are_finite() {
         let (header, mut columns) = scene.scan();
         let mut random = Random::new(seed ^ 0xf00d);
         if random.uniform() < 0.2 {
-            // Noise that is no surface at all.
+            // Noise without any surface.
             for column in &mut columns {
                 column.range_m.iter_mut().for_each(|r| *r *= 0.5 + random.uniform());
                 column
@@ -92,6 +92,6 @@ fn nothing_panics_and_all_numbers_are_finite() {
         }
     }
     println!("{patches} patches, {outlines} outlines, {measurements} measurements");
-    // The test would be empty if hardly any scan got that far.
+    // The test would be empty if hardly any scan reached these stages.
     assert!(patches > SCANS / 20 && outlines > SCANS / 50 && measurements > SCANS / 100);
 }

@@ -1,5 +1,6 @@
-//! Whole measurements of the sample plates with the harmonic map of Masuda et al., "Point-based shape
-//! monitoring of plate bending for large-scale storage tanks", against their truth.
+//! Whole measurements of the sample plates against their truth, with the harmonic map.
+//!
+//! The map is that of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks".
 
 #![allow(clippy::unwrap_used, reason = "test code: helpers fail like tests")]
 
@@ -29,7 +30,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Normal distances of the truth's grid from the face of S, mm: inside, and within 100 mm of an edge.
+/// Returns the normal distances of the truth's grid from the face of S, mm: inside, and within 100 mm of an edge.
 fn distances(surface: &Surface, grid: &Value) -> [Vec<f64>; 2] {
     let (us, vs) = (numbers(&grid["u_m"]), numbers(&grid["v_m"]));
     let mut out = [Vec::new(), Vec::new()];
@@ -43,7 +44,7 @@ fn distances(surface: &Surface, grid: &Value) -> [Vec<f64>; 2] {
     out
 }
 
-/// Errors of the curvatures along u and v and of the twist, 1/m, at least 150 mm from every edge.
+/// Returns the errors of the curvatures along u and v and of the twist, 1/m, at least 150 mm from every edge.
 fn bends(surface: &Surface, grid: &Value) -> Vec<f64> {
     let (us, vs) = (numbers(&grid["u_m"]), numbers(&grid["v_m"]));
     let mut out = Vec::new();
@@ -63,7 +64,7 @@ fn bends(surface: &Surface, grid: &Value) -> Vec<f64> {
     out
 }
 
-/// Largest errors: millimetres, and 1/m for the curvature.
+/// Largest errors allowed: millimetres, and 1/m for the curvature.
 struct Bounds {
     corners: f64,
     markers: f64,
@@ -72,10 +73,11 @@ struct Bounds {
     curvature: f64,
 }
 
-/// Twice what is found on the worst plate of each kind.
+/// Returns twice the errors found on the worst plate of each kind.
 fn bounds(name: &str) -> Bounds {
-    // Corners 0.20 to 0.46 mm and markers 0.10 to 0.13 mm: edges located to a thirtieth of the lattice's step of 8 mm. Normal
-    // distances 0.002 to 0.007 mm inside and 0.006 to 0.014 mm near an edge: noise of 0.4 mm over 70,000 to 130,000 samples.
+    // Corners 0.20 to 0.46 mm and markers 0.10 to 0.13 mm: edges located to a thirtieth of the lattice's step of 8 mm.
+    // Normal distances 0.002 to 0.007 mm inside and 0.006 to 0.014 mm near an edge: noise of 0.4 mm over 70,000 to
+    // 130,000 samples.
     let all = Bounds { corners: 0.92, markers: 0.26, inside: 0.014, near_edge: 0.028, curvature: 2.4e-4 };
     match name {
         // 0.61 mm: the harmonic map is wrong on double curvature.

@@ -59,7 +59,7 @@ fn a_hint_between_two_edges_and_another_size_are_refused() {
     assert!(matches!(refusal, OutlineError::WrongSize { side: "width", .. }));
 }
 
-/// Crossings nearer to one edge than so far are removed, up to a margin from its ends.
+/// Crossings nearer to one edge than a limit are removed, up to a margin from its ends.
 #[test]
 fn an_edge_seen_at_its_ends_alone_is_told_and_one_not_seen_is_refused() {
     let sample = support::read(&samples::plates()[0]);

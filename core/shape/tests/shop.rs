@@ -1,4 +1,5 @@
-//! Situations of a workshop on closed-form plates: bends, noise, grazing sight, people in the way, two plates, none.
+//! Situations of a workshop on closed-form plates: bends, noise, grazing incidence, people in the way, two plates,
+//! none.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test code")]
 
@@ -15,7 +16,7 @@ fn plate() -> Plate {
     Plate::rolled()
 }
 
-/// A scan's face, with the outcome that tells a test more than a panic.
+/// Extracts the face of a scan; returns a refusal instead of panicking.
 fn extract(header: &ScanHeader, columns: &[Column], spec: &PlateSpec) -> Result<Patch, Refusal> {
     let mut extractor = Extractor::new(header, spec);
     for column in columns {
@@ -31,7 +32,7 @@ fn measure(scene: &Scene) -> (Patch, Outline) {
     (patch, outline)
 }
 
-/// Distance of the corners from the truth, metres, by corner.
+/// Returns the distance of each corner from the truth, metres.
 fn corners_off(scene: &Scene, outline: &Outline) -> [f64; 4] {
     let p = &scene.plates[0];
     let truth = [(0.0, 0.0), (p.width, 0.0), (p.width, p.height), (0.0, p.height)];
@@ -42,7 +43,8 @@ fn rms(off: [f64; 4]) -> f64 {
     (off.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt()
 }
 
-/// `corner_limit`: about twice the error found (root mean square of the four corners, metres).
+/// Checks the corners of a scene. `corner_limit` is about twice the error found (root mean square of the four corners,
+/// metres).
 fn check(name: &str, scene: &Scene, corner_limit: f64) {
     let (patch, outline) = measure(scene);
     let off = corners_off(scene, &outline);
@@ -197,7 +199,7 @@ fn noise_of_two_millimetres_with_heavy_tails() {
 
 #[test]
 fn bent_along_the_line_of_sight() {
-    // The far end falls away nearly as fast as the sight line: seen from 40 to 81 degrees off the normal.
+    // The far end falls away nearly as fast as the beam: incidence of 40 to 81 degrees.
     let plate = Plate {
         width: 5.0,
         height: 2.0,
@@ -253,7 +255,7 @@ fn a_seam_between_the_faces_and_warm_up_columns() {
     // Few columns between the faces turn the chord across a step most.
     for warm_up in [1, 3, 10] {
         let mut columns = scanned.clone();
-        // The second face is 1.5 mm farther, and the first columns of both are no measurement.
+        // The second face is 1.5 mm farther, and the first columns of both faces are not valid measurements.
         for column in &mut columns[seam as usize..] {
             column.range_m.iter_mut().for_each(|r| *r += 1.5e-3);
         }

@@ -1,5 +1,6 @@
-//! Harmonic map of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", as a flattening
-//! without its plugin.
+//! Harmonic map as a flattening without its plugin.
+//!
+//! It is that of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks".
 
 #![allow(unreachable_pub, reason = "test code")]
 

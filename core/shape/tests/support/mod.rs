@@ -14,7 +14,7 @@ use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::{Patch, PlateSpec, Vec3};
 use serde_json::Value;
 
-/// A scan in memory and what is known of its plate.
+/// A scan in memory and the truth about its plate.
 pub struct Sample {
     pub header: ScanHeader,
     pub columns: Vec<Column>,
@@ -49,7 +49,7 @@ pub fn read(folder: &Path) -> Sample {
     Sample { header, columns, spec, truth }
 }
 
-/// The plate's face from columns that arrive in `order`.
+/// Extracts the plate's face from columns that arrive in `order`.
 pub fn extract(sample: &Sample, order: impl Iterator<Item = usize>) -> Result<Patch, Refusal> {
     let mut extractor = Extractor::new(&sample.header, &sample.spec);
     for index in order {
@@ -58,7 +58,7 @@ pub fn extract(sample: &Sample, order: impl Iterator<Item = usize>) -> Result<Pa
     extractor.finish()
 }
 
-/// (slow index, fast index, position)
+/// Cells as (slow index, fast index, position).
 type Cells = Vec<(i64, i64, [f64; 3])>;
 
 fn read_e57(path: &Path) -> Cells {
@@ -96,7 +96,7 @@ fn read_ptx_gz(path: &Path) -> Cells {
         .collect()
 }
 
-/// Mean step of `angle` per index, and the angle at index 0, by least squares.
+/// Returns the mean step of `angle` per index, and the angle at index 0, by least squares.
 fn line(pairs: impl Iterator<Item = (i64, f64)> + Clone) -> (f64, f64) {
     let n = pairs.clone().count() as f64;
     let (sx, sy) = pairs.clone().fold((0.0, 0.0), |(sx, sy), (i, a)| (sx + i as f64, sy + a));

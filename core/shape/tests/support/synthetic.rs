@@ -1,12 +1,14 @@
-//! Scans of closed-form plates: a flat or cylindrical plate with its side faces over a floor, people as upright
-//! cylinders, range noise with heavy tails, dropouts and mixed pixels. Every scan follows from its seed.
+//! Scans of closed-form plates, each determined by its seed.
+//!
+//! A scene consists of a flat or cylindrical plate with its side faces over a floor, and people as upright cylinders.
+//! The scan has range noise with heavy tails, dropouts and mixed pixels.
 
 #![allow(dead_code, unreachable_pub, reason = "test code of which every file uses its own part")]
 
 use platen_scan::{Column, Direction, Face, ScanHeader, State};
 use platen_shape::{PlateSpec, Vec3};
 
-/// A generator (SplitMix64), so that a seed gives the same scan for ever.
+/// Random generator (SplitMix64) with which a seed always gives the same scan.
 pub struct Random(u64);
 
 impl Random {
@@ -38,14 +40,14 @@ pub struct Plate {
     pub radius: Option<f64>,
     /// Middle of the mid-surface, metres, scanner frame.
     pub centre: Vec3,
-    /// Turned about the vertical, radians.
+    /// Rotation about the vertical, radians.
     pub turn: f64,
-    /// Before that, lifted at its far end about the horizontal across, radians.
+    /// Rotation before that, which lifts the far end about the horizontal across, radians.
     pub tilt: f64,
 }
 
 impl Plate {
-    /// A plate rolled to a radius of 9 m, concave face up, obliquely before the scanner.
+    /// Returns a plate rolled to a radius of 9 m, concave face up, placed obliquely in front of the scanner.
     pub fn rolled() -> Self {
         Self {
             width: 3.0,
@@ -72,20 +74,20 @@ impl Plate {
         Vec3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
     }
 
-    /// Material coordinates (u, v) of a point on or in the plate, scanner frame.
+    /// Returns the material coordinates (u, v) of a point on or in the plate, scanner frame.
     fn material(&self, point: Vec3) -> [f64; 2] {
         let p = self.to_local(point - self.centre);
         let x = self.radius.map_or(p.x, |r| r * (p.x / r).atan2(-(p.z - r) / r));
         [x + 0.5 * self.width, p.y + 0.5 * self.height]
     }
 
-    /// Unit normal of the faces at a point, scanner frame.
+    /// Returns the unit normal of the faces at a point, scanner frame.
     fn normal(&self, point: Vec3) -> Vec3 {
         let p = self.to_local(point - self.centre);
         self.to_scanner(self.radius.map_or(Vec3::z(), |r| Vec3::new(p.x, 0.0, p.z - r).normalize()))
     }
 
-    /// The upper face's point above (u, v) of the mid-surface, scanner frame.
+    /// Returns the upper face's point above (u, v) of the mid-surface, scanner frame.
     pub fn face(&self, u: f64, v: f64) -> Vec3 {
         let (x, y) = (u - 0.5 * self.width, v - 0.5 * self.height);
         let local = match self.radius {
@@ -99,7 +101,7 @@ impl Plate {
         self.centre + self.to_scanner(local)
     }
 
-    /// Range of the first hit, metres.
+    /// Returns the range of the first hit, metres.
     fn hit(&self, beam: Vec3) -> Option<f64> {
         let (o, d) = (self.to_local(-self.centre), self.to_local(beam));
         let half = Vec3::new(0.5 * self.width, 0.5 * self.height, 0.5 * self.thickness);
@@ -151,9 +153,10 @@ const WALL: f64 = 15.0;
 /// Range that a receiver gives for a beam that sees two surfaces.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Receiver {
-    /// Anywhere between those of both, for three quarters of the beams that a corner of theirs sees beyond an edge.
+    /// Any range between those of both, for three quarters of the beams of which a corner sees beyond an edge.
     Anywhere,
-    /// The mean over a Gaussian beam, weighted by power (Lambert's law); plates reflect so much of what the floor does.
+    /// The mean over a Gaussian beam, weighted by power (Lambert's law); `plates` is the reflectivity of plates over
+    /// that of the floor.
     Linear { plates: f64 },
 }
 
@@ -172,7 +175,7 @@ pub struct Scene {
     pub receiver: Receiver,
     /// Standard deviation of the range, metres.
     pub sigma: f64,
-    /// Part of the samples with four times that.
+    /// Part of the samples with four times that standard deviation.
     pub tails: f64,
     pub dropouts: f64,
     /// Material rectangle of the first plate, from (u, v) to (u, v), that mirrors the beam away.
@@ -225,7 +228,8 @@ impl Scene {
         people.fold(floor.min(WALL), f64::min)
     }
 
-    /// Range and power of the echo of one ray, of the echo of the floor straight below at one metre.
+    /// Returns the range of one ray and the power of its echo, relative to the echo of the floor straight below at one
+    /// metre.
     fn echo(&self, beam: Vec3, plates: f64) -> (f64, f64) {
         let behind = self.range_beside_plates(beam);
         let hits = self.plates.iter().filter_map(|plate| Some((plate.hit(beam)?, plate)));
@@ -238,7 +242,7 @@ impl Scene {
         (range, reflects * cosine / (range * range))
     }
 
-    /// Mean range over a Gaussian beam of which the directions from its middle are given in its radii.
+    /// Returns the mean range over a Gaussian beam whose directions from its middle are given in its radii.
     fn mean_range(&self, beam: impl Fn(f64, f64) -> Vec3, plates: f64, turned: f64) -> f64 {
         const SAMPLES: usize = 200;
         let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -252,12 +256,12 @@ impl Scene {
         sum.0 / sum.1
     }
 
-    /// The scan, over the plates and half a metre around them.
+    /// Returns the scan over the plates and half a metre around them.
     pub fn scan(&self) -> (ScanHeader, Vec<Column>) {
         self.scan_around(0.08)
     }
 
-    /// The scan over the plates and `around` radians beside them, as far as a dome goes.
+    /// Returns the scan over the plates and `around` radians beside them, within a full dome.
     pub fn scan_around(&self, around: f64) -> (ScanHeader, Vec<Column>) {
         let corners = self.plates.iter().flat_map(|p| {
             [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5)]
