@@ -1,4 +1,4 @@
-//! A scan's header as text: the description of a written E57 point cloud, which has no fields for nominal angles.
+//! Header of a scan as text, for the description of a written E57 point cloud, which has no fields for nominal angles.
 //!
 //! One line per field, `name value`, after a title line with the version. Floats are written in the shortest form that
 //! parses to the same bits. A reader skips lines with an unknown name.

@@ -1,15 +1,19 @@
 //! Orientation, handedness and units of a stored lattice by monotone fits of elevation and azimuth to row and column.
 //!
-//! Formats disagree on what a row is, where row 0 lies, in which direction columns run and in which unit coordinates are
-//! written, and headers are unreliable: names are swapped, counts are wrong. The decision therefore uses the cells alone.
-//! The first pass (`Survey`) keeps sums per row and per column. `Survey::decide` fits elevation to the row number and
-//! unwrapped azimuth to the column number by weighted least squares, the other way round too, requires correlations of
-//! 0.99 and returns a `Plan`. The second pass ([`Columns`]) applies it to every cell. The result has row 0 at the top,
-//! columns by increasing azimuth (counter-clockwise seen from above), a right-handed frame, and metres.
+//! Formats differ in the meaning of a row, the position of row 0, the direction of columns and the unit of coordinates.
+//! Headers are unreliable: names are swapped, counts are wrong. The decision therefore uses the cells alone.
+//!
+//! 1. The first pass (`Survey`) keeps sums per row and per column.
+//! 2. `Survey::decide` fits elevation to the row number and unwrapped azimuth to the column number by weighted least
+//!    squares, also with rows and columns swapped. It requires correlations of 0.99 and returns a `Plan`.
+//! 3. The second pass ([`Columns`]) applies the plan to every cell.
+//!
+//! The result has row 0 at the top, columns by increasing azimuth (counter-clockwise seen from above), a right-handed
+//! frame, and metres.
 //!
 //! Limits: a mirrored scan equals a real one whose head turns in the opposite direction. It is detected only when the
-//! frame declares it ([`Expected::mirror`]) or the direction of rotation is known ([`Expected::turn`]). The mirror face of
-//! a column is not stored in any lattice file.
+//! frame declares it ([`Expected::mirror`]) or the direction of rotation is known ([`Expected::turn`]). The mirror face
+//! of a column is not stored in any lattice file.
 
 mod apply;
 mod decide;
@@ -74,7 +78,7 @@ pub enum Mirror {
     Y,
 }
 
-/// Declarations about a scan beside its cells.
+/// Declarations about a scan in addition to its cells.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Expected {
     /// Smallest and largest intensity that the file declares.
@@ -83,11 +87,11 @@ pub struct Expected {
     pub turn: Option<Turn>,
     /// Set when the frame of the file is left-handed.
     pub mirror: Mirror,
-    /// Azimuth (radians) at which a full circle is cut open; where the file begins when not given.
+    /// Azimuth (radians) at which a full circle is cut open; without it, the beginning of the file.
     pub cut_azimuth: Option<f64>,
 }
 
-/// Reason why stored cells are no lattice of a scan.
+/// Reason why stored cells are not the lattice of a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum OrientError {
@@ -147,13 +151,13 @@ pub enum OrientError {
         "columns run {found}, this scanner's run {expected}: the file is mirrored; export in a right-handed frame, or set mirror"
     )]
     Mirrored { found: &'static str, expected: &'static str },
-    /// Other cells in the second pass than in the first.
+    /// The second pass found other cells than the first.
     #[error(
         "the scan changed while it was read ({expected} cells in the first pass, {found} in the second); wait until it is complete"
     )]
     Changed {
         expected: u64,
-        /// Cells in the second.
+        /// Number of cells in the second pass.
         found: u64,
     },
 }

@@ -1,9 +1,11 @@
-//! Two passes over the cells of a scan file, of any format.
+//! Reader of scan files of any format, in two passes over the cells.
 //!
-//! The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided ([`crate::orient`]) and
-//! the CRC-32C of all ranges; a thread of its own decodes the cells. The second ([`ScanReader::columns`]) delivers every column once, as soon
-//! as the file has completed it. Up to 2.6 million cells (107 MB) are kept from the first pass; a larger file is decoded twice, so that
-//! memory stays bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
+//! 1. The first pass ([`ScanReader::orient`]) collects the sums from which the orientation is decided
+//!    ([`crate::orient`]), and the CRC-32C of all ranges. The cells are decoded on a separate thread.
+//! 2. The second pass ([`ScanReader::columns`]) delivers every column once, as soon as the file has completed it.
+//!
+//! Up to 2.6 million cells (107 MB) are kept from the first pass. A larger file is decoded twice, so that the memory is
+//! bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
 mod cells;
 mod decode_ahead;
@@ -34,12 +36,12 @@ use error::Result;
 #[cfg(test)]
 pub(crate) use detect::format;
 
-/// Properties of a scan that its file declares beside the cells.
+/// Properties of a scan that its file declares in addition to the cells.
 #[derive(Debug, Clone, Default)]
 struct About {
     /// Name of the format, with the encoding of the cells.
     format: String,
-    /// Cells stored; an estimate for XYZ.
+    /// Number of cells stored; an estimate for XYZ.
     cells: u64,
     /// Smallest and largest intensity declared.
     intensity: Option<(f64, f64)>,
@@ -55,7 +57,7 @@ struct About {
     notes: Vec<String>,
 }
 
-/// Cells in the order of the file. Nothing follows an error.
+/// Cells in the order of the file. No batch follows an error.
 pub(crate) type Batches<'a> = Box<dyn Iterator<Item = Result<Cow<'a, SphericalCells>>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
@@ -75,7 +77,7 @@ pub struct ScanReader<'a> {
 
 /// Largest number of cells that are kept, 107 MB.
 const MAX_KEPT: u64 = 5 << 19;
-/// Cells between two reports of progress.
+/// Number of cells between two reports of progress.
 const PROGRESS_EVERY: u64 = 1 << 16;
 
 impl<'a> ScanReader<'a> {
@@ -115,8 +117,8 @@ impl<'a> ScanReader<'a> {
         Ok(Self { source, kept: SphericalCells::default() })
     }
 
-    /// First pass: decides the orientation of the lattice. `known` is what the plant declares about the scanner;
-    /// `progress` is called every 65,536 cells with the share read, 0 to 1, and an error from it ends the pass.
+    /// Decides the orientation of the lattice (first pass). `known` contains the plant's declarations about the
+    /// scanner. `progress` is called every 65,536 cells with the share read, 0 to 1; an error from it ends the pass.
     ///
     /// # Errors
     /// The error of `progress`, or a [`ReadError`].
@@ -127,7 +129,7 @@ impl<'a> ScanReader<'a> {
     ) -> std::result::Result<Oriented, E> {
         let about = self.source.about().clone();
         let (mut survey, mut checksum) = (Survey::default(), 0);
-        // The declared number saves memory; the real one is decisive.
+        // The declared number avoids keeping cells in vain; the real number is decisive.
         let mut fits = about.cells <= MAX_KEPT;
         let kept = &mut self.kept;
         *kept = SphericalCells::with_capacity(if fits { about.cells as usize } else { 0 });
@@ -160,7 +162,7 @@ impl<'a> ScanReader<'a> {
         Ok(Oriented { plan, checksum })
     }
 
-    /// Second pass: the columns of the oriented lattice.
+    /// Returns the columns of the oriented lattice (second pass).
     ///
     /// # Errors
     /// When the file cannot be read from its start again.
@@ -183,18 +185,19 @@ pub struct Oriented {
 }
 
 impl Oriented {
-    /// Size, angles and notes of the lattice.
+    /// Returns size, angles and notes of the lattice.
     pub fn header(&self) -> &ScanHeader {
         &self.plan.header
     }
 
-    /// CRC-32C of the ranges of all cells; equal for copies of one scan under any name, while the noise of two scans differs.
+    /// Returns the CRC-32C of the ranges of all cells. It is equal for copies of one scan under any name; two scans
+    /// differ by their noise.
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
 }
 
-/// Returns a CRC-32C continued over more numbers; `bytes` is room for them.
+/// Returns a CRC-32C continued over more numbers; `bytes` is a buffer for them.
 fn continued_checksum(checksum: u32, numbers: &[f64], bytes: &mut Vec<u8>) -> u32 {
     bytes.resize(size_of_val(numbers), 0);
     let (slots, _) = bytes.as_chunks_mut();

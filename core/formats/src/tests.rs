@@ -1,4 +1,4 @@
-//! Files written by others, the same lattice in every way of writing it, and files that are not sound.
+//! Tests with files written by other programs, one lattice in every encoding, and files that are not sound.
 
 mod collect;
 mod damage;

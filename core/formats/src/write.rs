@@ -1,7 +1,7 @@
-//! Writing of scan files, column by column in any order, in bounded memory.
+//! Writer of scan files, column by column in any order, in bounded memory.
 //!
-//! The file is written under a temporary name beside its final one, synced and renamed when it is whole; a scan that
-//! fails, or a full disk, leaves nothing behind, and an existing file is never replaced. The frame is the scanner's:
+//! The file is written under a temporary name in the same folder, synced and renamed when it is complete. A scan that
+//! fails, or a full disk, leaves no file behind, and an existing file is never replaced. The frame is the scanner's:
 //! right-handed, z up, metres; row 0 at the top, columns by increasing azimuth.
 //!
 //! E57 keeps ranges and directions to the last bit, with the scan's header in the description of its point cloud; PTX
@@ -62,7 +62,7 @@ pub struct ScanFile {
     encoding: Encoding,
 }
 
-/// Format, with the state that outlives the point cloud.
+/// Format, with the state that is kept beyond the point cloud.
 enum Encoding {
     E57(Box<E57Writer<File>>),
     Ptx,
@@ -85,13 +85,13 @@ impl Encoding {
 /// Size of a file written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Written {
-    /// Rows of the lattice.
+    /// Number of rows of the lattice.
     pub rows: u32,
-    /// Distinct columns pushed.
+    /// Number of distinct columns pushed.
     pub columns: u32,
-    /// Valid cells.
+    /// Number of valid cells.
     pub points: u64,
-    /// Bytes, 0 before [`ScanFile::persist`].
+    /// Number of bytes, 0 before [`ScanFile::persist`].
     pub bytes: u64,
 }
 
@@ -106,7 +106,7 @@ impl ScanFile {
             return Err(WriteError::Exists(path.to_path_buf()));
         }
         let create = || {
-            // As `File::create`: whoever may read the folder's files may read this one, within the umask.
+            // As `File::create`: readable for all who may read the folder's files, within the umask.
             let permissions = Permissions::from_mode(0o666);
             let mut prefix = path.file_name().map_or_else(OsString::new, OsString::from);
             prefix.push(format!(".{}.", std::process::id()));
@@ -127,7 +127,7 @@ impl ScanFile {
         create().map_err(WriteError::at(path))
     }
 
-    /// Starts the file's one scan.
+    /// Starts the single scan of the file.
     ///
     /// # Errors
     /// The reason of the operating system or of the E57 library.
@@ -164,7 +164,7 @@ impl ScanFile {
 trait Encoder {
     /// Writes a column; each once, in any order.
     fn column(&mut self, column: &Column) -> Result<()>;
-    /// Ends the scan; `came` has one entry per column of the lattice.
+    /// Ends the scan; `came` has one entry per column of the lattice, true for columns that were written.
     fn end(&mut self, end: &ScanEnd, came: &[bool]) -> Result<()>;
 }
 
@@ -177,7 +177,7 @@ pub struct ScanWriter<'a> {
 }
 
 impl ScanWriter<'_> {
-    /// Writes a column that passes [`Column::check`]. A column that comes again is ignored.
+    /// Writes a column that passes [`Column::check`]. A column that was written before is ignored.
     ///
     /// # Errors
     /// The reason of the operating system, or a cell out of the range of the format.

@@ -1,6 +1,7 @@
 //! Second pass: columns of the normalised lattice, from the cells in the order of their file.
 //!
-//! A column whose cells are stored in one piece is built from them; those of any other wait until the last of them was read.
+//! A column whose cells are stored in one piece is built at once; the cells of any other column are kept until its last
+//! cell was read.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -11,20 +12,20 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, State, wrap_azimuth};
 use super::{Mirror, OrientError, Plan, SphericalCells, Unit};
 use crate::read::{Batches, ReadError};
 
-/// Columns of an oriented lattice, each once, as soon as the file has completed it. Nothing follows an error.
+/// Columns of an oriented lattice, each once, as soon as the file has completed it. No column follows an error.
 ///
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
 pub struct Columns<'a> {
     plan: &'a Plan,
     batches: Batches<'a>,
     batch: Cow<'a, SphericalCells>,
-    /// Cells of the batch that were taken.
+    /// Number of cells of the batch that were taken.
     taken: usize,
-    /// Cells of every column that wait for the rest of it.
+    /// Cells kept for every column that is not complete.
     waiting: Vec<SphericalCells>,
     seen: u64,
     points: u64,
-    /// First column not yet examined for having no stored cell.
+    /// First column of those not yet checked for having no stored cell.
     rest: usize,
 }
 
@@ -130,12 +131,12 @@ impl Iterator for Columns<'_> {
 }
 
 impl Plan {
-    /// Returns rows and columns of cells as the lattice has them, before they are flipped.
+    /// Returns rows and columns of cells in the sense of the lattice, before they are flipped.
     fn lines<'c>(&self, cells: &'c SphericalCells) -> (&'c [u32], &'c [u32]) {
         if self.swapped { (&cells.column, &cells.row) } else { (&cells.row, &cells.column) }
     }
 
-    /// Returns the cells of a batch from one on that lie in its column.
+    /// Returns the cells of a batch from `from` on that lie in the same column.
     fn same_column(&self, cells: &SphericalCells, from: usize) -> Range<usize> {
         let (_, columns) = self.lines(cells);
         let column = columns[from];
@@ -143,7 +144,7 @@ impl Plan {
         from..from + n
     }
 
-    /// Returns the normalised column of a cell, `None` outside of the lattice decided.
+    /// Returns the normalised column of a cell; `None` outside of the lattice of the plan.
     fn column(&self, cells: &SphericalCells, cell: usize) -> Option<u32> {
         let (_, columns) = self.lines(cells);
         let n_columns = self.header.n_columns;
@@ -152,8 +153,8 @@ impl Plan {
         Some((column + n_columns - self.cut) % n_columns)
     }
 
-    /// Returns a column of the normalised lattice from the first to the last row of known direction: right-handed, metres. `None` when a cell
-    /// lies outside of the lattice decided.
+    /// Returns a column of the normalised lattice from the first to the last row of known direction: right-handed,
+    /// metres. `None` when a cell lies outside of the lattice of the plan.
     fn build(&self, index: u32, cells: &SphericalCells, some: Range<usize>) -> Option<Column> {
         let (rows, _) = self.lines(cells);
         let stored = &rows[some.clone()];

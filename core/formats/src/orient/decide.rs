@@ -53,7 +53,7 @@ impl Survey {
     /// Decides the orientation of the lattice.
     ///
     /// # Errors
-    /// Every variant of [`OrientError`] but those of single cells.
+    /// Every variant of [`OrientError`] except those of single cells.
     pub(crate) fn decide(self, expected: &Expected) -> Result<Plan, OrientError> {
         self.check_size()?;
         let (swapped, down, round) = self.choose_axes()?;

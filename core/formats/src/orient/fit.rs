@@ -10,13 +10,13 @@ use platen_scan::wrap_azimuth;
 /// Sums over the valid cells of one row or one column.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Line {
-    /// Cells stored, valid or not.
+    /// Number of cells stored, valid or not.
     pub(super) cells: u32,
-    /// Valid cells.
+    /// Number of valid cells.
     pub(super) valid: u32,
     elevation: f64,
     elevation2: f64,
-    // Horizontal part of the beams' unit vectors: beams near the zenith hardly weigh.
+    // Horizontal part of the beams' unit vectors: beams near the zenith have little weight.
     east: f64,
     north: f64,
     horizontal: f64,
@@ -33,14 +33,14 @@ impl Line {
         self.horizontal += horizontal;
     }
 
-    /// Mean and variance of the elevation.
+    /// Returns mean and variance of the elevation.
     fn elevation(&self) -> (f64, f64) {
         let n = f64::from(self.valid);
         let mean = self.elevation / n;
         (mean, (self.elevation2 / n - mean * mean).max(0.0))
     }
 
-    /// Circular mean and variance of the azimuth, radians and radians squared (2 (1 - R) for a small spread).
+    /// Returns circular mean and variance of the azimuth, radians and radians squared (2 (1 - R) for a small spread).
     fn azimuth(&self) -> (f64, f64) {
         let mean = self.north.atan2(self.east);
         let resultant = self.east.hypot(self.north) / self.horizontal.max(f64::MIN_POSITIVE);
@@ -94,7 +94,7 @@ fn means(lines: &[Line], angle: fn(&Line) -> (f64, f64)) -> Vec<Mean> {
 
 /// Adds whole turns so that the angle grows evenly from line to line.
 ///
-/// Every line is predicted from the one before by the median step between neighbours.
+/// Every line is predicted from the previous one by the median step between neighbours.
 fn unwrap(means: &mut [Mean]) {
     let mut steps: Vec<f64> = means
         .windows(2)

@@ -40,8 +40,8 @@ const WHOLE: [(f64, f64); 5] =
     [(0.0, 255.0), (0.0, 2047.0), (0.0, 4095.0), (0.0, 65535.0), (-2048.0, 2047.0)];
 
 impl Scale {
-    /// Chooses the declared scale where it contains all values, else the smallest scale in use that does, else the
-    /// extent of the values; with a note on every choice but the declared one.
+    /// Selects the declared scale where it contains all values, else the smallest scale in use that does, else the
+    /// extent of the values. Returns a note unless the declared scale is selected.
     pub(super) fn choose(declared: Option<(f64, f64)>, seen: &Observed) -> (Self, Option<String>) {
         if seen.min >= seen.max {
             let range = (seen.min.is_finite()).then(|| format!("all intensities are {}", seen.min));

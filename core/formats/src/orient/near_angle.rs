@@ -1,13 +1,13 @@
-//! Angles of successive points, and sines and cosines of successive angles, without a trigonometric function for each: the small
-//! angle from a known direction nearby, by Taylor series.
+//! Angles of successive points, and sines and cosines of successive angles, by Taylor series from a nearby direction.
 //!
-//! Neighbouring cells of a lattice differ by a step of the scanner. The results differ from `atan2`, `sin` and `cos` by less than 1e-15.
-//! For speed only: `tests::speed::speed_of_every_format`.
+//! Neighbouring cells of a lattice differ by a step of the scanner, so that only the small angle from a known direction
+//! is computed, without a trigonometric function per cell. The results differ from `atan2`, `sin` and `cos` by less
+//! than 1e-15. For speed only: `tests::speed::speed_of_every_format`.
 
 /// Largest angle from the known direction, or its tangent; the first term left out of each series is below 3e-18 there.
 const NEAR: f64 = 1.0 / 32.0;
 
-/// Angles in one plane, each from the direction of one before it.
+/// Angles in one plane, each computed from a previous direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NearAngle {
     angle: f64,
@@ -22,11 +22,12 @@ impl Default for NearAngle {
 }
 
 impl NearAngle {
-    /// Returns `y.atan2(x)`; up to whole turns where [`sin_cos`](Self::sin_cos) was asked for an angle beyond half a turn.
+    /// Returns `y.atan2(x)`; up to whole turns where [`sin_cos`](Self::sin_cos) was called with an angle beyond half a
+    /// turn.
     #[inline]
     pub(super) fn of(&mut self, y: f64, x: f64) -> f64 {
         let (across, along) = (y * self.cos - x * self.sin, x * self.cos + y * self.sin);
-        // Not so for numbers that are not finite, nor at the origin.
+        // False for numbers that are not finite, and at the origin.
         if across.abs() < NEAR * along {
             let tangent = across / along;
             let square = tangent * tangent;
@@ -91,7 +92,7 @@ mod tests {
                 found == expected || found.is_nan() && expected.is_nan() || (found - expected).abs() < 1e-15,
                 "{y} {x}: {found}"
             );
-            // What follows is not spoilt.
+            // Later results are not affected.
             let after = near.of(0.3, 0.4) - 0.3_f64.atan2(0.4);
             assert!(after.abs() < 1e-15, "after {y} {x}");
         }

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-/// Words of 64 rows allowed regardless of the number of cells; lattices of usual filling stay far below.
+/// Number of words of 64 rows allowed regardless of the number of cells; lattices of usual filling stay far below.
 const FREE_WORDS: u64 = 1 << 16;
-/// Words allowed per cell: 16 words are 1024 rows for one cell.
+/// Number of words allowed per cell: 16 words are 1024 rows for one cell.
 const WORDS_PER_CELL: u64 = 16;
 
 /// A set of (row, column).
@@ -72,7 +72,7 @@ impl Occupancy {
 }
 
 impl Rows {
-    /// Returns how many words to add until `word` is held.
+    /// Returns the number of words to add until `word` is contained.
     fn missing(&self, word: usize) -> usize {
         if self.words.is_empty() {
             1

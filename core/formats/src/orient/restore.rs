@@ -1,4 +1,4 @@
-//! Restoring the header of a scan from a file written by [`crate::ScanFile`], once the geometry confirms it.
+//! Restoration of a scan's header from a file written by [`crate::ScanFile`], after the geometry has confirmed it.
 
 use platen_scan::{ScanHeader, wrap_azimuth};
 

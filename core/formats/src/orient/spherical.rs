@@ -8,11 +8,11 @@ use platen_scan::{Direction, State, wrap_azimuth};
 use super::near_angle::NearAngle;
 use super::{Position, RawCell};
 
-/// Range below which a cell flagged valid holds no measurement, in the file's unit: writers that have no flag
-/// store missing cells at the origin, some of them through a transform that leaves rounding noise.
+/// Range below which a cell flagged valid is not a measurement, in the file's unit: writers without a flag store
+/// missing cells at the origin, some of them through a transform that leaves rounding noise.
 const NO_RANGE: f64 = 1e-6;
 
-/// Range above which a number is no measurement in any unit.
+/// Range above which a number is not a measurement in any unit.
 pub(super) const NO_NUMBER: f64 = 1e12;
 
 /// Cells as ranges and directions, in the unit and frame of their file and in its order: arrays of one length.
@@ -22,9 +22,9 @@ pub(crate) struct SphericalCells {
     pub(crate) row: Vec<u32>,
     /// Column numbers in the file.
     pub(crate) column: Vec<u32>,
-    /// Not finite where the file holds no numbers.
+    /// Ranges; not finite where the file contains no numbers.
     pub(crate) range: Vec<f64>,
-    /// A file's own directions are kept to the last bit.
+    /// Azimuths, with the elevations below; directions stored in the file are kept to the last bit.
     pub(crate) azimuth: Vec<f64>,
     pub(crate) elevation: Vec<f64>,
     /// Intensities in the scale of the file.
@@ -34,7 +34,7 @@ pub(crate) struct SphericalCells {
 }
 
 impl SphericalCells {
-    /// Returns none, with room for `n`.
+    /// Returns an empty set with capacity for `n` cells.
     pub(crate) fn with_capacity(n: usize) -> Self {
         Self {
             row: Vec::with_capacity(n),
@@ -52,7 +52,7 @@ impl SphericalCells {
         self.row.len()
     }
 
-    /// Returns the state of a cell by its numbers.
+    /// Returns the state of a cell as determined by its numbers.
     pub(super) fn true_state(&self, cell: usize) -> State {
         if (NO_RANGE..NO_NUMBER).contains(&self.range[cell]) { self.state[cell] } else { State::NoReturn }
     }
@@ -137,7 +137,7 @@ impl ToSpherical {
     }
 
     /// Returns range and direction, and the parts of its unit vector.
-    // Not inlined, the position goes through memory and is waited for; for speed only: `tests::speed`.
+    // Without inlining the position is passed through memory and delays the next step; for speed only: `tests::speed`.
     #[inline(always)]
     fn convert(&mut self, position: Position) -> (f64, Direction, [f64; 3]) {
         match position {
@@ -162,7 +162,7 @@ impl ToSpherical {
         let (sin_elevation, cos_elevation) = self.elevation.sin_cos(direction.elevation);
         let parts = [cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, cos_elevation];
         if !(-FRAC_PI_2..=FRAC_PI_2).contains(&direction.elevation) || !direction.azimuth.is_finite() {
-            // Beyond the zenith, where the azimuth is another; or no number.
+            // Beyond the zenith, where the azimuth differs; or not a number.
             return self.of_cartesian([parts[0], parts[1], sin_elevation].map(|part| part * range));
         }
         (range, Direction { azimuth: wrap_azimuth(direction.azimuth), ..direction }, parts)

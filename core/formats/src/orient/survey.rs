@@ -9,16 +9,17 @@ use super::{OrientError, fit::Line};
 /// Largest row or column number: three times the rows of the finest terrestrial scanner on a full circle.
 pub(super) const MAX_INDEX: u32 = (1 << 17) - 1;
 
-/// Least share of places that hold a cell. Real scans of halls fill more
-/// than half, a scan of the open air a third; a cloud thinned out on export fills less than a hundredth.
+/// Least share of places that contain a cell. Real scans of halls fill more than half, a scan of the open air a third;
+/// a cloud thinned out on export fills less than a hundredth.
 pub(super) const MIN_FILL: f64 = 0.02;
 
-/// Range that no such scanner reaches in metres, and nearly every one exceeds in millimetres.
+/// Range that no such scanner reaches in metres, and nearly every scan exceeds in millimetres.
 pub(super) const FAR: f64 = 350.0;
 /// Range below which no terrestrial scanner measures in metres.
 pub(super) const NEAR: f64 = 0.2;
 
-/// Sums over all cells of a stored lattice: one pass, memory by rows, columns and one bit per cell.
+/// Sums over all cells of a stored lattice, from one pass. The memory depends on the numbers of rows and columns, plus
+/// one bit per cell.
 #[derive(Debug, Default)]
 pub(crate) struct Survey {
     pub(super) rows: Vec<Line>,
@@ -96,7 +97,7 @@ impl Survey {
     }
 }
 
-/// Returns the range from the first to the last line that holds a cell.
+/// Returns the range from the first to the last line that contains a cell.
 pub(super) fn stored_range(lines: &[Line]) -> std::ops::Range<usize> {
     let first = lines.iter().position(|line| line.cells > 0).unwrap_or(0);
     first..lines.len()

@@ -44,7 +44,7 @@ fn missing(row: u32, column: u32) -> bool {
 }
 
 fn point(row: u32, column: u32) -> [f64; 3] {
-    // Real beams are not an ideal lattice: a small wobble on both angles.
+    // Real beams do not form an ideal lattice: a small wobble on both angles.
     let wobble = 1e-4 * f64::from((row * 7 + column * 3) % 5);
     let direction = Direction {
         azimuth: AZIMUTH + STEP * f64::from(column) + wobble,
@@ -265,7 +265,7 @@ fn what_is_no_lattice_is_refused() {
         refuse(&|_, cell| cell.state = State::NoReturn),
         OrientError::TooSmall { valid: 0, .. }
     ));
-    // A registered cloud: the points are seen from elsewhere.
+    // A registered cloud: its origin is not the scanner.
     let registered = refuse(&|_, cell| {
         let [x, y, z] = xyz(cell);
         cell.position = Position::Cartesian([x + 30.0, y - 200.0, z]);

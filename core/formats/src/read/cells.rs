@@ -1,18 +1,20 @@
-//! Batches of cells in the order of the file: of a packet, or of a fixed number. One dynamic call a batch instead of one a cell; for speed only: `tests::speed`.
+//! Batches of cells in the order of the file: those of a packet, or a fixed number.
+//!
+//! There is one dynamic call per batch instead of one per cell; for speed only: `tests::speed`.
 
 use crate::orient::{Converted, RawCell, ToSpherical};
 
 use super::error::Result;
 
-/// Cells of a batch where the format has no packets.
+/// Number of cells of a batch where the format has no packets.
 const BATCH: usize = 1 << 12;
 
-/// Cells in the order of the file. Nothing follows an error.
+/// Cells in the order of the file. No cell follows an error.
 pub(crate) trait Cells: Send {
-    /// Appends the next cells; none behind the last.
+    /// Appends the next cells; none after the last.
     ///
     /// # Errors
-    /// That of the file, behind the cells before it.
+    /// The error of the file, after the cells before it.
     fn append(&mut self, to_spherical: &mut ToSpherical, batch: &mut Converted) -> Result<()>;
 }
 

@@ -1,4 +1,6 @@
-//! Decoding on a thread of its own: the next cells are decoded while those before are used. For speed only: `tests::speed`.
+//! Decoding on a separate thread: the next cells are decoded while the previous ones are used.
+//!
+//! For speed only: `tests::speed`.
 
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
@@ -7,7 +9,7 @@ use super::cells::Cells;
 use super::error::{ReadError, Result};
 use crate::orient::{Converted, ToSpherical};
 
-/// Batches that wait.
+/// Largest number of decoded batches that wait.
 const AHEAD: usize = 4;
 
 /// Calls `take` with all cells, some at a time, in the order of the file; an error from it ends the pass.
@@ -34,7 +36,7 @@ pub(super) fn for_each<E: From<ReadError>>(
     })
 }
 
-/// Sends the cells in batches until the end or an error, or until nobody takes them.
+/// Sends the cells in batches until the end, an error, or the end of the receiver.
 fn decode(
     mut cells: Box<dyn Cells + '_>,
     filled: &SyncSender<Result<Converted>>,
@@ -48,7 +50,7 @@ fn decode(
         let is_last = batch.parts.is_empty();
         let sent = filled.send(Ok(batch));
         if let Err(error) = end {
-            // Nobody may be left to take it.
+            // The receiver may have ended.
             let _ = filled.send(Err(error));
             return;
         }

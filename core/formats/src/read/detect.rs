@@ -1,5 +1,7 @@
-//! Format detection: by the first bytes, where these are no signature by the extension, else by the count of numbers on
-//! the first lines. Formats that hold no lattice, or that only their maker's software reads, are named and refused.
+//! Format detection from the first bytes of a file and its extension.
+//!
+//! A file is recognised by its signature, else by its extension, else by the count of numbers on the first lines.
+//! Formats without a lattice, or that only their maker's software reads, are named and refused.
 
 use std::io::BufReader;
 
@@ -8,9 +10,9 @@ use super::lines::{self, Lines};
 use super::{xyb, xyz};
 use crate::Format;
 
-/// Bytes from which a format is detected.
+/// Number of bytes from which a format is detected.
 pub(super) const HEAD: u64 = 1 << 14;
-/// Data lines of a text file that are examined.
+/// Number of data lines of a text file that are examined.
 const SAMPLE_LINES: usize = 20;
 
 const STRUCTURED: &str =
@@ -80,12 +82,12 @@ pub(crate) fn format(head: &[u8], extension: &str) -> Result<Format> {
     text_format(head, extension)
 }
 
-/// Distinguishes text formats by how many numbers their first lines hold.
+/// Distinguishes text formats by the count of numbers on their first lines.
 fn text_format(head: &[u8], extension: &str) -> Result<Format> {
     let binary = head.contains(&0) || std::str::from_utf8(head).is_err_and(|e| e.error_len().is_some());
     let lines = if binary { Vec::new() } else { sample(head)? };
     let sizes: Vec<usize> = lines.iter().map(|line| line.numbers).collect();
-    // A first line that holds one number is a count of points.
+    // A first line with one number is the number of points.
     let data = if sizes.first() == Some(&1) { &lines[1..] } else { &lines[..] };
     let unorganised =
         |what: &str| Err(ReadError::Refused(format!("{what}, unorganised (no row and column)"), STRUCTURED));
@@ -101,15 +103,15 @@ fn text_format(head: &[u8], extension: &str) -> Result<Format> {
 
 /// A line of a text file.
 struct Sampled {
-    /// Numbers in it.
+    /// Count of numbers on the line.
     numbers: usize,
-    /// Whether they can be row, column and a point.
+    /// True when they can be row, column and a point.
     cell: bool,
 }
 
-/// Returns the first lines that are no comments; none when one holds anything but numbers.
+/// Returns the first lines that are not comments; none when one of them contains anything but numbers.
 fn sample(head: &[u8]) -> Result<Vec<Sampled>> {
-    // The last line is only whole when the file ends with it.
+    // The last line is complete only when the file ends with it.
     let whole = if (head.len() as u64) < HEAD {
         head
     } else {

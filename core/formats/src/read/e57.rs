@@ -1,10 +1,11 @@
-//! E57 (ASTM E2807; Huber, "The ASTM E57 file format for 3D imaging data exchange", Proc. SPIE 7864, 2011), structured:
-//! points with `rowIndex` and `columnIndex`.
+//! Reader of structured E57 files (ASTM E2807): points with `rowIndex` and `columnIndex`.
 //!
-//! The file is checked before it is parsed: its length against its header, then the CRC-32C of every page.
-//! Coordinates may be Cartesian or spherical, float, double or scaled integer; missing cells may be flagged, left out, or
-//! written as the origin. The pose is reported and not applied: the lattice stays in the scanner's frame. Cells are
-//! placed by their indices, never by their order.
+//! The file is checked before it is parsed: its length against its header, then the CRC-32C of every page. Coordinates
+//! may be Cartesian or spherical, float, double or scaled integer; missing cells may be flagged, left out, or written
+//! as the origin. The pose is reported and not applied: the lattice stays in the scanner's frame. Cells are placed by
+//! their indices, never by their order.
+//!
+//! Source also: Huber, "The ASTM E57 file format for 3D imaging data exchange", Proc. SPIE 7864, 2011.
 
 mod compressed_vector;
 mod values;
@@ -37,7 +38,7 @@ pub(crate) struct E57<R: Read + Seek> {
 }
 
 impl<R: Read + Seek> E57<R> {
-    /// Checks the file and finds the scan; `chosen` counts from 1 and is optional when the file holds one.
+    /// Checks the file and finds the scan; `chosen` counts from 1 and is optional when the file contains one scan.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length_note = check_length(&mut file)?;
         check_pages(&mut file)?;
@@ -67,12 +68,12 @@ impl<R: Read + Seek + Send> Source for E57<R> {
     }
 }
 
-/// The cells of the packets, one packet after the other.
+/// Cells of the packets, one packet after the other.
 struct PacketCells<'a, R> {
     packets: CompressedVector<R>,
     fields: &'a Fields,
     values: Values,
-    /// Points of the packets before.
+    /// Number of points in the previous packets.
     before: u64,
 }
 
@@ -139,7 +140,7 @@ fn check_length<R: Read + Seek>(file: &mut R) -> Result<Option<String>> {
     if xml_offset >= length || xml_length > length {
         return incomplete(format!("its table of contents ({xml_length} bytes at {xml_offset}) is missing"));
     }
-    // Some writers are off by one here; every page is checked all the same.
+    // Some writers are off by one here; every page is checked in any case.
     if length.abs_diff(declared) == 1 {
         return Ok(Some(format!("the header announces {declared} bytes, the file has {length}")));
     }
@@ -167,7 +168,7 @@ fn check_pages<R: Read + Seek>(file: &mut R) -> Result<()> {
     file.rewind().map_err(ReadError::io("going back to the start"))
 }
 
-/// Returns the chosen scan, or the only one that holds points.
+/// Returns the chosen scan, or the only one that contains points.
 fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> {
     let held = clouds.len();
     if let Some(chosen) = chosen {
@@ -186,7 +187,7 @@ fn choose(clouds: Vec<PointCloud>, chosen: Option<usize>) -> Result<PointCloud> 
     }
 }
 
-/// Refuses a prototype in which no record takes any bits: the data would never end, and the reader would fill all
+/// Refuses a prototype in which no record occupies any bits: the data would never end, and the reader would fill all
 /// memory.
 fn check_prototype(prototype: &[Record]) -> Result<()> {
     let takes_bits = |record: &Record| match record.data_type {
@@ -322,7 +323,7 @@ impl Fields {
     /// Checks indices and states.
     ///
     /// # Errors
-    /// The first point that is wrong, with the sentence.
+    /// The first point that is wrong, with the message.
     fn check(&self, values: &Values) -> std::result::Result<(), (usize, String)> {
         let [rows, columns] = self.bounds;
         let lines = [("row", &values.row, rows), ("column", &values.column, columns)];
@@ -370,7 +371,8 @@ fn bounds(declared: Option<&IndexBounds>) -> [(i64, i64); 2] {
     declared.map_or([any, any], |b| [or_any(b.row_min, b.row_max), or_any(b.column_min, b.column_max)])
 }
 
-/// Returns a position by range and direction. A range that is not positive becomes 0, no measurement; of a direction alone it is 1 m.
+/// Returns a position by range and direction. A range that is not positive becomes 0 (no measurement); where only the
+/// direction is known the range is 1 m.
 fn spherical(range: f64, azimuth: f64, elevation: f64, is_direction: bool) -> Position {
     let range = if is_direction { 1.0 } else { range.max(0.0) };
     Position::Spherical(range, Direction { azimuth, elevation })
@@ -380,7 +382,7 @@ fn spherical(range: f64, azimuth: f64, elevation: f64, is_direction: bool) -> Po
 mod tests {
     use super::*;
 
-    /// PDAL writes states as floats, others as the widest integers there are.
+    /// PDAL writes states as floats, other programs as the widest integers.
     #[test]
     fn states_of_any_type_are_read() {
         let double = RecordDataType::Double { min: None, max: None };

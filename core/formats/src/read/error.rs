@@ -23,16 +23,17 @@ pub enum ReadError {
     /// The content violates the format, the scan must be exported again: format, place and fault.
     #[error("{0} file is not sound: {1}; export it again, as a structured scan")]
     Unsound(&'static str, String),
-    /// The format is recognised and holds no readable lattice: its name, and the reason or the format to export instead.
+    /// The format is recognised and contains no readable lattice: its name, and the reason or the format to export
+    /// instead.
     #[error("{0}: {1}")]
     Refused(String, &'static str),
-    /// The file holds several scans and none was chosen: format, name or size of each scan.
+    /// The file contains several scans and none was chosen: format, name or size of each scan.
     #[error("{0} file holds {held} scans ({scans}); choose one with the option cloud = 1 to {held}", held = .1.len(), scans = .1.join(", "))]
     Several(&'static str, Vec<String>),
     /// The chosen scan does not exist: format, number of scans, number chosen from 1.
     #[error("{0} file holds {1} scans; there is no cloud {2}")]
     NoSuchCloud(&'static str, usize, usize),
-    /// The cells are no lattice.
+    /// The cells do not form a lattice.
     #[error("{0}")]
     Orient(#[from] OrientError),
 }

@@ -7,10 +7,10 @@ use super::error::{ReadError, Result};
 /// Longest line that is read; scan files stay below 300 bytes.
 const MAX_LINE: u64 = 4096;
 
-/// UTF-8's, as editors on Windows write it.
+/// Byte order mark of UTF-8, as written by editors on Windows.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Number of fields kept of a line.
+/// Largest number of fields kept of a line.
 pub(crate) const MAX_FIELDS: usize = 12;
 
 /// Reader of lines into one buffer of bounded size.
@@ -19,7 +19,7 @@ pub(crate) struct Lines<R> {
     line: Vec<u8>,
     /// Number of the line last read, from 1.
     pub(crate) number: u64,
-    /// Bytes read.
+    /// Number of bytes read.
     pub(crate) offset: u64,
     /// False when the line last read ended with the file and not with a line end.
     pub(crate) ended: bool,

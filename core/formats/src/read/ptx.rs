@@ -1,8 +1,8 @@
-//! PTX (Leica's note of 2009): columns, points per column, position, axes, 4x4, one line per cell.
+//! Reader of PTX files (Leica's note of 2009): columns, points per column, position, axes, 4x4, one line per cell.
 //!
-//! The first number is that of the columns, the second that of the cells per column; the geometry decides in the end. A
-//! missing cell is a line with the coordinates `0 0 0`. The only protection of the content is the number of lines. Several
-//! scans may follow each other in one file.
+//! The first number is that of the columns, the second that of the cells per column; the final decision is by the
+//! geometry. A missing cell is a line with the coordinates `0 0 0`. The only protection of the content is the number of
+//! lines. A file may contain several scans.
 
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
@@ -32,9 +32,9 @@ pub(crate) struct Ptx<R> {
 /// Place and header of one scan in the file.
 #[derive(Debug, Clone, PartialEq)]
 struct Part {
-    /// Byte behind the header.
+    /// Offset of the first byte after the header.
     offset: u64,
-    /// Line behind the header, from 1.
+    /// Number of the first line after the header, from 1.
     line: u64,
     columns: u32,
     per_column: u32,
@@ -43,7 +43,8 @@ struct Part {
 }
 
 impl<R: Read + Seek> Ptx<R> {
-    /// Counts the lines of the whole file and finds the scan; `chosen` counts from 1 and is optional when the file holds one.
+    /// Counts the lines of the whole file and finds the scan; `chosen` counts from 1 and is optional when the file
+    /// contains one scan.
     pub(crate) fn open(mut file: R, chosen: Option<usize>) -> Result<Self> {
         let length = file.seek(SeekFrom::End(0)).map_err(ReadError::io("finding the length"))?;
         file.rewind().map_err(ReadError::io("going back to the start"))?;
@@ -150,10 +151,10 @@ fn incomplete(needed: u64, found: std::fmt::Arguments<'_>) -> ReadError {
 }
 
 impl Part {
-    /// Returns the declared properties, handedness and notes on the pose included.
+    /// Returns the declared properties, including handedness and notes on the pose.
     ///
-    /// The points are in the scanner's frame, so that the pose is not applied; only a mirroring matrix concerns the points
-    /// themselves. Where position and matrix disagree the matrix is used.
+    /// The points are in the scanner's frame, so that the pose is not applied; only a mirroring matrix concerns the
+    /// points themselves. Where position and matrix disagree the matrix is used.
     fn describe(&self) -> About {
         let mut notes = Vec::new();
         let [a, b, c, translation] = self.matrix;
@@ -189,5 +190,5 @@ impl Part {
 
 /// Largest distance from 1 of the determinant of a motion written with six decimals.
 const RIGID: f64 = 1e-3;
-/// Largest distance of the two forms of the scanner's position, metres.
+/// Largest distance between the two statements of the scanner's position, metres.
 const SAME_PLACE: f64 = 1e-3;

@@ -1,33 +1,37 @@
 //! Recovery of rows and columns of hits stored without them, from the order of measurement.
 //!
-//! A column is measured in one sweep: the elevation steps in one direction, falls back at the end of the column, and the
-//! azimuth advances by one step. Real angles are no even lattice (on the pump sample they drift by more than a step over
-//! the scan, and by a quarter of a step from column to column), so that rounding to a grid fails; from one column to the
-//! next they drift little. Each hit is therefore compared with the angles of its row in the column before, and a hit in a
-//! new row with its neighbour in the same column. A cloud is refused when more than one hit in a thousand lies between two
-//! rows or columns. Steps are robust: medians and a lower quantile over the first million hits.
+//! A hit is a stored point with a range. A column is measured in one sweep: the elevation advances step by step in one
+//! direction and falls back at the end of the column, while the azimuth advances by one step.
+//!
+//! Real angles do not form an even lattice: on the pump sample they drift by more than a step over the scan, and by a
+//! quarter of a step from column to column. Rounding to a grid therefore fails, but the drift from one column to the
+//! next is small. Each hit is compared with the angles of its row in the previous columns, and a hit in a new row with
+//! its neighbour in the same column.
+//!
+//! The steps are estimated robustly, by medians and a lower quantile over the first million hits. Limit: a cloud is
+//! refused when more than one hit in a thousand lies between two rows or columns.
 
 use platen_scan::{Direction, wrap_azimuth};
 
-/// Distance from the nearest row, in steps, from which a hit is ambiguous.
+/// Distance from the nearest row or column, in steps, above which a hit is ambiguous.
 const DOUBTFUL: f64 = 0.4;
 /// Largest share of ambiguous hits.
 const MAX_DOUBTFUL: f64 = 1e-3;
-/// Azimuth steps between two hits of different columns, at least.
+/// Least distance of two hits of different columns, azimuth steps.
 const NEXT_COLUMN: f64 = 0.6;
-/// Rows within which the azimuth of a column does not drift.
+/// Number of rows within which the azimuth of a column does not drift.
 const NEIGHBOURS: usize = 8;
-/// Columns within which the elevation of a row does not drift.
+/// Number of columns within which the elevation of a row does not drift.
 const LATELY: i64 = 4;
-/// Rows reserved below the first, for hits lower than the lowest of the sample.
+/// Number of rows reserved below the first, for hits lower than the lowest of the sample.
 const MARGIN: f64 = 64.0;
 /// Largest number of hits in a column.
 const MAX_COLUMN: usize = 1 << 17;
-/// Rows that share one mean step.
+/// Number of rows of a stretch, which share one mean step.
 const STRETCH: f64 = 16.0;
-/// Least number of steps for a mean of their own.
+/// Least number of steps for a separate mean.
 const ENOUGH: f64 = 32.0;
-/// Hits from which the steps are estimated.
+/// Number of hits from which the steps are estimated.
 pub(crate) const SAMPLE: usize = 1 << 20;
 
 /// Reason why there is no lattice.
@@ -35,8 +39,8 @@ pub(crate) type Reason = String;
 
 /// Steps of a lattice, signed in the order of measurement.
 ///
-/// The elevation's step is a mean of thousands for every stretch of [`STRETCH`] rows: across a gap of hundreds of
-/// rows one mean for all would be half a row wrong.
+/// The elevation step is a mean of thousands for every stretch of [`STRETCH`] rows: across a gap of hundreds of rows a
+/// single mean for all rows would be wrong by half a row.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Steps {
     /// Elevation at which the first stretch begins.
@@ -57,14 +61,14 @@ pub(crate) struct Placed<T> {
 }
 
 impl Steps {
-    /// Estimates the steps from hits in the order of measurement; [`SAMPLE`] are enough.
+    /// Estimates the steps from hits in the order of measurement; [`SAMPLE`] hits suffice.
     pub(crate) fn estimate(hits: &[Direction]) -> Result<Self, Reason> {
         let moves = |angle: fn(&Direction) -> f64| -> Vec<f64> {
             hits.windows(2).map(|pair| wrap_azimuth(angle(&pair[1]) - angle(&pair[0]))).collect()
         };
         let (elevations, azimuths) = (moves(|d| d.elevation), moves(|d| d.azimuth));
         let up = median(elevations.clone()).ok_or("fewer than two hits")?.signum();
-        // Where cells are missing a step may be that of two rows or more, but seldom all of them.
+        // Where cells are missing a step may be that of two rows or more, but seldom are all steps.
         let along = elevations.iter().map(|e| e * up).filter(|e| *e > 0.0);
         let one = quantile(along.collect(), 0.1).unwrap_or(0.0);
         let sideways = median(azimuths.iter().map(|a| a.abs()).collect()).unwrap_or(0.0);
@@ -87,7 +91,7 @@ impl Steps {
         Ok(steps)
     }
 
-    /// Row at the end of every stretch, from the mean single step within each.
+    /// Returns the row at the end of every stretch, from the mean single step within each.
     fn stretches(&self, hits: &[Direction], single: &[(usize, f64)], length: f64) -> Vec<f64> {
         let n = (length / STRETCH) as usize + 1;
         let mut sums = vec![(0.0, 0.0); n];
@@ -105,7 +109,7 @@ impl Steps {
         rows.collect()
     }
 
-    /// Median move from column to column, columns separated where the elevation falls back.
+    /// Returns the median azimuth step from column to column; columns are separated where the elevation falls back.
     fn azimuth_step(&self, hits: &[Direction], elevations: &[f64]) -> Result<f64, Reason> {
         let falls_back = |(i, e): (usize, &f64)| (e / self.elevation < -0.5).then_some(i + 1);
         let breaks: Vec<usize> = elevations.iter().enumerate().filter_map(falls_back).collect();
@@ -145,9 +149,9 @@ struct Waiting<T> {
     row: usize,
     /// Distance of the elevation from the even lattice, rows.
     off: f64,
-    /// Whether the hit is ambiguous.
+    /// True when the hit is ambiguous.
     doubtful: bool,
-    /// Column by the latest hit of the row.
+    /// Column as determined by the latest hit of the row.
     column: Option<f64>,
 }
 
@@ -157,7 +161,7 @@ pub(crate) struct Placer<T> {
     steps: Steps,
     rows: Vec<Option<Seen>>,
     waiting: Vec<Waiting<T>>,
-    /// Number and first azimuth of the column before.
+    /// Number and first azimuth of the previous column.
     before: Option<(i64, f64)>,
     hits: u64,
     doubtful: u64,
@@ -168,7 +172,7 @@ impl<T: Copy> Placer<T> {
         Self { steps, rows: Vec::new(), waiting: Vec::new(), before: None, hits: 0, doubtful: 0 }
     }
 
-    /// Adds the next hit; returns the column before when the hit begins a new one.
+    /// Adds the next hit; returns the previous column when the hit begins a new one.
     pub(crate) fn push(&mut self, hit: Direction, record: T) -> Result<Vec<Placed<T>>, Reason> {
         let mut placed = Vec::new();
         let mut here = self.find_row(hit, record, self.waiting.last().map(|last| last.off));
@@ -192,7 +196,7 @@ impl<T: Copy> Placer<T> {
         Ok(placed)
     }
 
-    /// Returns whether the elevation falls back, or the azimuth advances further than it drifts within a column.
+    /// Returns whether the elevation falls back, or the azimuth advances by more than its drift within a column.
     fn begins_column(&self, last: &Waiting<T>, here: &Waiting<T>) -> bool {
         let falls_back = (here.hit.elevation - last.hit.elevation) / self.steps.elevation < -0.5;
         let moves_on = match (last.column, here.column) {
@@ -200,7 +204,7 @@ impl<T: Copy> Placer<T> {
             _ if here.row < last.row + NEIGHBOURS => self.columns(last.hit.azimuth, here.hit.azimuth),
             _ => 0.0,
         };
-        // Near the zenith azimuths mean little.
+        // Near the zenith azimuths are uncertain.
         falls_back || moves_on * here.hit.elevation.cos() > NEXT_COLUMN
     }
 
@@ -209,7 +213,7 @@ impl<T: Copy> Placer<T> {
         wrap_azimuth(to - from) / self.steps.azimuth
     }
 
-    /// Finds the row of a hit; `off` is the distance of the hit before it in its column from the even lattice.
+    /// Finds the row of a hit; `off` is the distance of the previous hit of its column from the even lattice.
     fn find_row(&self, hit: Direction, record: T, off: Option<f64>) -> Waiting<T> {
         let even = self.steps.even(hit.elevation);
         let near = off.or_else(|| self.nearest(even)).unwrap_or(0.0);
@@ -283,7 +287,7 @@ fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Returns the value below which the share lies.
+/// Returns the value below which the given share of the values lies.
 fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     let rank = (values.len() as f64 * share) as usize;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
@@ -293,7 +297,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A lattice whose angles wander, with gaps; what comes back must be rows and columns less the same offset.
+    /// A lattice with drifting angles and gaps; the result must be its rows and columns, less a common offset.
     #[track_caller]
     fn check(up: f64, round: f64, gap: fn(u32, u32) -> bool, wander: f64) -> Result<(), Reason> {
         let (elevation, azimuth) = (1.2e-3 * up, 4.4e-3 * round);

@@ -2,20 +2,20 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Bytes read from the system at once.
+/// Number of bytes read from the system at once.
 const WINDOW: usize = 1 << 18;
 
 /// A reader behind a buffer.
 ///
-/// Readers of E57 pages seek before every page, where `BufReader` would discard its buffer. `alive` is called before every
-/// refill: on a slow share that is the only place where a cancelled job can be noticed.
+/// Readers of E57 pages seek before every page, where `BufReader` would discard its buffer. `alive` is called before
+/// every refill: on a slow share that is the only place where a cancelled job can be noticed.
 pub(super) struct Window<'a, R> {
     file: R,
     alive: &'a (dyn Fn() -> bool + Sync),
     held: Vec<u8>,
-    /// Place of the first held byte in the file.
+    /// Offset in the file of the first byte in the buffer.
     start: u64,
-    /// Place of the next byte to give.
+    /// Offset in the file of the next byte to return.
     position: u64,
 }
 
@@ -36,7 +36,7 @@ impl<'a, R: Read + Seek> Window<'a, R> {
         Ok(())
     }
 
-    /// Returns the bytes held from the position on.
+    /// Returns the buffered bytes from the position on.
     fn rest(&self) -> &[u8] {
         let behind = self.position.checked_sub(self.start).and_then(|n| usize::try_from(n).ok());
         behind.and_then(|n| self.held.get(n..)).unwrap_or(&[])

@@ -1,8 +1,9 @@
-//! XYB (SCENE binary, version 1.0): a text header, four zero bytes, then x, y, z as f64 and the reflectance as u16.
+//! Reader of XYB files (SCENE binary, version 1.0).
 //!
-//! There is no count and no checksum; only the length of the file shows a cut record. `Rows` and `Cols` may be exchanged.
-//! Where the number of records equals that of the cells, all cells are stored and the geometry decides along which of the
-//! two the records run. Otherwise only hits are stored, and rows and columns are recovered from the order of measurement
+//! The file consists of a text header, four zero bytes, then x, y, z as f64 and the reflectance as u16. There is no
+//! count and no checksum; only the length of the file shows a cut record. `Rows` and `Cols` may be exchanged. Where the
+//! number of records equals that of the cells, all cells are stored, and the geometry determines along which of the two
+//! the records run. Otherwise only hits are stored, and rows and columns are recovered from the order of measurement
 //! ([`super::scan_order`]).
 
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -39,7 +40,7 @@ pub(crate) struct Xyb<R> {
 enum Order {
     /// All cells, with the number of them per line.
     Lines(u32),
-    /// Hits only, with the lowest row among them.
+    /// Hits only, with the steps of the lattice and the lowest row among them.
     Hits(Steps, u32),
 }
 

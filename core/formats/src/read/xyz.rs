@@ -1,6 +1,6 @@
-//! XYZ text with row and column, as SCENE exports it: `row col x y z [reflectance] [r g b [reflectance]]`.
+//! Reader of XYZ text with row and column, as SCENE exports it: `row col x y z [reflectance] [r g b [reflectance]]`.
 //!
-//! Missing cells are left out, so that the size of the lattice is known at the end only. The first line may hold the
+//! Missing cells are left out, so that the size of the lattice is known at the end only. The first line may be the
 //! number of points; lines that begin with `#` or `//` are comments. Without a count the only protection of the content
 //! is the end of the last line.
 
@@ -35,7 +35,7 @@ impl<R: Read + Seek> Xyz<R> {
     }
 }
 
-/// Bytes of a line, for the estimate.
+/// Number of bytes of a line, for the estimate.
 const TYPICAL_LINE: u64 = 40;
 
 impl<R: Read + Seek + Send> Source for Xyz<R> {
@@ -56,7 +56,7 @@ struct Points<R> {
     lines: Lines<R>,
     /// Number of points on the first line, where there is one.
     announced: Option<u32>,
-    /// Numbers on the first line of a point; all others hold as many.
+    /// Count of numbers on the first line of a point; all others have the same.
     width: Option<usize>,
     seen: u64,
 }

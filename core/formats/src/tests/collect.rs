@@ -7,7 +7,7 @@ use platen_scan::Lattice;
 use crate::orient::Expected;
 use crate::{ReadError, ScanReader};
 
-/// Reads a scan to the end and checks that every column comes once and that the end counts them.
+/// Reads a scan to the end and checks that every column is delivered once and that the trailer counts them.
 pub(super) fn collect(mut reader: ScanReader<'_>, known: &Expected) -> Result<Lattice, ReadError> {
     let oriented = reader.orient(known, |share| {
         assert!((0.0..=1.0).contains(&share), "progress {share}");
@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, chosen: Option<usize>) -> Result<Lattice, ReadEr
     read_with(path, chosen, &Expected::default())
 }
 
-/// Reads a file to the end, with what the plant declares about the scanner.
+/// Reads a file to the end, with the plant's declarations about the scanner.
 pub(super) fn read_with(path: &Path, chosen: Option<usize>, known: &Expected) -> Result<Lattice, ReadError> {
     collect(ScanReader::open(path, chosen, &|| true)?, known)
 }

@@ -1,4 +1,4 @@
-//! Damage anywhere in a file ends in an error or in cells, never in a panic or in memory without bound.
+//! Damaged files: the result is an error or cells, never a panic or unbounded memory.
 
 use std::io::Cursor;
 
@@ -10,7 +10,7 @@ use crate::orient::Expected;
 use crate::read::format;
 use crate::{ReadError, ScanReader};
 
-/// Reads bytes by what they look like; `Ok` with the points delivered.
+/// Reads bytes in the format detected from them; `Ok` with the number of points delivered.
 fn read(bytes: &[u8]) -> Result<u64, ReadError> {
     let format = format(&bytes[..bytes.len().min(1 << 14)], "")?;
     let reader = ScanReader::new(Cursor::new(bytes), format, None)?;
@@ -28,7 +28,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Most cells in any of the files.
+/// Largest number of cells in any of the files.
 const ALL: u64 = (ROWS * COLUMNS) as u64;
 
 #[test]
@@ -37,7 +37,7 @@ fn a_file_cut_anywhere_is_refused() {
         for length in (0..file.len()).step_by(97) {
             let cut = &file[..length];
             let read = read(cut);
-            // Cut behind a whole point a file cannot be told from a smaller scan where nothing announces the number.
+            // A file cut after a whole point cannot be distinguished from a smaller scan unless it states the number.
             let whole_points = match name {
                 "xyz" => cut.ends_with(b"\n"),
                 "xyb" | "xyb of hits" => true,
@@ -61,7 +61,7 @@ fn every_flipped_bit_of_an_e57_is_found() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Bytes replaced anywhere, with the checksums of an E57 mended so that the damage reaches the parser.
+    /// Bytes replaced anywhere, with the checksums of an E57 corrected so that the damage reaches the parser.
     #[test]
     fn no_damage_brings_the_reader_down(
         which in 0_usize..6,
@@ -80,7 +80,7 @@ proptest! {
         }
     }
 
-    /// Anything at all.
+    /// Arbitrary bytes.
     #[test]
     fn no_bytes_bring_the_reader_down(mut bytes in prop::collection::vec(any::<u8>(), 0..3000), head in 0..5) {
         let head: &[u8] = [b"ASTM-E57".as_slice(), b"5\n4\n0 0 0\n", b"1 2 3 4 5\n", b"# SCENE XYZ binary", b""][head as usize];
@@ -89,7 +89,7 @@ proptest! {
     }
 }
 
-/// Makes the checksum of every page right.
+/// Corrects the checksum of every page.
 fn mend(file: &mut [u8]) {
     for page in file.chunks_exact_mut(1024) {
         let crc = super::formats::crc32c(&page[..1020]);

@@ -1,4 +1,4 @@
-//! Faults of files by the names in `tests/README.md`, where no other test shows them.
+//! Faults of files by the names in `tests/README.md` that no other test covers.
 
 use std::io::Write as _;
 
@@ -24,7 +24,7 @@ fn refused(bytes: &[u8], name: &str, sentence: &str) {
     assert!(error.to_string().contains(sentence), "{error}");
 }
 
-/// The lattice as XYZ, each point changed by `change`; `None` leaves it out.
+/// Returns the lattice as XYZ, each point changed by `change`; `None` leaves a point out.
 fn changed(change: impl Fn(u32, u32, [f64; 3]) -> Option<[f64; 3]>) -> Vec<u8> {
     let mut text = Vec::new();
     for column in 0..COLUMNS {
@@ -53,7 +53,8 @@ fn tail_zero_second_half_is_missing_and_said() {
 
 #[test]
 fn split_files_of_one_scan_are_not_measured_as_one() {
-    // Half of the columns are a sound lattice of their own: only the second file shows the split, see the watched folder.
+    // Half of the columns form a sound lattice by themselves: only the second file shows the split, see the watched
+    // folder.
     let half = changed(|_, column, xyz| (column < COLUMNS / 2).then_some(xyz));
     let lattice = read_with(&half, "scan_1.xyz", Expected::default()).unwrap();
     assert_eq!(lattice.n_columns(), COLUMNS as usize / 2);
@@ -122,7 +123,7 @@ fn duplicate_cell_is_refused_with_its_place() {
     refused(&file, "scan.xyz", "cell (row 2, column 3) comes twice");
 }
 
-/// A file that says it holds a scan of this program's, whose cells say otherwise, is what its cells say.
+/// A file whose description claims a scan written by this program, but whose cells contradict it, is read by its cells.
 #[test]
 fn a_header_that_does_not_fit_its_cells_is_not_believed() {
     let folder = tempfile::tempdir().unwrap();
@@ -148,7 +149,7 @@ fn a_header_that_does_not_fit_its_cells_is_not_believed() {
     assert_eq!(lattice.point(lattice.cell(3, 5)).map(|p| (p[0] - point(5, 3)[0]).abs() < 1e-6), Some(true));
 }
 
-/// Found by fuzzing: nearly equal elevations would have asked for more rows than there is memory.
+/// Found by fuzzing: nearly equal elevations would have required more rows than there is memory.
 #[test]
 fn steps_of_no_scanner_are_refused_before_memory_runs_out() {
     let mut file = b"# SCENE XYZ binary format v1.0\nRows 0\nCols 0\n\0\0\0\0".to_vec();

@@ -1,4 +1,4 @@
-//! A scan file appears whole under its name, or not at all.
+//! Writing of scan files: a file appears complete under its name, or not at all.
 
 use std::os::unix::fs::PermissionsExt as _;
 

@@ -1,4 +1,4 @@
-//! The small lattice comes back from every way of writing it, or is refused with its sentence.
+//! Small lattice in every encoding: it is read back, or refused with the right message.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -224,7 +224,7 @@ fn a_cut_or_grown_e57_says_so() {
     check_refused(&whole[..whole.len() / 2], "scan.e57", "announced");
     check_refused(&whole[..500], "scan.e57", "500 bytes, at least 1024 needed");
     check_refused(&[&whole[..], &[0; 1024]].concat(), "scan.e57", "announced");
-    // Preallocated by the share: the full size, and zeros behind what has arrived.
+    // Preallocated by the share: the full size, with zeros after the bytes that have arrived.
     let mut preallocated = whole.clone();
     preallocated[3000..].fill(0);
     check_refused(&preallocated, "scan.e57", "checksum");
@@ -243,14 +243,14 @@ fn a_length_off_by_one_in_the_header_is_harmless() {
     }
 }
 
-/// Bit by bit, as the polynomial says.
+/// Computes the CRC-32C bit by bit from its polynomial.
 pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ (0x82F6_3B78 & (crc & 1).wrapping_neg()))
     })
 }
 
-/// Replaces text by as much text wherever it stands, and mends the checksums.
+/// Replaces every occurrence of a text by one of equal length, and corrects the checksums.
 fn edited(file: &[u8], from: &str, to: &str) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut logical: Vec<u8> = file.chunks(1024).flat_map(|page| &page[..1020]).copied().collect();
@@ -268,7 +268,7 @@ fn an_index_beyond_the_declared_bounds_is_an_error() {
     check_refused(&lies, "scan.e57", "point 432: column 18 lies outside of the declared 0 to 17");
 }
 
-/// Found by fuzzing: the XML parser quotes the line break that it met.
+/// Found by fuzzing: the XML parser quotes a line break in the file.
 #[test]
 fn broken_xml_is_told_in_one_line() {
     let broken = edited(&e57(PLAIN, 1), "\"Structure\">\n", "\"Structure\"/\n");

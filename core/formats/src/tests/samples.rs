@@ -1,4 +1,4 @@
-//! Every sample reads as what it is, or is refused with the right sentence.
+//! Sample files: each is read correctly, or refused with the right message.
 
 use platen_tests::samples;
 use serde_json::Value as Json;
@@ -41,8 +41,8 @@ fn what_is_no_structured_scan_is_refused_with_the_reason() {
     }
 }
 
-/// Largest distance of a coordinate between two lattices, metres, and the number of common cells; every valid
-/// cell of the second within its columns must be one of the first.
+/// Returns the largest distance of a coordinate between two lattices, metres, and the number of common cells; every
+/// valid cell of the second within its columns must be one of the first.
 fn compare(a: &platen_scan::Lattice, b: &platen_scan::Lattice, column_offset: usize) -> (f64, usize) {
     let (mut worst, mut common) = (0.0_f64, 0);
     for column in 0..b.n_columns() {
@@ -63,7 +63,7 @@ fn the_pump_is_the_same_lattice_in_every_format() {
     for set in samples::each("lattice") {
         let whole = set.join("pumpA.e57").metadata().unwrap().len() > 1_000_000;
         let (n_rows, n_columns, n_valid) = if whole { (1074, 345, 155_201) } else { (455, 60, 9908) };
-        // The E57 of the small set holds f32.
+        // The E57 of the small set contains f32.
         let most = if whole { 5e-6 } else { 5e-6 + 3e-7 };
         let temporary = tempfile::tempdir().unwrap();
         let pump = |name: &str| read(&samples::unpacked(&set.join(name), temporary.path()), None).unwrap();
@@ -84,7 +84,7 @@ fn the_pump_is_the_same_lattice_in_every_format() {
         let (worst, common) = compare(&e57, &pump("pumpA_lf.ptx.gz"), 0);
         assert!(worst < most && common == n_valid, "{worst} m over {common} cells");
 
-        // Five decimals: half of the last one.
+        // Five decimals: the error is half of the last one.
         let (worst, common) = compare(&e57, &pump("pumpA_rowcol.xyz.gz"), 0);
         assert!(worst < most + 1e-9 && common == n_valid, "{worst} m over {common} cells");
 

@@ -1,4 +1,6 @@
-//! Time to all columns and points per second, printed: `cargo test --release -p platen-formats speed -- --nocapture`.
+//! Speed test: time to all columns and points per second, printed.
+//!
+//! `cargo test --release -p platen-formats speed -- --nocapture`
 
 use std::time::Instant;
 

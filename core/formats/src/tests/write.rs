@@ -1,4 +1,4 @@
-//! One small lattice, written in every way a format allows.
+//! Small lattice, written in every encoding that a format allows.
 
 use std::fmt::Write as _;
 use std::io::Cursor;
@@ -13,19 +13,19 @@ pub(super) const ROWS: u32 = 24;
 pub(super) const COLUMNS: u32 = 32;
 const STEP: f64 = 0.012;
 
-/// True where the lattice has a gap.
+/// Returns true where the lattice has a gap.
 pub(super) fn missing(row: u32, column: u32) -> bool {
     (3 * row + column).is_multiple_of(11)
 }
 
-/// Direction and range of a cell: row 0 at the top, columns by growing azimuth, across the seam at pi.
+/// Returns direction and range of a cell: row 0 at the top, columns by increasing azimuth, across the seam at pi.
 pub(super) fn beam(row: u32, column: u32) -> (Direction, f64) {
     let direction =
         Direction { azimuth: 3.0 + STEP * f64::from(column), elevation: 0.1 - STEP * f64::from(row) };
     (direction, 5.0 + 0.03 * f64::from(row) + 0.02 * f64::from(column))
 }
 
-/// The point of a cell, metres.
+/// Returns the point of a cell, metres.
 pub(super) fn point(row: u32, column: u32) -> [f64; 3] {
     let (direction, range) = beam(row, column);
     direction.unit().map(|c| c * range)
@@ -66,7 +66,7 @@ pub(super) fn single(name: RecordName) -> Record {
     Record { name, data_type: RecordDataType::Single { min: None, max: None } }
 }
 
-/// Ten micrometres.
+/// Returns a record scaled to ten micrometres.
 pub(super) fn scaled(name: RecordName) -> Record {
     let data_type =
         RecordDataType::ScaledInteger { min: -2_000_000, max: 2_000_000, scale: 1e-5, offset: 0.25 };
@@ -99,12 +99,12 @@ fn value(record: &Record, value: f64) -> RecordValue {
     }
 }
 
-/// The lattice as an E57 file; `clouds` copies of it.
+/// Returns the lattice as an E57 file; `clouds` copies of it.
 pub(super) fn e57(style: E57Style, clouds: usize) -> Vec<u8> {
     file_of(|writer| (0..clouds).for_each(|number| add_cloud(writer, style, number, None)))
 }
 
-/// The lattice as an E57 file whose point cloud has a description.
+/// Returns the lattice as an E57 file whose point cloud has a description.
 pub(super) fn described(style: E57Style, description: &str) -> Vec<u8> {
     file_of(|writer| add_cloud(writer, style, 0, Some(description.to_owned())))
 }
@@ -203,7 +203,7 @@ pub(super) const PTX: PtxStyle = PtxStyle {
     mark: "",
 };
 
-/// The lattice as a PTX file; the first `columns` stored.
+/// Returns the lattice as a PTX file with the first `columns` stored.
 pub(super) fn ptx(style: PtxStyle, columns: u32) -> Vec<u8> {
     let mut text = style.mark.to_owned();
     let end = style.header_end;
@@ -224,7 +224,8 @@ pub(super) fn ptx(style: PtxStyle, columns: u32) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The lattice as XYZ text: `fields` behind row, column, x, y, z; rows and columns swapped when asked.
+/// Returns the lattice as XYZ text: `head`, then row, column, x, y, z and `tail` per cell; rows and columns `swapped`
+/// on request.
 pub(super) fn xyz(head: &str, tail: &str, swapped: bool, end: &str) -> Vec<u8> {
     let mut text = head.to_owned();
     for column in 0..COLUMNS {
@@ -237,7 +238,7 @@ pub(super) fn xyz(head: &str, tail: &str, swapped: bool, end: &str) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The lattice as an XYB file: `sizes` in the header, all cells or hits alone, along columns or along rows.
+/// Returns the lattice as an XYB file: `sizes` in the header, all cells or hits only, along columns or along rows.
 pub(super) fn xyb(sizes: (u32, u32), all: bool, along_rows: bool, missing_as: f64) -> Vec<u8> {
     let (rows, columns) = sizes;
     let head =

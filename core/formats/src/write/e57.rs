@@ -1,7 +1,7 @@
-//! E57 (ASTM E2807): range, azimuth and elevation as 64-bit floats, so that nothing is rounded.
+//! Writer of E57 files (ASTM E2807): range, azimuth and elevation as 64-bit floats, without rounding.
 //!
 //! Only cells of known direction are stored. Properties without a field in the format (nominal angles, the size of the
-//! lattice beyond the cells stored, warm-up columns, notes) go into the description of the point cloud
+//! lattice beyond the cells stored, warm-up columns, notes) are written to the description of the point cloud
 //! ([`crate::header_text`]); other readers show it as a remark.
 
 use std::fs::File;

@@ -11,7 +11,7 @@ pub(super) type Result<T> = std::result::Result<T, WriteFault>;
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum WriteError {
-    /// The extension is that of no format.
+    /// The extension does not belong to a format.
     #[error("{}: unknown format; let the name end in .e57, .ptx, .xyz or .xyb", .0.display())]
     Format(PathBuf),
     /// A file of that name exists.

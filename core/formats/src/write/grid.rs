@@ -1,4 +1,4 @@
-//! PTX and XYB: every cell is stored, column after column.
+//! Writers of PTX and XYB files: every cell is stored, column after column.
 //!
 //! All records have one size, so that a column is written at its offset in any order of arrival; missing columns are
 //! filled in at the end. The sizes in the header are padded and written again when the number of columns is known.
@@ -20,10 +20,10 @@ pub(super) trait Layout {
     fn put(&self, out: &mut Vec<u8>, cell: Option<([f64; 3], u16)>, intensity_range: (u16, u16));
 }
 
-/// Text: columns, cells of one, pose, then `x y z intensity` with the intensity in 0 to 1.
+/// Text: number of columns, cells per column, pose, then `x y z intensity` with the intensity in 0 to 1.
 pub(super) struct Ptx;
 
-/// The scanner's position and axes, then the 4x4: the points are in the scanner's own frame.
+/// The scanner's position and axes, then the 4x4 matrix: the points are in the scanner's own frame.
 const POSE: &str = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
 
 impl Layout for Ptx {
@@ -67,7 +67,7 @@ pub(super) struct Grid<L> {
     intensity_range: (u16, u16),
     /// Record of a cell that was not measured.
     missing: Vec<u8>,
-    /// Bytes of one column, reused.
+    /// Buffer of the bytes of one column.
     bytes: Vec<u8>,
 }
 

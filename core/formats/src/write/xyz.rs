@@ -1,4 +1,4 @@
-//! XYZ with row and column: one line per valid cell, `row column x y z intensity`.
+//! Writer of XYZ with row and column: one line per valid cell, `row column x y z intensity`.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};

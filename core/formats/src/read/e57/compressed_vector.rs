@@ -1,8 +1,10 @@
-//! Binary section of a point cloud (ASTM E2807, CompressedVector): packets of bytestreams, one per field of the prototype.
+//! Binary section of a point cloud (ASTM E2807, CompressedVector): packets of bytestreams, one per field of the
+//! prototype.
 //!
-//! Whole packets are unpacked and converted field by field, array by array. The `e57` crate, which
-//! reads the rest of the file, makes an enum of every value and a vector of every point, at five times the processor time
-//! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not looked at: they were checked when the file was opened.
+//! Whole packets are unpacked and converted field by field, array by array. The `e57` crate, which reads the rest of
+//! the file, makes an enum of every value and a vector of every point, at five times the processor time
+//! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not looked at: they were checked when the file
+//! was opened.
 
 use std::io::{Read, Seek, SeekFrom};
 
@@ -10,13 +12,13 @@ use e57::{Record, RecordDataType};
 
 use super::PAGE;
 
-/// Bytes of a page that are content; the rest is its checksum.
+/// Number of content bytes of a page; the rest is its checksum.
 const CONTENT: usize = PAGE as usize - 4;
 
-/// Pages read at once.
+/// Number of pages read at once.
 const PAGES: usize = 64;
 
-/// Bytes of the section's header.
+/// Number of bytes of the section's header.
 const HEADER: usize = 32;
 
 /// Kinds of packets.
@@ -29,7 +31,7 @@ const IGNORED: u8 = 2;
 pub(super) struct CompressedVector<R> {
     pages: Pages<R>,
     points: Points,
-    /// Points that have not been read yet.
+    /// Number of points that have not been read yet.
     left: u64,
     packet: Vec<u8>,
 }
@@ -38,7 +40,7 @@ impl<R: Read + Seek> CompressedVector<R> {
     /// Opens the section at a physical offset of the file.
     ///
     /// # Errors
-    /// The sentence for a section that cannot be read, or is none.
+    /// The message for bytes that cannot be read or are not such a section.
     pub(super) fn open(file: R, offset: u64, prototype: &[Record], records: u64) -> Result<Self, String> {
         let mut pages = Pages { file, content: Vec::new(), at: 0 };
         pages.seek(offset)?;
@@ -53,10 +55,10 @@ impl<R: Read + Seek> CompressedVector<R> {
         Ok(Self { pages, points, left: records, packet: Vec::new() })
     }
 
-    /// Returns the points of the next packet that completes any, `None` behind the last.
+    /// Returns the points of the next packet that completes any; `None` after the last.
     ///
     /// # Errors
-    /// The sentence for a packet that cannot be read.
+    /// The message for a packet that cannot be read.
     pub(super) fn next(&mut self) -> Result<Option<&Points>, String> {
         if self.left == 0 {
             return Ok(None);
@@ -109,7 +111,7 @@ impl Points {
         stream.encoding.wholes(&stream.values(self.n), into);
     }
 
-    /// One packet of bytestreams of these types.
+    /// Builds one packet of bytestreams of these types.
     #[cfg(test)]
     pub(super) fn of(types: &[&RecordDataType], bytestreams: &[Vec<u8>]) -> Self {
         let streams = types.iter().map(|data_type| Stream::new(data_type)).collect();
@@ -121,7 +123,7 @@ impl Points {
         points
     }
 
-    /// Goes on behind the points.
+    /// Advances past the points.
     fn skip(&mut self) {
         for stream in &mut self.streams {
             stream.bit += self.n * stream.width;
@@ -129,7 +131,7 @@ impl Points {
         self.n = 0;
     }
 
-    /// Appends the points that are complete with a data packet, given from behind its first four bytes.
+    /// Appends the points that a data packet completes; `packet` begins after its first four bytes.
     fn append(&mut self, packet: &[u8]) -> Result<(), String> {
         let n = self.streams.len();
         let broken = || "a packet is shorter than its bytestreams".to_owned();
@@ -149,11 +151,11 @@ impl Points {
     }
 }
 
-/// Values of one field: of one packet, and what the packet before left of an incomplete value.
+/// Values of one field: those of one packet, with the bits of an incomplete value left by the previous packet.
 #[derive(Debug)]
 struct Stream {
     encoding: Encoding,
-    /// Bits of a value, up to 64; 0 where all are equal.
+    /// Number of bits of a value, up to 64; 0 where all values are equal.
     width: usize,
     bytes: Vec<u8>,
     /// First bit of the first value.
@@ -172,7 +174,7 @@ impl Stream {
         self.bytes.extend_from_slice(more);
     }
 
-    /// Returns the number of complete values; `None` where values take no bits.
+    /// Returns the number of complete values; `None` where values occupy no bits.
     fn complete(&self) -> Option<usize> {
         (8 * self.bytes.len() - self.bit).checked_div(self.width)
     }
@@ -192,7 +194,7 @@ impl Stream {
             nine[..held].copy_from_slice(&from[..held]);
             (u128::from_le_bytes(nine) >> (bit % 8)) as u64 & mask
         };
-        // Where eight are enough, all but the last few are read eight bytes at a time.
+        // Where eight bytes suffice, all but the last few values are read eight bytes at a time.
         let in_eight = width <= 57 || width.is_multiple_of(8) && start.is_multiple_of(8);
         let last = (8 * bytes.len()).saturating_sub(start + 64);
         let fast = if in_eight { n.min(last / width) } else { 0 };
@@ -241,10 +243,10 @@ impl Encoding {
         }
     }
 
-    /// Replaces numbers by those of values.
+    /// Replaces `numbers` by the decoded values.
     fn numbers(self, values: &[u64], numbers: &mut Vec<f64>) {
         numbers.clear();
-        // The encoding is told once, not for every value; for speed only: `tests::speed`.
+        // The encoding is distinguished once, not for every value; for speed only: `tests::speed`.
         match self {
             Self::Single => {
                 numbers.extend(values.iter().map(|value| f64::from(f32::from_bits(*value as u32))))
@@ -260,7 +262,7 @@ impl Encoding {
         }
     }
 
-    /// Replaces whole numbers by those of values, the fraction cut off.
+    /// Replaces `wholes` by the decoded values, with the fraction cut off.
     fn wholes(self, values: &[u64], wholes: &mut Vec<i64>) {
         wholes.clear();
         if let Self::Integer { min } = self {
@@ -304,7 +306,7 @@ impl<R: Read + Seek> Pages<R> {
         Ok(())
     }
 
-    /// Reads more pages; keeps the place within them.
+    /// Reads more pages; the offset within a page is kept.
     fn refill(&mut self) -> Result<(), String> {
         self.at -= self.content.len();
         let mut pages = Vec::with_capacity(PAGES * PAGE as usize);
@@ -323,7 +325,7 @@ mod tests {
     use super::*;
     use e57::RecordDataType as Type;
 
-    /// One value after the other, bit by bit.
+    /// Packs one value after the other, bit by bit.
     fn packed(values: &[u64], width: usize) -> Vec<u8> {
         let mut bytes = vec![0; (values.len() * width).div_ceil(8)];
         for (k, value) in values.iter().enumerate() {
