@@ -2,9 +2,9 @@
 //! prototype.
 //!
 //! Whole packets are unpacked and converted field by field, array by array. The `e57` crate, which reads the rest of
-//! the file, makes an enum of every value and a vector of every point, at five times the processor time
-//! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not looked at: they were checked when the file
-//! was opened.
+//! the file, builds an enum for every value and a vector for every point, at five times the processor time
+//! (`core/formats/src/tests/speed.rs`). The checksums of the pages are not checked here; they were checked when the
+//! file was opened.
 
 use std::io::{Read, Seek, SeekFrom};
 
