@@ -1,8 +1,10 @@
-//! Mean and covariance of an unnormalised log density by robust adaptive Metropolis (Vihola, Stat. Comput. 22 (2012),
-//! 997-1008, section 2).
+//! Mean and covariance of an unnormalised log density by robust adaptive Metropolis.
 //!
-//! A random walk whose proposal covariance is adapted to the target until the acceptance rate is the optimal one. For a
-//! few dimensions; the chain starts in the origin and its length is fixed, so that a seed gives the same moments.
+//! The method is a random walk whose proposal covariance is adapted until the acceptance rate is optimal. In: the log
+//! density as a function. Out: mean and covariance. Limit: a few dimensions. The chain starts at the origin and its
+//! length is fixed, so that a seed always gives the same moments.
+//!
+//! Source: Vihola, Stat. Comput. 22 (2012), 997-1008, section 2.
 
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -11,14 +13,14 @@ use crate::random::Random;
 /// Acceptance rate of the fastest mixing (Roberts, Gelman and Gilks, Ann. Appl. Probab. 7 (1997)).
 const ACCEPTANCE: f64 = 0.234;
 
-/// Steps of the chain that only adapt it, and steps that count. Means scatter by a tenth of their standard deviation
-/// between chains; with two fifths of the steps some chains do not mix.
+/// Number of steps that only adapt the chain, and of steps that count. Means scatter between chains by a tenth of their
+/// standard deviation; with two fifths of the steps some chains do not mix.
 const BURN_IN: u32 = 2000;
 const STEPS: u32 = 10_000;
 
 /// Returns mean and covariance of the density exp(`log_density`), up to a constant factor.
 ///
-/// `first_step`: standard deviations of the first proposals.
+/// `first_step` contains the standard deviations of the first proposals.
 pub fn mean_and_covariance<const D: usize>(
     first_step: SVector<f64, D>,
     seed: u64,
@@ -48,7 +50,8 @@ pub fn mean_and_covariance<const D: usize>(
     (mean, squares / f64::from(STEPS) - mean * mean.transpose())
 }
 
-/// Cholesky factor of the proposal covariance after a rank-one update along the last direction: S (I + by d d' / |d|^2) S'.
+/// Returns the Cholesky factor of the proposal covariance after a rank-one update along the last direction: S (I + by d
+/// d' / |d|^2) S'.
 fn adapted<const D: usize>(
     factor: &SMatrix<f64, D, D>,
     direction: &SVector<f64, D>,

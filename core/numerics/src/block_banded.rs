@@ -1,10 +1,10 @@
-//! The Cholesky factor of a tensor spline's normal matrix: its layout, and variances from it.
+//! Cholesky factor of a tensor spline's normal matrix: its layout, and variances computed from it.
 //!
-//! Coefficients are ordered row after row of the control net along its longer axis. A B-spline meets those of the
-//! three rows before it, so the matrix has half-bandwidth 3 in blocks of one row, and so has its factor. `block_banded_cholesky`
-//! makes it.
+//! Coefficients are ordered row after row of the control net along its longer axis. The support of a B-spline overlaps
+//! those of the three previous rows. The matrix therefore has half-bandwidth 3 in blocks of one row, and so has its
+//! factor, which `block_banded_cholesky` computes.
 
-/// Rows of the net that one B-spline reaches back to.
+/// Number of previous rows of the net with which a B-spline overlaps.
 pub(crate) const REACH: usize = 3;
 
 /// Layout of the coefficients of a net in blocks.
@@ -15,7 +15,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Blocks run along v when it is the longer axis.
+    /// Returns true when blocks follow each other along v, the longer axis.
     pub(crate) fn v_is_outer(self) -> bool {
         self.n_v >= self.n_u
     }
@@ -28,12 +28,12 @@ impl Layout {
         self.n_u.min(self.n_v)
     }
 
-    /// (outer, inner) place of the coefficient (i along u, k along v).
+    /// Returns the place (outer, inner) of the coefficient (i along u, k along v).
     pub(crate) fn place(self, i: usize, k: usize) -> (usize, usize) {
         if self.v_is_outer() { (k, i) } else { (i, k) }
     }
 
-    /// Index in block order of the coefficient with index `c` in the net's order (v outer).
+    /// Returns the index in block order of the coefficient with index `c` in the net's order (v outer).
     pub(crate) fn index(self, c: usize) -> usize {
         let (row, inner) = self.place(c % self.n_u, c / self.n_u);
         row * self.block() + inner
@@ -43,7 +43,7 @@ impl Layout {
         self.n_rows() * (REACH + 1) * self.block() * self.block()
     }
 
-    /// Range of the block that couples row `row` to row `row - back`.
+    /// Returns the range of the block that couples row `row` to row `row - back`.
     pub(crate) fn range(self, row: usize, back: usize) -> std::ops::Range<usize> {
         let size = self.block() * self.block();
         let start = (row * (REACH + 1) + back) * size;
@@ -51,7 +51,8 @@ impl Layout {
     }
 }
 
-/// The lower Cholesky factor of a matrix that couples each row of a net with itself and the three before, in the same layout.
+/// Lower Cholesky factor of a matrix that couples each row of a net with itself and the three previous rows, in the
+/// same layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockBandedFactor {
     pub(crate) layout: Layout,
@@ -79,8 +80,8 @@ impl BlockBandedFactor {
         self.forward(&columns).iter().map(|[x]| x * x).sum()
     }
 
-    /// Returns `L'^-1 Z` in the net's order, by backward substitution: columns of independent standard normal numbers become draws of
-    /// coefficients with the covariance A^-1.
+    /// Returns `L'^-1 Z` in the net's order, by backward substitution: columns of independent standard normal numbers
+    /// become draws of coefficients with the covariance A^-1.
     #[must_use]
     pub fn draws<const D: usize>(&self, mut z: Vec<[f64; D]>) -> Vec<[f64; D]> {
         let (layout, m) = (self.layout, self.layout.block());
@@ -103,7 +104,7 @@ impl BlockBandedFactor {
         (0..z.len()).map(|c| z[layout.index(c)]).collect()
     }
 
-    /// L^-1 B in block order, by forward substitution.
+    /// Returns L^-1 B in block order, by forward substitution.
     pub(crate) fn forward<const D: usize>(&self, b: &[[f64; D]]) -> Vec<[f64; D]> {
         let (layout, m) = (self.layout, self.layout.block());
         let mut work = vec![[0.0; D]; b.len()];

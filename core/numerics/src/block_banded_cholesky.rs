@@ -1,11 +1,11 @@
 //! Block-banded Cholesky factorisation of the normal matrix of a tensor spline, and the band of its inverse.
 //!
-//! Coefficients are ordered row after row of the control net along its longer axis. A B-spline meets those of the
-//! three rows before it, so the matrix has half-bandwidth 3 in blocks of one row, and so has its factor. The
-//! covariance of a spline's value at one place needs the inverse only inside the same band: the recursion of
-//! Takahashi, Fagan and Chen (1973), in blocks as in Golub and Plemmons (1980).
+//! Coefficients are ordered row after row of the control net along its longer axis. The support of a B-spline overlaps
+//! those of the three previous rows. The matrix therefore has half-bandwidth 3 in blocks of one row, and so has its
+//! factor. The covariance of a spline's value at one place requires the inverse only inside the same band. It is
+//! computed by the recursion of Takahashi, Fagan and Chen (1973), in blocks as in Golub and Plemmons (1980).
 //!
-//! All dense kernels run on one thread: the bits do not depend on the machine's load.
+//! All dense kernels run on one thread: the results do not depend on the machine's load, to the last bit.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
@@ -16,7 +16,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use crate::block_banded::{BlockBandedFactor, Layout, REACH};
 use crate::vector_registers::ClearVectorRegisters;
 
-/// A symmetric matrix over the coefficients of a net: blocks (row, row - 0..=3), column-major, lower triangle.
+/// Symmetric matrix over the coefficients of a net: blocks (row, row - 0..=3), column-major, lower triangle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockBandedMatrix {
     layout: Layout,
@@ -55,7 +55,7 @@ impl BlockBandedMatrix {
                 for (low, diagonals) in inner.iter().enumerate() {
                     for (high, value) in (low..m).zip(diagonals) {
                         block[low * m + high] += factor * value;
-                        // Of a block on the diagonal the lower triangle counts.
+                        // Only the lower triangle of a block on the diagonal is used.
                         if back > 0 && high > low {
                             block[high * m + low] += factor * value;
                         }
@@ -72,7 +72,7 @@ impl BlockBandedMatrix {
         self.blocks[block + low.1 * self.layout.block() + high.1] += value;
     }
 
-    /// Product with a vector in the net's order.
+    /// Returns the product with a vector in the net's order.
     #[cfg(test)]
     fn times(&self, x: &[f64]) -> Vec<f64> {
         let (layout, m) = (self.layout, self.layout.block());
@@ -108,7 +108,8 @@ impl BlockBandedMatrix {
         for row in 0..layout.n_rows() {
             for back in (0..=REACH.min(row)).rev() {
                 let column = row - back;
-                // Blocks of earlier rows lie before this one, those of this row farther back behind it.
+                // In memory the blocks of earlier rows precede this block; those of this row with larger `back` follow
+                // it.
                 let here = layout.range(row, back);
                 let (before, rest) = self.blocks.split_at_mut(here.start);
                 let (target, after) = rest.split_at_mut(here.len());
@@ -172,8 +173,8 @@ impl BlockBandedFactor {
         }
     }
 
-    /// Returns the inverse inside the band, per coefficient (i, k) of the net's order: covariances with the coefficients
-    /// (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
+    /// Returns the inverse inside the band, per coefficient (i, k) of the net's order: covariances with the
+    /// coefficients (i + di, k + dk) at `(dk + 3) * 7 + di + 3`, 0 where there is none.
     #[must_use]
     pub fn local_inverse(&self) -> Vec<[f64; 49]> {
         let _clear = ClearVectorRegisters;
@@ -212,7 +213,7 @@ impl BlockBandedFactor {
                 let known = recent.block(row, k).transpose();
                 matmul(work.as_mut(), Accum::Add, known, u.as_ref(), -1.0, Par::Seq);
             }
-            // Rounding leaves a skew part, and the recursion, which takes blocks for their transposes, makes it grow.
+            // Rounding leaves a skew part, which the recursion would amplify since it uses blocks for their transposes.
             for c in 0..m {
                 for r in 0..c {
                     let mean = 0.5 * (work[(r, c)] + work[(c, r)]);
@@ -226,7 +227,7 @@ impl BlockBandedFactor {
     }
 }
 
-/// Blocks of the inverse that couple the last rows of the recursion with each other: more of it would only fill memory.
+/// Blocks of the inverse that couple the last rows of the recursion with each other; no others are required.
 struct Recent {
     blocks: Vec<Mat<f64>>,
 }
@@ -240,7 +241,7 @@ impl Recent {
         row % (REACH + 1) * (REACH + 1) + ahead
     }
 
-    /// The block that couples row `row + ahead`, down, to row `row`, across.
+    /// Returns the block that couples row `row + ahead`, down, to row `row`, across.
     fn block(&self, row: usize, ahead: usize) -> MatRef<'_, f64> {
         self.blocks[Self::place(row, ahead)].as_ref()
     }
@@ -250,8 +251,8 @@ impl Recent {
     }
 }
 
-/// Copies what lies inside the band along both axes, of the block that couples row `row + ahead`, down, to row `row`,
-/// across, into the 49 slots of each coefficient, from both sides.
+/// Copies the block that couples row `row + ahead`, down, to row `row`, across, into the 49 slots of each coefficient,
+/// from both sides, as far as it lies inside the band along both axes.
 fn spread(layout: Layout, row: usize, ahead: usize, block: MatRef<'_, f64>, local: &mut [[f64; 49]]) {
     let slot = |by_row: usize, by_inner: usize| {
         if layout.v_is_outer() { by_row * 7 + by_inner } else { by_inner * 7 + by_row }
@@ -284,7 +285,7 @@ mod tests {
     use crate::uniform_knots::UniformKnots;
     use nalgebra::DMatrix;
 
-    /// Gram matrix plus penalty over a small net, as a band and as a dense matrix.
+    /// Returns the Gram matrix plus penalty over a small net, as a band and as a dense matrix.
     fn example(spans_u: usize, spans_v: usize) -> (BlockBandedMatrix, DMatrix<f64>) {
         let (u, v) = (UniformKnots::new(0.0, 1.0, spans_u), UniformKnots::new(0.0, 1.3, spans_v));
         let mut band = BlockBandedMatrix::zeros(u.n_coefficients(), v.n_coefficients());

@@ -1,9 +1,9 @@
-//! Two computations at the same time, each on one thread: the results are those of one after the other.
+//! Concurrent execution of two functions, each on one thread, with the results of sequential execution.
 
 use std::panic::resume_unwind;
 use std::thread;
 
-/// Runs two functions, the first one on a thread of its own where the system gives one, and returns both results.
+/// Runs two functions, the first one on a separate thread if the system provides one, and returns both results.
 pub fn join<A: Send, B>(first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
     thread::scope(|scope| {
         let other = thread::Builder::new().spawn_scoped(scope, &first);

@@ -1,12 +1,13 @@
-//! Median by selection, and the robust standard deviation by it.
+//! Median by selection, and the robust standard deviation computed from it.
 
-/// Returns the upper median of some values, `None` without any.
+/// Returns the upper median of the values; `None` when there are none.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Estimates the standard deviation of normal deviates with outliers from their absolute values (median absolute deviation), `None` without any.
+/// Estimates the standard deviation of normal deviates with outliers from their absolute values (median absolute
+/// deviation); `None` when there are none.
 pub fn robust_deviation(sizes: Vec<f64>) -> Option<f64> {
     /// The median of |x| of the standard normal distribution.
     const MEDIAN: f64 = 0.674_489_750_196_081_7;

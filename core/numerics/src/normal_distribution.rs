@@ -1,9 +1,9 @@
-//! The normal distribution function: the rational approximation of Abramowitz and Stegun 7.1.26, accurate to 1.5e-7.
+//! Normal distribution function, by the rational approximation of Abramowitz and Stegun 7.1.26, accurate to 1.5e-7.
 
-/// Beyond so many standard deviations the distribution function is taken as 0 or 1, to a hundred-millionth.
+/// Number of standard deviations beyond which the distribution function is taken as 0 or 1, to a hundred-millionth.
 pub const CERTAIN: f64 = 5.6;
 
-/// The normal distribution function at a place, with the derivatives of its logarithm.
+/// Normal distribution function at a place, with the derivatives of its logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogCdf {
     /// The distribution function.
@@ -18,7 +18,7 @@ pub struct LogCdf {
 #[inline]
 #[must_use]
 pub fn log_cdf(z: f64) -> LogCdf {
-    // Below, the density by the series of Mills' ratio; its error there is below 1 in 500.
+    // Below this, the ratio to the density follows from the series of Mills' ratio, with an error below 1 in 500.
     const TAIL: f64 = -4.0;
     if z > CERTAIN {
         return LogCdf { cdf: 1.0, slope: 0.0, bend: 0.0 };
@@ -46,7 +46,7 @@ pub fn cdf(z: f64) -> f64 {
     if z < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// One minus the distribution function at `z` of 0 or more, where `bell` is exp(-z^2 / 2).
+/// Returns one minus the distribution function at `z` of 0 or more, where `bell` is exp(-z^2 / 2).
 #[inline]
 fn upper_tail(z: f64, bell: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.327_591_1 / std::f64::consts::SQRT_2 * z);

@@ -1,8 +1,8 @@
 //! Normal equations of a penalised tensor spline fit, accumulated as moments per cell of the knot grid.
 //!
-//! The 16 B-splines of a cell are polynomials of degree 3 x 3, so every product of two is one of degree 6 x 6: 49
-//! weighted moments per cell hold what 136 products per point would. Points are only touched to add their
-//! moments; the cells are turned into the normal matrix once, whatever the number of points.
+//! The 16 B-splines of a cell are polynomials of degree 3 x 3, so that every product of two is a polynomial of degree 6
+//! x 6. Thus 49 weighted moments per cell contain the same information as 136 products per point. Each point only adds
+//! its moments; the normal matrix is computed from the cells once, whatever the number of points.
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -15,20 +15,20 @@ use crate::uniform_knots::{BASIS, UniformKnots, multiply, pairs};
 /// Weighted sums over the points of one cell.
 #[derive(Debug, Clone, Copy)]
 struct Cell<const D: usize> {
-    /// Sum of w s^p t^q at `[q][p]`; one slot more than powers, for whole vector registers.
+    /// Sum of w s^p t^q at `[q][p]`, with one slot more than powers, to fill vector registers.
     gram: [[f64; 8]; 7],
     /// Sum of w s^p t^q y at `[q][component][p]`.
     rhs: [[[f64; 4]; D]; 4],
     n_points: u32,
 }
 
-/// Points that a cell needs before its own values are read: twice the coefficients.
+/// Least number of points of a cell for its own values: twice the coefficients.
 const LEAST_POINTS: u32 = 8;
 /// Powers (of u, of v) of a bilinear function.
 const BILINEAR: [(usize, usize); 4] = [(0, 0), (1, 0), (0, 1), (1, 1)];
 
 impl<const D: usize> Cell<D> {
-    /// Coefficients of the least-squares bilinear function of the component along `direction`.
+    /// Returns the coefficients of the least-squares bilinear function of the component along `direction`.
     fn bilinear(&self, direction: [f64; D]) -> Option<Vector4<f64>> {
         let gram =
             Matrix4::from_fn(|a, b| self.gram[BILINEAR[a].1 + BILINEAR[b].1][BILINEAR[a].0 + BILINEAR[b].0]);
@@ -36,7 +36,7 @@ impl<const D: usize> Cell<D> {
             let sums = &self.rhs[BILINEAR[a].1];
             sums.iter().zip(&direction).map(|(x, y)| x[BILINEAR[a].0] * y).sum()
         });
-        // Points spread over the whole cell give pivots down to 1/144 of their mass; a quarter of it will do.
+        // Points spread over the whole cell give pivots down to 1/144 of their mass; a quarter of that is accepted.
         let cholesky = gram.cholesky()?;
         let least = cholesky.l_dirty().diagonal().iter().fold(f64::INFINITY, |a, x| a.min(x * x));
         (least > self.gram[0][0] / 576.0).then(|| cholesky.solve(&rhs))
@@ -53,12 +53,12 @@ pub(crate) struct CellMoments<const D: usize> {
     pub(crate) square: f64,
     /// Sum of the weights.
     pub(crate) weight: f64,
-    /// Points with a positive weight.
+    /// Number of points with a positive weight.
     pub(crate) n_points: usize,
 }
 
 impl<const D: usize> CellMoments<D> {
-    /// No points yet.
+    /// Returns the sums of no points.
     pub(crate) fn empty(u: UniformKnots, v: UniformKnots) -> Self {
         let empty = Cell { gram: [[0.0; 8]; 7], rhs: [[[0.0; 4]; D]; 4], n_points: 0 };
         Self { u, v, cells: vec![empty; u.n_spans() * v.n_spans()], square: 0.0, weight: 0.0, n_points: 0 }
@@ -71,7 +71,7 @@ impl<const D: usize> CellMoments<D> {
             return;
         }
         let ((i, s), (k, t)) = (self.u.locate(u), self.v.locate(v));
-        // Were the 1 in it known, the loops over slots would fall apart into scalars.
+        // If the compiler knew the constant 1 in it, it would split the loops over slots into scalars.
         let (p, q) = (std::hint::black_box(powers(s)), powers(t));
         let cell = &mut self.cells[k * self.u.n_spans() + i];
         cell.n_points += 1;
@@ -94,7 +94,8 @@ impl<const D: usize> CellMoments<D> {
         self.n_points += 1;
     }
 
-    /// The same sums, to the last bits, over cells of twice the length along those of (u, v) that are named `coarser`.
+    /// Returns the same sums, to the last bits, over cells of twice the length along those of (u, v) that `coarser`
+    /// selects.
     pub(crate) fn joined(&self, coarser: [bool; 2]) -> Self {
         let axis = |axis: UniformKnots, coarser: bool| if coarser { (axis.coarser(), 2) } else { (axis, 1) };
         let ((u, of_u), (v, of_v)) = (axis(self.u, coarser[0]), axis(self.v, coarser[1]));
@@ -117,7 +118,7 @@ impl<const D: usize> CellMoments<D> {
         Self { u, v, cells, ..*self }
     }
 
-    /// The normal matrix and the right-hand sides, in the net's order of control values.
+    /// Returns the normal matrix and the right-hand sides, in the net's order of control values.
     pub(crate) fn normal_equations(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
         dispatch_simd(
             #[inline(always)]
@@ -128,12 +129,12 @@ impl<const D: usize> CellMoments<D> {
     #[inline(always)]
     fn normal_equations_here(&self) -> (BlockBandedMatrix, Vec<[f64; D]>) {
         let (n_u, n_v) = (self.u.n_coefficients(), self.v.n_coefficients());
-        // Per coefficient the sums with those up to three further along v and along u.
+        // Per coefficient, the sums with the coefficients up to three farther along v and along u.
         let mut sums = vec![[[0.0; 4]; 4]; n_u * n_v];
         let mut rhs = vec![[0.0; D]; n_u * n_v];
         let products: Vec<((usize, usize), [f64; 7])> =
             pairs().map(|(i, j)| ((i, j), multiply(&BASIS[i], &BASIS[j]))).collect();
-        // By power, the coefficients of all pairs side by side; some more than pairs, for whole vector registers.
+        // By power, the coefficients of all pairs side by side; more slots than pairs, to fill vector registers.
         let mut by_power = [[0.0; 12]; 7];
         for (pair, (_, product)) in products.iter().enumerate() {
             (0..7).for_each(|p| by_power[p][pair] = product[p]);
@@ -142,7 +143,7 @@ impl<const D: usize> CellMoments<D> {
             let (i, k) = (index % self.u.n_spans(), index / self.u.n_spans());
             self.add_right_hand_side(cell, i, k, &mut rhs);
             for ((a, b), pv) in &products {
-                // CellMoments of this pair of v-splines, left as a polynomial in u.
+                // Moments for this pair of v-splines, as a polynomial in u.
                 let mut row = [0.0; 8];
                 for (f, moments) in pv.iter().zip(&cell.gram) {
                     row.iter_mut().zip(moments).for_each(|(slot, moment)| *slot += f * moment);
@@ -168,7 +169,7 @@ impl<const D: usize> CellMoments<D> {
         (matrix, rhs)
     }
 
-    /// Weighted sum of squared distances of the points from `spline`, over all components.
+    /// Returns the weighted sum of squared distances of the points from `spline`, over all components.
     pub(crate) fn residual_square(&self, spline: &TensorSpline<D>) -> f64 {
         let mut sum = self.square;
         for (index, cell) in self.cells.iter().enumerate().filter(|(_, c)| c.n_points > 0) {
@@ -188,9 +189,9 @@ impl<const D: usize> CellMoments<D> {
         sum.max(0.0)
     }
 
-    /// Four values per cell of the component along `direction`: a bilinear function through each cell's points, read
-    /// at the Gauss places, where the noise of the four is independent and even. Nothing where too few points, or
-    /// badly spread ones, were seen.
+    /// Returns four values per cell of the component along `direction`: those of a bilinear function through the cell's
+    /// points at the Gauss places, where the noise of the four is independent and equal. A cell with too few points, or
+    /// badly spread ones, has none.
     pub(crate) fn grid_values(&self, direction: [f64; D]) -> GridValues {
         let n_u = 2 * self.u.n_spans();
         let mut values = vec![None; n_u * 2 * self.v.n_spans()];
@@ -232,13 +233,13 @@ impl<const D: usize> CellMoments<D> {
 /// Powers of a place s in a cell by those of the place t in a part of it: `[p][q]` is the coefficient of t^q in s^p.
 type Shift = [[f64; 7]; 7];
 
-/// The part is the cell.
+/// Shift of a part that is the whole cell.
 const WHOLE: Shift = shift(1.0, 0.0);
 
-/// The first and the second half of the cell.
+/// Shifts of the first and the second half of the cell.
 const HALVES: [Shift; 2] = [shift(0.5, -0.25), shift(0.5, 0.25)];
 
-/// Of s = `scale` t + `middle`.
+/// Returns the shift for s = `scale` t + `middle`.
 const fn shift(scale: f64, middle: f64) -> Shift {
     let mut powers = [[0.0; 7]; 7];
     powers[0][0] = 1.0;

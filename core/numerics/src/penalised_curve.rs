@@ -1,5 +1,7 @@
-//! Smoothing curves: cubic splines of one variable by penalised least squares (P-splines: Eilers and Marx, Stat. Sci. 11
-//! (1996)), seen as a Gaussian prior on the coefficients.
+//! Smoothing curves: cubic splines of one variable by penalised least squares (P-splines).
+//!
+//! The penalty is a Gaussian prior on the coefficients. In: weighted values. Out: the most likely spline and the
+//! Cholesky factor of its precision. Source: Eilers and Marx, Stat. Sci. 11 (1996).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -56,15 +58,16 @@ impl SplineCurve {
         (0..4).map(|i| values[i] * self.coefficients[first + i]).sum()
     }
 
-    /// Returns an upper bound of the distance from a spline over the same knots: the largest between their coefficients.
+    /// Returns an upper bound of the distance from a spline over the same knots: the largest between their
+    /// coefficients.
     #[must_use]
     pub fn distance(&self, other: &Self) -> f64 {
         (&self.coefficients - &other.coefficients).amax()
     }
 }
 
-/// Normal equations of a smoothing curve: sums over data, and a Gaussian prior of its roughness. Further parameters that enter observations linearly
-/// beside the curve stand behind its coefficients.
+/// Normal equations of a smoothing curve: sums over data, and a Gaussian prior of its roughness. Further parameters
+/// that enter observations linearly in addition to the curve follow its coefficients.
 #[derive(Debug, Clone)]
 pub struct CurveFit {
     knots: UniformKnots,
@@ -82,7 +85,8 @@ pub enum Roughness {
 }
 
 impl CurveFit {
-    /// Starts without data: the derivative varies as white noise over `length` with the standard deviation `spread`.
+    /// Builds the equations without data: the derivative varies as white noise over `length` with the standard
+    /// deviation `spread`.
     #[must_use]
     pub fn with_prior(knots: UniformKnots, roughness: Roughness, spread: f64, length: f64) -> Self {
         let n = knots.n_coefficients();
@@ -102,8 +106,8 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
-    /// Starts without data: the curvature is an amplitude, known by its mean and standard deviation, times `profile`, and varies about that as white noise over
-    /// `length` with the standard deviation `spread`.
+    /// Starts without data: the curvature is an amplitude times `profile`, and varies about that as white noise over
+    /// `length` with the standard deviation `spread`. The amplitude is given by its mean and standard deviation.
     #[must_use]
     pub fn with_curvature(
         knots: UniformKnots,
@@ -114,15 +118,16 @@ impl CurveFit {
     ) -> Self {
         let mut fit = Self::with_prior(knots, Roughness::Curvature, spread, length);
         let step = knots.step();
-        // The curvatures at the knots are D c / step^2 with the second differences D of the coefficients c. For their profile f this is D^T f.
+        // The curvatures at the knots are D c / step^2 with the second differences D c of the coefficients c. With the
+        // profile f at the knots the functional is D^T f.
         let (mut functional, mut square) = (DVector::zeros(knots.n_coefficients()), 0.0);
         for k in 0..=knots.n_spans() {
             let value = profile(knots.start() + k as f64 * step);
             [1.0, -2.0, 1.0].iter().enumerate().for_each(|(i, factor)| functional[k + i] += factor * value);
             square += value * value;
         }
-        // Their covariance S = s^2 I + a^2 f f^T has the inverse (I - f f^T a^2 / t) / s^2, and S^-1 f = f / t, with t = s^2 + a^2 f^T f
-        // (Sherman and Morrison 1950).
+        // Their covariance S = s^2 I + a^2 f f^T has the inverse (I - f f^T a^2 / t) / s^2, and S^-1 f = f / t, with
+        // t = s^2 + a^2 f^T f (Sherman-Morrison formula).
         let variance = length * spread * spread / step;
         let total = variance + square * amplitude * amplitude;
         fit.hold(&functional, -amplitude * amplitude / (total * variance) * step.powi(-4));
@@ -181,14 +186,16 @@ impl CurveFit {
         self.matrix += functional * functional.transpose() * w;
     }
 
-    /// Solves for the most likely curve; also returns the Cholesky factor of its precision. `None` when it is undetermined.
+    /// Solves for the most likely curve. Also returns the Cholesky factor of its precision. `None` when the curve is
+    /// undetermined.
     #[must_use]
     pub fn solve(self) -> Option<(SplineCurve, Cholesky<f64, Dyn>)> {
         let (curve, _, factor) = self.solve_with_parameters()?;
         Some((curve, factor))
     }
 
-    /// Solves for the most likely curve and parameters; also returns the Cholesky factor of the precision of both, the curve's coefficients first.
+    /// Solves for the most likely curve and parameters. Also returns the Cholesky factor of the precision of both, with
+    /// the curve's coefficients first.
     #[must_use]
     pub fn solve_with_parameters(self) -> Option<(SplineCurve, DVector<f64>, Cholesky<f64, Dyn>)> {
         let factor = Cholesky::new(self.matrix)?;
@@ -204,7 +211,8 @@ impl CurveFit {
 mod tests {
     use super::*;
 
-    /// Values of a parabola on its first half: where its curvature may be constant it goes on beyond them, else the curve goes on nearly straight.
+    /// Values of a parabola on its first half. With a constant curvature in the prior the curve follows the parabola
+    /// beyond them, without one it goes on nearly straight.
     #[test]
     fn a_constant_curvature_goes_on_beyond_the_values() {
         const CURVATURE: f64 = 0.01;
@@ -223,7 +231,7 @@ mod tests {
         assert!(known.0.abs() < 1e-9 && (known.1 - straight.1).abs() < 1e-9, "{known:?}");
     }
 
-    /// Two values on a line: the rest is the prior, a cubic of the mean amplitude and of its standard deviation.
+    /// Two values on a line: the rest follows from the prior, a cubic of the mean amplitude and its standard deviation.
     #[test]
     fn without_values_the_curvature_is_that_of_the_prior() {
         let knots = UniformKnots::new(0.0, 3.0, 12);
@@ -237,7 +245,8 @@ mod tests {
         assert!((sigma - 0.12).abs() < 1e-4, "{sigma}");
     }
 
-    /// Values of a parabola, every other one off by three parts of a parameter: both are found, and the precision tells that the parameter is known.
+    /// Values of a parabola, every other one off by three times a parameter: both are found, and the parameter has a
+    /// high precision.
     #[test]
     fn a_shared_parameter_is_found_together_with_the_curve() {
         const OFF: f64 = 0.7;

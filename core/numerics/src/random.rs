@@ -1,12 +1,14 @@
-//! Pseudo-random numbers: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA
-//! 2014). A seed gives the same numbers on every machine.
+//! Pseudo-random numbers by SplitMix64.
+//!
+//! A seed gives the same numbers on every machine. Source: Steele, Lea and Flood, "Fast splittable pseudorandom number
+//! generators", OOPSLA 2014.
 
 /// A SplitMix64 generator.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// Starts at a seed.
+    /// Builds a generator from a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)

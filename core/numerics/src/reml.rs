@@ -1,14 +1,15 @@
 //! Restricted maximum likelihood (REML) of the two penalty weights of a spline fit.
 //!
-//! A fit minimises sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2. Third derivatives leave every shape of
-//! constant curvature alone; one weight per direction lets a narrow bend stay narrow across and be smoothed along
-//! the bend. The weights are the most likely ones when the third derivatives are taken as random with unknown
-//! variance (REML: Wood, *J. R. Stat. Soc. B* 73 (2011); P-splines: Eilers and Marx, *Stat. Sci.* 11 (1996)).
+//! A fit minimises sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2. A penalty on third derivatives does not
+//! change a shape of constant curvature. With one weight per direction a narrow bend stays narrow across and is
+//! smoothed along the bend. The weights m_u and m_v are those of largest likelihood if the third derivatives are random
+//! with unknown variance (REML: Wood, *J. R. Stat. Soc. B* 73 (2011); P-splines: Eilers and Marx, *Stat. Sci.* 11
+//! (1996)).
 //!
-//! The criterion is evaluated on a regular grid of four values per cell, taken from the cells' moments: there the
-//! normal matrix and the penalty are Kronecker products, one eigenvalue problem per axis makes them diagonal, and a
-//! pair of weights costs one pass over the coefficients instead of a factorisation. Unequal density of the points
-//! and holes only enter the choice of the weights this way, never the fit itself.
+//! The criterion is evaluated on a regular grid of four values per cell, taken from the cells' moments. On this grid
+//! the normal matrix and the penalty are Kronecker products, and one eigenvalue problem per axis makes them diagonal. A
+//! pair of weights then costs one pass over the coefficients instead of a factorisation. Limit: the selection of the
+//! weights treats points of unequal density and holes approximately; the fit itself does not.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
 
@@ -17,9 +18,9 @@ use crate::uniform_knots::UniformKnots;
 /// Weights of the penalty of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Penalty {
-    /// Of the squared third derivative by u, integrated over the rectangle.
+    /// Weight of the squared third derivative by u, integrated over the rectangle.
     pub u: f64,
-    /// Of the squared third derivative by v.
+    /// Weight of the squared third derivative by v.
     pub v: f64,
 }
 
@@ -28,46 +29,50 @@ pub struct Penalty {
 pub struct SelectedPenalty {
     /// The weights.
     pub penalty: Penalty,
-    /// Share of the covariance that is scatter: see [`FittedSpline::noise_share`](crate::spline_fit::FittedSpline::noise_share).
+    /// Share of the covariance that is scatter: see
+    /// [`FittedSpline::noise_share`](crate::spline_fit::FittedSpline::noise_share).
     pub noise_share: f64,
-    /// Along u and along v: the penalty leaves nothing that spans of twice the length could not follow.
+    /// Along u and along v: true when the smoothed shape can be represented by spans of twice the length.
     pub coarse: [bool; 2],
 }
 
-/// The two Gauss places of a span, from its middle: a function of degree 1 fitted to evenly spread noise has
+/// The two Gauss places of a span, from its middle. A function of degree 1 fitted to evenly distributed noise has
 /// independent noise of equal size there.
 pub(crate) const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_812_9];
 
-/// Returns the place of a value of a row of them, in spans from the start.
+/// Returns the place of the `k`-th value of a row, in spans from the start.
 fn place_in_spans(k: usize) -> f64 {
     (k / 2) as f64 + 0.5 + GAUSS[k % 2]
 }
 
-/// Values at the Gauss places of all spans, `None` where nothing was seen.
+/// Values at the Gauss places of all spans; `None` where no points were seen.
 #[derive(Debug, Clone)]
 pub(crate) struct GridValues {
     pub(crate) u: UniformKnots,
     pub(crate) v: UniformKnots,
-    /// v outer, u inner.
+    /// The values, v outer, u inner.
     pub(crate) values: Vec<Option<f64>>,
-    /// Mean variance of a value as the points' weights state it.
+    /// Mean variance of a value according to the points' weights.
     pub(crate) stated: f64,
 }
 
 /// Nullity of the third-difference penalty along an axis: quadratics.
 const NULLITY: usize = 3;
-/// The search covers penalties whose largest eigenvalue is 10^x times that of the data, x in this range. Beyond the
-/// upper end rounding would bend the shapes that the penalty is to leave alone; beyond the lower the fit interpolates.
+/// Range of the exponents x of the search, in which the penalty's largest eigenvalue is 10^x times that of the data.
+/// Beyond the upper end rounding would bend the shapes that the penalty does not affect; beyond the lower end the fit
+/// interpolates.
 const EXPONENTS: (f64, f64) = (-1.0, 10.0);
-/// Exponents of the spline that goes through first: it follows waves over ten spans and damps those over four, as kinks of a fill are.
+/// Exponents of the stiff spline for the first fill of gaps: it follows waves over ten spans and damps those over four,
+/// such as the kinks of a crude fill.
 const STIFF: [f64; 2] = [6.0, 6.0];
-/// From this exponent on spans of twice the length will do: a wave over four of them is damped to 1/240, and it is
-/// the shortest that they follow to a hundredth.
+/// Exponent from which spans of twice the length suffice: a wave over four spans is damped to 1/240, and it is the
+/// shortest that they follow to a hundredth.
 const COARSE: f64 = 6.0;
-/// Rounds of filling gaps with the smoothed values; each takes up what the gaps' values still bend the spline.
+/// Rounds of filling gaps with the smoothed values; each reduces the remaining effect of the gaps' values on the
+/// spline.
 const ROUNDS: usize = 5;
-/// The values' variance is taken to be at least this part of what the weights state: data without noise would ask for a
-/// penalty against which the points vanish in rounding.
+/// Least variance of the values, in parts of that by the weights: data without noise would require a penalty against
+/// which the points vanish in rounding.
 const LEAST_NOISE: f64 = 0.01;
 /// Width of the last step of the search, in decades. The criterion is flat: a tenth of a decade changes nothing.
 const LAST_STEP: f64 = 0.2;
@@ -80,8 +85,8 @@ impl GridValues {
         let mut criterion = RestrictedLikelihood::new(&along_u, &along_v, &filled);
         let mut best = STIFF;
         if !gaps.is_empty() {
-            // A crude fill has kinks that would pass for shape, and so has one that does not follow the shape: first a stiff spline goes through, then the
-            // chosen one.
+            // A crude fill has kinks that would be taken for shape, and so has one that does not follow the shape: the
+            // gaps are filled by a stiff spline first, then by the selected one.
             criterion.refill(&mut filled, &gaps, best);
             best = criterion.minimise();
             criterion.refill(&mut filled, &gaps, best);
@@ -100,8 +105,12 @@ impl GridValues {
         }
     }
 
-    /// The values, with gaps their departures from their biquadratic trend, the gaps filled by those around them, weighted by distance; and the gaps. The trend is in
-    /// the null space of the penalty and does not change the likelihood; without it a gap at the border of an inclined plate would be filled far off it.
+    /// Returns the values with gaps filled, and the gaps.
+    ///
+    /// Where there are gaps the values are replaced by their departures from their biquadratic trend, and a gap is
+    /// filled by the nearest values around it, weighted by distance. The trend is in the null space of the penalty and
+    /// does not change the likelihood. Without it a gap at the border of an inclined plate would be filled far off the
+    /// plate.
     fn filled(&self) -> (DMatrix<f64>, Vec<(usize, usize)>) {
         let (n_u, n_v) = (2 * self.u.n_spans(), 2 * self.v.n_spans());
         let trend = if self.values.contains(&None) { self.trend() } else { Trend::zeros() };
@@ -153,11 +162,11 @@ fn biquadratic(index: usize, [n_u, n_v]: [usize; 2]) -> Trend {
     Trend::from_fn(|term, _| powers(x)[term % NULLITY] * powers(y)[term / NULLITY])
 }
 
-/// The basis of an axis that makes data and penalty diagonal.
+/// Basis of an axis in which data and penalty are diagonal.
 struct AxisSpectrum {
-    /// From grid values to coordinates.
+    /// Transform from grid values to coordinates.
     transform: DMatrix<f64>,
-    /// The penalty's eigenvalues relative to the data's, the null space exactly 0.
+    /// The penalty's eigenvalues relative to those of the data; exactly 0 in the null space.
     roughness: DVector<f64>,
 }
 
@@ -169,7 +178,7 @@ impl AxisSpectrum {
             let (first, values) = axis.values(axis.start() + axis.step() * place_in_spans(j));
             (0..4).for_each(|i| basis[(j, first + i)] = values[i]);
         }
-        // Two places per span do not quite determine a spline of few spans: a touch of the identity does.
+        // Two places per span do not fully determine a spline of few spans; a small multiple of the identity is added.
         let gram = basis.transpose() * &basis + DMatrix::identity(n, n) * 1e-9;
         let rough = axis.roughness();
         let penalty = DMatrix::from_fn(n, n, |i, j| {
@@ -189,15 +198,15 @@ impl AxisSpectrum {
     }
 }
 
-/// The restricted likelihood of one grid of values.
+/// Restricted likelihood of one grid of values.
 struct RestrictedLikelihood<'a> {
     u: &'a AxisSpectrum,
     v: &'a AxisSpectrum,
     /// Coordinates of the values, u down, v across.
     coordinates: DMatrix<f64>,
-    /// Their squares.
+    /// Squares of the coordinates.
     squares: DMatrix<f64>,
-    /// Sum of squares that no spline of this net can reach.
+    /// Sum of squares that no spline of this net can represent.
     outside: f64,
     n_values: usize,
 }
@@ -210,7 +219,8 @@ impl<'a> RestrictedLikelihood<'a> {
         Self { u, v, coordinates, squares, outside, n_values: values.len() }
     }
 
-    /// Puts the spline at exponents `x` into the gaps of the values, so that in the end they no longer pull at it.
+    /// Fills the gaps of the values with the spline at exponents `x`, repeatedly, so that the gaps finally have no
+    /// effect on it.
     fn refill(&mut self, values: &mut DMatrix<f64>, gaps: &[(usize, usize)], x: [f64; 2]) {
         for _ in 0..ROUNDS {
             let smooth = self.smoothed(x);
@@ -219,13 +229,13 @@ impl<'a> RestrictedLikelihood<'a> {
         }
     }
 
-    /// The penalty's factors at exponents `x`.
+    /// Returns the penalty's factors at exponents `x`.
     fn scales(&self, x: [f64; 2]) -> [f64; 2] {
         let largest = |s: &AxisSpectrum| s.roughness.max().max(f64::MIN_POSITIVE);
         [10f64.powf(x[0]) / largest(self.u), 10f64.powf(x[1]) / largest(self.v)]
     }
 
-    /// Penalised sum of squares, and ln det of data + penalty over penalty, without the null space.
+    /// Returns the penalised sum of squares, and ln det of data + penalty over penalty, without the null space.
     fn terms(&self, x: [f64; 2]) -> (f64, f64) {
         let [su, sv] = self.scales(x);
         let (mut square, mut log_det) = (self.outside, 0.0);
@@ -247,8 +257,9 @@ impl<'a> RestrictedLikelihood<'a> {
         (square, log_det)
     }
 
-    /// What noise alone makes the spline scatter by, over what is not known of it in all, both as variances summed over the
-    /// coordinates: a coordinate shrunk by the factor f scatters by f^2 of its noise, and is known to f of it.
+    /// Returns the share of the spline's posterior variance that is scatter due to noise, both summed over the
+    /// coordinates: a coordinate shrunk by the factor f scatters by f^2 of its noise and has a posterior variance of f
+    /// of it.
     fn noise_share(&self, x: [f64; 2]) -> f64 {
         let [su, sv] = self.scales(x);
         let kept = |ru: &f64, rv: &f64| 1.0 / (1.0 + su * ru + sv * rv);
@@ -257,18 +268,18 @@ impl<'a> RestrictedLikelihood<'a> {
         all().map(|f| f * f).sum::<f64>() / all().sum::<f64>()
     }
 
-    /// Variance of a grid value at exponents `x`.
+    /// Returns the variance of a grid value at exponents `x`.
     fn noise(&self, x: [f64; 2]) -> f64 {
         (self.terms(x).0 / (self.n_values - NULLITY * NULLITY) as f64).max(f64::MIN_POSITIVE)
     }
 
-    /// -2 ln of the restricted likelihood, up to a constant.
+    /// Returns -2 ln of the restricted likelihood, up to a constant.
     fn value(&self, x: [f64; 2]) -> f64 {
         let (square, log_det) = self.terms(x);
         (self.n_values - NULLITY * NULLITY) as f64 * square.max(f64::MIN_POSITIVE).ln() + log_det
     }
 
-    /// Exponents of the largest likelihood: a coarse grid, then a search with halved steps.
+    /// Finds the exponents of the largest likelihood by a coarse grid, then a search with halved steps.
     fn minimise(&self) -> [f64; 2] {
         let (low, high) = EXPONENTS;
         let coarse = |k: usize| low + (high - low) * k as f64 / 5.0;
@@ -296,7 +307,7 @@ impl<'a> RestrictedLikelihood<'a> {
         best.0
     }
 
-    /// The grid values of the spline at exponents `x`.
+    /// Returns the grid values of the spline at exponents `x`.
     fn smoothed(&self, x: [f64; 2]) -> DMatrix<f64> {
         let [su, sv] = self.scales(x);
         let shrunk = DMatrix::from_fn(self.coordinates.nrows(), self.coordinates.ncols(), |i, k| {

@@ -1,12 +1,12 @@
 //! Sparse Cholesky factorisation of symmetric positive definite systems on meshes, ordered by nested dissection.
 //!
-//! A system has `D` unknowns per node of a [`Graph`]; nodes that share an edge of the graph may couple. [`Spd::analyse`]
-//! orders the nodes and analyses the factor once; after that [`Spd::clear`], [`Spd::add`], [`Spd::factor`] and
-//! [`Spd::solve`] may be repeated with other values on the same graph.
+//! A system has `D` unknowns per node of a [`Graph`]; nodes that share an edge of the graph may couple.
+//! [`Spd::analyse`] orders the nodes and analyses the factor once; after that [`Spd::clear`], [`Spd::add`],
+//! [`Spd::factor`] and [`Spd::solve`] may be repeated with other values on the same graph.
 //!
-//! faer does the factorisation: supernodal at every size (its own choice is simplicial up to 10,000 unknowns, which is
-//! slower there), and always on one thread, so that the bits of a result never depend on the machine's load or cores.
-//! The matrix is stored as its upper triangle in elimination order, so faer neither orders nor permutes anything.
+//! The factorisation is that of faer, supernodal at every size (faer's own choice is simplicial up to 10,000 unknowns,
+//! which is slower there) and always on one thread, so that results never depend on the machine's load or cores. The
+//! matrix is stored as its upper triangle in elimination order, so that faer neither orders nor permutes it.
 
 mod elimination_order;
 
@@ -39,7 +39,7 @@ pub enum SparseError {
     },
 }
 
-/// An undirected graph: for each node its neighbours, each pair listed from both ends, no node its own neighbour.
+/// Undirected graph: the neighbours of each node; each pair is listed from both ends, and no node is its own neighbour.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Graph {
     /// Neighbours of node `i` are `neighbours[starts[i]..starts[i + 1]]`; one more entry than nodes.
@@ -50,7 +50,7 @@ pub struct Graph {
 impl Graph {
     /// Joins the nodes that share an element (triangle) of `elements`.
     ///
-    /// `node_of[v]` is the node of vertex `v`, or `None` where the vertex is no unknown; nodes are `0..n_nodes`.
+    /// `node_of[v]` is the node of vertex `v`, or `None` where the vertex is not an unknown; nodes are `0..n_nodes`.
     pub fn of_elements<const K: usize>(
         elements: &[[u32; K]],
         node_of: &[Option<u32>],
@@ -103,7 +103,7 @@ impl Graph {
         self.starts.len() - 1
     }
 
-    /// Returns the neighbours of a node, in growing order.
+    /// Returns the neighbours of a node, in increasing order.
     pub fn neighbours(&self, node: u32) -> &[u32] {
         &self.neighbours[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
     }
@@ -113,7 +113,7 @@ impl Graph {
 pub struct Spd<const D: usize> {
     /// Place of each node in the elimination order.
     place: Vec<u32>,
-    /// Upper neighbours (in places, growing, without the diagonal) of each place.
+    /// Upper neighbours of each place, as places, in increasing order, without the diagonal.
     upper: Graph,
     matrix: SymbolicSparseColMat<u32>,
     values: Vec<f64>,
@@ -123,7 +123,7 @@ pub struct Spd<const D: usize> {
 
 impl<const D: usize> Spd<D> {
     /// Orders the nodes of `graph` by bisecting `points` (any projection of the nodes to a plane; only the cost depends
-    /// on it) and analyses the factor symbolically. All values are zero after it.
+    /// on it) and analyses the factor symbolically. All values are zero afterwards.
     ///
     /// # Errors
     /// [`SparseError::TooLarge`].
@@ -156,14 +156,14 @@ impl<const D: usize> Spd<D> {
         self.place.len() * D
     }
 
-    /// Sets all values to zero; the factor stays as it was.
+    /// Sets all values to zero; the factor is not changed.
     pub fn clear(&mut self) {
         self.values.fill(0.0);
     }
 
     /// Adds `block` at (i, j) and its transpose at (j, i); for i = j the block is symmetric and added once.
     ///
-    /// `i` and `j` are equal or neighbours in the graph; another pair is left out in release builds.
+    /// `i` and `j` are equal or neighbours in the graph; any other pair is ignored in release builds.
     pub fn add(&mut self, i: u32, j: u32, block: [[f64; D]; D]) {
         let (i, j) = (self.place[i as usize], self.place[j as usize]);
         let (row, column, flip) = if i <= j { (i, j, false) } else { (j, i, true) };
@@ -181,7 +181,7 @@ impl<const D: usize> Spd<D> {
         }
     }
 
-    /// Factors the matrix as it stands.
+    /// Factors the current matrix.
     ///
     /// # Errors
     /// [`SparseError::NotPositiveDefinite`], also for values that are not finite; [`SparseError::TooLarge`].
@@ -232,7 +232,7 @@ fn too_large(unknowns: usize, reason: impl std::fmt::Debug) -> SparseError {
     SparseError::TooLarge { unknowns, reason: format!("{reason:?}") }
 }
 
-/// For each place of the elimination order its neighbours at earlier places.
+/// Returns, for each place of the elimination order, its neighbours at earlier places.
 fn upper_triangle(graph: &Graph, order: &[u32], place: &[u32]) -> Graph {
     let mut upper = Graph { starts: vec![0], neighbours: Vec::with_capacity(graph.neighbours.len() / 2) };
     for (at, &node) in order.iter().enumerate() {
@@ -246,7 +246,7 @@ fn upper_triangle(graph: &Graph, order: &[u32], place: &[u32]) -> Graph {
     upper
 }
 
-/// The upper triangle in compressed columns, every node widened to `D` unknowns.
+/// Returns the pattern of the upper triangle in compressed columns, with every node widened to `D` unknowns.
 fn pattern<const D: usize>(upper: &Graph) -> Result<SymbolicSparseColMat<u32>, SparseError> {
     let unknowns = upper.n_nodes() * D;
     let entries = D * D * upper.neighbours.len() + upper.n_nodes() * D * (D + 1) / 2;

@@ -1,4 +1,7 @@
-//! Penalised weighted least squares of a bicubic spline on scattered points: sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2.
+//! Penalised weighted least squares of a bicubic spline S on scattered points.
+//!
+//! The fit minimises sum w |y - S|^2 + m_u int |S_uuu|^2 + m_v int |S_vvv|^2. In: points with weights. Out:
+//! [`FittedSpline`], with the precision of its coefficients.
 
 use crate::block_banded::BlockBandedFactor;
 use crate::normal_equations::CellMoments;
@@ -6,7 +9,7 @@ use crate::reml::{Penalty, SelectedPenalty};
 use crate::tensor_spline::TensorSpline;
 use crate::uniform_knots::UniformKnots;
 
-/// Spans of a spline, at least, when it is made coarser.
+/// Least number of spans of a coarsened spline.
 const LEAST_SPANS: usize = 8;
 
 /// Sums over the points of a fit of `D` components over two axes.
@@ -22,14 +25,15 @@ pub struct FittedSpline<const D: usize> {
     pub spline: TensorSpline<D>,
     /// Cholesky factor of the coefficients' precision, the same for every component.
     pub precision: BlockBandedFactor,
-    /// Share of the covariance that is scatter of the points, the mean over the axes' rectangle: what is left of it when two fits
-    /// to the same shape are compared. The rest is what the penalty takes from a shape, the same in both. 1 under a given penalty.
+    /// Share of the covariance that is scatter of the points, mean over the axes' rectangle: the part that remains when
+    /// two fits to the same shape are compared. The rest is the error due to the penalty, which is the same in both
+    /// fits. 1 under a given penalty.
     pub noise_share: f64,
     /// Weighted sum of squared residuals over the points and components.
     pub residual_square: f64,
     /// Sum of the weights.
     pub weight: f64,
-    /// Points with a positive weight.
+    /// Number of points with a positive weight.
     pub n_points: usize,
 }
 
@@ -37,7 +41,7 @@ pub struct FittedSpline<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{n_points} points do not determine the surface")]
 pub struct Undetermined {
-    /// Points that were given.
+    /// Number of points that were given.
     pub n_points: usize,
 }
 
@@ -48,16 +52,18 @@ impl<const D: usize> SplineFit<D> {
         Self { moments: CellMoments::empty(u, v) }
     }
 
-    /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points a little outside count for the
+    /// Adds the point `y` at (u, v) with weight `w`, one over its variance. Points slightly outside are assigned to the
     /// outermost span.
     #[inline(always)]
     pub fn add(&mut self, u: f64, v: f64, y: [f64; D], w: f64) {
         self.moments.add(u, v, y, w);
     }
 
-    /// Solves with the penalty selected by REML from the component along `direction`. Along an axis where that smooths over many
-    /// spans, and their number is even, the spline gets spans of twice the length: the same surface, at a fraction of the
-    /// cost, which grows with the fourth power of their number.
+    /// Solves with the penalty selected by REML from the component along `direction`.
+    ///
+    /// Along an axis where the penalty smooths over many spans, and their number is even, the spline gets spans of
+    /// twice the length: the same surface at a fraction of the cost, which grows with the fourth power of the number of
+    /// spans.
     ///
     /// # Errors
     /// [`Undetermined`] when there are too few points, or all in one place.
@@ -70,8 +76,8 @@ impl<const D: usize> SplineFit<D> {
         Ok(FittedSpline { noise_share, ..fitted })
     }
 
-    /// Moves the points to spans of twice the length along those of (u, v) that are `wanted` and have twice as many as a spline
-    /// needs; `None` when there is no such axis.
+    /// Returns the fit with spans of twice the length along those of (u, v) that are `wanted` and have at least twice
+    /// the least number of spans; `None` when there is no such axis.
     fn coarser(&self, wanted: [bool; 2]) -> Option<Self> {
         let can = |axis: &UniformKnots| axis.n_spans().is_multiple_of(2) && axis.n_spans() >= 2 * LEAST_SPANS;
         let coarser = [wanted[0] && can(&self.moments.u), wanted[1] && can(&self.moments.v)];
@@ -113,7 +119,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Scattered points of f with noise sigma, fitted on n x m spans.
+    /// Fits scattered points of f with noise sigma on n x m spans.
     fn fit(n_points: usize, spans: [usize; 2], sigma: f64, f: impl Fn(f64, f64) -> f64) -> FittedSpline<1> {
         let mut noise = Random::new(7);
         let mut fit =
@@ -138,7 +144,7 @@ mod tests {
     fn a_quadratic_is_smoothed_without_bias() {
         let f = |u: f64, v: f64| 0.1 * u * u - 0.05 * u * v + 0.02 * v * v + 0.3;
         let fitted = fit(20_000, [40, 28], 5e-4, f);
-        // Nine free coefficients of 20,000 points: 0.5 mm / sqrt(20,000 / 9) = 0.011 mm.
+        // Nine free coefficients from 20,000 points: 0.5 mm / sqrt(20,000 / 9) = 0.011 mm.
         let error = rms(&fitted.spline, f);
         assert!(error < 2.5e-5, "rms error {error}");
         let per_point = fitted.residual_square / fitted.n_points as f64;
@@ -163,8 +169,8 @@ mod tests {
 
     #[test]
     fn a_narrow_bend_across_both_axes_is_kept() {
-        // The same bend at 35 degrees to u. Neither penalty can be small alone, as along an axis: a seventh of the
-        // peak is lost, a fifth of it at most must be.
+        // The same bend at 35 degrees to u. Neither penalty alone can be small, as it can along an axis: a seventh of
+        // the peak is lost, a fifth is allowed.
         let (sin, cos) = 35.0_f64.to_radians().sin_cos();
         let bend = |u: f64, v: f64| {
             let x = (((u - 1.5) * cos + (v - 1.0) * sin) / 0.3 + 0.5).clamp(0.0, 1.0);
@@ -180,8 +186,9 @@ mod tests {
         assert!((peak - 0.15).abs() < 0.03, "peak curvature {peak}");
     }
 
-    /// Rows 38 mm apart under spans of 62 mm leave a third of the cells without a value, up to the border. A fill that does not follow the inclined plate passes for
-    /// shape, and hardly anything is smoothed: 0.07 mm with one by the neighbours, 0.17 mm with one by a quadratic.
+    /// Rows 38 mm apart under spans of 62 mm leave a third of the cells without a value, up to the border. A fill that
+    /// does not follow the inclined plate would be taken for shape, with hardly any smoothing: 0.07 mm with a fill by
+    /// the neighbours, 0.17 mm with a fill by a quadratic.
     #[test]
     fn an_inclined_cylinder_of_sparse_rows_is_smooth() {
         const SIGMA: f64 = 1e-3;
@@ -202,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_stated_deviation_is_the_observed_one() {
-        // The scatter of independent repeats at one place against the posterior's own figure.
+        // The scatter of independent repeats at one place is compared with the posterior's figure.
         let f = |u: f64, v: f64| 0.05 * (2.0 * u).sin() + 0.1 * v * v;
         let (mut square, mut stated) = (0.0, 0.0);
         for seed in 0..40 {
@@ -248,7 +255,7 @@ mod tests {
         assert!(apart.map(f64::abs).fold(0.0, f64::max) < 1e-10);
         assert!((joined.residual_square / direct.residual_square - 1.0).abs() < 1e-10);
         assert_eq!((joined.n_points, joined.spline.u.n_spans(), joined.spline.v.n_spans()), (4000, 12, 8));
-        // Fewer than eight spans, or an odd number, stay.
+        // Axes that would get fewer than eight spans, or have an odd number, are not changed.
         assert!(fine.coarser([false, false]).is_none() && coarse.coarser([false, true]).is_none());
     }
 

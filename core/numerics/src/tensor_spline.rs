@@ -15,7 +15,7 @@ pub struct TensorSpline<const D: usize> {
     pub control: Vec<[f64; D]>,
 }
 
-/// Value and derivatives of a spline at one place: the order of the names is the order of differentiation.
+/// Value and derivatives of a spline at one place; a field's name states the variables of differentiation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jet<const D: usize> {
     /// Value.
@@ -120,15 +120,15 @@ impl<const D: usize> TensorSpline<D> {
         jet
     }
 
-    /// The four control values that row `k` gives to the span starting at coefficient `i`.
+    /// Returns the four control values of row `k` for the span that starts at coefficient `i`.
     #[inline(always)]
     fn row(&self, i: usize, k: usize) -> &[[f64; D]] {
         let start = k * self.u.n_coefficients() + i;
         &self.control[start..start + 4]
     }
 
-    /// Returns the polynomial of the span (i, k) in its middle-centred coordinates s (along u) and t (along v): `[q][p]` is
-    /// the coefficient of s^p t^q.
+    /// Returns the polynomial of the span (i, k) in coordinates s (along u) and t (along v) from its middle: `[q][p]`
+    /// is the coefficient of s^p t^q.
     #[cfg(feature = "solvers")]
     pub(crate) fn polynomial(&self, i: usize, k: usize) -> [[[f64; D]; 4]; 4] {
         let mut bicubic = [[[0.0; D]; 4]; 4];
@@ -161,7 +161,8 @@ pub fn approximate_curve<const D: usize>(
     (0..knots.n_coefficients()).map(coefficient).collect()
 }
 
-/// Returns the sample places of one direction, two per span and the end, and the matrix from samples to least-squares coefficients.
+/// Returns the sample places of one direction, two per span and the end, and the matrix that maps samples to
+/// least-squares coefficients.
 fn grid_projection(knots: &UniformKnots) -> (Vec<f64>, DMatrix<f64>) {
     let n = 2 * knots.n_spans().max(3);
     let at: Vec<f64> =

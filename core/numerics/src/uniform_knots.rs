@@ -1,4 +1,4 @@
-//! Uniform cubic B-splines: the basis over an interval cut into equal spans, with its Gram and roughness matrices.
+//! Uniform cubic B-splines: basis over an interval divided into equal spans, with its Gram and roughness matrices.
 
 /// The cubic B-splines in one span as polynomials in t = s - 1/2: `BASIS[i][p]` is the coefficient of t^p.
 /// s in [0, 1] is the place in the span; centred powers keep moments well conditioned.
@@ -22,7 +22,7 @@ pub struct UniformKnots {
 /// Values of the four B-splines of one span, and of their derivatives by the parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct LocalBasis {
-    /// Index of the first of the four coefficients; also the span.
+    /// Index of the first of the four coefficients, which is also that of the span.
     pub first: usize,
     /// Values.
     pub value: [f64; 4],
@@ -33,7 +33,7 @@ pub struct LocalBasis {
 }
 
 impl UniformKnots {
-    /// Cuts the interval into `n_spans` (at least 1) equal spans from `start` to `end` (start < end).
+    /// Divides the interval from `start` to `end` (start < end) into `n_spans` (at least 1) equal spans.
     #[must_use]
     pub fn new(start: f64, end: f64, n_spans: usize) -> Self {
         let n_spans = n_spans.max(1);
@@ -41,7 +41,7 @@ impl UniformKnots {
         Self { start, step, per_step: 1.0 / step, n_spans }
     }
 
-    /// Cuts the interval from 0 to `length` into spans of about `span`: at least 8, at most 128.
+    /// Divides the interval from 0 to `length` into spans of about `span`: at least 8, at most 128 spans.
     #[must_use]
     pub fn of_length(length: f64, span: f64) -> Self {
         Self::new(0.0, length, ((length / span).round() as usize).clamp(8, 128))
@@ -54,7 +54,7 @@ impl UniformKnots {
         self.n_spans
     }
 
-    /// Returns the number of B-splines, and so of coefficients: spans + 3.
+    /// Returns the number of B-splines, which is that of coefficients: spans + 3.
     #[inline]
     #[must_use]
     pub fn n_coefficients(&self) -> usize {
@@ -94,7 +94,8 @@ impl UniformKnots {
         (0..self.n_spans + 7).map(|k| self.start + (k as f64 - 3.0) * self.step).collect()
     }
 
-    /// Returns the Greville abscissa of a coefficient: where a spline of linear coefficients takes their value.
+    /// Returns the Greville abscissa of a coefficient: the place where a spline of linear coefficients has the value of
+    /// this coefficient.
     #[must_use]
     pub fn abscissa(&self, coefficient: usize) -> f64 {
         self.start + (coefficient as f64 - 1.0) * self.step
@@ -156,8 +157,8 @@ impl UniformKnots {
         gram
     }
 
-    /// Returns the integrals of the products of third derivatives, laid out as [`UniformKnots::gram`]: third differences of the
-    /// coefficients.
+    /// Returns the integrals of the products of third derivatives, laid out as [`UniformKnots::gram`]: third
+    /// differences of the coefficients.
     #[must_use]
     pub fn roughness(&self) -> Vec<[f64; 4]> {
         const THIRD: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
@@ -171,12 +172,12 @@ impl UniformKnots {
     }
 }
 
-/// The pairs i <= j of the four B-splines of a span.
+/// Returns the pairs i <= j of the four B-splines of a span.
 pub(crate) fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..4).flat_map(|i| (i..4).map(move |j| (i, j)))
 }
 
-/// Product of two cubic polynomials.
+/// Returns the product of two cubic polynomials.
 pub(crate) fn multiply(a: &[f64; 4], b: &[f64; 4]) -> [f64; 7] {
     let mut product = [0.0; 7];
     for (p, x) in a.iter().enumerate() {

@@ -1,10 +1,11 @@
-//! Vector registers: cleaning up after kernels that leave their upper halves dirty.
+//! Clean-up of vector registers after kernels that leave their upper halves set.
 
 /// Guard that clears the upper halves of the vector registers when it is dropped (`vzeroupper`).
 ///
-/// To be held where faer's dense kernels run: private-gemm-x86 0.1.22, their assembly, returns without the instruction. On Intel
-/// processors every later SSE instruction between the AVX ones of the C library's `sin`, `exp` and `log` then costs a
-/// transition: outline and extraction of the next plate were measured 5 to 10 times slower. AMD processors are not affected.
+/// A guard must exist wherever faer's dense kernels run: their assembly (private-gemm-x86 0.1.22) returns without the
+/// instruction. On Intel processors every later SSE instruction between the AVX instructions of the C library's `sin`,
+/// `exp` and `log` then costs a transition: outline and extraction of the next plate were measured 5 to 10 times
+/// slower. AMD processors are not affected.
 #[derive(Debug, Default)]
 pub(crate) struct ClearVectorRegisters;
 

@@ -1,13 +1,13 @@
 //! Elimination order by geometric nested dissection (George, SIAM J. Numer. Anal. 10 (1973)).
 //!
-//! The nodes are cut in two halves at the median of their longer extent, the nodes of one half that touch the other are
-//! eliminated last, and each half is ordered in the same way. On plane meshes the separators are short, so the factor is
-//! sparser and quicker to find than by minimum degree.
+//! The nodes are divided into two halves at the median of their longer extent. The nodes of one half that are
+//! neighbours of the other form the separator and are eliminated last; each half is ordered in the same way. On plane
+//! meshes the separators are short, so that the factor is sparser and quicker to find than by minimum degree.
 
 use super::Graph;
 
-/// Parts up to this size are eliminated along their longer extent. Larger leaves are quicker to order, but 48 gives
-/// an eighth more fill (benchmarks of the flattening plugins).
+/// Largest size of a part that is not divided but eliminated along its longer extent. Larger leaves are quicker to
+/// order, but 48 gives an eighth more fill (benchmarks of the flattening plugins).
 const LEAF: usize = 20;
 
 /// Returns the nodes of `graph` in elimination order. `points` has one point per node.
@@ -21,7 +21,7 @@ pub(super) fn nested_dissection(graph: &Graph, points: &[[f64; 2]]) -> Vec<u32> 
 struct Dissection<'a> {
     graph: &'a Graph,
     points: &'a [[f64; 2]],
-    /// The upper half that a node was last put in, by number; numbers are never used again.
+    /// Number of the upper half to which a node was last assigned; numbers are never reused.
     half: Vec<u32>,
     halves: u32,
 }
@@ -68,7 +68,7 @@ impl Dissection<'_> {
         usize::from(high[1] - low[1] > high[0] - low[0])
     }
 
-    /// Puts the nodes that touch the current upper half behind the others; returns how many others there are.
+    /// Moves the nodes that are neighbours of the current upper half behind the others; returns the number of others.
     fn move_separator_to_end(&self, lower: &mut [u32]) -> usize {
         let touches =
             |node: u32| self.graph.neighbours(node).iter().any(|&k| self.half[k as usize] == self.halves);

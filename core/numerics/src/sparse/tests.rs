@@ -1,6 +1,6 @@
 use super::*;
 
-/// Triangles of an n x n grid of vertices, and their places.
+/// Returns the triangles of an n x n grid of vertices, and the places of the vertices.
 fn grid(n: u32) -> (Vec<[u32; 3]>, Vec<[f64; 2]>) {
     let points = (0..n * n).map(|k| [f64::from(k % n), f64::from(k / n)]).collect();
     let cells = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
@@ -30,7 +30,7 @@ fn the_order_names_every_node_once_and_saves_fill() {
     let graph = Graph::of_elements(&triangles, &all_free(n), n);
     let mut order = elimination_order::nested_dissection(&graph, &points);
     let dissected = Spd::<1>::analyse(&graph, &points).unwrap().factor.len();
-    // Along a line nothing can be dissected: the order is that of the rows, the factor a full band.
+    // Nodes on a line cannot be dissected: the order is that of the rows, the factor a full band.
     let row_by_row: Vec<_> = (0..n).map(|k| [k as f64, 0.0]).collect();
     let banded = Spd::<1>::analyse(&graph, &row_by_row).unwrap().factor.len();
     assert!(dissected * 3 < banded * 2, "factor of {dissected} entries against {banded} of a band");
@@ -46,7 +46,7 @@ fn solving_undoes_multiplying() {
     let mut spd = Spd::<2>::analyse(&graph, &points).unwrap();
     let couple = |i: u32, j: u32| {
         let (low, high) = (f64::from(i.min(j)), f64::from(i.max(j)));
-        // Not symmetric, so that a block that lands transposed is seen.
+        // Not symmetric, so that a transposed block is detected.
         let block = [[-0.3 - low.sin() * 0.1, 0.2 * high.cos()], [0.05 * low.cos(), -0.4]];
         if i <= j { block } else { [[block[0][0], block[1][0]], [block[0][1], block[1][1]]] }
     };
