@@ -5,9 +5,9 @@ use std::f64::consts::{PI, TAU};
 /// Direction of one beam in the scanner frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
-    /// Radians, counter-clockwise from +x seen from above.
+    /// Azimuth, radians, counter-clockwise from +x seen from above.
     pub azimuth: f64,
-    /// Radians above the horizontal plane.
+    /// Elevation, radians above the horizontal plane.
     pub elevation: f64,
 }
 
@@ -26,7 +26,7 @@ impl Direction {
     }
 }
 
-/// Returns the azimuth in (-pi, pi]; one within stays the same to the last bit.
+/// Returns the azimuth in (-pi, pi]; an azimuth already within is unchanged to the last bit.
 pub fn wrap_azimuth(azimuth: f64) -> f64 {
     if -PI < azimuth && azimuth <= PI {
         return azimuth;
@@ -35,9 +35,9 @@ pub fn wrap_azimuth(azimuth: f64) -> f64 {
     if wrapped > PI { wrapped - TAU } else { wrapped }
 }
 
-/// An angular window of the scanner: the part of the dome that a region scan covers, radians.
+/// Angular window of the scanner: the part of the dome that a region scan covers, radians.
 ///
-/// `azimuth_width` runs counter-clockwise from `azimuth_start`, so that a window across the seam at pi is no special
+/// `azimuth_width` runs counter-clockwise from `azimuth_start`, so that a window across the seam at pi is not a special
 /// case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {

@@ -1,4 +1,4 @@
-//! One vertical sweep of the mirror.
+//! Column of the lattice: one vertical sweep of the mirror.
 
 /// Side of the mirror's rotation that measured a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,29 +18,29 @@ pub enum State {
     Valid = 0,
     /// Only the direction is known.
     DirectionOnly = 1,
-    /// Without an echo.
+    /// No echo was received.
     #[default]
     NoReturn = 2,
 }
 
 /// One vertical sweep of the mirror at one azimuth, rows from top to bottom.
 ///
-/// All vectors have one entry per row from `first_row` on. `azimuth` and `elevation` are the true directions of
-/// the beams (radians), which need not be those of an ideal lattice. `range_m` is undefined unless the state is
+/// All vectors have one entry per row from `first_row` on. `azimuth` and `elevation` are the true directions of the
+/// beams (radians), which may differ from those of an ideal lattice. `range_m` is undefined unless the state is
 /// [`State::Valid`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Column {
     /// Place in the lattice, by increasing azimuth.
     pub index: u32,
-    /// Side of the mirror turn.
+    /// Side of the mirror's rotation.
     pub face: Face,
     /// Row of the first entry.
     pub first_row: u32,
     /// Distance along the beam, metres.
     pub range_m: Vec<f64>,
-    /// Radians.
+    /// True azimuth of each beam, radians.
     pub azimuth: Vec<f64>,
-    /// Radians.
+    /// True elevation of each beam, radians.
     pub elevation: Vec<f64>,
     /// Raw reflectance in the range that the header declares.
     pub intensity: Vec<u16>,
@@ -80,7 +80,7 @@ pub enum ColumnError {
 }
 
 impl Column {
-    /// Bytes of one sample: range, two angles, intensity, state.
+    /// Number of bytes of one sample: range, two angles, intensity, state.
     pub const SAMPLE_BYTES: usize = 3 * size_of::<f64>() + size_of::<u16>() + size_of::<State>();
 
     /// Returns the number of rows.
@@ -93,7 +93,7 @@ impl Column {
         self.range_m.is_empty()
     }
 
-    /// Checks lengths, rows and numbers: a checked column holds no NaN in a measured cell.
+    /// Checks lengths, rows and numbers: a checked column has no NaN in a measured cell.
     ///
     /// # Errors
     /// The first fault, with its place.

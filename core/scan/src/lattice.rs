@@ -1,10 +1,10 @@
-//! A whole scan in memory.
+//! Lattice: a whole scan in memory.
 
 use crate::{Column, ColumnError, Direction, Face, ScanHeader, State};
 
 /// A scan as one lattice, stored column after column: cell index `column * n_rows + row`.
 ///
-/// A cell costs 27 bytes; nothing is rounded.
+/// A cell takes 27 bytes; values are not rounded.
 #[derive(Debug, Clone)]
 pub struct Lattice {
     header: ScanHeader,
@@ -48,7 +48,7 @@ impl Lattice {
         }
     }
 
-    /// Stores a column, in any order of arrival; a column that comes twice replaces itself.
+    /// Stores a column, in any order of arrival; a column that arrives again replaces the former one.
     ///
     /// # Errors
     /// As [`Column::check`].
@@ -83,7 +83,7 @@ impl Lattice {
         self.n_columns as usize
     }
 
-    /// Returns the face of a column, `None` when it did not come.
+    /// Returns the face of a column; `None` when the column has not arrived.
     pub fn face(&self, column: usize) -> Option<Face> {
         self.present[column]
     }

@@ -1,10 +1,12 @@
 //! Lattice of a terrestrial laser scan: columns, cell states, directions, header and trailer.
 //!
-//! A terrestrial laser scanner turns a mirror about a horizontal axis (one *column* per sweep) while its head
-//! turns about the vertical (one azimuth per column). The cells therefore form a lattice with `n_rows` x
-//! `n_columns` places, most of them filled. Everything here is in the scanner frame: right-handed, z up, origin
-//! at the mirror; metres, radians; azimuth counter-clockwise from +x seen from above, elevation up from the
-//! horizontal. Row 0 is at the top, columns run by increasing azimuth. Drivers deliver every scan in this order.
+//! A terrestrial laser scanner turns a mirror about a horizontal axis (one *column* per sweep) while its head turns
+//! about the vertical (one azimuth per column). The cells therefore form a lattice with `n_rows` x `n_columns` places,
+//! most of them filled.
+//!
+//! All quantities are in the scanner frame: right-handed, z up, origin at the mirror; metres, radians; azimuth
+//! counter-clockwise from +x seen from above, elevation up from the horizontal. Row 0 is at the top, columns run by
+//! increasing azimuth. Drivers deliver every scan in this order.
 //!
 //! This crate does no I/O and has no file format; those are in `platen-formats`.
 

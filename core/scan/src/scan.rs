@@ -3,9 +3,9 @@
 /// Header of a scan, before its first column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScanHeader {
-    /// Rows of the lattice.
+    /// Number of rows of the lattice.
     pub n_rows: u32,
-    /// Columns expected by the driver.
+    /// Number of columns expected by the driver.
     pub n_columns: u32,
     /// Nominal azimuth of column 0, radians.
     pub azimuth_start: f64,
@@ -15,19 +15,19 @@ pub struct ScanHeader {
     pub elevation_start: f64,
     /// Angle between neighbouring rows, radians, positive.
     pub elevation_step: f64,
-    /// First column of the other face where the scan has two: of the back face, of the front face where the head turns
-    /// clockwise.
+    /// First column of the second face where the scan has two faces: that of the back face, or of the front face where
+    /// the head turns clockwise.
     pub seam_column: Option<u32>,
     /// Smallest and largest intensity that the instrument can report.
     pub intensity_range: (u16, u16),
-    /// Whether the scan was simulated.
+    /// True when the scan was simulated.
     pub simulated: bool,
     /// Maker, model and serial number, as far as known.
     pub instrument: String,
     /// Time of the scan, seconds since 1970 UTC, where known.
     pub acquired_unix_s: Option<f64>,
-    /// Range error that neighbouring cells share and averaging leaves, one sigma, metres, as the instrument's data sheet
-    /// states it; `None` where it is not known.
+    /// Range error that neighbouring cells share and averaging does not reduce, one standard deviation, metres, as
+    /// stated by the instrument's data sheet; `None` where it is not known.
     pub range_error_m: Option<f64>,
     /// Decisions and changes of the driver, one sentence each (orientation, units, handedness).
     pub notes: Vec<String>,
@@ -48,11 +48,11 @@ pub enum Outcome {
 /// Trailer of a scan, after its last column; a scan without one is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ScanEnd {
-    /// Columns sent.
+    /// Number of columns sent.
     pub columns: u32,
-    /// Valid cells sent.
+    /// Number of valid cells sent.
     pub points: u64,
-    /// Columns at the start, in time, that are laser warm-up and must not be used.
+    /// Number of columns at the start, in time, that are laser warm-up and must not be used.
     pub warm_up_columns: u32,
     /// Outcome.
     pub outcome: Outcome,
