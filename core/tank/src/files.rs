@@ -1,4 +1,4 @@
-//! Plate files and the list of blanks.
+//! Writer of plate files and of the list of blanks.
 
 use std::fmt::Write as _;
 
@@ -126,7 +126,7 @@ fn write_templates(out: &mut String, plate: &Plate, rule: &Rule) -> std::fmt::Re
 /// Returns the list of blanks as CSV: one line for each zone with its plate.
 ///
 /// # Errors
-/// A sentence of the writer.
+/// A message of the writer.
 pub fn blank_list<'a>(
     tank: &Tank,
     plates: impl Iterator<Item = (&'a Zone, &'a Plate)>,

@@ -1,10 +1,12 @@
-//! From a tank's zones to its plates: blank, target, templates and trim lines of each.
+//! Development of a tank's zones to plates: blank, target, templates and trim lines of each plate.
 //!
-//! A zone is a ring of equal plates on a surface of revolution: course of a cylinder, cone, sphere between two polar angles, knuckle of
-//! a torus. [`Tank::load`] reads the zones, [`Plate::of`] develops one, [`plate_file`] writes the plate file and [`blank_list`] the list
-//! for the mill. Lengths in metres, on the mid-surface unless named otherwise; angles in radians.
+//! A zone is a ring of equal plates on a surface of revolution: course of a cylinder, cone, sphere between two polar
+//! angles, knuckle of a torus. [`Tank::load`] reads the zones, [`Plate::of`] develops one, [`plate_file`] writes the
+//! plate file and [`blank_list`] the list for the mill. Lengths are in metres, on the mid-surface unless stated
+//! otherwise; angles in radians.
 //!
-//! Limits: plates are rectangles with u across the ring and v along its meridian; openings, crowns and the weld preparation are not laid out.
+//! Limits: blanks are rectangles with u across the ring and v along its meridian; openings, crowns and the weld
+//! preparation are not laid out.
 
 mod files;
 mod membrane;
@@ -27,7 +29,7 @@ const DENSITY: f64 = 7850.0;
 pub struct Tank {
     /// Name.
     pub name: String,
-    /// Surface that the file's radii refer to.
+    /// Surface to which the file's radii refer.
     pub radius_of: RadiusOf,
     /// Face that the scanner sees.
     pub scanned_face: Facing,
@@ -39,7 +41,7 @@ pub struct Tank {
     pub supports: Option<String>,
     /// Steel of the plates.
     pub steel: Option<Steel>,
-    /// Largest blank; `None` where any can be had.
+    /// Largest blank; `None` where any size is available.
     pub mill: Option<Mill>,
     /// Rules of the templates.
     pub rules: Vec<Rule>,
@@ -58,18 +60,19 @@ pub struct Mill {
     pub mass: Option<f64>,
 }
 
-/// Rule for templates: which board, which gap, and where that is written.
+/// Rule for templates: length of the board, largest gap, and their source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rule {
     /// Name by which zones refer to it.
     pub name: String,
-    /// Length of the board and largest gap; `None` until somebody who owns the text has typed them in. An empty rule judges nothing.
+    /// Length of the board and largest gap; `None` until a person with access to the document has entered them. A rule
+    /// without them gives no verdict.
     pub limit: Option<[f64; 2]>,
     /// Document and clause.
     pub clause: String,
-    /// Its edition.
+    /// Edition of the document.
     pub edition: Option<String>,
-    /// Who read it and typed it in.
+    /// Person who read the document and entered the figures.
     pub typed_by: Option<String>,
 }
 
@@ -88,14 +91,14 @@ impl Rule {
 pub struct Zone {
     /// Name, also the plates' name.
     pub name: String,
-    /// Number of the plate file, by which the press names its target.
+    /// Number of the plate file, by which the press identifies its target.
     pub recipe: u16,
     /// Mid-surface.
     pub surface: Revolution,
     /// Thickness.
     pub thickness: f64,
-    /// Plates around.
+    /// Number of plates around the ring.
     pub plates: u32,
-    /// Rule of its templates, by its place in [`Tank::rules`].
+    /// Rule of its templates, by its index in [`Tank::rules`].
     pub rule: Option<usize>,
 }

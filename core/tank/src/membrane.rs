@@ -1,24 +1,30 @@
-//! Airy stress function of a shallow plate with constant Gaussian curvature: material displacements of a rectangular blank that is bent to a
-//! doubly curved plate with the least membrane energy.
+//! Airy stress function of a shallow, doubly curved plate, by Galerkin's method.
 //!
-//! The plate is shallow: its Gaussian curvature K is constant and K times its area small. The membrane stresses then follow from an Airy
-//! stress function X (over Young's modulus) with del^4 X = -K and X = dX/dn = 0 at the free edges (Foeppl; Timoshenko and Woinowsky-Krieger,
-//! Theory of Plates and Shells, section 98). Galerkin's method with (1 - x^2)^2 (1 - y^2)^2 times even powers. In the middle of a long strip of
-//! width W the strain along it is K (W^2 / 24 - x^2 / 2): its middle line grows, its edges shorten.
+//! In: the extents of a rectangular blank, metres, and the Gaussian curvature K of the surface to which it is bent,
+//! 1/m^2. Out: the strains, and the displacements of the material between blank and formed plate, for the least
+//! membrane energy.
+//!
+//! The membrane stresses follow from an Airy stress function X (over Young's modulus) with del^4 X = -K and X = dX/dn =
+//! 0 at the free edges (Foeppl; Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, section 98). The basis
+//! of Galerkin's method is (1 - x^2)^2 (1 - y^2)^2 times even powers. In the middle of a long strip of width W the
+//! strain along it is K (W^2 / 24 - x^2 / 2): the middle line is stretched, the edges are shortened.
+//!
+//! Limits: the plate is shallow, that is, K is constant and K times the area small.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Poisson's ratio of steel.
 const POISSON: f64 = 0.3;
-/// Even powers along each side. With 5 the displacement of the corner of a square differs by 2 % from that with 4.
+/// Number of even powers along each side. With 5 the displacement of the corner of a square differs by 2 % from that
+/// with 4.
 const POWERS: usize = 5;
-/// Points of Gauss and Legendre on an interval: exact to degree 31.
+/// Number of Gauss-Legendre points on an interval: exact to degree 31.
 const POINTS: usize = 16;
 
-/// Material of one blank.
+/// Membrane state of one blank.
 #[derive(Debug, Clone)]
 pub struct Membrane {
-    /// Half the blank along u and v.
+    /// Half the extents of the blank along u and v.
     half: [f64; 2],
     curvature: f64,
     /// Coefficients of X, v outer.
@@ -49,7 +55,7 @@ impl Membrane {
         });
         let mean = |i: usize| rule.iter().map(|(x, w)| w * basis(i, *x)[0]).sum::<f64>();
         let right = DVector::from_fn(n, |p, _| -curvature * mean(p % POWERS) * mean(p / POWERS));
-        // The matrix of a positive definite form; a blank without extent has none.
+        // The form is positive definite, except for a blank without extent.
         let solution = matrix.cholesky().map_or_else(|| DVector::zeros(n), |matrix| matrix.solve(&right));
         Self {
             half,
@@ -76,8 +82,8 @@ impl Membrane {
         [yy - POISSON * xx, xx - POISSON * yy]
     }
 
-    /// Returns the place on the formed plate of a place on the blank, both from the middle: u across the middle meridian along great circles, v
-    /// along it.
+    /// Returns the place on the formed plate of a place on the blank, both from the middle: u across the middle
+    /// meridian along great circles, v along the meridian.
     #[must_use]
     pub fn formed(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         // The middle lines stay straight, so that the strains alone move the material along each line from them.
@@ -89,7 +95,7 @@ impl Membrane {
         [x + from_middle(x, &|s| self.strain([s, y])[0]), y + from_middle(y, &along)]
     }
 
-    /// Returns the place on the blank that comes to a place on the formed plate.
+    /// Returns the place on the blank whose material is at a place on the formed plate.
     #[must_use]
     pub fn blank(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let mut place = [u, v];
@@ -160,7 +166,7 @@ mod tests {
         }
     }
 
-    /// A square is drawn in alike along both sides, and turned by a quarter it is the same square.
+    /// A square is drawn in equally along both sides, and is symmetric under a quarter turn.
     #[test]
     fn square_is_symmetric() {
         let membrane = Membrane::new([3.0, 3.0], 0.01);

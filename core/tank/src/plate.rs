@@ -1,13 +1,14 @@
-//! Development of a zone to its plate.
+//! Development of a zone to its plate: blank, trim lines, template lines and check figures.
 
 use platen_model::{Facing, Target, TrimLine};
 use serde::Serialize;
 
 use crate::{DENSITY, Membrane, Mill, Rule, Tank, Zone};
 
-/// Steps of a trim line along the meridian and across it.
+/// Number of steps of a trim line along the meridian and across it.
 const STEPS: [usize; 2] = [12, 6];
-/// Rounds in which blank and material settle: to 0.1 mm after two.
+/// Number of rounds in which the blank's size and the material's displacement are computed in turn; they agree to 0.1
+/// mm after two.
 const SIZES: usize = 3;
 /// Distance of the outer templates from the trim lines, metres.
 const INSET: f64 = 0.1;
@@ -17,7 +18,7 @@ const OUTER: f64 = 0.8;
 /// A length to be measured on the formed plate, or a figure of its forming.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
-    /// What is measured.
+    /// Name of the length or figure.
     pub what: String,
     /// Value, in the unit of its name.
     pub value: f64,
@@ -34,7 +35,7 @@ pub struct Plate {
     pub allowance: f64,
     /// Mass of the blank, kg.
     pub mass: f64,
-    /// Target, its radii on the mid-surface.
+    /// Target, with its radii on the mid-surface.
     pub target: Target,
     /// Outline of the finished plate on the blank: the seams at small and large u, the ends at small and large v.
     pub trim: [TrimLine; 4],
@@ -57,13 +58,13 @@ impl Plate {
         let share = |k: usize, n: usize| k as f64 / n as f64;
         let seam = |side: f64| (0..=STEPS[0]).map(|k| at(share(k, STEPS[0]), side)).collect::<Vec<_>>();
         let end = |t: f64| (0..=STEPS[1]).map(|k| at(t, 2.0 * share(k, STEPS[1]) - 1.0)).collect::<Vec<_>>();
-        // On the formed plate, with the widest place of the seams.
+        // Outline on the formed plate, with the widest place of the seams.
         let formed = [seam(-1.0), seam(1.0), end(0.0), end(1.0)];
         let widest = [-1.0, 1.0].map(|side| at(widest(zone), side));
         let middle = extents(formed.iter().flatten().chain(&widest)).map(|[low, high]| 0.5 * (low + high));
         let from_middle = |point: &[f64; 2]| [point[0] - middle[0], point[1] - middle[1]];
 
-        // On the blank: its size decides where its material comes to, which decides its size.
+        // Outline on the blank: its size depends on the displacement of the material, which depends on the size.
         let mut outline = formed.clone().map(|line| line.iter().map(from_middle).collect::<Vec<_>>());
         let mut widest = widest.map(|point| from_middle(&point));
         let mut box_ = extents(outline.iter().flatten().chain(&widest));
@@ -113,13 +114,14 @@ impl Plate {
         a.min(b) <= mill.width && a.max(b) <= mill.length && mill.mass.is_none_or(|most| self.mass <= most)
     }
 
-    /// Returns the least number of plates around whose blanks the mill has; `None` where no number helps, as the plates are too long.
+    /// Returns the least number of plates around the ring whose blanks the mill can supply; `None` where no number is
+    /// sufficient since the plates are too long.
     #[must_use]
     pub fn least(tank: &Tank, zone: &Zone, mill: &Mill) -> Option<u32> {
         (zone.plates..=10 * zone.plates).find(|plates| Self::with(tank, zone, *plates).is_of(mill))
     }
 
-    /// Returns the names of the lines that are long enough for a rule's board, and of those that are not.
+    /// Returns the names of the lines that are long enough for a rule's board, and those of the lines that are not.
     #[must_use]
     pub fn templates(&self, rule: &Rule) -> (Vec<&str>, Vec<&str>) {
         let chord = rule.limit.map_or(f64::INFINITY, |[chord, _]| chord);
@@ -203,7 +205,7 @@ fn checks(tank: &Tank, zone: &Zone, plates: u32, blank: [f64; 2]) -> Vec<Check> 
         mm("diagonal", chord(corner(0.0, -1.0), corner(1.0, 1.0))),
         mm("mid-surface radius across, middle", 1e3 * surface.cross_radius(0.5)),
     ];
-    // Outer fibre, from flat: ASME VIII-1, UCS-79, as design sheets quote it.
+    // Strain of the outer fibre, from flat: ASME VIII-1, UCS-79, as design sheets quote it.
     let share = if surface.is_doubly_curved() { 75.0 } else { 50.0 };
     let tightest = match surface {
         crate::Revolution::Torus { radius, .. } => radius.min(surface.cross_radius(0.5)),

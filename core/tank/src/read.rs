@@ -40,7 +40,8 @@ impl Tank {
     /// Reads a tank file.
     ///
     /// # Errors
-    /// [`Error::Unreadable`], or [`Error::Faulty`] with every fault of the file, plates that the mill cannot roll included.
+    /// [`Error::Unreadable`], or [`Error::Faulty`] with every fault of the file, including plates that the mill cannot
+    /// roll.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Ok(Self::take(Document::load(path)?)?)
     }
@@ -135,7 +136,8 @@ fn read_rule(mut table: TomlTable<'_>) -> Result<Rule, Reported> {
     Ok(Rule { name: name?, limit, clause: clause?, edition: edition?, typed_by: typed_by? })
 }
 
-/// Reads a zone into the tank. One that the mill has no blanks for is a fault with the number of plates that fits.
+/// Reads a zone into the tank. A zone for which the mill has no blanks is a fault, reported with the number of plates
+/// that fits.
 fn read_zone(mut table: TomlTable<'_>, tank: &mut Tank) -> Result<(), Reported> {
     let name = table.name("name").required();
     let recipe = table.integer("recipe").in_range(1..=i64::from(u16::MAX)).required();
@@ -202,7 +204,7 @@ fn read_surface(shape: Shape, table: &mut TomlTable<'_>, half: f64) -> Result<Re
                 let message = "radius_end_mm must be above radius_start_mm, by less than slant_mm";
                 return Err(document.fault(&place, message));
             }
-            // Half a thickness along the normal, as far as it leads away from the axis.
+            // Component of half a thickness along the normal that points away from the axis.
             let out = half * (1.0 - ((to - from) / slant).powi(2)).sqrt();
             Ok(Revolution::Cone { from: from + out, to: to + out, slant })
         }

@@ -36,7 +36,7 @@ pub enum Revolution {
     },
 }
 
-/// Half thickness and its direction: a place on the meridian with its outward normal, in the plane through the axis.
+/// Place on the meridian with its outward normal, in the plane through the axis.
 #[derive(Debug, Clone, Copy)]
 struct Meridian {
     /// Distance from the axis.
@@ -93,13 +93,15 @@ impl Revolution {
         }
     }
 
-    /// Returns half the angle about the axis that a plate covers at the share `t` of the meridian: its part of the ring, less half a gap.
+    /// Returns half the angle about the axis that a plate covers at the share `t` of the meridian: half its part of the
+    /// ring, less half a gap.
     #[must_use]
     pub fn half_width(&self, t: f64, plates: u32, gap: f64) -> f64 {
         PI / f64::from(plates) - 0.5 * gap / self.meridian(t).r
     }
 
-    /// Returns the point at the share `t` of the meridian and the angle `turn` about the axis, `off` metres outside of the mid-surface.
+    /// Returns the point at the share `t` of the meridian and the angle `turn` about the axis, `off` metres outside of
+    /// the mid-surface.
     #[must_use]
     pub fn point(&self, t: f64, turn: f64, off: f64) -> [f64; 3] {
         let Meridian { r, z, normal } = self.meridian(t);
@@ -110,9 +112,10 @@ impl Revolution {
 
     /// Returns the place of that point in the plane: u across from the middle meridian, v along it.
     ///
-    /// Cylinder and cone are developed exactly. On a sphere u is the distance from the middle meridian along the great circle across it,
-    /// and v the place on the meridian where that circle leaves it. A torus is taken for the sphere that touches it along the parallel
-    /// circle through the point, with its own meridian: right to the second order of the angle.
+    /// Cylinder and cone are developed exactly. On a sphere u is the distance from the middle meridian along the great
+    /// circle across it, and v the place on the meridian where that circle leaves it. A torus is approximated by the
+    /// sphere that touches it along the parallel circle through the point, with the torus's own meridian: correct to
+    /// the second order of the angle.
     #[must_use]
     pub fn develop(&self, t: f64, turn: f64) -> [f64; 2] {
         match *self {
@@ -133,7 +136,8 @@ impl Revolution {
         }
     }
 
-    /// Returns the target of a plate that reaches from `v_from` to `v_to` along the middle meridian (as [`Self::develop`] counts it).
+    /// Returns the target of a plate that extends from `v_from` to `v_to` along the middle meridian, in the coordinates
+    /// of [`Self::develop`].
     #[must_use]
     pub fn target(&self, v_from: f64, v_to: f64) -> TargetShape {
         let axis = std::f64::consts::FRAC_PI_2;

@@ -34,7 +34,7 @@ fn near(found: f64, wanted: f64, within: f64) {
     assert!((found - wanted).abs() <= within, "{found} for {wanted}");
 }
 
-/// 18 plates round R 9 m with gaps of 3 mm: W = (2 pi R - n g) / n, chord 2 R sin(W / 2 R) less half a thickness.
+/// 18 plates around R 9 m with gaps of 3 mm: W = (2 pi R - n g) / n, chord 2 R sin(W / 2 R) less half a thickness.
 #[test]
 fn course_of_a_cylinder() {
     let (_, plate) = only_plate(
@@ -48,8 +48,8 @@ fn course_of_a_cylinder() {
     assert_eq!(plate.target.shape, TargetShape::Cylinder { radius: 9.0, axis: FRAC_PI_2 });
 }
 
-/// Net of a frustum, "The Net of a Frustum", ceemrr.com/Geometry2: ducts of radii 2.5 and 4 inches 4 inches apart, so slant radii 7.12 and
-/// 11.39 inches and a sector of 126.4 degrees; here in units of 100 mm, in three plates.
+/// Net of a frustum, "The Net of a Frustum", ceemrr.com/Geometry2: ducts of radii 2.5 and 4 inches, 4 inches apart,
+/// hence slant radii of 7.12 and 11.39 inches and a sector of 126.4 degrees; here in units of 100 mm, in three plates.
 #[test]
 fn published_frustum() {
     let slant = (4.0_f64.powi(2) + 1.5_f64.powi(2)).sqrt();
@@ -75,7 +75,7 @@ fn petal_of_a_sphere() {
     let (tank, plate) = only_plate(
         "allowance_mm = 20.0\n[[zone]]\nname = \"s\"\nrecipe = 1\nshape = \"sphere\"\nradius_mm = 9000.0\nfrom_deg = 55.0\nto_deg = 90.0\nthickness_mm = 36.0\nplates = 24\n",
     );
-    // The petal as formed, from the blank's material.
+    // The formed petal, from the blank's material.
     let membrane = Membrane::new(plate.blank, 1.0 / 81.0);
     let half = plate.blank.map(|side| 0.5 * side);
     let formed = |at: &[f64; 2]| membrane.formed([at[0] - half[0], at[1] - half[1]]);
@@ -86,14 +86,14 @@ fn petal_of_a_sphere() {
     // The middle of a petal three times as long as wide is nearly that of a long strip, W^2 / 24 R^2.
     let wide = plate.blank[0] * plate.blank[0] / (24.0 * 81.0);
     near(check(&plate, "the same along v"), 100.0 * wide, 8.0 * wide);
-    // Blank and trimmed plate meet, but for the allowance.
+    // Blank and trimmed plate differ by the allowance only.
     let low = plate.trim.iter().flat_map(|line| &line.points).map(|at| at[1]).fold(f64::INFINITY, f64::min);
     near(low, 0.02, 1e-9);
     near(check(&plate, "cold forming strain"), 0.3, 1e-12);
     assert_eq!(tank.zones[0].surface.cross_radius(0.3), 9.0);
 }
 
-/// A place on the sphere, found again from its (u, v): along the middle meridian, then across it.
+/// A place on the sphere is recovered from its (u, v): along the middle meridian, then across it.
 #[test]
 fn sphere_is_developed_along_great_circles() {
     let surface = Revolution::Torus { radius: 9.0, centre: 0.0, from: 0.5, to: 2.4 };
@@ -108,7 +108,7 @@ fn sphere_is_developed_along_great_circles() {
     });
 }
 
-/// Cylinder and cone are developed without stretching: short distances stay.
+/// Cylinder and cone are developed without stretching: short distances are kept.
 #[test]
 fn single_curvature_keeps_lengths() {
     let cone = Revolution::Cone { from: 3.0, to: 4.0, slant: 2.5 };
@@ -124,7 +124,7 @@ fn single_curvature_keeps_lengths() {
     });
 }
 
-/// On a knuckle the development is right to the second order: a seam is as long as the meridian that it is.
+/// On a knuckle the development is correct to the second order: a seam has the length of its meridian.
 #[test]
 fn knuckle_seam_has_its_length() {
     let (radius, centre, turn, steps) = (1.5, 6.0, PI / 24.0, 12_u32);
@@ -158,7 +158,7 @@ fn too_wide_for_the_mill_names_the_number_that_fits() {
     );
 }
 
-/// Every plate file that is written is read again, and has what it was made of.
+/// Every plate file that is written can be read and contains the data from which it was made.
 #[test]
 fn plate_files_are_sound() {
     let text = "root_gap_mm = 3.0\nallowance_mm = 20.0\n[steel]\ngrade = \"SM490\"\nyield_mpa = 440.0\n\
@@ -196,7 +196,7 @@ fn the_example_makes_plates() {
     assert_eq!(list.iter().filter(|byte| **byte == b'\n').count(), 5);
 }
 
-/// Any tank of the trade gives plate files that are read again.
+/// Any tank of the trade gives plate files that can be read.
 #[test]
 fn every_zone_gives_a_sound_plate_file() {
     let lengths = (2000.0..20_000.0, 800.0..6000.0, 8.0..60.0, 12..60_u32, 0.0..6.0, 0.0..60.0);
