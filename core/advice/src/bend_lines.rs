@@ -1,7 +1,7 @@
-//! Lines along which a plate is bent to its target: parallel on a cylinder, through the developed apex on a cone.
+//! Bend lines of a target: parallel on a cylinder, through the developed apex on a cone.
 //!
-//! A line is named by its coordinate x: its distance from the plate's first corner across the lines, on a cone measured along the arc
-//! through the middle of the plate. x grows with u, or with v where the lines run along u.
+//! A line is identified by its coordinate x, metres: its distance from the plate's first corner across the lines, on a
+//! cone measured along the arc through the middle of the plate. x grows with u, or with v where the lines run along u.
 
 use platen_model::{Target, TargetShape, Task};
 use platen_shape::TargetSurface;
@@ -11,7 +11,7 @@ use platen_shape::TargetSurface;
 pub struct BendLines {
     family: Family,
     size: [f64; 2],
-    /// Coordinate of the plate's first corner, before it becomes 0.
+    /// Coordinate of the plate's first corner, before the shift that makes it 0.
     first: f64,
     length: f64,
 }
@@ -20,8 +20,8 @@ pub struct BendLines {
 enum Family {
     /// Unit direction across the lines.
     Parallel([f64; 2]),
-    /// Apex (u, v), distance from the apex to the middle of the plate, unit direction from the apex to the middle, and 1 when x grows
-    /// with the angle from u towards v, else -1.
+    /// Apex (u, v), distance from the apex to the middle of the plate, unit direction from the apex to the middle, and
+    /// 1 when x grows with the angle from u towards v, else -1.
     Fan { apex: [f64; 2], slant: f64, to_middle: [f64; 2], way: f64 },
 }
 
@@ -65,7 +65,7 @@ impl BendLines {
         x - self.first
     }
 
-    /// Returns the distance of a place from the line x, positive onward.
+    /// Returns the distance of a place from the line x, positive towards larger x.
     #[must_use]
     pub fn distance(&self, x: f64, at: [f64; 2]) -> f64 {
         match self.family {
@@ -100,7 +100,7 @@ impl BendLines {
         };
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for k in [0, 1] {
-            // Parallel to an edge to within rounding: the line lies between both edges, or misses the plate.
+            // Parallel to a pair of edges within rounding: the line lies between both edges, or misses the plate.
             if direction[k].abs() < 1e-12 {
                 if !(0.0..=self.size[k]).contains(&through[k]) {
                     return None;
@@ -116,7 +116,7 @@ impl BendLines {
     }
 }
 
-/// Returns the direction or its opposite: the one that grows with u, or with v along the v axis.
+/// Returns the direction or its opposite: the one along which u grows, or v for a direction along the v axis.
 fn onward([a, b]: [f64; 2]) -> [f64; 2] {
     let sign = if a.abs() > 1e-9 { a.signum() } else { b.signum() };
     [sign * a, sign * b]

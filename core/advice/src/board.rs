@@ -1,18 +1,20 @@
-//! Boards: the templates across the bends, with the height of the plate over the target along their lines.
+//! Boards: templates across the bends, with the height of the plate over the target along their lines, metres.
 //!
-//! On cylinder and cone a bend by the angle th along a line adds th times the distance behind the line to the height of the plate over
-//! the target: heights are linear in the angles. They are integrated from the difference of the curvatures of plate and target, in which
-//! the strokes before add up without the error of slopes; a rigid motion of the plate is free, as a template seats itself.
+//! On cylinder and cone a bend by the angle th along a line adds th times the distance behind the line to the height of
+//! the plate over the target. Heights are therefore linear in the angles. They are integrated from the difference of
+//! the curvatures of plate and target, in which earlier strokes add up without the error of slopes. A rigid motion of
+//! the plate does not matter, since a template seats itself.
 
 use platen_model::{Centre, Seat, Template};
 use platen_shape::template_seat::{Profile, Seating};
 
 use crate::bend_lines::BendLines;
 
-/// Distance of the places along a board's line, metres.
+/// Spacing of the places along a board's line, metres.
 pub const STEP: f64 = 0.025;
 
-/// Steps of the integration from one place to the next: the curvature of a sharp bend lives on a few centimetres.
+/// Number of integration steps from one place to the next: the curvature of a sharp bend extends over a few
+/// centimetres.
 const FINE: usize = 5;
 
 /// Step of the search for the worst place of a template, places.
@@ -32,7 +34,7 @@ pub struct Board {
     seat: Seat,
     /// Places along the line, metres from its first point.
     along: Vec<f64>,
-    /// The same on the plate.
+    /// The same places on the plate, (u, v).
     at: Vec<[f64; 2]>,
     /// Height of the plate over the target, metres, towards the scanner.
     pub(crate) height: Vec<f64>,
@@ -43,15 +45,15 @@ pub struct Board {
 pub struct Gap {
     /// Gap, metres.
     pub gap: f64,
-    /// The board bridges it: the plate is more hollow there than the template.
+    /// True when the board bridges the gap: the plate is more hollow there than the template.
     pub hollow: bool,
     /// Index of its place on the line.
     pub place: usize,
 }
 
 impl Board {
-    /// Lays a template on a line from the difference of curvature, plate minus target along the line, 1/m, positive towards the
-    /// scanner, at any distance along the line, metres.
+    /// Builds the board of a template on a line. The difference of curvature is plate minus target along the line, 1/m,
+    /// positive towards the scanner, as a function of the distance along the line, metres.
     #[must_use]
     pub fn new(
         template: &Template,
@@ -71,7 +73,7 @@ impl Board {
         for k in 0..n * FINE {
             let s = fine * k as f64;
             let (middle, last) = (at_distance(s + 0.5 * fine), at_distance(s + fine));
-            // Exact for a curvature that is a parabola in each fine step.
+            // Simpson's rule, exact for a curvature that is a parabola in each fine step.
             rise += slope * fine + fine * fine / 6.0 * (first + 2.0 * middle);
             slope += fine / 6.0 * (first + 4.0 * middle + last);
             first = last;
@@ -123,7 +125,8 @@ impl Board {
         worst.unwrap_or(Gap { gap: 0.0, hollow: false, place: 0 })
     }
 
-    /// Returns the largest gap that the template bridges at any place along its line (`hollow`), or the largest that it does not.
+    /// Returns the largest gap that the template bridges at any place along its line (`hollow`), or the largest gap
+    /// that it does not bridge.
     pub(crate) fn largest(&self, height: &[f64], hollow: bool) -> f64 {
         let at_place = |(profile, seating, _): (Profile, Seating, usize)| {
             let bridged = bridged(&profile, &seating);
@@ -165,7 +168,8 @@ impl Board {
     }
 }
 
-/// Returns whether the gap at a point of a seated template is one that it bridges, between its outermost contacts.
+/// Returns whether a seated template bridges the gap at a point, that is, the point lies between its outermost
+/// contacts.
 fn bridged(profile: &Profile, seating: &Seating) -> impl Fn(usize, f64) -> bool {
     let contacts = profile.contacts(seating);
     let (first, last) = (contacts.first().copied(), contacts.last().copied());

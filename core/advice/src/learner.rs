@@ -1,38 +1,50 @@
-//! Learner of the depth law: Gaussian process regression of its offset q along the plate, with its slope a (Rasmussen, Williams, "Gaussian
-//! processes for machine learning", 2006, sections 2.2 and 2.7).
+//! Learner of the depth law: Gaussian process regression of its offset q along the plate, with its slope a.
 //!
-//! A stroke at x that left the angle th observes q(x) + a th. q is a mean over the plate, which earlier plates of the same kind foretell, and
-//! a departure that is alike at neighbouring places: thickness and yield strength vary along a plate, so that a bend is foretold best by the
-//! strokes beside it. A stroke that bent less than can be told is a one-sided observation: the plate yields no sooner than at that depth.
+//! In: reported depths and measured angles of strokes. Out: offset and slope with their covariance, and from these the
+//! depth for an angle and the scatter of the angle.
+//!
+//! - A stroke at x that left the angle th observes q(x) + a th.
+//! - q is the sum of a mean over the plate, which is predicted from earlier plates of the same kind, and a departure
+//!   that is correlated between neighbouring places. Thickness and yield strength vary along a plate, so that a bend is
+//!   predicted best by the strokes beside it.
+//! - A stroke that bent the plate by less than can be detected is a one-sided observation: the plate yields no sooner
+//!   than at that depth.
+//!
+//! Source: Rasmussen, Williams, "Gaussian processes for machine learning", 2006, sections 2.2 and 2.7.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, RowVector2, Vector2};
 use platen_model::{LikePlates, PressModel};
 
 use crate::press_law::PressLaw;
 
-/// Standard deviations of offset, metres, and of the slope, share of the closed form's, where nothing is known.
+/// Prior standard deviations without earlier plates: of the offset, metres, and of the slope, share of that of the
+/// closed form.
 const COLD: [f64; 2] = [0.6e-3, 0.1];
-/// Departure of the offset from its mean over the plate, metres, one standard deviation, and the distance over which it falls to 1/e of its
-/// likeness, metres: thickness (EN 10029: about a millimetre from the thinnest to the thickest place of a plate) and yield strength vary.
+/// Departure of the offset from its mean over the plate, metres, one standard deviation, and its correlation length
+/// (distance over which the correlation falls to 1/e), metres: thickness (EN 10029: about a millimetre from the
+/// thinnest to the thickest place of a plate) and yield strength vary.
 const DEPARTURE: (f64, f64) = (0.3e-3, 2.0);
 /// Usual distance of neighbouring bends, metres.
 const FEED: f64 = 0.3;
-/// Error of a told depth, metres, with what differs from stroke to stroke at one place.
+/// Error of a reported depth, metres, including the variation from stroke to stroke at one place.
 const DEPTH_NOISE: f64 = 0.10e-3;
 /// Least error of a measured angle, radians.
 const ANGLE_NOISE: f64 = 0.4e-3;
-/// Angle by which a small bend comes out larger than by the closed form, radians, and the angles from which that falls to none: steel yields
-/// rounder than the closed form, whose offset is learned from large bends. Found with fibre steel: 3.2 mrad where 2.5 were wanted, 1 at 6 to 8.
+/// Angle by which a small bend is larger than by the closed form, radians, and the range of angles in which this excess
+/// falls to zero. Steel yields more gradually than in the closed form, whose offset is learned from large bends. Found
+/// with the steel of the fibre model: 3.2 mrad where 2.5 were wanted, 1 at 6 to 8.
 const ROUND_KNEE: (f64, [f64; 2]) = (3.2e-3, [5.7e-3, 9e-3]);
-/// Scatter of that angle from bend to bend, radians, one standard deviation. Found with fibre steel: 1.4 mrad.
+/// Scatter of that angle from bend to bend, radians, one standard deviation. Found with the steel of the fibre model:
+/// 1.4 mrad.
 const KNEE: f64 = 1.4e-3;
-/// Strokes that the assumed scatter counts for beside the observed one.
+/// Number of strokes whose weight the assumed scatter has beside the observed one.
 const SPREAD: f64 = 3.0;
-/// Scatter of the ram before any is known, metres, and the strokes that this assumption counts for.
+/// Scatter of the ram before any is known, metres, and the number of strokes whose weight this assumption has.
 const RAM: (f64, f64) = (0.1e-3, 4.0);
-/// Scatter of the place of a bend before any is known, metres, and the strokes that this assumption counts for.
+/// Scatter of the place of a bend before any is known, metres, and the number of strokes whose weight this assumption
+/// has.
 pub(crate) const PLACE: (f64, f64) = (9.2e-3, 4.0);
-/// Angle that is no bend, radians: as much as the surfaces on both sides of a stroke can hide.
+/// Least angle of a bend, radians: a smaller one can be hidden by the errors of the surfaces before and after a stroke.
 pub const LEAST_ANGLE: f64 = 2.5e-3;
 /// Half width of a 99 % interval, standard deviations.
 const P99: f64 = 2.576;
@@ -43,7 +55,7 @@ struct Observed {
     /// Coordinate of the bend, metres.
     x: f64,
     angle: f64,
-    /// Depth beyond sag and closed form, metres, and the variance of its error.
+    /// Depth in excess of sag and closed form, metres, and the variance of its error.
     depth: f64,
     noise: f64,
 }
@@ -57,18 +69,20 @@ pub struct Learner {
     covariance: Matrix2<f64>,
     like_plates: u32,
     observed: Vec<Observed>,
-    /// Covariance of the observations, factored, and its inverse times what they depart from the mean; `None` before the first.
+    /// Factored covariance of the observations, and its inverse times their departures from the mean; `None` before the
+    /// first.
     solved: Option<(Cholesky<f64, Dyn>, DVector<f64>)>,
     ram_square: f64,
     ram_weight: f64,
     /// Sum, sum of squares and number of the distances of bends from their advised lines.
     marks: [f64; 3],
-    /// Normalised innovation of each stroke with a told depth, standard deviations; positive when it bent more than expected.
+    /// Normalised innovation of each stroke with a reported depth, standard deviations; positive when it bent more than
+    /// expected.
     pub(crate) surprises: Vec<f64>,
 }
 
 impl Learner {
-    /// Starts from like plates, or from nothing known.
+    /// Builds the learner from like plates, or from the prior.
     #[must_use]
     pub fn new(law: PressLaw, like: Option<&LikePlates>) -> Self {
         let cold =
@@ -91,14 +105,14 @@ impl Learner {
         }
     }
 
-    /// Learns from a stroke of this depth at x into a plate that sagged by `sag` in the die: the angle that stayed with its standard
-    /// deviation, `None` when no bend was found.
+    /// Adds the observation of a stroke of this depth at x into a plate that sagged by `sag` in the die. `bend` is the
+    /// angle that remained with its standard deviation; `None` when no bend was found.
     pub fn observe(&mut self, x: f64, depth: f64, sag: f64, bend: Option<(f64, f64)>) {
         let (angle, sigma) = bend.unwrap_or((LEAST_ANGLE, ANGLE_NOISE));
         let depth = depth - sag - self.closed_form(angle);
         let (expected, variance) = self.expected(x, angle);
         let innovation = depth - expected;
-        // It bent no more than the least angle: only an offset that would have bent it more is contradicted.
+        // The bend is at most the least angle: this contradicts only an offset that would have given a larger bend.
         if bend.is_none() && innovation <= 0.0 {
             return;
         }
@@ -109,12 +123,12 @@ impl Learner {
         self.solve();
     }
 
-    /// Returns the depth that leaves an angle on a flat plate by the closed form, its knee rounded, metres.
+    /// Returns the depth that leaves an angle on a flat plate by the closed form with a rounded knee, metres.
     fn closed_form(&self, angle: f64) -> f64 {
         self.law.depth(angle) - ROUND_KNEE.0 * at_knee(angle) * self.law.stiffness()
     }
 
-    /// Returns the expected depth beyond sag and closed form for an angle at x, metres, and its variance.
+    /// Returns the expected depth in excess of sag and closed form for an angle at x, metres, and its variance.
     fn expected(&self, x: f64, angle: f64) -> (f64, f64) {
         let row = RowVector2::new(1.0, angle);
         let prior = (row * self.covariance * row.transpose())[0] + DEPARTURE.0.powi(2);
@@ -164,13 +178,13 @@ impl Learner {
         self.law.stiffness() + self.of_plate().0[1]
     }
 
-    /// Learns how far the ram stopped from the advised depth, metres.
+    /// Adds the distance by which the ram stopped off the advised depth, metres.
     pub fn observe_ram(&mut self, off: f64) {
         self.ram_square += off * off;
         self.ram_weight += 1.0;
     }
 
-    /// Learns how far a bend lies from its advised line, metres, positive onward.
+    /// Adds the distance of a bend from its advised line, metres, positive towards larger x.
     pub fn observe_mark(&mut self, off: f64) {
         let [sum, squares, n] = self.marks;
         self.marks = [sum + off, squares + off * off, n + 1.0];
@@ -188,7 +202,7 @@ impl Learner {
         self.sigma_told(x, angle).hypot(self.ram_sigma() / self.slope())
     }
 
-    /// Returns the same for a bend beside another one near x, as all but the first are.
+    /// Returns the same for a bend beside another one near x, as all bends except the first are.
     #[must_use]
     pub fn sigma_beside(&self, x: f64, angle: f64) -> f64 {
         if !self.observed.is_empty() {
@@ -199,7 +213,7 @@ impl Learner {
         self.angle_sigma(variance, angle).hypot(self.ram_sigma() / self.slope())
     }
 
-    /// Returns the same where the depth that the ram reached is told, radians.
+    /// Returns the same where the press reports the depth that the ram reached, radians.
     #[must_use]
     pub fn sigma_told(&self, x: f64, angle: f64) -> f64 {
         self.angle_sigma(self.expected(x, angle).1, angle)
@@ -211,7 +225,7 @@ impl Learner {
         ((variance * self.spread()).sqrt() / self.slope()).hypot(ANGLE_NOISE).hypot(KNEE * at_knee(angle))
     }
 
-    /// Returns by how much the strokes so far scattered more than expected, variances; 1 while little is known.
+    /// Returns the ratio of the observed to the expected variance of the strokes so far; 1 while little is known.
     fn spread(&self) -> f64 {
         let square: f64 = self.surprises.iter().map(|it| it * it).sum();
         ((SPREAD + square) / (SPREAD + self.surprises.len() as f64)).max(1.0)
@@ -223,7 +237,7 @@ impl Learner {
         (self.ram_square / self.ram_weight).sqrt()
     }
 
-    /// Returns the mean distance of the bends from their advised lines, drawn to 0 while few are known, metres.
+    /// Returns the mean distance of the bends from their advised lines, shrunk to 0 while few are known, metres.
     #[must_use]
     pub fn off_mark(&self) -> f64 {
         self.marks[0] / (self.marks[2] + 1.0)
@@ -260,16 +274,16 @@ impl Learner {
     }
 }
 
-/// Returns the share of the error of the closed form at its knee that is left at an angle.
+/// Returns the share of the closed form's error at the knee that remains at an angle.
 fn at_knee(angle: f64) -> f64 {
     let [from, to] = ROUND_KNEE.1;
     ((to - angle) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// Least number of like plates whose own scatter counts as much as the assumption.
+/// Number of like plates whose own scatter has the same weight as the assumption.
 const SHRINK: f64 = 3.0;
 
-/// Combines what finished plates of the same kind learned; `None` without one. Their scatter is drawn to that of nothing known
+/// Combines the results of finished plates of the same kind; `None` without any. Their scatter is shrunk to the prior
 /// while they are few.
 #[must_use]
 pub fn like_plates(law: &PressLaw, models: &[PressModel]) -> Option<LikePlates> {
@@ -325,7 +339,8 @@ mod tests {
         );
     }
 
-    /// A plate 0.8 mm thicker at its far end: back at the first end, the strokes made there count, not the last ones.
+    /// A plate 0.8 mm thicker at its far end: for a bend back at the first end the strokes made there count, not the
+    /// last ones.
     #[test]
     fn an_offset_that_changes_along_the_plate_is_followed_back() {
         let law = law();

@@ -1,21 +1,24 @@
-//! Advice for the next stroke: from target, surface and record of a plate to place, angle and depth of the next bend, with intervals,
-//! and to the reason to stop. Not in Masuda et al., who leave the choice of the stroke to the operator.
+//! Advice for the next stroke: place, angle and depth of the next bend with intervals, or the reason to stop.
+//!
+//! In: target, surface and record of a plate. Out: [`Advice`]. Not in Masuda et al., who leave the choice of the stroke
+//! to the operator.
 //!
 //! | module | from -> to | method |
 //! |---|---|---|
 //! | [`situation`] | record, surfaces -> [`Situation`] | heights under the boards by integration of the curvature |
 //! | [`bend_lines`], [`board`] | target -> lines, templates on them | parallel lines, fan of a cone; seat of a template |
 //! | [`press_law`] | angle -> depth | three-point bending with springback in closed form |
-//! | [`learner`] | told depths, measured angles -> offset and slope | Gaussian process regression along the plate |
+//! | [`learner`] | reported depths, measured angles -> offset and slope | Gaussian process regression along the plate |
 //! | `planner`, `nnls` | heights -> fewest bends | non-negative least squares, settled lines |
 //! | `past` | strokes of the history -> bends in the plate, depth law | |
 //! | `next_bend` | plan, depth law -> [`Advice`] | guard against bending too far; intervals |
-//! | `remarks` | what the strokes say of press and plate file -> sentences | |
+//! | `remarks` | evidence of the strokes about press and plate file -> sentences | |
 //! | [`press_capability`] | scatter of the ram -> gap under a board | first order |
 //! | [`strain`] | angles of bends -> strain of the face | width of a bend by thickness and punch |
 //! | `place` | double curvature -> place and direction | largest mean missing curvature |
 //!
-//! Metres and radians; angles are positive the way the target bends. Pure and deterministic: no clock, no files, no randomness.
+//! A *board* is a template on its line. Units are metres and radians; angles are positive in the sense in which the
+//! target bends. All functions are pure and deterministic: no clock, no files, no randomness.
 
 pub mod bend_lines;
 pub mod board;
@@ -41,8 +44,8 @@ pub use situation::Situation;
 use platen_model::{CannotAdvise, PlateHistory};
 use platen_shape::{Surface, TargetSurface};
 
-/// Returns the advice after the last stroke of the history, from the surfaces of the plate and of its blank: a bend with its intervals
-/// on cylinder and cone, a place on double curvature.
+/// Returns the advice after the last stroke of the history, from the surfaces of the plate and of its blank: a bend
+/// with its intervals on cylinder and cone, a place on double curvature.
 #[must_use]
 pub fn advise_on_surfaces(
     settings: &Settings,

@@ -1,4 +1,4 @@
-//! The next bend: first line of the plan, guarded against bending too far, with its depth and intervals.
+//! Next bend: the first line of the plan, guarded against bending too far, with its depth and intervals.
 //!
 //! | part | contents |
 //! |---|---|
@@ -23,20 +23,21 @@ use crate::strain::angle_of_strain;
 
 /// Half width of a 95 % interval, standard deviations.
 const P95: f64 = 1.96;
-/// Distance of a new bend from an old one, metres, unless nothing else reaches the limit.
+/// Least distance of a new bend from an old one, metres, unless no other bend reaches the limit.
 const FROM_OLD: f64 = 0.07;
-/// Error of the place, metres, and arm of an error of the angle under a board, metres: one bend misplaced and misjudged.
+/// Error of the place, metres, and arm of an error of the angle under a board, metres: one bend misplaced and
+/// misjudged.
 const RESERVE: [f64; 2] = [0.010, 0.5];
 const RESERVE_SHARE: f64 = 0.45;
-/// Smallest bend that is advised, radians: a smaller one can hardly be told from none.
+/// Smallest bend that is advised, radians: a smaller one can hardly be detected.
 const LEAST_BEND: f64 = 1.6 * LEAST_ANGLE;
-/// Missing turn below which a plate that is bent too far is turned over, radians.
+/// Missing turn (total bend angle) below which a plate that is bent too far is turned over, radians.
 const TURN_OVER: f64 = 0.040;
-/// Templates disagree where a plan lowers the largest gap to no less than this share of what it is over the limit, or where the best that whole
-/// lines can do leaves this share of the limit over it.
+/// Share that decides whether templates disagree: the plan leaves at least this share of the largest gap's excess over
+/// the limit, or the best bends along whole lines leave an excess of this share of the limit.
 const HELPS: f64 = 0.7;
 const DISAGREES: f64 = 0.2;
-/// Standard deviation of an angle, share of it, on a press that does not tell its depth.
+/// Relative standard deviation of an angle on a press that does not report its depth.
 const BY_EYE: f64 = 0.25;
 
 /// Returns the advice after the last stroke of the history.
@@ -153,7 +154,7 @@ impl<'a> Adviser<'a> {
             Sentence::new(remarks::FLATTEN_LAST, &[&u, &v])
         });
         Advice {
-            // What such a press makes of the next strokes, nobody knows.
+            // On a press that is too coarse the next strokes cannot be predicted.
             strokes_left: (!coarse).then_some([n, n + 2]),
             plan: in_order.filter_map(planned).collect(),
             too_far,
@@ -168,7 +169,8 @@ impl<'a> Adviser<'a> {
         gap.hollow == (self.situation.side > 0.0)
     }
 
-    /// Returns the worst place under each board that is bent too far, also where the plate is flatter elsewhere under the same board.
+    /// Returns the worst place under each board that is bent too far, also where the plate is flatter elsewhere under
+    /// the same board.
     fn too_far(&self) -> Vec<[f64; 2]> {
         let far = self.situation.boards.iter().filter_map(|board| {
             let far = board.gaps(&board.height).filter(|gap| self.is_too_far(gap) && gap.gap > board.limit);
@@ -217,7 +219,8 @@ impl<'a> Adviser<'a> {
         boards.iter().all(|board| alone(board) <= 0.0).then(|| Sentence::new(texts, &[&board.name, &gap]))
     }
 
-    /// Returns whether a line lies on an old bend. The surface shows a sharp kink too round, so gaps beside a re-hit are less sure.
+    /// Returns whether a line lies on an old bend. The fitted surface rounds a sharp kink, so that gaps beside a re-hit
+    /// are less certain.
     fn is_old(&self, line: usize) -> bool {
         self.past.bends.iter().any(|(x, _)| (x - self.planner.grid[line]).abs() < FROM_OLD)
     }
@@ -259,7 +262,8 @@ impl<'a> Adviser<'a> {
         if anywhere.excess < plan.excess { anywhere } else { plan }
     }
 
-    /// Returns the index of the bend to make first: of those that are not small corrections, the first in the shop's order.
+    /// Returns the index of the bend to make first: of those that are not small corrections, the first in the shop's
+    /// order.
     fn choose(&self, plan: &Plan) -> usize {
         let mut angles: Vec<f64> = plan.bends.iter().map(|bend| bend.1).collect();
         angles.sort_by(f64::total_cmp);
@@ -287,14 +291,14 @@ impl<'a> Adviser<'a> {
         self.past.learner.as_ref().map_or(PLACE.0, Learner::place_sigma)
     }
 
-    /// Returns the learned depth law where a depth can be advised: over a known die, on a press that tells its depth.
+    /// Returns the learned depth law where a depth can be advised: over a known die, on a press that reports its depth.
     fn depth_law(&self) -> Option<&Learner> {
         let told = self.history.strokes.is_empty() || self.past.depth_told;
         self.past.learner.as_ref().filter(|_| self.history.tells_depth && told)
     }
 
-    /// Returns what a bend of this angle must keep from the limit, metres: its errors of place and angle under a board, where the next bends
-    /// lie, beside the last one.
+    /// Returns the distance from the limit that a bend of this angle must keep, metres: the effect under a board of its
+    /// errors of place and angle, beside the last bend, where the next bends lie.
     fn reserve(&self, angle: f64) -> f64 {
         let x = self.past.last.unwrap_or(0.5 * self.situation.lines.length());
         let sigma = self.depth_law().map_or(BY_EYE * angle, |learner| learner.sigma_beside(x, angle));
@@ -307,13 +311,15 @@ impl<'a> Adviser<'a> {
         self.situation.sag(x, opening, &self.past.bends)
     }
 
-    /// Returns the ends of the line to be pressed, so far before the wanted one as the bends lie off their lines.
+    /// Returns the ends of the line to be pressed, offset from the wanted line by the mean distance of the bends from
+    /// their lines, in the opposite direction.
     fn ends(&self, line: usize) -> Option<[[f64; 2]; 2]> {
         let off = self.past.learner.as_ref().map_or(0.0, Learner::off_mark);
         self.situation.lines.ends(self.planner.grid[line] - off)
     }
 
-    /// Returns the bend along a line with its depth and intervals; `None` where the line to be pressed misses the plate.
+    /// Returns the bend along a line with its depth and intervals; `None` where the line to be pressed misses the
+    /// plate.
     fn bend(&self, line: usize, angle: f64) -> Option<NextBend> {
         let x = self.planner.grid[line];
         let (sigma, sag) = (self.sigma(line, angle.abs()), self.sag(x));

@@ -1,9 +1,11 @@
-//! Non-negative least squares on normal equations (Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23; on the normal
-//! equations as Bro and de Jong, "A fast non-negativity-constrained least squares algorithm", J. Chemometrics 11, 1997).
+//! Non-negative least squares on normal equations, by an active-set method.
+//!
+//! Source: Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23; on the normal equations as Bro and de
+//! Jong, "A fast non-negativity-constrained least squares algorithm", J. Chemometrics 11, 1997.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the mean diagonal that is added to it: neighbouring columns are nearly equal.
+/// Ridge in parts of the mean diagonal: neighbouring columns are nearly equal.
 const RIDGE: f64 = 1e-9;
 
 /// Returns the x >= 0 that minimises x' G x / 2 - c' x over the columns `of`, in their order.
@@ -13,7 +15,7 @@ pub(crate) fn solve(gram: &DMatrix<f64>, right: &DVector<f64>, of: &[usize]) -> 
     let scale = of.iter().map(|&i| right[i].abs()).fold(0.0, f64::max);
     let mut x = vec![0.0; n];
     let mut passive: Vec<usize> = Vec::new();
-    // Each round adds a column; cycling is impossible in exact arithmetic, and the bound stands for rounding.
+    // Each round adds a column. Cycling is impossible in exact arithmetic; the bound covers rounding.
     for _ in 0..4 * n {
         let gradient = |k: usize| {
             let taken: f64 = passive.iter().map(|&j| gram[(of[k], of[j])] * x[j]).sum();
@@ -69,7 +71,7 @@ fn least_squares(
 mod tests {
     use super::*;
 
-    /// The conditions of Karush, Kuhn and Tucker: no gradient points into the feasible side, and none is left where x > 0.
+    /// Karush-Kuhn-Tucker conditions: no gradient points into the feasible side, and it vanishes where x > 0.
     #[test]
     fn the_solution_is_optimal() {
         let mut random = fastrand::Rng::with_seed(3);

@@ -1,4 +1,4 @@
-//! Effect of the strokes so far: the bends that lie in the plate, and what they taught of the press.
+//! Effect of the strokes so far: the bends in the plate, and the state of the depth law learned from them.
 
 use platen_model::{Bend, CannotAdvise, PlateHistory, PressedStroke, Steel};
 
@@ -10,11 +10,11 @@ use crate::situation::Situation;
 
 /// Mean yield strength of structural steel where the plate file names none, pascals.
 pub(crate) const YIELD: f64 = 440e6;
-/// Largest angle between a bend and the lines, radians: others are not of a stroke.
+/// Largest angle between a bend and the lines, radians: other bends were not made by a stroke.
 const ASKEW: f64 = 0.26;
 /// Half width of a 95 % interval, standard deviations.
 const P95: f64 = 1.96;
-/// Standard deviations of the ram below which a stroke stopped short.
+/// Number of standard deviations of the ram below the advised depth from which a stroke counts as stopped short.
 const SHORT: f64 = 3.0;
 
 /// Bends, state of the depth law and last stroke of a plate.
@@ -24,18 +24,18 @@ pub(crate) struct Past {
     pub(crate) bends: Vec<(f64, f64)>,
     /// Coordinate of the last stroke.
     pub(crate) last: Option<f64>,
-    /// `None` without a die opening.
+    /// State of the depth law; `None` without a die opening.
     pub(crate) learner: Option<Learner>,
-    /// A stroke had its depth told.
+    /// True when the press reported the depth of a stroke.
     pub(crate) depth_told: bool,
-    /// Strokes whose place taught where the die is.
+    /// Number of strokes whose place was used to locate the die.
     pub(crate) marks: usize,
     /// Distance by which the last stroke stopped short of the advised depth, metres.
     pub(crate) short: Option<f64>,
 }
 
 impl Past {
-    /// Learns from the strokes of a history in their order.
+    /// Evaluates the strokes of a history in their order.
     ///
     /// # Errors
     /// [`CannotAdvise::BendsUnknown`] after a stroke whose bends are not known.
@@ -78,12 +78,13 @@ impl Past {
         self.short = None;
         if let (Some(learner), Some(depth), Some(x)) = (&mut self.learner, stroke.depth, place) {
             let sag = situation.sag(x, opening, &self.bends);
-            // A bend backwards was made with the plate turned over: another law, as the steel remembers its first direction.
+            // A bend backwards was made with the plate turned over. It follows another law, since the steel was first
+            // bent the other way.
             if learns && made.is_none_or(|(_, angle, _)| angle > 0.0) {
                 learner.observe(x, depth, sag, made.map(|(_, angle, sigma)| (angle, sigma)));
             }
             if let Some(off) = wanted.and_then(|(_, wanted)| wanted.depth).map(|wanted| depth - wanted) {
-                // A stroke that stopped short says nothing of the scatter.
+                // A stroke that stopped short is not evidence of the scatter.
                 if off > -SHORT * learner.ram_sigma() {
                     learner.observe_ram(off);
                 } else {
@@ -100,15 +101,15 @@ impl Past {
         self.last = place.or(self.last);
     }
 
-    /// Returns what the press can hold under the first template; `None` without a die or a template.
+    /// Returns the press capability under the first template; `None` without a die or a template.
     pub(crate) fn press(&self, history: &PlateHistory) -> Option<PressCapability> {
         let (die, board) = (history.die.as_ref()?, history.task.templates.first()?);
         Some(PressCapability::new(self.learner.as_ref()?.ram_sigma(), die.opening, board.chord, board.limit))
     }
 }
 
-/// Returns the angle that a told depth at the line x is expected to leave, radians, and half its 95 % interval, from the strokes of the
-/// history; `None` without a die.
+/// Returns the angle that a given depth at the line x is expected to leave, radians, and half its 95 % interval, from
+/// the strokes of the history; `None` without a die.
 #[must_use]
 pub fn expected_angle(
     settings: &Settings,
@@ -129,8 +130,8 @@ pub fn expected_angle(
     Some([low, P95 * learner.sigma_told(x, low)])
 }
 
-/// Returns the depth for a bend of this angle along the line x, as [`advise`](crate::advise) would, metres; `None` where no depth can be
-/// told.
+/// Returns the depth for a bend of this angle along the line x, as advised by [`advise`](crate::advise), metres; `None`
+/// where no depth can be given.
 #[must_use]
 pub fn depth_at(
     settings: &Settings,

@@ -1,6 +1,7 @@
-//! Place of the next bend on a doubly curved target: where most curvature is missing, and the direction in which it is.
+//! Place of the next bend on a doubly curved target: the place and direction of the largest missing curvature.
 //!
-//! Bending both ways stretches the plate, so that neither the gap after a bend nor a plan can be told from bends along lines.
+//! Limit: bending in two directions stretches the plate, so that neither the gap after a bend nor a plan can be
+//! predicted from bends along lines.
 
 use platen_model::{Advice, CannotAdvise, PlateHistory, Sentence, Step};
 use platen_shape::surface::Curvature;
@@ -9,10 +10,10 @@ use platen_shape::{Surface, TargetSurface};
 use crate::next_bend::{cannot, done, of, passes};
 use crate::remarks::STRETCHES;
 
-/// Distance of the places that are tried, metres, and half the side of the square over which each is averaged.
+/// Spacing of the places that are tried, metres, and half the side of the square over which the curvature is averaged.
 const GRID: f64 = 0.1;
 const HALF: f64 = 0.2;
-/// Least missing curvature that counts, 1/m: a radius of 200 m.
+/// Least missing curvature that is considered, 1/m: a radius of 200 m.
 const LEAST: f64 = 5e-3;
 
 /// Returns the place after the last stroke.

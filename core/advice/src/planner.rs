@@ -1,8 +1,11 @@
-//! Planner, by non-negative least squares: the fewest bends, none of them backwards, with which every board passes.
+//! Planner by non-negative least squares: the fewest bends, none of them backwards, with which every board passes.
 //!
-//! Heights of the plate over the target are linear in the angles (see [`Board`]). The angles of given lines are the non-negative least
-//! squares solution under all boards, with each board's rigid motion projected out. Over lines on a fine grid it gives the missing turn;
-//! lines at equal shares of that turn, moved while the fit gains, start the search for the fewest.
+//! 1. Heights of the plate over the target are linear in the angles (see [`Board`]). The angles on given lines are the
+//!    non-negative least-squares solution under all boards, with the rigid motion of each board projected out.
+//! 2. With all lines of a fine grid this solution is the missing turn: the bend angle that is missing along each line,
+//!    radians.
+//! 3. The search for the fewest bends starts from lines at equal shares of the missing turn, which are moved while the
+//!    fit improves.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,20 +13,21 @@ use crate::bend_lines::BendLines;
 use crate::board::{Board, Gap};
 use crate::nnls;
 
-/// Distance of the candidate lines, metres.
+/// Spacing of the candidate lines, metres.
 const GRID: f64 = 0.025;
-/// Least distance of two bends, candidate lines: closer ones act as one.
+/// Least distance of two bends, candidate lines: closer bends act as one.
 const APART: usize = 3;
-/// Moves of a line while the plan settles, candidate lines.
+/// Moves of a line that are tried while the plan is improved, candidate lines.
 const MOVES: [isize; 4] = [-3, -1, 1, 3];
 /// Rounds of moves.
 const ROUNDS: usize = 6;
-/// Numbers of strokes that are tried beyond the fewest conceivable.
+/// Number of stroke counts that are tried beyond the fewest conceivable.
 const MORE: usize = 7;
-/// Candidate lines from one to the next, and angles, of the search for a single bend; the least gain that counts, metres.
+/// Search for a single bend: distance of the lines that are tried, candidate lines, and number of angles; the least
+/// gain that counts, metres.
 const SINGLE: (usize, usize) = (2, 6);
 const SINGLE_GAIN: f64 = 0.1e-3;
-/// Bends may exceed the largest bend by this share, so that a plan is not a stroke longer for nothing.
+/// Share by which bends may exceed the largest bend, so that a plan does not take another stroke for a small excess.
 const OVER: f64 = 1.03;
 
 /// The largest gap of the plate, relative to what passes.
@@ -33,19 +37,19 @@ pub(crate) struct Worst {
     pub(crate) gap: Gap,
     /// Gap and its uncertainty less the limit, metres; negative on a plate that passes.
     pub(crate) over: f64,
-    /// The same for plans, which keep further away from a plate that is bent too far ([`HOLLOW`]).
+    /// The same for plans, which keep a larger distance from a plate that is bent too far ([`HOLLOW`]).
     pub(crate) excess: f64,
 }
 
-/// Distance that plans keep from a plate that is bent too far, beyond that from one that is not bent enough, metres: the one is mended by
-/// another stroke, the other by turning the plate over.
+/// Additional distance that plans keep from a plate that is bent too far, compared with a plate that is not bent
+/// enough, metres: the latter is corrected by another stroke, the former by turning the plate over.
 const HOLLOW: f64 = 0.3e-3;
 
 /// Bends that finish the plate: candidate line and angle, in the order of the lines.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     pub(crate) bends: Vec<(usize, f64)>,
-    /// As [`Worst::excess`], after all bends.
+    /// Excess after all bends, as [`Worst::excess`].
     pub(crate) excess: f64,
 }
 
@@ -56,15 +60,16 @@ pub(crate) struct Planner<'a> {
     side: f64,
     /// Coordinates of the candidate lines.
     pub(crate) grid: Vec<f64>,
-    /// Heights by a unit bend along each candidate line, boards one after the other.
+    /// Heights due to a unit bend along each candidate line, boards one after the other.
     ramps: Vec<DVector<f64>>,
-    /// The same with the rigid motions of the boards projected out.
+    /// The same heights with the rigid motions of the boards projected out.
     projected: DMatrix<f64>,
     gram: DMatrix<f64>,
 }
 
 impl<'a> Planner<'a> {
-    /// Prepares the lines from `edge` to the same distance from the other end. Bends act towards the scanner where `side` is 1, else away.
+    /// Prepares the lines from `edge` to the same distance from the other end. Bends act towards the scanner where
+    /// `side` is 1, else away.
     pub(crate) fn new(lines: &BendLines, boards: &'a [Board], side: f64, edge: f64) -> Self {
         let n = ((lines.length() - 2.0 * edge) / GRID).floor().max(0.0) as usize;
         // The grid lies in the middle of the reach, so that a mirrored plate gets mirrored lines.
@@ -96,7 +101,7 @@ impl<'a> Planner<'a> {
         heights + &self.ramps[line] * angle
     }
 
-    /// Returns the heights after a bend `off` metres onward of a candidate line, between the lines of the grid.
+    /// Returns the heights after a bend `off` metres beyond a candidate line, between the lines of the grid.
     pub(crate) fn bent_off(&self, heights: &DVector<f64>, line: usize, off: f64, angle: f64) -> DVector<f64> {
         let last = (self.grid.len() - 1) as f64;
         let at = (line as f64 + off / GRID).clamp(0.0, last);
@@ -109,8 +114,8 @@ impl<'a> Planner<'a> {
         bent
     }
 
-    /// Returns the largest excess of a gap and its uncertainty over the limit on the side of too much bending, under any board at any
-    /// place, metres; negative where none is bent too far.
+    /// Returns the largest excess of a gap and its uncertainty over the limit on the side of too much bending, under
+    /// any board at any place, metres; negative where the plate is bent too far nowhere.
     pub(crate) fn too_far(&self, heights: &DVector<f64>) -> f64 {
         let mut from = 0;
         let each = self.boards.iter().map(|board| {
@@ -122,7 +127,8 @@ impl<'a> Planner<'a> {
         each.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Returns heights with so many half waves along each board, as high as its uncertainty.
+    /// Returns the heights with `waves` half waves added along each board, with an amplitude of the board's
+    /// uncertainty.
     pub(crate) fn waved(&self, heights: &DVector<f64>, waves: f64, sign: f64) -> DVector<f64> {
         let wave = self.boards.iter().flat_map(|board| {
             let last = (board.height.len() - 1) as f64;
@@ -152,14 +158,14 @@ impl<'a> Planner<'a> {
         nnls::solve(&self.gram, &self.right(heights), &all)
     }
 
-    /// Returns the excess that stays when every candidate line may be bent.
+    /// Returns the excess that remains when every candidate line may be bent.
     pub(crate) fn least_excess(&self, heights: &DVector<f64>) -> f64 {
         let angles = self.missing(heights);
         self.excess_after(heights, angles.into_iter().enumerate())
     }
 
-    /// Returns the plan with the fewest bends of at most `largest` after which every board passes with `reserve(angle)` to spare; the
-    /// best of those tried where none does. Lines for which `free` is false are left out.
+    /// Returns the plan with the fewest bends of at most `largest` after which every board passes with a reserve of
+    /// `reserve(angle)`; without such a plan, the best of those tried. Lines for which `free` is false are left out.
     pub(crate) fn plan(
         &self,
         heights: &DVector<f64>,
@@ -190,8 +196,9 @@ impl<'a> Planner<'a> {
         best
     }
 
-    /// Returns the single bend of at most `largest` that lowers the largest gap most, searched directly; `None` where none does. Near the end
-    /// of a plate the least squares solution may be nothing while a gap is still too large.
+    /// Returns the single bend of at most `largest` that lowers the largest gap most, by direct search; `None` where no
+    /// bend lowers it. Near the end of a plate the least-squares solution may contain no bend while a gap is still too
+    /// large.
     pub(crate) fn single(
         &self,
         heights: &DVector<f64>,
@@ -213,7 +220,7 @@ impl<'a> Planner<'a> {
         best
     }
 
-    /// Returns the reverse bend that helps most, two thirds of it: candidate line and angle, negative.
+    /// Returns two thirds of the reverse bend that helps most: candidate line and angle, negative.
     pub(crate) fn reverse(&self, heights: &DVector<f64>) -> Option<(usize, f64)> {
         let right = self.right(heights);
         let gain = |k: &usize| right[*k].powi(2) / self.gram[(*k, *k)];
@@ -234,8 +241,9 @@ impl<'a> Planner<'a> {
         -self.projected.tr_mul(heights)
     }
 
-    /// Returns `n` lines at equal shares of the missing turn, moved while the fit gains; `None` where they find no room. Settled from
-    /// either end and the better taken, so that a mirrored plate gets mirrored lines.
+    /// Returns `n` lines at equal shares of the missing turn, moved while the fit improves; `None` where there is no
+    /// room for them. The lines are moved in order from either end and the better result is selected, so that a
+    /// mirrored plate gets mirrored lines.
     fn settled(
         &self,
         right: &DVector<f64>,
@@ -252,8 +260,8 @@ impl<'a> Planner<'a> {
         Some(lines)
     }
 
-    /// Returns the lines settled one after the other in the order of `line`, which gives the candidate line of an index, with their misfit;
-    /// `missing` is in that order too.
+    /// Returns the lines, moved one after the other in the order of `line`, with their misfit. `line` gives the
+    /// candidate line of an index; `missing` is in the same order.
     fn settled_in_order(
         &self,
         right: &DVector<f64>,

@@ -1,26 +1,27 @@
-//! Press capability: gap under a board that the repeatability of the ram leaves, beside the limit; first order.
+//! Press capability: gap under a board due to the repeatability of the ram, compared with the limit, to first order.
 //!
-//! A ram that repeats to s turns the plate by s / (w / 4) more or less in a die of opening w; under a board of chord c that is a gap of
-//! c s / w. A third of the limit is as much as a press may take of it: the rest is for places, plates and the scan.
+//! A ram with a repeatability s changes the bend angle by s / (w / 4) in a die of opening w. Under a board of chord c
+//! this is a gap of c s / w. The press may take at most a third of the limit; the rest is for the places of bends, the
+//! plates and the scan.
 
 use platen_model::units::mm;
 use platen_model::{Sentence, texts};
 
-/// Share of the limit that a press may take.
+/// Largest share of the limit that a press may take.
 const SHARE: f64 = 1.0 / 3.0;
-/// Least number of strokes from which a scatter is told.
+/// Least number of strokes from which a scatter is estimated.
 pub const LEAST_STROKES: usize = 10;
 
 /// Press capability: repeatability of the ram, and the gap under a board that it leaves.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct PressCapability {
-    /// Standard deviation of the reached about the wanted depth, metres.
+    /// Standard deviation of the reached depth about the wanted depth, metres.
     pub ram_sigma: f64,
-    /// The gap that it leaves under the board, one standard deviation, metres.
+    /// Gap under the board due to this scatter, one standard deviation, metres.
     pub gap_sigma: f64,
     /// Chord of the board, metres.
     pub chord: f64,
-    /// Its limit, metres.
+    /// Largest gap allowed under the board, metres.
     pub limit: f64,
 }
 
@@ -37,7 +38,7 @@ impl PressCapability {
         self.gap_sigma > SHARE * self.limit
     }
 
-    /// Returns it in words.
+    /// Returns the capability in words.
     #[must_use]
     pub fn sentence(&self) -> Sentence {
         let texts = if self.is_too_coarse() { TOO_COARSE } else { FINE_ENOUGH };
@@ -56,7 +57,8 @@ texts! { ,
     FINE_ENOUGH "this press is fine enough for the limit: its ram repeats to {} mm, that is {} mm under a board of {} m, limit {} mm" "このプレスは許容値に対して十分です: ラムの繰返し {} mm はすき間 {} mm に当たります (型板 {} m、許容 {} mm)"
 }
 
-/// Returns the wanted less reached depths of the strokes that did not stop short, which is three robust standard deviations or more.
+/// Returns the wanted less the reached depths of the strokes that did not stop short. A stroke stopped short where the
+/// difference is three robust standard deviations or more.
 #[must_use]
 pub fn without_short(offs: &[f64]) -> Vec<f64> {
     let mut sizes: Vec<f64> = offs.iter().map(|off| off.abs()).collect();
@@ -66,7 +68,8 @@ pub fn without_short(offs: &[f64]) -> Vec<f64> {
     offs.iter().copied().filter(|off| *off >= -3.0 * robust).collect()
 }
 
-/// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` below [`LEAST_STROKES`].
+/// Returns the standard deviation of wanted less reached depths about 0, metres, with its 95 % interval; `None` with
+/// fewer than [`LEAST_STROKES`].
 #[must_use]
 pub fn ram_scatter(offs: &[f64]) -> Option<[f64; 3]> {
     if offs.len() < LEAST_STROKES {

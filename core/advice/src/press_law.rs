@@ -1,7 +1,10 @@
 //! Depth law of a stroke: three-point bending of an elastic, perfectly plastic plate, with springback, in closed form.
 //!
-//! With w the die opening, t the thickness, E' = E / (1 - nu^2) and s' = 2 s_y / sqrt 3 (plane strain), the yield curvature is
-//! k_y = 2 s' / (E' t). Under the punch the moment is m yield moments, 1 <= m < 1.5, falling linearly to the shoulders; r = sqrt(3 - 2 m):
+//! In: thickness, yield strength, die opening. Out: the depth of the ram for a bend angle, metres.
+//!
+//! With w the die opening, t the thickness, E' = E / (1 - nu^2) and s' = 2 s_y / sqrt 3 (plane strain), the yield
+//! curvature is k_y = 2 s' / (E' t). Under the punch the moment is m yield moments, 1 <= m < 1.5; it falls linearly to
+//! the shoulders. With r = sqrt(3 - 2 m):
 //!
 //! ```text
 //! angle that stays   th(m) = (w k_y / m) [(1 - r) - (m^2 - 1) / 2]
@@ -10,9 +13,10 @@
 //! depth              f(th) = s + e;   beyond the plastic hinge  f(1.5) + (th - th(1.5)) w / 4
 //! ```
 //!
-//! A stroke of depth h leaves the angle th with h = sag + f(th) + q + a th: the sag of the bends that already lie in the die, an
-//! offset q (zero, thickness, frame, die, yield: all that is constant on a plate) and a slope a (hardening, effective opening), which
-//! the [`Learner`](crate::learner::Learner) finds. As the moment saturates, the springback hardly depends on the angle.
+//! A stroke of depth h leaves the angle th with h = sag + f(th) + q + a th. The sag is that of the bends that already
+//! lie in the die. The offset q (zero of the ram, thickness, frame, die, yield: all effects that are constant on a
+//! plate) and the slope a (hardening, effective opening) are found by the [`Learner`](crate::learner::Learner). Since
+//! the moment saturates, the springback hardly depends on the angle.
 
 use platen_model::{Die, Steel};
 
@@ -59,7 +63,8 @@ impl PressLaw {
         self.sag_at(m) + self.springback_at(m) + (angle - hinge).max(0.0) * self.stiffness()
     }
 
-    /// Returns the moment that leaves an angle below the hinge's, yield moments, by bisection: the angle grows with the moment.
+    /// Returns the moment that leaves an angle below that of the hinge, yield moments, by bisection: the angle grows
+    /// with the moment.
     fn moment(&self, angle: f64) -> f64 {
         let (mut low, mut high) = (1.0, HINGE);
         for _ in 0..60 {
@@ -105,15 +110,15 @@ mod tests {
     #[test]
     fn the_hinge_of_a_known_plate() {
         let law = law(0.36);
-        // 0.122 1/m, 11 mrad, 2.0 mm: advice of a plate of 36 mm and 440 MPa in a die of 360 mm.
+        // 0.122 1/m, 11 mrad, 2.0 mm: figures of a plate of 36 mm and 440 MPa in a die of 360 mm.
         assert!((law.yield_curvature - 0.1223).abs() < 1e-4, "{}", law.yield_curvature);
         assert!((law.angle_at(HINGE) - 0.25 * 0.36 * law.yield_curvature).abs() < 1e-15);
         assert!((law.springback_at(HINGE) - 1.98e-3).abs() < 1e-5);
         assert!((super::PressLaw::springback_at(&self::law(0.6), HINGE) - 5.5e-3).abs() < 1e-5);
     }
 
-    /// Integrates curvature over the die: a half span of the moment m (1 - 2 x / w), curvature k_y / sqrt(3 - 2 m) in the plastic part
-    /// less the elastic curvature of unloading.
+    /// Integrates the curvature over half the die with the moment m (1 - 2 x / w): curvature k_y / sqrt(3 - 2 m) in the
+    /// plastic part, less the elastic curvature of unloading.
     #[test]
     fn angle_and_sag_agree_with_numeric_integration() {
         let law = law(0.36);

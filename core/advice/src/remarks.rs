@@ -7,11 +7,11 @@ use crate::past::{Past, YIELD};
 
 /// Half width of a 95 % interval, standard deviations.
 const P95: f64 = 1.96;
-/// Strokes and distance, metres, from which an offset of the die is told.
+/// Least number of strokes and least distance, metres, from which an offset of the die is reported.
 const OFF_MARK: (usize, f64) = (3, 0.012);
-/// Like plates, and strokes of this one, below which the advice says how little it has learned.
+/// Number of like plates, and of strokes of this plate, below which the advice states that little has been learned.
 const FEW: u32 = 3;
-/// Distance from which a short stop is told, metres.
+/// Least distance of a short stop that is reported, metres.
 const SHORT: f64 = 0.3e-3;
 
 texts! { pub(crate),
@@ -43,7 +43,7 @@ pub(crate) fn of_press(past: &Past, history: &PlateHistory) -> Vec<Sentence> {
         .collect()
 }
 
-/// Returns what the strokes so far say of press and plate file, most important first.
+/// Returns sentences on press and plate file that follow from the strokes so far, the most important first.
 pub(crate) fn of_strokes(past: &Past, history: &PlateHistory) -> Vec<Sentence> {
     let say = |texts| Sentence::new(texts, &[]);
     let Some(learner) = &past.learner else { return vec![say(NO_DIE)] };

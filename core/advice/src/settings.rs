@@ -1,4 +1,4 @@
-//! Settings of the advice, as a shop chooses them: largest bend of a stroke, order of the lines.
+//! Settings of the advice, chosen by a shop: largest bend of a stroke, order of the lines.
 
 /// Settings of the advice.
 #[derive(Debug, Clone, Copy)]
@@ -9,16 +9,16 @@ pub struct Settings {
     pub strain: f64,
     /// Order of the lines.
     pub order: Order,
-    /// The guard against bending too far is on; off for the study of what it is worth.
+    /// True when the guard against bending too far is on; false only for the study of its benefit.
     pub guard: bool,
-    /// Strokes teach the depth law; off for the study of what that is worth.
+    /// True when the depth law is learned from strokes; false only for the study of its benefit.
     pub learns: bool,
 }
 
 /// Order of the lines of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// From the last bend onward, then from the first edge again.
+    /// From the last bend towards larger x, then from the first edge again.
     Onward,
     /// From both ends to the middle.
     EndsIn,

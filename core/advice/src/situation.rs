@@ -1,4 +1,4 @@
-//! Input of the planner: bend lines, boards across them with the heights of the plate over its target, and the curvature of the blank.
+//! Situation of a plate, the input of the planner: bend lines, boards with heights, and curvature of the blank.
 
 use platen_model::{CannotAdvise, PlateHistory};
 use platen_shape::{Surface, TargetSurface};
@@ -7,27 +7,28 @@ use crate::bend_lines::BendLines;
 use crate::board::{Board, STEP};
 use crate::press_law::sag_of_bends;
 
-/// A board that runs within this angle along the bends cannot be changed by them: its sine.
+/// Sine of the angle to the bends below which a board is not changed by them.
 const ALONG: f64 = 0.5;
 /// Longest part of a board's line that may be unseen, metres.
 const UNSEEN: f64 = 0.2;
 
-/// Plate between two strokes.
+/// Situation of a plate between two strokes.
 #[derive(Debug, Clone)]
 pub struct Situation {
-    /// Lines along which it is bent.
+    /// Lines along which the plate is bent.
     pub lines: BendLines,
     /// Templates across the lines.
     pub boards: Vec<Board>,
     /// 1 when bends turn towards the scanner, else -1.
     pub side: f64,
-    /// Curvature of the blank across the lines in steps of [`STEP`] along x, positive the way the target bends, 1/m. Empty: flat.
+    /// Curvature of the blank across the lines in steps of [`STEP`] along x, positive in the sense in which the target
+    /// bends, 1/m. Empty for a flat blank.
     pub blank: Vec<f64>,
 }
 
 impl Situation {
-    /// Returns the situation of a plate with a cylinder or cone as its target, from its surface and that of the blank; a blank that was
-    /// not scanned counts as flat.
+    /// Returns the situation of a plate with a cylinder or cone as its target, from its surface and that of the blank.
+    /// A blank that was not scanned counts as flat.
     ///
     /// # Errors
     /// The reason why nothing can be advised.
@@ -69,8 +70,8 @@ impl Situation {
         Ok(Self { lines, boards, side, blank })
     }
 
-    /// Returns the sag of the plate at the line x in a die of this opening, metres: the blank's curvature and the sharp bends since,
-    /// (x, angle).
+    /// Returns the sag of the plate at the line x in a die of this opening, metres, due to the blank's curvature and
+    /// the sharp bends since, each as (x, angle).
     #[must_use]
     pub fn sag(&self, x: f64, opening: f64, bends: &[(f64, f64)]) -> f64 {
         let blank =

@@ -1,19 +1,25 @@
 //! Strain of the face of a plate under its bends.
 //!
-//! A bend by three points is sharp, and a scan rounds it off over its spans: the width that the scan shows says nothing of the strain. Under
-//! the punch the steel spreads it over about its own thickness t, and over the arc on which it lies on a punch of radius r: a bend of
-//! angle a is about t + r a wide, its curvature a / (t + r a), the strain of its face t / 2 times that: between
-//! the mean over a thickness and the cusp of the simulator's fibre model (`core/bench`). Bends nearer to each other than the thickness strain the same face.
+//! In: the angle of the bends at one place, radians; thickness t and punch radius r, metres. Out: the strain of the
+//! face.
 //!
-//! Limit: a plate that lies on a wide punch from the first touch, or one that was rolled, is strained less than this says.
+//! A bend by three points is sharp, and the fitted surface rounds it off over its spans: the width of a bend in the
+//! scan does not determine the strain. Under the punch the bend extends over about the thickness t, and over the arc on
+//! which the plate lies on the punch. A bend of angle a is therefore about t + r a wide, its curvature is a / (t + r
+//! a), and the strain of its face t / 2 times that. This is between the mean over a thickness and the cusp of the
+//! simulator's fibre model (`core/bench`). Bends nearer to each other than the thickness strain the same face.
+//!
+//! Limit: a plate that lies on a wide punch from the first touch, or one that was rolled, is strained less than
+//! computed here.
 
-/// Returns the strain of the face under bends of this angle in all, radians, at one place.
+/// Returns the strain of the face under bends of this total angle, radians, at one place.
 #[must_use]
 pub fn face_strain(thickness: f64, punch_radius: f64, angle: f64) -> f64 {
     0.5 * thickness * angle / (thickness + punch_radius * angle)
 }
 
-/// Returns the angle in all that strains the face so far, radians; infinite where the punch is too round for that.
+/// Returns the total angle that strains the face to a given strain, radians; infinite where the punch is too round for
+/// that.
 #[must_use]
 pub fn angle_of_strain(thickness: f64, punch_radius: f64, strain: f64) -> f64 {
     let rest = 0.5 * thickness - strain * punch_radius;
@@ -31,7 +37,7 @@ mod tests {
             assert!((face_strain(0.036, radius, angle) - 0.05).abs() < 1e-12, "{radius}");
         }
         assert_eq!(angle_of_strain(0.036, 0.4, 0.05), f64::INFINITY);
-        // The study of thick plates: 1.5 and 2.1 % at 31 and 43 mrad.
+        // From the study of thick plates: 1.5 and 2.1 % at 31 and 43 mrad.
         assert!((face_strain(0.036, 0.0, 0.031) - 0.015).abs() < 1e-3);
         assert!((face_strain(0.036, 0.0, 0.043) - 0.021).abs() < 1e-3);
     }

@@ -1,5 +1,7 @@
-//! Properties of the advice on plates of one curvature profile: mirrored plates get mirrored advice, finished ones "enough", and a flat plate
-//! as few bends as a polygon under a board needs.
+//! Properties of the advice on plates of one curvature profile.
+//!
+//! Mirrored plates get mirrored advice, finished plates the advice "enough", and a flat plate as few bends as a polygon
+//! under a board requires.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod cases;
@@ -8,13 +10,13 @@ use cases::{Case, bends};
 use platen_advice::{Advice, Settings};
 use platen_model::{LikePlates, Step};
 
-/// Some bends of a stroke each at random places and of random angles.
+/// Returns some bends of one stroke each at random places and of random angles.
 fn bent(seed: u64) -> Vec<[f64; 2]> {
     let mut random = fastrand::Rng::with_seed(seed);
     (0..random.usize(0..7)).map(|_| [0.25 + 2.5 * random.f64(), 0.01 + 0.02 * random.f64()]).collect()
 }
 
-/// Places along u, metres, and angles of the plan, from the left.
+/// Returns the places along u, metres, and angles of the plan, from the left.
 fn plan(advice: &Advice, place: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let bends = advice.plan.iter().map(|bend| [place(0.5 * (bend.line[0][0] + bend.line[1][0])), bend.angle]);
     let mut bends: Vec<[f64; 2]> = bends.collect();
@@ -22,7 +24,7 @@ fn plan(advice: &Advice, place: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     bends
 }
 
-/// A flat plate is its own mirror image: of its two best plans it gets one.
+/// A flat plate is its own mirror image: one of its two best plans is advised.
 #[test]
 fn a_mirrored_plate_gets_a_mirrored_plan() {
     let case = Case::default();
@@ -47,9 +49,9 @@ fn a_finished_plate_gets_enough() {
     }
 }
 
-/// n equal bends at the pitch p leave about 0.9 k p^2 / 8 under a board. Known for a limit of 3 mm under 2 m: 7 or 8 bends of 3 m at R 9 m, 9 of
-/// 4 m at R 12 m, 11 of 3 m at R 5 m, 9 of 5 m at R 15 m, on a perfect press and gaps known exactly; here they are known to 0.2 mm, and bends
-/// keep their reserve.
+/// n equal bends at the pitch p leave about 0.9 k p^2 / 8 under a board. For a limit of 3 mm under 2 m, on a perfect
+/// press and with gaps known exactly, the known numbers are: 7 or 8 bends for 3 m at R 9 m, 9 for 4 m at R 12 m, 11 for
+/// 3 m at R 5 m, 9 for 5 m at R 15 m. Here gaps are known to 0.2 mm, and bends keep their reserve.
 #[test]
 fn a_flat_plate_needs_as_many_bends_as_a_polygon_under_the_board() {
     for (width, radius, least) in

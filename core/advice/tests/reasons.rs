@@ -1,4 +1,4 @@
-//! Reasons for no advice, and sentences about press and plate: each in both languages, and never a number that is not known.
+//! Reasons for no advice, and sentences about press and plate: each in both languages, without unknown numbers.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod cases;
@@ -62,7 +62,7 @@ fn a_stroke_that_was_not_measured_ends_the_advice() {
 fn other_supports_end_the_advice_until_they_stand_again() {
     let case = Case { supports_changed: true, ..Case::default() };
     assert_eq!(reason(&case.advice(|_, _| 0.0)), CannotAdvise::SupportsChanged);
-    // The verdict stands.
+    // The verdict is kept.
     assert_eq!(case.advice(|_, _| 1.0 / 9.0).step, Step::Done);
 }
 
@@ -73,7 +73,7 @@ fn three_boards_that_disagree_are_not_averaged() {
     let advice = case.advice(|_, v| if (v - 1.25).abs() < 0.5 { 0.8 / 9.0 } else { 1.0 / 9.0 });
     assert_eq!(reason(&advice), CannotAdvise::TemplatesDisagree);
     says(&advice, "under T1 the plate is flatter than under the other templates");
-    // All three alike flat: a plan.
+    // All three equally flat: a plan.
     bend(&case.advice(|_, _| 0.8 / 9.0));
 }
 
@@ -87,7 +87,7 @@ fn a_plate_bent_too_far_is_turned_over_only_where_that_is_allowed() {
     assert!(matches!(&advice.step, Step::TurnOver(bend) if bend.angle < 0.0), "{:?}", advice.step);
 }
 
-/// Two thirds of the plate are bent too far, the last one is flat: bending goes on there, and the zone is told.
+/// Two thirds of the plate are bent too far, the last third is flat: bending continues there, and the zone is reported.
 #[test]
 fn a_zone_that_is_bent_too_far_is_flattened_last() {
     let advice = Case::default().advice(|u, _| if u < 2.0 { 1.3 / 9.0 } else { 0.0 });
@@ -101,7 +101,8 @@ fn what_is_learned_from_few_plates_and_strokes_is_said() {
     says(&Case::default().advice(|_, _| 0.0), "learned from 0 like plates and 0 strokes");
 }
 
-/// The last 600 mm are flat, and the die reaches to 700 mm from the end: bends beside it help, until no other does.
+/// The last 600 mm are flat, and the die reaches to 700 mm from the end: bends beside that part are advised until no
+/// bend helps.
 #[test]
 fn what_lies_beyond_the_reach_of_the_die_is_said() {
     let die = Die { id: 1, opening: 0.36, edge: 0.7, punch_radius: None };
@@ -199,7 +200,7 @@ fn a_die_off_its_mark_is_said_and_allowed_for() {
     let bent: Vec<[f64; 2]> = strokes.iter().map(|it| [it.bends[0].at[0], it.bends[0].angle]).collect();
     let advice = Case { strokes, ..Case::default() }.advice(bends(&bent));
     says(&advice, "24 mm onward of the advised lines");
-    // The bend is to come where the plan has it: the advised line lies before it.
+    // The bend must be at its planned place: the advised line lies before it.
     let model = advice.model.unwrap();
     assert!((model.off_mark - 0.024).abs() < 1e-9, "{}", model.off_mark);
 }

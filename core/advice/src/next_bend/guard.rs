@@ -1,18 +1,22 @@
-//! Guard against bending too far: a bend backwards costs turning the plate over, so that a bend is made smaller while it could end there.
+//! Guard against bending too far: a planned bend is reduced while it could exceed the target.
+//!
+//! A bend backwards requires the plate to be turned over. A bend is therefore made smaller until the plate can still be
+//! finished if the bend comes out larger than intended.
 
 use super::{Adviser, LEAST_BEND, P95};
 use crate::learner::LEAST_ANGLE;
 
-/// Standard deviations up to which a bend may come out larger than intended, 99.5 % of them.
+/// Number of standard deviations up to which a bend may come out larger than intended; this covers 99.5 % of the bends.
 const GUARD: f64 = 2.6;
-/// Share of the angle at which the first stroke aims when neither like plates nor a stroke taught anything.
+/// Share of the angle that the first stroke aims at, when neither like plates nor earlier strokes are known.
 const CAUTIOUS: f64 = 0.6;
 /// Share by which a bend is made smaller in each step.
 const SMALLER: f64 = 0.85;
 
 impl Adviser<'_> {
-    /// Returns a planned bend, smaller while the plate could not be finished if it came out larger than intended. Where even a small one is
-    /// too much there, as near the end of a plate, it is the small bend anywhere that helps with the least hazard.
+    /// Returns the planned bend, reduced until the plate can be finished even if the bend comes out larger than
+    /// intended. Where even a small bend is too much, as near the end of a plate, returns the small bend on any line
+    /// that helps with the least hazard.
     pub(super) fn safe(&self, (line, planned): (usize, f64)) -> (usize, f64) {
         let mut angle = planned.min(self.settings.largest * 1.03);
         let nothing_known = self.history.like.is_none() && self.history.strokes.is_empty();
@@ -35,11 +39,12 @@ impl Adviser<'_> {
         }
     }
 
-    /// Returns the smallest bend that lowers the largest gap and, if it came out larger than intended and beside its line, bends the plate too
-    /// far under any board by the least; `None` where no such bend helps.
+    /// Returns the smallest bend that lowers the largest gap and that, if it came out larger than intended and beside
+    /// its line, would exceed the limits of the boards on the side of too much bending by the least. `None` where no
+    /// such bend helps.
     fn least_hazard(&self) -> Option<(usize, f64)> {
         let now = self.planner.worst(&self.heights)?.excess;
-        // Deeper after each stroke in a row that left no bend.
+        // Deeper after each consecutive stroke that left no bend.
         let idle = self.history.strokes.iter().rev().take_while(|stroke| stroke.bends.is_empty()).count();
         let small = LEAST_ANGLE * (1.0 + 0.4 * idle as f64);
         let large = |line| small + GUARD * self.sigma(line, small);
@@ -66,7 +71,8 @@ impl Adviser<'_> {
         self.planner.least_excess(&after) <= before
     }
 
-    /// Returns the largest angle to intend whose 99 % value still lets the plate be finished.
+    /// Returns the largest intended angle with which the plate can still be finished if the bend comes out at its 99 %
+    /// value.
     pub(super) fn deepest(&self, line: usize, angle: f64) -> f64 {
         let finishes = |angle: f64| self.finishes(line, angle + GUARD * self.sigma(line, angle));
         let (mut low, mut high) = (angle, 2.0 * angle + 0.02);

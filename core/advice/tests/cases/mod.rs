@@ -15,7 +15,7 @@ pub(crate) struct Case {
     pub(crate) width: f64,
     /// Radius of the target, metres.
     pub(crate) radius: f64,
-    /// Places along v of the boards, metres.
+    /// Places of the boards along v, metres.
     pub(crate) boards: Vec<f64>,
     pub(crate) settings: Settings,
     pub(crate) die: Option<Die>,
@@ -28,7 +28,7 @@ pub(crate) struct Case {
 }
 
 impl Default for Case {
-    /// 3 m at a radius of 9 m, one board in the middle, no stroke yet.
+    /// Returns a plate of 3 m at a radius of 9 m with one board in the middle and no stroke yet.
     fn default() -> Self {
         Self {
             width: 3.0,
@@ -114,7 +114,7 @@ impl Case {
     }
 }
 
-/// The finding of a board, as the comparison `template` gives it.
+/// Returns the finding of a board, as given by the comparison `template`.
 fn finding(board: &Board) -> TemplateFinding {
     let gap = board.worst(board.height());
     let passes = gap.gap + board.uncertainty <= board.limit;
@@ -136,13 +136,13 @@ fn finding(board: &Board) -> TemplateFinding {
     }
 }
 
-/// A stroke of this depth that left a bend across u at (u, angle).
+/// Returns a stroke of this depth that left a bend across u at (u, angle).
 pub(crate) fn stroke(u: f64, angle: f64, depth: f64) -> PressedStroke {
     let bend = Bend { at: [u, 1.25], direction: std::f64::consts::FRAC_PI_2, angle, sigma: 0.3e-3 };
     PressedStroke { depth: Some(depth), bends: vec![bend], ..PressedStroke::default() }
 }
 
-/// Curvature of bends (u, angle), each 0.1 m long, 1/m.
+/// Returns the curvature of bends (u, angle), each 0.1 m long, 1/m.
 pub(crate) fn bends(bends: &[[f64; 2]]) -> impl Fn(f64, f64) -> f64 {
     move |u, _| bends.iter().filter(|[at, _]| (u - at).abs() < 0.05).map(|[_, angle]| angle / 0.1).sum()
 }
