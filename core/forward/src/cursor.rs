@@ -1,8 +1,9 @@
-//! Cursors of the sinks: how far each has got, in `forward.sqlite` beside the record.
+//! Cursors of the sinks: the last change that each sink has, in `forward.sqlite` beside the record.
 //!
-//! A cursor moves only when its sink has acknowledged a change. Losing the file means sending again, which changes nothing at the sinks. A record
-//! that was restored from a backup has other changes after the backup than before it was lost: a cursor that belongs to the former owner number
-//! goes back to where the new one begins.
+//! A cursor moves only when its sink has acknowledged a change. Losing the file means that changes are sent again,
+//! which changes nothing at the sinks. A record that was restored from a backup has other changes after the backup than
+//! it had before it was lost. A cursor that belongs to the former owner number is therefore set back to the beginning
+//! of the new one.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,11 +23,11 @@ const SCHEMA: &str = "
 pub struct CursorError {
     /// The file.
     pub path: PathBuf,
-    /// Reason, with what to do.
+    /// Reason, with the action to take.
     pub why: String,
 }
 
-/// Cursors of one host's sinks. One process has them at a time.
+/// Cursors of one host's sinks, open in one process at a time.
 #[derive(Debug)]
 pub(crate) struct Cursors {
     connection: Connection,
@@ -37,12 +38,12 @@ impl Cursors {
     /// Opens the file, and creates it if there is none.
     ///
     /// # Errors
-    /// [`CursorError`], also while another process has it.
+    /// [`CursorError`], also while another process has the file open.
     pub(crate) fn open(path: &Path) -> Result<Self, CursorError> {
         let error = |e: rusqlite::Error| CursorError { path: path.to_owned(), why: sentence(&e) };
         let connection = Connection::open(path).map_err(error)?;
-        // The lock is kept until the process ends, however it ends. A write-ahead log with NORMAL syncs no commit: a power cut costs the last
-        // moves of a cursor, and the disk is left to the host's record.
+        // The lock is kept until the process ends, in whatever way. A write-ahead log with NORMAL syncs no commit: a
+        // power cut loses the last moves of a cursor, and the disk remains free for the host's record.
         let setup = format!(
             "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; BEGIN EXCLUSIVE; {SCHEMA} COMMIT;"
         );
@@ -62,7 +63,7 @@ impl Cursors {
         Ok(resumed(owner, n.unsigned_abs(), owners))
     }
 
-    /// Sets how far a sink has got.
+    /// Sets the cursor of a sink.
     ///
     /// # Errors
     /// [`CursorError`].
@@ -71,7 +72,7 @@ impl Cursors {
         self.run(sql, (sink, owner, signed(n)))
     }
 
-    /// Notes a change that a sink refused for its content.
+    /// Records a change that a sink refused for its content.
     ///
     /// # Errors
     /// [`CursorError`].
@@ -79,7 +80,7 @@ impl Cursors {
         self.run("INSERT OR REPLACE INTO refused VALUES (?1, ?2, ?3, ?4)", (sink, owner, signed(n), why))
     }
 
-    /// Returns how many changes a sink has refused.
+    /// Returns the number of changes that a sink has refused.
     ///
     /// # Errors
     /// [`CursorError`].
@@ -89,7 +90,7 @@ impl Cursors {
         count.map(i64::unsigned_abs).map_err(|e| self.error(&e))
     }
 
-    /// Returns the next number of a birth and death pair of Sparkplug, 0 to 255, never that of the session before.
+    /// Returns the next number of a birth and death pair of Sparkplug, 0 to 255, never that of the previous session.
     ///
     /// # Errors
     /// [`CursorError`].
@@ -122,12 +123,12 @@ impl SharedCursors {
     }
 }
 
-/// Returns where a cursor goes on in a record with these owner numbers.
+/// Returns the change at which a cursor continues in a record with these owner numbers.
 fn resumed(owner: u16, n: u64, owners: &[Owner]) -> u64 {
     match owners.iter().position(|it| it.owner == owner) {
-        // Changes up to the next owner number are those that the cursor has counted; later ones are others.
+        // Changes up to the next owner number are those that the cursor has counted; later ones are different changes.
         Some(k) => owners.get(k + 1).map_or(n, |next| n.min(next.after_change)),
-        // Of another record.
+        // The cursor belongs to another record.
         None => 0,
     }
 }

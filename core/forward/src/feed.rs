@@ -1,6 +1,7 @@
 //! Reader of the record: the next messages after a cursor.
 //!
-//! The record is opened for reading beside its host. One that was restored from a backup is another file under the same name, and is opened anew.
+//! The record is opened for reading while its host writes it. A record that was restored from a backup is another file
+//! under the same name, and is opened anew.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -14,13 +15,13 @@ use crate::message::{self, Message, Names};
 pub(crate) struct Batch {
     /// Their messages, in order.
     pub(crate) messages: Vec<Message>,
-    /// Changes of which no message can be made, each with the reason.
+    /// Changes from which no message can be built, each with the reason.
     pub(crate) unreadable: Vec<(u64, String)>,
     /// Number of the last change: the cursor when all were sent.
     pub(crate) last: u64,
 }
 
-/// How far a cursor is behind the record.
+/// Backlog of a cursor: changes of the record after it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Backlog {
     pub(crate) changes: u64,
@@ -64,7 +65,7 @@ impl Feed {
         Ok(batch)
     }
 
-    /// Returns how far a cursor is behind.
+    /// Returns the backlog of a cursor.
     pub(crate) fn backlog(&mut self, after: u64) -> Result<Backlog, Error> {
         let archive = self.archive()?;
         let changes = archive.last_change()?.saturating_sub(after);
@@ -78,7 +79,7 @@ impl Feed {
         self.before_first(|change| change.run_id.is_some_and(|run| run >= run_id))
     }
 
-    /// Returns the cursor before the first change of this time or later.
+    /// Returns the cursor before the first change at this time or later.
     pub(crate) fn before(&mut self, at: jiff::Timestamp) -> Result<u64, Error> {
         self.before_first(|change| change.at.parse::<jiff::Timestamp>().is_ok_and(|it| it >= at))
     }

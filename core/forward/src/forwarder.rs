@@ -1,6 +1,7 @@
-//! The forwarder: each sink is served by a task of its own, with a reader and a cursor of its own.
+//! Forwarder: each sink is served by a separate task with its own reader and cursor.
 //!
-//! A sink that stalls, lies or is away delays no other sink, and nothing that is done here reaches the press: the record is read only.
+//! A sink that stalls, gives wrong answers or is not reachable delays no other sink. The press is not affected, since
+//! the record is only read.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -22,17 +23,17 @@ use crate::status::{ForwardStatus, SinkStatus};
 
 /// File of the cursors, beside the record.
 const CURSORS: &str = "forward.sqlite";
-/// Time between two looks for a new state.
+/// Time between two checks for a new state.
 const STATE: Duration = Duration::from_secs(1);
-/// Looks after which a state that is still the same is written again: its time tells that the forwarder runs.
+/// Number of checks after which an unchanged state is written again: its time shows that the forwarder runs.
 const SAME: u32 = 5;
 
-/// Where the sinks begin.
+/// Change from which the sinks begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// Where each has got to.
+    /// The cursor of each sink.
     Cursor,
-    /// After the changes before this stroke: what was sent is sent again.
+    /// After the changes before this stroke: changes that were sent are sent again.
     Run(u32),
     /// After the changes before this time.
     Time(jiff::Timestamp),
@@ -131,7 +132,7 @@ fn spawn(
     Ok(())
 }
 
-/// Sets the cursors of all sinks back.
+/// Resets the cursors of all sinks to an earlier change.
 fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> Result<(), ForwardError> {
     let owners = feed.owners()?;
     let before = match start {
@@ -148,7 +149,8 @@ fn rewind(feed: &mut Feed, shared: &Shared, forward: &Forward, start: Start) -> 
     Ok(())
 }
 
-/// Writes the state to the output folder when it has changed, at most once a second: a file that is replaced makes the host's next sync of its record wait.
+/// Writes the state to the output folder when it has changed, at most once a second: replacing a file delays the host's
+/// next sync of its record.
 async fn keep(shared: Arc<Shared>, folder: std::path::PathBuf) {
     let mut reported = false;
     let (mut written, mut looks) = (None, 0);
@@ -171,7 +173,7 @@ async fn keep(shared: Arc<Shared>, folder: std::path::PathBuf) {
 mod tests {
     use super::*;
 
-    /// In virtual time: half a second after each look.
+    /// Runs in virtual time, half a second after each check.
     #[tokio::test(start_paused = true)]
     async fn a_state_is_written_when_it_changes_and_now_and_then() {
         let folder = tempfile::tempdir().unwrap();

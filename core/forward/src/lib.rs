@@ -1,18 +1,19 @@
-//! Transactional outbox: the record of a host to databases and brokers, by `platen forward`.
+//! Transactional outbox: delivery of a host's record to databases and brokers, by `platen forward`.
 //!
-//! A process of its own reads the record beside the host and keeps a cursor for each sink. Nothing is queued twice: the record's table of changes is
-//! the outbox, and a cursor moves when its sink has acknowledged. A change that is sent twice is known by its key.
+//! A separate process reads the record while the host writes it, and keeps a cursor for each sink. There is no second
+//! queue: the record's table of changes is the outbox, and a cursor moves when its sink has acknowledged. A change that
+//! is sent twice is identified by its key.
 //!
-//! | module | what it does |
+//! | module | contents |
 //! |---|---|
 //! | [`message`] | a change of the record as `platen.stroke/1` |
 //! | `feed` | the next messages after a cursor |
-//! | `cursor` | how far each sink has got |
+//! | `cursor` | last change that each sink has |
 //! | `sink` | a destination |
 //! | `postgresql`, `mqtt`, `sparkplug` | the destinations |
 //! | `shared` | cursors and states that the tasks share |
-//! | `pump` | one sink's task |
-//! | `forwarder` | all of them |
+//! | `pump` | task of one sink |
+//! | `forwarder` | tasks of all sinks |
 //! | [`schema`] | tables of the database |
 //! | `status` | the state for `platen status` |
 

@@ -1,8 +1,9 @@
-//! Messages `platen.stroke/1`: a change of the record as its consumers get it, the same bytes each time it is sent.
+//! Messages `platen.stroke/1`: a change of the record as delivered to consumers, the same bytes each time it is sent.
 //!
-//! A change is known by site, press, owner number, kind and id ([`Key`]). Its message holds only what cannot change any more once the change was
-//! made, so that a change that is sent again has the same SHA-256. Lengths in documents are millimetres, named `_mm`; figures are those of the
-//! record, in metres, radians, seconds and fractions.
+//! A change is identified by site, press, owner number, kind and id ([`Key`]). Its message contains only data that
+//! cannot change after the change was made, so that a change that is sent again has the same SHA-256. Lengths in
+//! documents are in millimetres, named `_mm`; figures are those of the record, in metres, radians, seconds and
+//! fractions.
 
 mod document;
 
@@ -27,7 +28,7 @@ pub struct Names {
     pub site: String,
     /// Press, unique at its site.
     pub press: String,
-    /// Whether codes of crews leave the record.
+    /// True when the codes of crews are sent.
     pub crews: bool,
 }
 
@@ -158,7 +159,7 @@ pub struct EventOf<'a> {
     pub text: &'a str,
 }
 
-/// Returns the message of a change; none of a kind that a later version added.
+/// Returns the message of a change; `None` for a kind that a later version added.
 ///
 /// # Errors
 /// [`Error`] when the record cannot be read.
@@ -217,7 +218,7 @@ fn empty<'a>() -> Document<'a> {
 
 fn seal(change: &Change, names: &Names, key: Key, parts: Document<'_>) -> Message {
     let document = Document { site: &names.site, press: &names.press, key: &key, at: &change.at, ..parts };
-    // A record holds nothing that JSON cannot; a text with the character 0 is one that databases refuse.
+    // All data of a record can be written as JSON; databases refuse text with the character 0.
     let text = serde_json::to_string(&document).unwrap_or_default().replace("\\u0000", "\\ufffd");
     let sha256 = sha256(text.as_bytes());
     Message { n: change.n, at: change.at.clone(), text, sha256, key }

@@ -1,12 +1,12 @@
-//! MQTT 5: strokes and alarms as JSON at QoS 1, and the retained state of the press.
+//! MQTT 5 sink: strokes and alarms as JSON at QoS 1, and the retained state of the press.
 //!
 //! | topic | content |
 //! |---|---|
 //! | `platen/v1/SITE/PRESS/stroke` | [`platen.stroke/1`](crate::message) of kinds accepted, finished, acked, plate |
 //! | `platen/v1/SITE/PRESS/alarm` | the same of kind event |
-//! | `platen/v1/SITE/PRESS/state` | retained: `platen.state/1`; its will says that nobody forwards any more |
+//! | `platen/v1/SITE/PRESS/state` | retained: `platen.state/1`; the will states that forwarding has stopped |
 //!
-//! Delivery is at least once: a consumer drops what it has by site, press, owner, kind and id.
+//! Delivery is at least once: a consumer drops duplicates by site, press, owner, kind and id.
 
 pub(crate) mod connection;
 
@@ -22,7 +22,7 @@ use crate::press_state::PressState;
 use crate::sink::{Receipt, Sink, SinkError};
 use connection::{Address, Connection, Publication};
 
-/// Messages of one delivery.
+/// Largest number of messages of one delivery.
 const BATCH: u32 = 100;
 const JSON: Option<&str> = Some("application/json");
 
@@ -64,7 +64,7 @@ impl MqttSink {
         }
     }
 
-    /// Publishes the state of the press where it has changed.
+    /// Publishes the state of the press if it has changed.
     async fn tell(&mut self) -> Result<(), SinkError> {
         let now = PressState::load(&self.folder);
         if self.told.as_ref() != Some(&now) {
@@ -81,7 +81,7 @@ impl Sink for MqttSink {
         (self.connection, self.told) = (None, None);
         let will = self.state(&PressState::nobody());
         self.connection = Some(Connection::open(&self.address, &self.client_id, will).await?);
-        // The newest state first; then what was not sent.
+        // The newest state first, then the changes that were not sent.
         self.tell().await
     }
 
@@ -108,7 +108,7 @@ impl Sink for MqttSink {
         if self.connection.is_some() {
             let nobody = self.state(&PressState::nobody());
             if let Some(mut connection) = self.connection.take() {
-                // The will comes only after a break.
+                // The broker publishes the will only after a broken connection.
                 let _ = connection.publish(vec![nobody]).await;
                 connection.close().await;
             }

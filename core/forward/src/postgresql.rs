@@ -1,8 +1,8 @@
-//! PostgreSQL: messages are inserted into `platen.inbox`; triggers on the server fill the tables that people query.
+//! PostgreSQL sink: messages are inserted into `platen.inbox`; triggers on the server fill the tables for queries.
 //!
-//! One statement that stays the same for years is all that a host may do, so that hosts of several releases write beside each other and a
-//! migration happens in one place (`sql/`). A message that is there already is passed over by the server; what it has to say of others it says
-//! in warnings, [`APART`] and [`CONFLICT`].
+//! A host may execute only this one statement, the same in all releases. Hosts of several releases can therefore write
+//! at the same time, and a migration takes place in one place (`sql/`). The server ignores a message that it already
+//! has. It reports other cases in warnings, [`APART`] and [`CONFLICT`].
 
 use std::error::Error as _;
 use std::future::poll_fn;
@@ -29,12 +29,12 @@ const INSERT: &str = "\
     FROM unnest($5::int[], $6::text[], $7::bigint[], $8::text[], $9::text[], $10::text[]) \
     AS t (owner, kind, id, at, sha256, doc) ON CONFLICT DO NOTHING";
 
-/// Beginning of the warning that the server keeps messages apart or saw another host under the name.
+/// Beginning of the warning that the server keeps messages separate or has seen another host under the same name.
 const APART: &str = "platen apart: ";
 /// Beginning of the warning that a message differs from one under the same key.
 const CONFLICT: &str = "platen conflict: ";
 
-/// Messages of one insert.
+/// Largest number of messages of one insert.
 const BATCH: u32 = 100;
 
 pub(crate) type Warnings = Arc<Mutex<Vec<String>>>;
@@ -88,7 +88,7 @@ impl PostgresqlSink {
         }
     }
 
-    /// Returns a sentence with what to do.
+    /// Returns an error with the action to take.
     fn explain(&self, error: &tokio_postgres::Error) -> SinkError {
         let place = &self.place;
         let Some(db) = error.as_db_error() else {
@@ -124,7 +124,7 @@ pub(crate) fn configuration(sink: &SinkUse) -> Result<Config, ForwardError> {
     Ok(config)
 }
 
-/// Connects; the task carries the connection and collects the server's warnings.
+/// Connects. A task drives the connection and collects the server's warnings.
 pub(crate) async fn open(
     config: &Config,
     tls: Option<rustls::ClientConfig>,
@@ -147,7 +147,7 @@ where
     S: AsyncRead + AsyncWrite + Unpin,
     T: AsyncRead + AsyncWrite + Unpin,
 {
-    // The client hears of the end by its next request.
+    // The client notices the end at its next request.
     while let Some(Ok(message)) = poll_fn(|context| connection.poll_message(context)).await {
         if let AsyncMessage::Notice(notice) = message {
             warnings
@@ -169,7 +169,7 @@ pub(crate) fn chain(error: &tokio_postgres::Error) -> String {
     text
 }
 
-/// Returns what the warnings of a batch say.
+/// Returns the receipt that follows from the warnings of a batch.
 fn receipt(warnings: &[String]) -> Receipt {
     let conflicts = warnings.iter().filter(|it| it.starts_with(CONFLICT)).count();
     let apart = warnings.iter().find_map(|it| it.strip_prefix(APART)).map(str::to_owned);

@@ -1,4 +1,4 @@
-//! State of the press for live views, from the status file that the host keeps in its output folder.
+//! State of the press for live views, from the status file that the host writes to its output folder.
 
 use std::path::Path;
 
@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 
 /// File that the host writes at least once a second.
 const FILE: &str = "status.json";
-/// Age from which on the host does not run, or hangs, seconds.
+/// Age of the file, seconds, from which the host counts as not running or hung.
 const STALE_S: f64 = 5.0;
 
 /// State of the press and its host.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(crate) struct PressState {
     schema: &'static str,
-    /// Somebody forwards.
+    /// True while changes are forwarded.
     pub(crate) online: bool,
-    /// The host runs.
+    /// True while the host runs.
     pub(crate) running: bool,
     /// State of the press cycle.
     pub(crate) state: Option<String>,
@@ -39,7 +39,7 @@ struct Status {
 }
 
 impl PressState {
-    /// Reads the state; a host that has not written for 5 s does not run.
+    /// Reads the state; a host that has not written for 5 s counts as not running.
     pub(crate) fn load(folder: &Path) -> Self {
         let status = std::fs::read(folder.join(FILE))
             .ok()
@@ -52,7 +52,7 @@ impl PressState {
         }
     }
 
-    /// The state when nobody forwards: nothing is known.
+    /// Returns the state without a forwarder: nothing is known.
     pub(crate) fn nobody() -> Self {
         Self { online: false, ..Self::online() }
     }
@@ -70,7 +70,7 @@ impl PressState {
     }
 
     pub(crate) fn json(&self) -> Vec<u8> {
-        // A struct of texts and flags has no value that JSON cannot hold.
+        // A struct of texts and flags can always be written as JSON.
         serde_json::to_vec(self).unwrap_or_default()
     }
 }

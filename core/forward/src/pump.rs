@@ -1,4 +1,4 @@
-//! At-least-once delivery to one sink: new changes of the record are sent, and the cursor follows what was acknowledged.
+//! At-least-once delivery to one sink: new changes of the record are sent, and the cursor follows the acknowledgements.
 
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
@@ -13,29 +13,29 @@ use crate::shared::Shared;
 use crate::sink::{Sink, SinkError};
 use crate::status::SinkStatus;
 
-/// Time between two looks for new changes.
+/// Time between two checks for new changes.
 const LOOK: Duration = Duration::from_millis(500);
-/// Waits before a connection is tried again: doubled after each failure, up to the second.
+/// First and longest wait before a connection is tried again; the wait is doubled after each failure.
 const RETRY: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
 
-/// Passes the changes of the record to one sink.
+/// Task that passes the changes of the record to one sink.
 pub(crate) struct Pump {
-    /// Place of the sink's state.
+    /// Index of the sink's state.
     pub(crate) place: usize,
     pub(crate) name: String,
     pub(crate) shared: Arc<Shared>,
     pub(crate) feed: Feed,
-    /// Ends when nothing is left to send.
+    /// True when the task ends as soon as all changes have been sent.
     pub(crate) until_sent: bool,
 }
 
 /// Reason why a pump leaves its sink.
 enum Leave {
-    /// Nothing is left to send, and no more was asked for.
+    /// All changes have been sent, and only that was requested.
     Sent,
-    /// The connection is gone.
+    /// The connection is lost.
     Lost(SinkError),
-    /// The file of cursors cannot be written: going on would send for ever.
+    /// The file of cursors cannot be written: to continue would mean to send the same changes for ever.
     Cursor(CursorError),
 }
 
@@ -58,7 +58,7 @@ impl From<platen_history::Error> for Leave {
 }
 
 impl Pump {
-    /// Serves a sink until the end is asked for: connects, sends, and begins anew after each failure.
+    /// Serves a sink until the end is requested: connects, sends, and starts again after each failure.
     ///
     /// # Errors
     /// The file of cursors cannot be written.
@@ -124,7 +124,7 @@ impl Pump {
         }
     }
 
-    /// Sends messages; one that is refused for its content is noted and passed over.
+    /// Sends messages; a message that is refused for its content is recorded and skipped.
     async fn deliver(
         &self,
         sink: &mut impl Sink,
@@ -168,7 +168,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Returns the cursor and the owner numbers; notes how far the sink is behind.
+    /// Returns the cursor and the owner numbers; records the backlog of the sink.
     fn look(&mut self) -> Result<(u64, Vec<Owner>), Leave> {
         let owners = self.feed.owners()?;
         let after = self.shared.cursors.lock().of(&self.name, &owners)?;
@@ -189,7 +189,7 @@ impl Pump {
     }
 
     fn lost(&mut self, why: &str) {
-        // The count goes on while the sink is away.
+        // The backlog is counted while the sink is not reachable.
         let _ = self.look();
         self.update(|it| {
             if it.error.as_deref() != Some(why) {
@@ -207,8 +207,8 @@ impl Pump {
     }
 }
 
-/// Returns when the end is asked for.
+/// Waits until the end is requested.
 async fn asked(stop: &mut watch::Receiver<bool>) {
-    // A sender that is gone asks, too.
+    // A dropped sender also counts as a request.
     let _ = stop.wait_for(|stop| *stop).await;
 }

@@ -1,6 +1,6 @@
 //! Schema of the database: numbered SQL files, applied in order, each once, by the owner of the database.
 //!
-//! Later versions only add: hosts of an older release go on writing the same statement while the schema grows.
+//! Later versions only add to the schema: hosts of an older release continue with the same statement.
 
 use platen_plant::SinkUse;
 use tokio_postgres::Client;
@@ -19,18 +19,18 @@ pub struct Migration {
     pub sql: &'static str,
 }
 
-/// All of them, in order.
+/// All files, in order.
 pub const MIGRATIONS: [Migration; 3] = [
     Migration { number: 1, name: "001-inbox.sql", sql: include_str!("../sql/001-inbox.sql") },
     Migration { number: 2, name: "002-tables.sql", sql: include_str!("../sql/002-tables.sql") },
     Migration { number: 3, name: "003-questions.sql", sql: include_str!("../sql/003-questions.sql") },
 ];
 
-/// Taken before a file by a database that hosts write to. A host locks the inbox first and then the tables that its triggers fill; a file that
-/// began with those would deadlock with it.
+/// Lock taken before a file is applied to a database to which hosts write. A host locks the inbox first and then the
+/// tables that its triggers fill; a file that locked those tables first would deadlock with the host.
 const LOCK_INBOX: &str = "LOCK TABLE platen.inbox IN SHARE ROW EXCLUSIVE MODE;";
 
-/// Failure of a migration; the database is as before it.
+/// Failure of a migration; the database is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum SchemaError {
     /// A file that the plant file names.
@@ -62,8 +62,8 @@ fn noted(migration: &Migration) -> String {
     )
 }
 
-/// Applies the files that the database has not yet, each in a transaction, and returns them. `sink` names the server; its user and password are
-/// those of the owner.
+/// Applies the files that are missing in the database, each in a transaction, and returns them. `sink` identifies the
+/// server; its user and password are those of the owner.
 ///
 /// # Errors
 /// [`SchemaError`].

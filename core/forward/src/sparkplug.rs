@@ -1,8 +1,11 @@
-//! Sparkplug B 3.0: a live view for SCADA. The group is the site, the edge node the press, its one device the scanner.
+//! Sparkplug B 3.0 sink: a live view for SCADA.
 //!
-//! The standard demands QoS 0 for data (`tck-id-payloads-ddata-qos`), so this is no way of delivery: a cursor moves when a stroke was sent, not
-//! when somebody has it. Strokes from before the birth of the session are marked as historical. Where a primary host application is named, the node
-//! is born only while that is online, and dies when it goes offline; what happens meanwhile is sent as history.
+//! The group is the site, the edge node the press, its only device the scanner. Strokes from before the birth of the
+//! session are marked as historical. Where a primary host application is named, the node is born only while that
+//! application is online, and dies when it goes offline; strokes in the meantime are sent as history.
+//!
+//! Limit: the standard requires QoS 0 for data (`tck-id-payloads-ddata-qos`). Delivery is therefore not guaranteed: a
+//! cursor moves when a stroke was sent, not when it was received.
 
 mod metrics;
 mod session;
@@ -27,11 +30,11 @@ use session::{Heard, Session};
 
 /// The device of the node.
 const DEVICE: &str = "scanner";
-/// Messages of one delivery.
+/// Largest number of messages of one delivery.
 const BATCH: u32 = 20;
-/// Wait for the primary host application before the connection is built anew.
+/// Longest wait for the primary host application before a new connection is opened.
 const PRIMARY_HOST: Duration = Duration::from_secs(60);
-/// Time between two looks at what was received.
+/// Time between two checks of the received messages.
 const LOOK: Duration = Duration::from_millis(500);
 
 /// Sink of a Sparkplug host application.
@@ -107,7 +110,7 @@ impl SparkplugSink {
         self.live()?.connection.publish(births).await
     }
 
-    /// Acts on what the broker has sent.
+    /// Processes the messages received from the broker.
     async fn hear(&mut self) -> Result<(), SinkError> {
         let live = self.live()?;
         for publish in live.connection.take_received() {
@@ -121,7 +124,7 @@ impl SparkplugSink {
                     }
                 }
                 Heard::PrimaryOffline => {
-                    // tck-id-message-flow-edge-node-birth-publish-phid-offline: death, and leave.
+                    // tck-id-message-flow-edge-node-birth-publish-phid-offline: death, then disconnect.
                     self.close().await;
                     return Err(self.without_primary());
                 }
@@ -130,7 +133,7 @@ impl SparkplugSink {
         Ok(())
     }
 
-    /// Tells a change of the press's state.
+    /// Publishes the press's state if it has changed.
     async fn tell(&mut self) -> Result<(), SinkError> {
         let state = PressState::load(&self.folder);
         let live = self.live()?;
@@ -209,7 +212,7 @@ impl Sink for SparkplugSink {
     async fn close(&mut self) {
         if let Some(mut live) = self.live.take() {
             let death = self.death(live.session.bd_seq());
-            // tck-id-operational-behavior-edge-node-intentional-disconnect-ndeath: told before the end.
+            // tck-id-operational-behavior-edge-node-intentional-disconnect-ndeath: death is published before the end.
             let _ = live.connection.publish(vec![death]).await;
             live.connection.close().await;
         }

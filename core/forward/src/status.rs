@@ -1,4 +1,6 @@
-//! State of the forwarding, `forward.json` in the output folder: written by `platen forward`, read by the host and by `platen status`.
+//! State of the forwarding: `forward.json` in the output folder.
+//!
+//! The file is written by `platen forward` and read by the host and by `platen status`.
 
 use std::path::Path;
 
@@ -12,9 +14,9 @@ pub const FILE: &str = "forward.json";
 pub struct ForwardStatus {
     /// Time of this state.
     pub at: jiff::Timestamp,
-    /// Process.
+    /// Number of the process.
     pub pid: u32,
-    /// Each sink.
+    /// State of each sink.
     pub sinks: Vec<SinkStatus>,
 }
 
@@ -25,17 +27,17 @@ pub struct SinkStatus {
     pub name: String,
     /// Kind: `postgresql`, `mqtt`, `sparkplug`.
     pub kind: String,
-    /// Connected at present.
+    /// True while the sink is connected.
     pub connected: bool,
-    /// Why it is not, with what to do.
+    /// Reason why the sink is not connected, with the action to take.
     pub error: Option<String>,
-    /// Changes of the record that it has not got.
+    /// Number of changes of the record that the sink does not have.
     pub backlog: u64,
     /// Age of the oldest of them, seconds.
     pub behind_s: Option<f64>,
-    /// Changes sent since the forwarder started.
+    /// Number of changes sent since the forwarder started.
     pub sent: u64,
-    /// Changes that it has under the same key with another content.
+    /// Number of changes that the sink has under the same key with other content.
     pub conflicts: u64,
     /// Changes that it refused for their content.
     pub refused: u64,

@@ -1,4 +1,5 @@
-//! Encryption of the connections, by rustls: the server is known by its certificate, in date and for its name.
+//! Encryption of the connections by rustls: the server is identified by its certificate, which must be in date and
+//! issued for its name.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use rustls::{ClientConfig, RootCertStore};
 
 use crate::ForwardError;
 
-/// Returns the settings of a sink; `None` where it goes without encryption.
+/// Returns the settings of a sink; `None` where it uses no encryption.
 pub(crate) fn config(sink: &SinkUse) -> Result<Option<ClientConfig>, ForwardError> {
     if !sink.tls {
         return Ok(None);

@@ -1,6 +1,7 @@
-//! The JSON schema of the messages, `schema/platen.stroke-1.json`, against the types.
+//! Comparison of the JSON schema of the messages, `schema/platen.stroke-1.json`, with the types.
 //!
-//! `PLATEN_BLESS=1 cargo test -p platen-forward` writes it anew; read it before you commit it. Consumers count on every member.
+//! `PLATEN_BLESS=1 cargo test -p platen-forward` writes the file anew; check the result before committing it. Consumers
+//! rely on every member.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

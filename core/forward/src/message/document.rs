@@ -1,4 +1,5 @@
-//! Parts of a result document that go with a message: what is judged and how well it is known, without surfaces, grids and profiles.
+//! Excerpt of a result document for a message: verdicts, figures and uncertainties, without surfaces, grids and
+//! profiles.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use serde_json::{Map, Value as Json, json};
 
-/// Members of `platen.result/1` that are taken as they are.
+/// Members of `platen.result/1` that are copied without change.
 const TAKEN: [&str; 12] = [
     "software",
     "plate",
@@ -23,7 +24,7 @@ const TAKEN: [&str; 12] = [
     "timings_ms",
     "clock",
 ];
-/// Members of a template that are taken: not its profile.
+/// Members of a template that are copied; its profile is not.
 const OF_TEMPLATE: [&str; 10] = [
     "name",
     "seat",
@@ -54,8 +55,8 @@ pub struct DocumentExcerpt {
 impl DocumentExcerpt {
     /// Reads a document; `None` where there is none or it is damaged.
     ///
-    /// Nine tenths of a document are surface, grid and profiles: what is not taken is passed over unread, for the sake of a backlog
-    /// (`tests/peers/forward`, the changes a second).
+    /// Nine tenths of a document are surface, grid and profiles. Members that are not copied are skipped without
+    /// parsing; for speed with a backlog only (`tests/peers/forward`, the changes a second).
     pub(super) fn load(path: &Path) -> Option<Self> {
         let bytes = std::fs::read(path).ok()?;
         let document: Members<'_> = serde_json::from_slice(&bytes).ok()?;
@@ -77,7 +78,7 @@ impl DocumentExcerpt {
     }
 }
 
-/// Members of a JSON object, their values unread.
+/// Members of a JSON object with their values not yet parsed.
 type Members<'a> = BTreeMap<String, &'a RawValue>;
 
 /// Reference line of a document.
@@ -89,7 +90,7 @@ struct Line<'a> {
     templates: Vec<Members<'a>>,
 }
 
-/// Returns the value of a member; `None` where there is none or it is another kind of value.
+/// Returns the value of a member; `None` where there is none or it has another type.
 fn read<'a, T: Deserialize<'a>>(of: &Members<'a>, name: &str) -> Option<T> {
     serde_json::from_str(of.get(name)?.get()).ok()
 }

@@ -1,7 +1,7 @@
-//! One connection to an MQTT 5 broker: publications at most 20 in flight, and what the broker sends meanwhile.
+//! Connection to an MQTT 5 broker: at most 20 publications in flight, and publications received from the broker.
 //!
-//! A connection is never resumed: after a failure the next one is new, and what was not acknowledged is sent again from the cursor. The client's
-//! own memory of pending messages therefore never matters.
+//! A connection is never resumed: after a failure a new one is opened, and changes that were not acknowledged are sent
+//! again from the cursor. The client's own list of pending messages is therefore never used.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,12 +18,12 @@ use tokio::time::Instant;
 use crate::sink::{ANSWER, SinkError};
 use crate::{ForwardError, tls};
 
-/// Publications without an acknowledgement at a time.
+/// Largest number of publications that wait for an acknowledgement at a time.
 const IN_FLIGHT: u16 = 20;
-/// Time without traffic after which the connection is tried.
+/// Time without traffic after which the connection is tested.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// How to reach a broker.
+/// Address of a broker.
 #[derive(Debug, Clone)]
 pub(crate) struct Address {
     host: String,
@@ -38,7 +38,7 @@ pub(crate) struct Address {
 pub(crate) struct Publication {
     pub(crate) topic: String,
     pub(crate) payload: Vec<u8>,
-    /// With an acknowledgement of the broker.
+    /// True when the broker acknowledges it.
     pub(crate) acknowledged: bool,
     pub(crate) retain: bool,
     pub(crate) content_type: Option<&'static str>,
@@ -49,7 +49,7 @@ pub(crate) struct Connection {
     client: AsyncClient,
     events: EventLoop,
     place: String,
-    /// Received publications that nobody has taken yet.
+    /// Received publications that have not been taken yet.
     received: Vec<Publish>,
 }
 
@@ -91,7 +91,8 @@ impl Connection {
         Ok(connection)
     }
 
-    /// Publishes in order and returns when the broker has acknowledged each that asks for it, and sent the others.
+    /// Publishes in order. Returns when the broker has acknowledged each publication that requires it and the others
+    /// have been sent.
     pub(crate) async fn publish(&mut self, publications: Vec<Publication>) -> Result<(), SinkError> {
         let mut waiting = publications.into_iter();
         let mut next = waiting.next();
@@ -129,12 +130,12 @@ impl Connection {
         }
     }
 
-    /// Subscribes.
+    /// Subscribes to a topic.
     pub(crate) fn subscribe(&mut self, topic: &str) -> Result<(), SinkError> {
         self.client.try_subscribe(topic, QoS::AtLeastOnce).map_err(|e| self.unavailable(&e.to_string()))
     }
 
-    /// Keeps the connection alive for a time, or until something is received.
+    /// Keeps the connection alive for a time, or until a publication is received.
     pub(crate) async fn idle(&mut self, time: Duration) -> Result<(), SinkError> {
         let end = Instant::now() + time;
         while self.received.is_empty() {
@@ -146,7 +147,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Takes what was received.
+    /// Takes the received publications.
     pub(crate) fn take_received(&mut self) -> Vec<Publish> {
         std::mem::take(&mut self.received)
     }
@@ -155,7 +156,7 @@ impl Connection {
     pub(crate) async fn close(mut self) {
         if self.client.try_disconnect().is_ok() {
             let end = Instant::now() + ANSWER;
-            // The end of the connection is what is waited for.
+            // Wait for the end of the connection.
             while !matches!(
                 self.event(end).await,
                 Err(_) | Ok(Event::Outgoing(rumqttc::Outgoing::Disconnect))
@@ -201,7 +202,7 @@ fn quality(acknowledged: bool) -> QoS {
     if acknowledged { QoS::AtLeastOnce } else { QoS::AtMostOnce }
 }
 
-/// Returns a sentence with what to do.
+/// Returns a sentence that includes the action to take.
 fn explain(error: &ConnectionError) -> String {
     match error {
         ConnectionError::ConnectionRefused(code)
@@ -216,7 +217,8 @@ fn explain(error: &ConnectionError) -> String {
             ..
         })
         | ConnectionError::MqttState(StateError::ConnectionAborted) => {
-            // Not every broker says why: mosquitto 2.0.11 closes without a word when a client id comes again, and when its access list is against it.
+            // Not every broker gives a reason: mosquitto 2.0.11 closes the connection without a message when a client
+            // id is used twice, and when its access list refuses the user.
             "the broker closed the connection; where this comes again and again, its access list is against this user, or another \
              client has this press's name"
                 .to_owned()

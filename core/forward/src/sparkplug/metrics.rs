@@ -8,7 +8,7 @@ use srad_types::payload::{DataType, Metric, Payload, PropertySet, PropertyValue,
 use crate::message::Message;
 use crate::press_state::PressState;
 
-/// A metric of the device: name, unit, type, place in a message of kind `finished`, and factor of its unit.
+/// Metric of the device: name, unit, type, place in a message of kind `finished`, and factor of its unit.
 struct Measure {
     name: &'static str,
     unit: Option<&'static str>,
@@ -46,12 +46,12 @@ const MEASURES: [Measure; 14] = [
     number("Result/Stroke To Result", Some("s"), "/result/figures/stroke_to_result_time", 1.0),
 ];
 
-/// NDEATH: the number of its birth alone. `tck-id-payloads-ndeath-seq`: no sequence number.
+/// Returns NDEATH: the number of its birth only. `tck-id-payloads-ndeath-seq`: no sequence number.
 pub(super) fn death(bd_seq: u8) -> Payload {
     Payload { timestamp: Some(now()), metrics: vec![bd_seq_metric(bd_seq)], ..Payload::default() }
 }
 
-/// NBIRTH: every metric of the node.
+/// Returns NBIRTH: every metric of the node.
 pub(super) fn node_birth(state: &PressState, bd_seq: u8, seq: u8) -> Payload {
     let mut rebirth = metric(NODE_CONTROL_REBIRTH, DataType::Boolean, now());
     rebirth.set_value(Value::BooleanValue(false));
@@ -62,12 +62,12 @@ pub(super) fn node_birth(state: &PressState, bd_seq: u8, seq: u8) -> Payload {
     payload(metrics, seq)
 }
 
-/// NDATA: the state of the press.
+/// Returns NDATA with the state of the press.
 pub(super) fn node_data(state: &PressState, seq: u8) -> Payload {
     payload(state_metrics(state).to_vec(), seq)
 }
 
-/// NDATA: an alarm.
+/// Returns NDATA with an alarm.
 pub(super) fn alarm(message: &Message, historical: bool, seq: u8) -> Payload {
     let document = document(message);
     let mut alarm = metric("Alarm", DataType::String, millis(&message.at));
@@ -76,7 +76,7 @@ pub(super) fn alarm(message: &Message, historical: bool, seq: u8) -> Payload {
     payload(vec![alarm], seq)
 }
 
-/// DBIRTH: every metric of the device, with the last stroke's values; null where there is none.
+/// Returns DBIRTH: every metric of the device, with the last stroke's values; null where there is none.
 pub(super) fn device_birth(last: Option<&Message>, seq: u8) -> Payload {
     let document = last.map(document).unwrap_or_default();
     let at = last.map_or_else(now, |it| millis(&it.at));
@@ -88,7 +88,7 @@ pub(super) fn device_birth(last: Option<&Message>, seq: u8) -> Payload {
     payload(metrics.collect(), seq)
 }
 
-/// DDATA: a stroke.
+/// Returns DDATA with a stroke.
 pub(super) fn device_data(message: &Message, historical: bool, seq: u8) -> Payload {
     let (document, at) = (document(message), millis(&message.at));
     let metrics = MEASURES.iter().map(|measure| {
@@ -130,7 +130,7 @@ fn measured(measure: &Measure, document: &Json, at: u64) -> Metric {
     metric
 }
 
-/// Sets the value; null where the message has none of this type.
+/// Sets the value of a metric; null where the message has no value of this type.
 fn set(metric: &mut Metric, value: Option<&Json>, factor: f64) {
     let value =
         match (metric.datatype.and_then(|kind| DataType::try_from(i32::try_from(kind).ok()?).ok()), value) {

@@ -1,4 +1,4 @@
-//! Session of an edge node: numbers, births and what is heard, as a state machine without a connection.
+//! Session of an edge node: sequence numbers, births and received requests, as a state machine without a connection.
 //!
 //! Transitions are named by the identifiers of the Sparkplug 3.0 specification (`tck-id-...`).
 
@@ -24,13 +24,13 @@ pub(super) struct Session {
 /// Request in a received message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Heard {
-    /// Nothing.
+    /// No request.
     Nothing,
-    /// All births again.
+    /// Request for all births again.
     Rebirth,
-    /// The primary host application is there.
+    /// The primary host application is online.
     PrimaryOnline,
-    /// It has gone.
+    /// The primary host application is offline.
     PrimaryOffline,
 }
 
@@ -53,7 +53,7 @@ impl Session {
         }
     }
 
-    /// Number that pairs birth and death: `tck-id-payloads-ndeath-bdseq`.
+    /// Returns the number that pairs birth and death: `tck-id-payloads-ndeath-bdseq`.
     pub(super) fn bd_seq(&self) -> u8 {
         self.bd_seq
     }
@@ -62,10 +62,11 @@ impl Session {
         self.born.is_some()
     }
 
-    /// Notes the birth; returns the sequence numbers of NBIRTH and DBIRTH. `tck-id-payloads-nbirth-seq`: the first is 0.
+    /// Records the birth; returns the sequence numbers of NBIRTH and DBIRTH. `tck-id-payloads-nbirth-seq`: the first is
+    /// 0.
     pub(super) fn born(&mut self, now: Timestamp) -> [u8; 2] {
         self.next = 0;
-        // A rebirth is no new beginning: what was live stays live.
+        // A rebirth does not start a new session: strokes that were live remain live.
         self.born = self.born.or(Some(now));
         [self.next_seq(), self.next_seq()]
     }
@@ -77,7 +78,7 @@ impl Session {
         seq
     }
 
-    /// Whether a time lies before the birth, so that its data is history.
+    /// Returns whether a time lies before the birth, so that its data is historical.
     pub(super) fn is_historical(&self, at: &str) -> bool {
         match (self.born, at.parse::<Timestamp>()) {
             (Some(born), Ok(at)) => at < born,
@@ -95,7 +96,7 @@ impl Session {
         }
         let Ok(state) = serde_json::from_slice::<State>(payload) else { return Heard::Nothing };
         if state.timestamp < self.primary_at {
-            // tck-id-message-flow-edge-node-birth-publish-phid-wait-timestamp: an older state says nothing.
+            // tck-id-message-flow-edge-node-birth-publish-phid-wait-timestamp: an older state is ignored.
             return Heard::Nothing;
         }
         self.primary_at = state.timestamp;
