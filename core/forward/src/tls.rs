@@ -1,5 +1,6 @@
-//! Encryption of the connections by rustls: the server is identified by its certificate, which must be in date and
-//! issued for its name.
+//! Encryption of the connections by rustls.
+//!
+//! The server is identified by its certificate, which must be in date and issued for its name.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -136,8 +136,8 @@ mod tests {
     /// Amplitude of the scanner's cyclic error along the normal and its period on the plate, metres.
     const CYCLIC: [f64; 2] = [0.3e-3, 1.5];
 
-    /// A plate of 2 m by `height`, bent along u by bands of 0.03 rad around the places given. `names` map (u, v) to the
-    /// material place scanned there, counted from the middle; names that mirror show the other face.
+    /// Builds a plate of 2 m by `height`, bent along u by bands of 0.03 rad around the places given. `names` map (u, v)
+    /// to the material place scanned there, counted from the middle; names that mirror show the other face.
     fn plate(height: f64, bands: &[f64], names: Matrix2<f64>, seed: u64) -> Surface {
         let n = 2000_usize;
         let h = SIDE / n as f64;

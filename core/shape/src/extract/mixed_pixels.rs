@@ -111,8 +111,8 @@ mod tests {
 
     const FACE_ROWS: usize = 40;
 
-    /// Window with a face of [`FACE_ROWS`] rows before a surface; `range` gives the range of a row and its standard
-    /// deviation.
+    /// Builds a window with a face of [`FACE_ROWS`] rows before a surface; `range` gives the range of a row and its
+    /// standard deviation.
     fn window(seed: u64, range: impl Fn(usize) -> (f64, f64)) -> Window {
         let header = ScanHeader {
             n_rows: 80,

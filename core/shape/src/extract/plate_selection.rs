@@ -228,7 +228,7 @@ mod tests {
         region: None,
     };
 
-    /// A level face around `centre` of the given sides, of which `part` is seen.
+    /// Returns a level face around `centre` with the given sides; `part` of it is seen.
     fn face(centre: [f64; 3], [a, b]: [f64; 2], part: f64, hidden: f64) -> Candidate {
         let centre = Vec3::from(centre);
         let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];

@@ -5,8 +5,8 @@
 //! lengths. Out: the doubtful edges, lengths in metres. Own.
 //!
 //! The check is necessary because a far edge at grazing incidence may be located at the wrong one of several places,
-//! each with a small standard deviation; no confidence interval shows this. In 300 simulated random scenes (seeds 1 to
-//! 300) the check finds seven of the eleven with a corner more than 2 mm off, and none of the 257 with all corners
+//! each with a small standard deviation; no confidence interval shows this. In 300 simulated random scenes (seeds 1
+//! to 300) the check finds seven of the eleven with a corner more than 2 mm off, and none of the 257 with all corners
 //! within 1 mm.
 //!
 //! Limits: an edge that is off as a whole is not distinguished from a plate that was cut so; two edges that are off to

@@ -140,7 +140,7 @@ mod tests {
     use super::*;
     use crate::Blank;
 
-    /// A unit square of four triangles around its centre.
+    /// Returns a unit square of four triangles around its centre.
     fn square() -> DiskParts {
         DiskParts {
             vertices: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]]

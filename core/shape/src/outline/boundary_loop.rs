@@ -19,9 +19,9 @@ const DIAGONAL: u32 = 7;
 /// A lattice square with all four cells.
 const ALL: u8 = 0b1111;
 
-/// The cells of the face in their bounding rectangle, with one empty column and row around them; index `column * n_rows
-/// + row`. Hidden cells and cells without a return belong to the face when they lie between two cells of it; holes in
-/// the plate do not.
+/// The cells of the face in their bounding rectangle, with one empty column and row around them, at the index `column *
+/// n_rows + row`. Hidden cells and cells without a return belong to the face when they lie between two cells of it;
+/// holes in the plate do not.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     n_rows: usize,

@@ -260,8 +260,8 @@ mod tests {
     const JUMP: f64 = 2.0;
     const RANGE: f64 = 8.0;
 
-    /// A crossing straight below the scanner, before a plane 2 m behind it; `background` is the part of that plane in
-    /// the echo of the mixed pixel.
+    /// Returns a crossing straight below the scanner, before a plane 2 m behind it; `background` is the part of that
+    /// plane in the echo of the mixed pixel.
     fn crossing(background: f64) -> Crossing {
         let at = |y: f64| Vec3::new(0.0, y, -RANGE);
         Crossing {
@@ -281,7 +281,7 @@ mod tests {
         }
     }
 
-    /// Contrasts of planes whose echo is `times` that of the face at the same incidence.
+    /// Returns the contrasts of planes whose echo is `times` that of the face at the same incidence.
     fn contrasts(times: f64) -> Contrasts {
         Contrasts::of(&[times.ln() + 2.0 * (1.0 + JUMP / RANGE).ln(); BACKGROUND_PLANES])
     }
@@ -308,8 +308,8 @@ mod tests {
         assert!((of.planes()[1].0 - PRIOR.0).abs() < 1e-12 && (of.planes()[1].1 - PRIOR.1).abs() < 1e-12);
     }
 
-    /// Part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by strips of
-    /// equal width.
+    /// Returns the part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by
+    /// strips of equal width.
     fn beyond(most: f64, off: f64) -> f64 {
         const STRIPS: i32 = 1000;
         let strip = |k: i32| {

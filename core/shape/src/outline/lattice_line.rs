@@ -284,8 +284,8 @@ pub(super) mod tests {
     use super::super::contrast::ContrastDistribution;
     use super::*;
 
-    /// A line without mixed pixels at a side face that is visible over 1.35 mm beside the edge and recedes by 50 mm per
-    /// millimetre; the half footprint is 1.6 mm.
+    /// Returns a line without mixed pixels at a side face that is visible over 1.35 mm beside the edge and recedes by
+    /// 50 mm per millimetre; the half footprint is 1.6 mm.
     fn line(behind: f64) -> LatticeLine {
         LatticeLine {
             along: 0.0,
@@ -312,18 +312,19 @@ pub(super) mod tests {
         }
     }
 
-    /// The same line where the side face is hidden, with these mixed pixels.
+    /// Returns the same line where the side face is hidden, with these mixed pixels.
     pub(crate) fn open_line(mixed: Option<(f64, f64)>) -> LatticeLine {
         LatticeLine { side: 0.0, mixed, ..line(0.0) }
     }
 
-    /// Likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm of noise.
+    /// Returns the likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm
+    /// of noise.
     fn inside(line: &LatticeLine, far: f64) -> f64 {
         let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
         of.value(line.high + far, &[]) / of.value(line.high, &[])
     }
 
-    /// Three mixed pixels in a row 5.7 mm apart, of which a footprint of 3.2 mm explains one.
+    /// Three mixed pixels in a row 5.7 mm apart; a spot 3.2 mm wide explains one of them.
     #[test]
     fn mixed_pixels_of_another_edge_behind_a_strip_do_not_count() {
         let line = LatticeLine { low: -21.1e-3, ..open_line(Some((-15.4e-3, -4e-3))) };

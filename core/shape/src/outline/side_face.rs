@@ -123,8 +123,8 @@ mod tests {
         }
     }
 
-    /// Sight of an edge along y from `height` above the face; `inwards` is the distance from the scanner to the edge,
-    /// positive for a near edge.
+    /// Returns the sight of an edge along y from `height` above the face; `inwards` is the distance from the scanner to
+    /// the edge, positive for a near edge.
     fn sight(side: &SideFace, inwards: f64, height: f64) -> Sight {
         side.seen_by(Vec3::new(inwards, 0.0, -height), Vec3::z(), Vec3::x())
     }

@@ -1,8 +1,8 @@
 //! Correction of S within the surface: material points are moved to the places that the chart gives them.
 //!
 //! The penalty of the fit is selected for the heights of the samples. The tangential components of S are exact and
-//! require no penalty; on a curved plate, however, they have third derivatives as well, which the penalty suppresses (x
-//! = R sin(u / R) of a cylinder becomes a straight line). Without this correction a plate of 2.5 m with a radius of 11
+//! require no penalty; on a curved plate, however, they have third derivatives as well, which the penalty suppresses:
+//! x = R sin(u / R) of a cylinder becomes a straight line. Without this correction a plate of 2.5 m with a radius of 11
 //! m, scanned with 1.5 mm of noise, is 2 mm too long, at its ends by 4 mm/m, with the heights unchanged.
 //!
 //! In: the fitted S, the mid-surface over (a, b), the chart as a spline from (a, b) to (u, v). Out: S with corrected

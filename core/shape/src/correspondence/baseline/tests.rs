@@ -1,7 +1,7 @@
 use super::*;
 use crate::flatten::closed_form::{ClosedForm, cone, cylinder, half_bent, sphere_of_fibres};
 
-/// A blank of 4004 x 2997 mm, its diagonals 5 mm apart, one edge bulging by 2 mm and one hollow by 1 mm.
+/// Returns a blank of 4004 x 2997 mm; its diagonals differ by 5 mm, one edge bulges by 2 mm and one is hollow by 1 mm.
 fn real() -> Blank {
     let corners = [[-3e-3, 0.75e-3], [4.001, 2.25e-3], [4.003, 2.99925], [-1e-3, 2.99775]];
     Blank { corners, bows: [0.0, 2e-3, -1e-3, 0.0], ..Blank::rectangle(4.0, 3.0) }

@@ -7,8 +7,8 @@ use super::*;
 const STEP: f64 = 9e-4;
 const NOISE: f64 = 3e-4;
 
-/// Scene of a level plate 3.5 m below the scanner, a table `below` it and the floor; `places` gives, by row, the
-/// columns at which the plate and the table end. A beam sees a quarter of a step around its middle.
+/// Builds the scene of a level plate 3.5 m below the scanner, a table `below` it and the floor; `places` gives, by row,
+/// the columns at which the plate and the table end. A beam sees a quarter of a step around its middle.
 fn scene(below: f64, places: impl Fn(f64) -> [f64; 2]) -> (Window, Vec<Option<bool>>) {
     let header = ScanHeader {
         n_rows: 80,
