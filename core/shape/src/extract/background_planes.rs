@@ -15,8 +15,8 @@
 //! - A cell on a plane is not a mixed pixel, whatever the ranges of its neighbours. There are two exceptions. About one
 //!   mixed pixel in a hundred has the range of a plane by chance (more before a plane whose continuation is close
 //!   behind the edge): a mixed pixel stays mixed if it is alone on a plane that holds few of them. It also stays mixed
-//!   if there are mixed pixels in front of the plane on both sides of it: along an edge parallel to a row some beams
-//!   return the range of the background.
+//!   if there are mixed pixels in front of the plane on both sides of this cell: along an edge parallel to a row some
+//!   beams return the range of the background.
 //! - A mixed pixel behind the plane of a strip next to it sees the far edge of the strip, not that of the plate. It
 //!   becomes sound.
 //! - A plane that is seen edge-on is discarded: the cells of one row of a round wall also lie in a plane, through the
