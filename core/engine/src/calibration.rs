@@ -88,9 +88,9 @@ impl Calibration {
         })
     }
 
-    /// Returns the calibration file as text.
+    /// Returns the calibration as the text of a TOML file.
     pub fn to_toml(&self) -> String {
-        // A text of JSON is one of TOML.
+        // JSON string literals are valid TOML basic strings.
         let text = |text: &str| serde_json::Value::from(text).to_string();
         let mut file = format!(
             "# Written by platen calibrate. One sigma, of a position between two scans and of a template's gap.\n\
@@ -108,7 +108,7 @@ impl Calibration {
     }
 }
 
-/// Returns the plant's calibration if it is valid at `now`, the scanner having been connected for `in_reach`.
+/// Returns the plant's calibration if it is valid at `now`, with the scanner connected for the time `in_reach`.
 ///
 /// # Errors
 /// The reason why it is invalid.

@@ -1,11 +1,16 @@
-//! Sensitivity of a template's verdict to a doubtful edge: a verdict that changes when the lines are moved by the doubt is withdrawn.
+//! Sensitivity analysis of template verdicts to a doubtful edge of the plate: a verdict that depends on it is
+//! withdrawn.
 //!
-//! The material places (u, v) follow from the edges. Where the length of an edge along u differs from the one that was cut by d, one of
-//! its ends is off by up to d along u, and with it the places of the plate; likewise v. So the judging comparisons
-//! are repeated with every reference line moved by d to either side, cut off where it leaves the plate, which also takes from a template
-//! that reaches the edge the strip in doubt. A template whose verdict is not the same in all of them gets `cannot_tell`. Own.
+//! The material coordinates (u, v) of the plate are derived from its edges. An edge is doubtful if its measured length
+//! differs by d from the length that was cut. One of its ends is then in the wrong place by up to d along u (or along
+//! v), and the coordinates of the plate with it.
 //!
-//! Limits: only what `edge_doubts` finds is in doubt; places move as a whole, not in proportion to their distance from the edge.
+//! Method (own): the judging comparisons are repeated with every reference line moved by d to either side. A line is
+//! cut off where it leaves the plate, so that a template that reaches the edge also loses the doubtful strip. A
+//! template whose verdict is not the same in all repetitions gets `cannot_tell`.
+//!
+//! Limits: only the edges in `edge_doubts` are treated as doubtful. All coordinates are moved by the same amount, not
+//! in proportion to their distance from the edge.
 
 use platen_model::{Centre, Report, Task, Template, Verdict};
 use platen_shape::EdgeDoubt;
@@ -35,7 +40,8 @@ pub fn withdraw_verdicts(
     }
 }
 
-/// Returns the task with its lines moved by each doubt, to either side, and by how much, metres.
+/// Returns copies of the task with its lines moved by each doubt to either side, each with the amount of its movement
+/// in metres.
 fn moved_tasks(task: &Task, doubts: &[EdgeDoubt]) -> Vec<(f64, Task)> {
     let along = |axis: usize| {
         let of_axis = doubts.iter().filter(|doubt| doubt.edge % 2 == axis);
@@ -45,8 +51,8 @@ fn moved_tasks(task: &Task, doubts: &[EdgeDoubt]) -> Vec<(f64, Task)> {
     doubtful.flat_map(|(axis, by)| [-by, by].map(|signed| (by, moved(task, axis, signed)))).collect()
 }
 
-/// Returns the task with every line moved along u (axis 0) or v (axis 1), cut off at the plate's edges; templates longer than what is
-/// left of their line are shortened to it.
+/// Returns the task with every line moved along u (axis 0) or v (axis 1) and cut off at the plate's edges. Templates
+/// that are longer than the rest of their line are shortened to it.
 fn moved(task: &Task, axis: usize, by: f64) -> Task {
     let mut task = task.clone();
     let size = [task.width, task.height];
@@ -72,7 +78,8 @@ fn fitted(template: &Template, lines: &[platen_model::ReferenceLine]) -> Templat
     template
 }
 
-/// Sets the templates whose verdict is another in one of `others` (amount of the movement, metres, and report) to `cannot_tell`.
+/// Sets to `cannot_tell` the templates whose verdict differs in one of `others` (amount of the movement in metres, and
+/// report).
 fn withdraw(report: &mut Report, others: &[(f64, Option<Report>)]) {
     let findings = &mut report.findings;
     let (mut names, mut said) = (Vec::new(), Vec::new());
@@ -196,10 +203,10 @@ mod tests {
         assert_eq!([one.templates[0].verdict, one.templates[1].verdict], [CannotTell, Pass]);
         assert!(one.says[0].starts_with("whole: cannot tell") && one.says[0].contains("4.0 mm"));
         assert_eq!(one.says[1..], ["across: as measured", "anywhere"]);
-        // A failure that a movement takes away is none; one that stays is.
+        // A failure that disappears with a movement is withdrawn; one that remains is kept.
         assert_eq!(withdrawn([Fail, Pass], &[[Pass, Pass]]).findings.verdict, Some(CannotTell));
         assert_eq!(withdrawn([Fail, Pass], &[[Fail, CannotTell]]).findings.verdict, Some(Fail));
-        // A repetition that failed tells nothing.
+        // A repetition that failed is not evidence.
         let mut found = report([Pass, Pass]);
         withdraw(&mut found, &[(0.004, None)]);
         assert_eq!(found.findings.verdict, Some(CannotTell));

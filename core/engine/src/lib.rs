@@ -1,4 +1,4 @@
-//! The measuring part of the host: plugins, the pipeline of a plant, and the stroke.
+//! Measurement engine of the host: plugin loading, the pipeline of a plant, and the evaluation of one stroke.
 //!
 //! | module | contents |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | `pipeline` | the plugins of one plant file, configured, and the place of the scanner |
 //! | `calibration` | the calibration file of a scanner and the conditions under which it is valid |
 //! | `doubtful_edge` | verdicts that depend on a doubtful edge, withdrawn |
-//! | `scanner_error` | the scanner's error in every uncertainty: its calibration, or the range error of its data sheet |
+//! | `scanner_error` | the scanner's error in every uncertainty: from its calibration, or from the range error of its data sheet |
 //! | `stroke` | one stroke in the order of its data: scan, patch, outline, measurement, reports, verdict |
 //!
 //! Another program that measures plates links this crate; `platen` adds the press, the record and the command line.

@@ -1,4 +1,4 @@
-//! The pipeline of a plant: its plugins, loaded and configured, and the frames of scanner and press.
+//! Pipeline of a plant: its plugins, loaded and configured, and the coordinate frames of scanner and press.
 
 use std::time::Duration;
 
@@ -23,9 +23,9 @@ pub struct Pipeline {
     pub flattening: Flattening,
     /// Comparisons, in the order of the plant file.
     pub comparisons: Vec<Comparison>,
-    /// The one whose figures fill the press's registers.
+    /// Index of the comparison whose figures fill the press's registers.
     pub register_source: Option<usize>,
-    /// Rough direction of growing u at a plate's first scan, scanner frame.
+    /// Approximate direction of growing u at a plate's first scan, scanner frame.
     pub u_axis: Option<Vec3>,
     /// Origin of the press, scanner frame, where the plant file has `press_from_scanner`.
     pub press: Option<Vec3>,

@@ -1,17 +1,17 @@
-//! Plugins: found by name, each in a process of its own, started again after a fault.
+//! Plugin host: plugins are found by name, run in a process of their own, and started again after a fault.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `catalogue` | the plugin folders, and the libraries in them |
 //! | `library`, `descriptor` | a plugin of a library, and its description |
 //! | `scanner`, `flattening`, `comparison`, `advisor` | the four kinds behind safe types |
-//! | `instance`, `job` | one configured plugin, and what it is asked for |
-//! | `faults`, `quarantine` | when a plugin rests, and when it is given up |
-//! | `worker` | its process: messages, shared memory, limits; both ends |
-//! | `local` | its library inside the worker: the calls through the tables of `platen.h` |
+//! | `instance`, `job` | one configured plugin, and the specification of a job |
+//! | `faults`, `quarantine` | pause before the restart of a plugin, and its exclusion after too many faults |
+//! | `worker` | the plugin's process: messages, shared memory, limits; both ends |
+//! | `local` | the plugin's library inside the worker: the calls through the tables of `platen.h` |
 //! | `error` | reasons why a plugin cannot be used or has failed |
 //!
-//! All `unsafe` of the host is in this module, nearly all of it runs in workers.
+//! All `unsafe` of the host is in this module; nearly all of it runs in workers.
 
 mod advisor;
 mod catalogue;

@@ -1,22 +1,23 @@
-//! Correlated error of the scanner in the stated uncertainties: that of its calibration, and until there is one that of the
-//! instrument's data sheet.
+//! Correlated error of the scanner in the stated uncertainties, taken from its calibration or else from its data sheet.
 //!
-//! A data sheet states the accuracy of a range: an error that neighbouring cells share, which no fit averages out. The plant file
-//! has precedence over the driver; where neither states one, that of common phase scanners is assumed. A range error moves a place
-//! along the beam, thus along the normal by its cosine of incidence. Two scans differ by the errors of both, hence the factor of
-//! sqrt 2, as in a calibration by pairs of scans.
+//! The data sheet of a scanner states a range error. Neighbouring cells share this error, so no fit averages it out.
+//! Without a calibration the error is taken from the plant file, then from the driver. If neither states one, the error
+//! of common phase scanners is assumed.
 //!
-//! Levels of detection, templates and stations hold the error, calibrated or assumed. Places, lengths and angles hold it once it is
-//! calibrated ([`RangeError`]): a data sheet bounds an error and does not say over which ranges it changes, and two ends of an
-//! edge that were off by all of it independently would make each length uncertain by millimetres. The assumption says that they
-//! are stated without it.
+//! - A range error moves a point along the beam, and along the normal by the cosine of incidence times that.
+//! - Two scans differ by the errors of both, hence the factor sqrt 2, as in a calibration by pairs of scans.
+//! - The calibrated error belongs to a pair of scans; a single scan has 1 / sqrt 2 of it.
+//! - The gap in the middle of a template on an artefact is z1 / 2 - z2 + z3 / 2. Its error is that of a point times the
+//!   square root of 3 / 2. Either error divided by the cosine of incidence is an error of a range.
 //!
-//! Of the calibrated error of a pair a single scan has its share; the gap in the middle of a template on an artefact is
-//! z1 / 2 - z2 + z3 / 2, its error that of a place times the square root of 3 / 2. Both divided by the cosine of incidence are
-//! errors of a range.
+//! Levels of detection, templates and stations include the error, calibrated or assumed. Positions, lengths and angles
+//! include it only if it is calibrated ([`RangeError`]). A data sheet bounds the error and does not state over which
+//! distances it changes. If the two ends of an edge had the full error independently of each other, every length would
+//! be uncertain by millimetres. The sentence about the assumption states that positions and lengths do not include it.
 //!
-//! Limits: one figure for the whole plate, without a wavelength; what is equal in both scans of a pair cancels, and counts here all
-//! the same. A calibration without an artefact does not know what repeats in every scan, and then no uncertainty holds it.
+//! Limits: there is one figure for the whole plate, without a wavelength. An error that is equal in both scans of a
+//! pair cancels, but it is counted here. A calibration without an artefact cannot find an error that repeats in every
+//! scan; then no uncertainty includes it.
 
 use std::f64::consts::SQRT_2;
 
@@ -27,8 +28,8 @@ use platen_shape::{RangeError, Surface};
 
 use crate::calibration::Calibration;
 
-/// Range error where neither the plant file nor the driver states one, one sigma, metres: the data sheets of phase scanners for
-/// buildings and plants state 1 to 3 mm (FARO Focus3D S120: 2 mm at 10 m and 25 m).
+/// Range error where neither the plant file nor the driver states one, one sigma, metres: the data sheets of phase
+/// scanners for buildings and plants state 1 to 3 mm (FARO Focus3D S120: 2 mm at 10 m and 25 m).
 const UNSTATED: f64 = 2e-3;
 
 /// Sum of the squared weights of the heights in the gap of a balanced template: 1/4 + 1 + 1/4.
@@ -37,7 +38,7 @@ const GAP_SQUARES: f64 = 1.5;
 /// Smallest cosine of incidence by which an error along the normal is divided: 85 degrees.
 const LEAST_COSINE: f64 = 0.09;
 
-/// Places along each side at which the incidence is taken.
+/// Sample positions along each side at which the incidence is taken.
 const PLACES: usize = 21;
 
 /// Correlated and systematic errors of a scanner at one plate.
@@ -47,9 +48,9 @@ pub struct ScannerError {
     correlated: f64,
     /// Systematic error of a gap, one sigma, metres; known only from an artefact.
     systematic: Option<f64>,
-    /// Range error in places, lengths and angles; none unless calibrated.
+    /// Range error in positions, lengths and angles; none unless calibrated.
     range: RangeError,
-    /// Sentence that names the assumed range error; `None` with a calibration.
+    /// Sentence that states the assumed range error; `None` with a calibration.
     pub assumption: Option<String>,
 }
 
@@ -66,7 +67,7 @@ impl ScannerError {
         }
     }
 
-    /// Returns the errors of a scanner that nobody calibrated, at this plate: the range error of the plant file, else of the
+    /// Returns the errors of an uncalibrated scanner at this plate: the range error of the plant file, else of the
     /// driver (metres, one sigma), else the stand-in.
     pub fn assumed(of_plant: Option<f64>, of_driver: Option<f64>, surface: &Surface) -> Self {
         let (error, source) = match (of_plant, of_driver) {
@@ -97,13 +98,13 @@ impl ScannerError {
         self.correlated
     }
 
-    /// Returns the range error in places, lengths and angles; none unless it was calibrated.
+    /// Returns the range error in positions, lengths and angles; none unless it was calibrated.
     #[must_use]
     pub fn range(&self) -> RangeError {
         self.range
     }
 
-    /// Logs the assumption, if there is one: a warning, unless the scanner is said to have no such error.
+    /// Logs the assumption, if there is one: a warning, unless the stated range error is zero.
     pub fn log(&self) {
         match &self.assumption {
             Some(assumption) if self.correlated > 0.0 => tracing::warn!("{assumption}; run platen calibrate"),
@@ -118,7 +119,7 @@ impl ScannerError {
     }
 }
 
-/// Returns the root mean square of the cosine of incidence over the places that were seen; 1 where none was.
+/// Returns the root mean square of the cosine of incidence over the sample positions that were seen; 1 where none was.
 fn rms_cosine(surface: &Surface) -> f64 {
     let along = |k: usize, length: f64| length * k as f64 / (PLACES - 1) as f64;
     let places = (0..PLACES * PLACES)

@@ -1,9 +1,10 @@
-//! One stroke in the order of its data: scan, plate, outline, surface, comparisons, verdict.
+//! Evaluation of one stroke in the order of its data: scan, plate, outline, surface, comparisons, verdict.
 //!
 //! ```text
 //! columns -> Patch -> Outline -> Measurement (mid-surface, mesh, chart, S) -> Reports -> Verdict
 //! ```
-//! Each arrow is one function here ([`scan`], [`measure_scanned`], [`compare`], [`verdict`]), with one type on each side.
+//! Each arrow is one function here ([`scan`], [`measure_scanned`], [`compare`], [`verdict`]), with one type on each
+//! side.
 
 mod previous_pose;
 mod scan_buffer;
@@ -60,7 +61,7 @@ pub enum NotMeasured {
     Shape(#[from] MeasureError),
 }
 
-/// Scans; the plate is extracted while columns arrive. The whole scan goes to `buffer`, if there is one.
+/// Acquires a scan; the plate is extracted while columns arrive. The whole scan goes to `buffer`, if there is one.
 ///
 /// # Errors
 /// No scan, or no plate in it.
@@ -109,8 +110,8 @@ pub enum Baseline<'a> {
     None,
     /// From an earlier scan of the blank.
     Earlier(&'a Blank),
-    /// From this scan, which is the baseline. Without an outline in it the nominal rectangle is used, and the log names the
-    /// reason.
+    /// From this scan, which is the baseline. Without an outline in it the nominal rectangle is used, and the log names
+    /// the reason.
     This,
 }
 

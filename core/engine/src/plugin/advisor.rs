@@ -1,4 +1,4 @@
-//! Advisor plugins: from the history of a plate and its surface to advice.
+//! Advisor plugins: they compute advice on the next stroke from the history and the surface of a plate.
 
 use std::time::Duration;
 
@@ -16,12 +16,13 @@ pub struct Advisor {
     limit: Duration,
 }
 
-/// Longest sentence, characters; longer ones are cut. Most sentences; the first are the most important.
+/// Longest sentence, characters; longer ones are cut. Below: largest number of sentences; the first are the most
+/// important.
 const SENTENCE: usize = 500;
 const SENTENCES: usize = 20;
 /// Rounding allowed for places on the edge of the plate, metres.
 const ON_EDGE: f64 = 1e-6;
-/// Largest bend of one stroke that is believed, radians.
+/// Largest bend of one stroke that is accepted, radians.
 const MOST: f64 = 1.0;
 
 impl Advisor {
@@ -40,8 +41,8 @@ impl Advisor {
         &self.instance
     }
 
-    /// Asks for the next stroke and checks the answer. `cancel` ends it early, with an error. An advisor that fails is not asked again
-    /// for the same stroke.
+    /// Requests the advice on the next stroke and checks the answer. `cancel` ends the job early, with an error. An
+    /// advisor that fails is not run again for the same stroke.
     ///
     /// # Errors
     /// The plugin's reason, the deadline, or the violation in its answer.
@@ -79,7 +80,7 @@ impl Advisor {
     }
 }
 
-/// Checks advice as far as it goes to people: lines on the plate, intervals in order, sentences that leave a screen alone.
+/// Checks the advice before it is shown: lines on the plate, intervals in order, sentences without control characters.
 fn checked(mut advice: Advice, size: [f64; 2]) -> Result<Advice, String> {
     let on_plate =
         |at: &[f64; 2]| at.iter().zip(size).all(|(x, length)| (-ON_EDGE..=length + ON_EDGE).contains(x));

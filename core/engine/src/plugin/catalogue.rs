@@ -1,4 +1,4 @@
-//! The folders of the plugins, and the libraries in them.
+//! Plugin folders, and the libraries in them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,8 @@ pub struct Listed {
 }
 
 impl Catalogue {
-    /// Returns the search order: `given` first, then `../lib/platen/plugins` beside the program, then the program's own folder.
+    /// Returns the search order: `given` first, then `../lib/platen/plugins` beside the program, then the program's own
+    /// folder.
     pub fn new(given: Option<&Path>) -> Self {
         let program = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
         let installed = program.as_ref().map(|folder| folder.join("../lib/platen/plugins"));
@@ -32,19 +33,20 @@ impl Catalogue {
         Self { folders, isolation: Isolation::Process, quarantine: None }
     }
 
-    /// Returns the same with plugins in another place.
+    /// Returns the catalogue with another place for its plugins to run in.
     #[must_use]
     pub fn isolated(self, isolation: Isolation) -> Self {
         Self { isolation, ..self }
     }
 
-    /// Returns the same with plugins that are given up when they fail too often.
+    /// Returns the catalogue with a quarantine for plugins that fail too often.
     #[must_use]
     pub fn with_quarantine(self, quarantine: Quarantine) -> Self {
         Self { quarantine: Some(quarantine), ..self }
     }
 
-    /// Loads the plugin named `name` in plant files: from the library of that name, else from any that holds it.
+    /// Loads the plugin that plant files call `name`: from the library of that name, else from any library that
+    /// contains it.
     ///
     /// # Errors
     /// [`PluginError::NotFound`], or the reason why the library found cannot be used.
@@ -68,7 +70,7 @@ impl Catalogue {
         })
     }
 
-    /// Loads a library file, and returns its plugins.
+    /// Loads a library file and returns its plugins.
     ///
     /// # Errors
     /// Why it cannot be used.
@@ -81,7 +83,7 @@ impl Catalogue {
         Library::load(path, settings, self.quarantine.as_ref())
     }
 
-    /// Returns the installed plugin with the name nearest to `name`, if one is near.
+    /// Returns the installed plugin whose name is most similar to `name`, if one is similar enough.
     fn nearest(&self, name: &str) -> Option<String> {
         let names: Vec<String> = self.files().into_keys().map(|stem| stem.replace('_', "-")).collect();
         platen_plant::nearest(name, names.iter().map(String::as_str)).map(str::to_owned)

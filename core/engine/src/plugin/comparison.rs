@@ -1,4 +1,4 @@
-//! Comparison plugins: from a task and surfaces to a report.
+//! Comparison plugins: they compute a report from a task and the surfaces of a plate.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -27,7 +27,8 @@ const SENTENCE: usize = 500;
 /// Most sentences; the first are the most important.
 const SENTENCES: usize = 50;
 
-/// Checks findings as far as they go to people and registers: names that tell figures apart, numbers, sentences that leave a screen alone.
+/// Checks findings before they reach a screen or registers: unique names of figures, numbers, sentences without control
+/// characters.
 fn checked(mut findings: Findings) -> Result<Findings, String> {
     let mut names = BTreeSet::new();
     for figure in &findings.figures {
@@ -76,7 +77,7 @@ impl Comparison {
         Ok(Self { instance, limit })
     }
 
-    /// Returns the same with another deadline.
+    /// Returns the comparison with another deadline.
     #[must_use]
     pub fn with_limit(self, limit: Duration) -> Self {
         Self { limit, ..self }

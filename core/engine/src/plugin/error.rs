@@ -32,7 +32,7 @@ pub enum PluginError {
     /// The plugin refused its options.
     #[error("plugin {name}: refused its options: {message}")]
     RefusedOptions { name: String, message: String },
-    /// The plugin failed at a job, and said why.
+    /// The plugin failed at a job and returned the reason.
     #[error("{name}: {message}")]
     Failed { name: String, message: String, retryable: bool },
     /// The job was cancelled, or its deadline passed.
@@ -75,12 +75,12 @@ impl PluginError {
         }
     }
 
-    /// Whether the plugin is at fault, so that a fresh process of it may do better.
+    /// Returns whether the plugin is at fault, so that a new process of it may succeed.
     pub fn is_fault(&self) -> bool {
         matches!(self, Self::Died { .. } | Self::Misbehaved { .. } | Self::Hangs { .. })
     }
 
-    /// Whether nothing was tried because the plugin is out of use.
+    /// Returns whether nothing was tried because the plugin is out of use.
     pub fn is_out_of_use(&self) -> bool {
         matches!(self, Self::Quarantined { .. } | Self::Resting { .. })
     }

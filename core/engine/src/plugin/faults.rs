@@ -1,25 +1,25 @@
-//! Faults of one plugin: how long it rests before it is started again, and when it is given up.
+//! Fault counter of one plugin: the pause before it is started again, and the limit at which it is quarantined.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Rest after the first, second, ... fault without a success between.
+/// Pause after the first, second, ... fault without a success between.
 const RESTS: [Duration; 4] =
     [Duration::ZERO, Duration::from_secs(1), Duration::from_secs(5), Duration::from_secs(30)];
-/// So many faults in so many jobs are too many.
+/// Limit on faults (first value) within a number of jobs (second value).
 const IN_JOBS: (usize, u64) = (3, 20);
-/// So many faults in such a time are too many.
+/// Limit on faults (first value) within a time (second value).
 const IN_TIME: (usize, Duration) = (5, Duration::from_secs(600));
 
-/// The faults of late.
+/// Recent faults of a plugin.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
     jobs: u64,
-    /// Number of the job, time.
+    /// Number of the job, and time of the fault.
     recent: VecDeque<(u64, Instant)>,
-    /// Without a success between.
+    /// Faults without a success between.
     in_a_row: usize,
-    /// All of them.
+    /// All faults since the start of the host.
     count: u64,
     why: String,
 }
@@ -33,7 +33,7 @@ impl Faults {
         self.in_a_row = 0;
     }
 
-    /// Adds a fault; returns whether there are too many now.
+    /// Adds a fault; returns whether there are now too many.
     pub(super) fn add(&mut self, why: &str, now: Instant) -> bool {
         self.in_a_row += 1;
         self.count += 1;
@@ -48,7 +48,7 @@ impl Faults {
         in_jobs >= jobs.0 || in_time >= time.0
     }
 
-    /// Returns the rest that is left.
+    /// Returns the remaining pause.
     pub(super) fn rest(&self, now: Instant) -> Duration {
         let Some((_, last)) = self.recent.back().filter(|_| self.in_a_row > 0) else { return Duration::ZERO };
         (*last + RESTS[(self.in_a_row - 1).min(RESTS.len() - 1)]).saturating_duration_since(now)
@@ -62,7 +62,7 @@ impl Faults {
         &self.why
     }
 
-    /// Forgets them: another build of the plugin is there.
+    /// Clears the faults: another build of the plugin has been installed.
     pub(super) fn forget(&mut self) {
         *self = Self { jobs: self.jobs, count: self.count, ..Self::default() };
     }

@@ -1,4 +1,4 @@
-//! Flattening plugins: from the mid-surface mesh to a chart.
+//! Flattening plugins: they map the mid-surface mesh to a chart in the plane.
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ impl Flattening {
         Ok(Self { instance, limit })
     }
 
-    /// Returns the same with another deadline.
+    /// Returns the flattening with another deadline.
     #[must_use]
     pub fn with_limit(self, limit: Duration) -> Self {
         Self { limit, ..self }

@@ -24,9 +24,9 @@ use super::job::JobSpec;
 use super::worker::{CallError, Confinement, Job, Link, LinkError, SharedMemory, new_job, printable};
 use super::{Descriptor, Isolation, Kind, Library, PluginError, Quarantined, clock, library};
 
-/// Time for a driver to look for devices: 3 s, and some for itself.
+/// Time for a driver to search for devices: 3 s for the search, the rest as a margin.
 const DISCOVERY_LIMIT: Duration = Duration::from_secs(5);
-/// Time for an instrument's state, which must not ask for it.
+/// Time for the state of an instrument, which the driver must return without a request to the instrument.
 const HEALTH_LIMIT: Duration = Duration::from_secs(1);
 
 /// An input of a job, in memory that the plugin can only read.
@@ -50,7 +50,7 @@ impl InputFrame {
 pub struct Instance {
     library: Library,
     values: Vec<OptionValue>,
-    /// Stroke of the jobs that name none.
+    /// Stroke number of the jobs that give none.
     stroke: AtomicU64,
     state: Mutex<State>,
 }
@@ -58,30 +58,31 @@ pub struct Instance {
 #[derive(Debug, Default)]
 struct State {
     link: Option<Link>,
-    /// The host has opened it: a job opens it again where its link was lost.
+    /// The host has opened it: after a lost link the next job opens it again.
     opened: bool,
     /// SHA-256 of the library that the link runs.
     sha256: String,
     faults: Faults,
-    /// Content that failed too often, and its file at that time.
+    /// Content that failed too often, and the state of its file at that time.
     given_up: Option<(Quarantined, Option<Stamp>)>,
-    /// A job was repeated in a fresh process, since it was last asked.
+    /// A job was repeated in a new process since the last call of `take_retried`.
     retried: bool,
 }
 
-/// Inode, size and modification time (seconds, nanoseconds) of a file, which change with its content and are had without opening it.
+/// Inode, size and modification time (seconds, nanoseconds) of a file: they change with its content and can be read
+/// without opening it.
 type Stamp = (u64, u64, i64, i64);
 
 fn stamp(path: &Path) -> Option<Stamp> {
     fs::metadata(path).ok().map(|file| (file.ino(), file.size(), file.mtime(), file.mtime_nsec()))
 }
 
-/// State of a plugin's worker, for the people who look after it.
+/// State of a plugin's worker, for maintenance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkerState {
     /// Name of the plugin.
     pub plugin: String,
-    /// Number of its process; `None` when there is none.
+    /// Process identifier; `None` when there is no process.
     pub process: Option<u32>,
     /// Private memory, bytes.
     pub memory: Option<u64>,
@@ -89,13 +90,13 @@ pub struct WorkerState {
     pub files: Option<u64>,
     /// Threads.
     pub threads: Option<u64>,
-    /// The last line that it printed.
+    /// Last line that it printed.
     pub printed: Option<String>,
-    /// What it is kept from.
+    /// Sandbox in force.
     pub confinement: Confinement,
     /// Faults since the start of the host.
     pub faults: u64,
-    /// Reason why it is not in use.
+    /// Reason why it is out of use.
     pub out_of_use: Option<String>,
 }
 
@@ -136,7 +137,7 @@ impl Instance {
         self.state().map(|state| state.sha256.clone()).unwrap_or_default()
     }
 
-    /// Names the stroke of the jobs to come, 0 for none.
+    /// Sets the stroke number of the following jobs, 0 for none.
     pub fn at_stroke(&self, stroke: u64) {
         self.stroke.store(stroke, Ordering::Relaxed);
     }
@@ -146,12 +147,12 @@ impl Instance {
         JobSpec { stroke: self.stroke.load(Ordering::Relaxed), ..JobSpec::untriggered(limit) }
     }
 
-    /// Whether the plugin runs in a process of its own.
+    /// Returns whether the plugin runs in a process of its own.
     pub fn is_isolated(&self) -> bool {
         self.library.settings.isolation == Isolation::Process
     }
 
-    /// Returns the state; an error while a job runs, which has it until its end.
+    /// Returns the state; an error while a job runs, which holds it until its end.
     fn state(&self) -> Result<MutexGuard<'_, State>, PluginError> {
         match self.state.try_lock() {
             Ok(state) => Ok(state),
@@ -164,20 +165,20 @@ impl Instance {
         }
     }
 
-    /// Looks after a worker that idles.
+    /// Checks an idle worker.
     ///
     /// # Errors
-    /// How it ended, once.
+    /// The reason why the worker ended, returned once.
     pub fn check(&self) -> Result<(), PluginError> {
         let mut state = self.state()?;
         let checked = state.link.as_mut().map_or(Ok(()), Link::check);
         checked.map_err(|error| self.failed(&mut state, error, Instant::now()))
     }
 
-    /// Makes sure that there is a worker, in which the plugin is created: looks after one that idles, starts one that is missing.
+    /// Ensures that there is a worker in which the plugin is created: checks an idle one, starts a missing one.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The reason why there is no worker.
     pub fn revive(&self) -> Result<(), PluginError> {
         if let Err(error) = self.check() {
             tracing::error!("{error}");
@@ -194,7 +195,7 @@ impl Instance {
         self.link(&mut state).map(drop)
     }
 
-    /// Returns the worker, a fresh one where there is none.
+    /// Returns the worker; starts a new one where there is none.
     fn link<'a>(&self, state: &'a mut State) -> Result<&'a mut Link, PluginError> {
         let link = match state.link.take() {
             Some(link) => link,
@@ -255,7 +256,7 @@ impl Instance {
     /// Opens the plugin: it connects to its device, again when it was connected.
     ///
     /// # Errors
-    /// The plugin's reason, or why it has no worker.
+    /// The plugin's reason, or the reason why it has no worker.
     pub fn open(&self, limit: Duration) -> Result<(), PluginError> {
         let mut state = self.state()?;
         let start = Instant::now();
@@ -267,7 +268,7 @@ impl Instance {
     /// Returns the duration of a scan of the window, seconds, if the plugin can estimate it.
     ///
     /// # Errors
-    /// Why it has no worker, or does not answer.
+    /// The reason why it has no worker or does not answer.
     pub fn estimate_s(&self, window: Option<&Window>, limit: Duration) -> Result<Option<f64>, PluginError> {
         let mut state = self.state()?;
         let start = Instant::now();
@@ -276,10 +277,10 @@ impl Instance {
         seconds.map_err(|error| self.failed(&mut state, error, start))
     }
 
-    /// Returns the state of the plugin's instrument, if it tells.
+    /// Returns the state of the plugin's instrument, if the plugin reports it.
     ///
     /// # Errors
-    /// Why it has no worker, or does not answer.
+    /// The reason why it has no worker or does not answer.
     pub fn health(&self) -> Result<Option<Health>, PluginError> {
         let mut state = self.state()?;
         let start = Instant::now();
@@ -299,7 +300,7 @@ impl Instance {
     /// Returns the devices that a driver finds in reach, without opening any.
     ///
     /// # Errors
-    /// When it cannot look for them, or why it has no worker or does not answer.
+    /// The plugin cannot search for devices, has no worker, or does not answer.
     pub fn discover(&self) -> Result<Vec<Device>, PluginError> {
         let mut state = self.state()?;
         let start = Instant::now();
@@ -313,7 +314,7 @@ impl Instance {
         Ok(found.into_iter().map(device).collect())
     }
 
-    /// Returns whether a job was repeated in a fresh process since this was last asked.
+    /// Returns whether a job was repeated in a new process since the last call of this function.
     pub fn take_retried(&self) -> bool {
         self.state().is_ok_and(|mut state| std::mem::take(&mut state.retried))
     }
@@ -338,7 +339,7 @@ impl Instance {
         })
     }
 
-    /// Puts a value where the plugin can read it.
+    /// Encodes a value in memory that the plugin can read.
     pub(super) fn input<T: Payload>(
         &self,
         value: &T,
@@ -368,7 +369,7 @@ impl Instance {
         Ok(RunningJob::new(self, state, job.id, started, spec.limit, spec.cancel))
     }
 
-    /// Runs a job, and once more in a fresh process when the plugin's process ended or its answer was none.
+    /// Runs a job, and a second time in a new process if the plugin's process ended or its answer was invalid.
     pub(super) fn twice<T>(&self, job: impl Fn() -> Result<T, PluginError>) -> Result<T, PluginError> {
         match job() {
             Err(error) if error.is_fault() && !matches!(error, PluginError::Hangs { .. }) => {
@@ -381,7 +382,7 @@ impl Instance {
         }
     }
 
-    /// Takes account of an error of the worker, and returns it as one of the plugin.
+    /// Records an error of the worker, and returns it as an error of the plugin.
     fn failed(&self, state: &mut State, error: LinkError, since: Instant) -> PluginError {
         let name = self.name().to_owned();
         let failed = |message, retryable| PluginError::Failed { name: name.clone(), message, retryable };
@@ -409,7 +410,7 @@ impl Instance {
         }
     }
 
-    /// Counts a fault: its process is not used again, and after too many nor is its library.
+    /// Counts a fault: the process is not used again, and after too many faults nor is the library.
     fn fault(&self, state: &mut State, error: PluginError) -> PluginError {
         state.link = None;
         let why = error.to_string();

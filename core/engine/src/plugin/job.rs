@@ -1,4 +1,4 @@
-//! A job as it is asked for.
+//! Specification of a job: stroke, deadline, cancellation and progress.
 
 use std::fmt;
 use std::sync::Arc;
@@ -15,25 +15,25 @@ impl CancelToken {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the job was cancelled.
+    /// Returns whether the job was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Receiver of what a job says on its way: the share done, 0 to 1, and its phase in words.
+/// Receiver of a job's progress reports: the share done, 0 to 1, and the name of its phase.
 #[derive(Clone, Default)]
 pub struct ProgressSink(Option<Arc<Receive>>);
 
 type Receive = dyn Fn(f64, &str) + Send + Sync;
 
 impl ProgressSink {
-    /// Makes a receiver; it is called from the thread that waits for the job.
+    /// Creates a receiver; it is called from the thread that waits for the job.
     pub fn new(receive: impl Fn(f64, &str) + Send + Sync + 'static) -> Self {
         Self(Some(Arc::new(receive)))
     }
 
-    /// Hands on what a plugin said; a share that is no number is dropped.
+    /// Passes on a progress report of a plugin; a share that is not finite is dropped.
     pub(super) fn tell(&self, share: f64, phase: &str) {
         if let Some(receive) = self.0.as_ref().filter(|_| share.is_finite()) {
             receive(share.clamp(0.0, 1.0), phase);
@@ -50,7 +50,7 @@ impl fmt::Debug for ProgressSink {
 /// Stroke and deadline of a job.
 #[derive(Debug, Clone)]
 pub struct JobSpec {
-    /// Stroke, 0 when none.
+    /// Stroke number, 0 for none.
     pub stroke: u64,
     /// Time of the press's trigger.
     pub trigger: Instant,

@@ -1,4 +1,4 @@
-//! A plugin as found in a library, described by a worker: the host itself opens no library.
+//! Plugin of a library, as described by a worker: the host itself opens no library.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,33 +7,33 @@ use std::time::{Duration, Instant};
 use super::worker::{Limits, Link, LinkError, LoadedLibrary, Place};
 use super::{Descriptor, PluginError, Quarantine};
 
-/// Where a plugin runs.
+/// Place where a plugin runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Isolation {
     /// In a process of its own.
     #[default]
     Process,
-    /// In a thread of the host, for a debugger: whatever ends the plugin ends the host.
+    /// In a thread of the host, for a debugger: a crash of the plugin ends the host.
     InProcess,
 }
 
-/// How a plugin runs.
+/// Run settings of a plugin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
-    /// Where.
+    /// Place.
     pub isolation: Isolation,
-    /// With how much.
+    /// Resource limits.
     pub limits: Limits,
 }
 
 /// Effects of loading a library on its process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LoadFacts {
-    /// From the start of the process to the description.
+    /// Time from the start of the process to the description.
     pub took: Duration,
-    /// The last line that it printed.
+    /// Last line that it printed.
     pub printed: Option<String>,
-    /// Threads afterwards; 0 where it is not in a process of its own.
+    /// Threads after loading; 0 where the plugin is not in a process of its own.
     pub threads: u64,
 }
 
@@ -53,7 +53,7 @@ impl Library {
     /// Loads a library in a worker and returns its plugins.
     ///
     /// # Errors
-    /// Not a plugin, wrong version, failed to load, or it ended the worker.
+    /// Not a plugin, wrong version, failed to load, or the worker ended while loading.
     pub(super) fn load(
         path: &Path,
         settings: Settings,
@@ -77,10 +77,10 @@ impl Library {
         Ok((0..about.plugins.len()).map(plugin).collect())
     }
 
-    /// Returns the same plugin, run in another way.
+    /// Returns the plugin with other run settings.
     #[must_use]
     pub fn with(mut self, settings: Settings) -> Self {
-        // What the command line wants in-process stays there.
+        // In-process from the command line takes precedence.
         let isolation = if self.settings.isolation == Isolation::InProcess {
             Isolation::InProcess
         } else {
@@ -95,12 +95,12 @@ impl Library {
         &self.about.plugins[self.index]
     }
 
-    /// Returns what loading it did to its process.
+    /// Returns the effects of loading the library on its process.
     pub fn facts(&self) -> &LoadFacts {
         &self.facts
     }
 
-    /// File.
+    /// Returns the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -111,7 +111,7 @@ impl Library {
     }
 }
 
-/// Returns a number of a process's status.
+/// Returns a numeric entry of a process's status file.
 pub(super) fn status(process: u32, name: &str) -> Option<u64> {
     let text = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = text.lines().find(|line| line.split(':').next() == Some(name))?;

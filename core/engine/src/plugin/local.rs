@@ -1,4 +1,5 @@
-//! A plugin in this process, that of its worker: its library, the calls through its tables, and the host's table for it.
+//! Plugin library inside the worker's own process: the library, the calls through its tables, and the host's table for
+//! it.
 
 mod descriptor;
 mod host_table;

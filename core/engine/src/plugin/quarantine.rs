@@ -1,5 +1,7 @@
-//! Plugins that failed too often: a file of their libraries' SHA-256, beside the record of the plant. It is ended by another
-//! content of the library, or by `platen plugins quarantine clear`.
+//! Quarantine of plugins that failed too often: a file of the SHA-256 of their libraries, beside the record of the
+//! plant.
+//!
+//! A quarantine ends when the library has another content, or with `platen plugins quarantine clear`.
 
 use std::fs;
 use std::io;
@@ -7,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-/// The file of a plant's quarantined plugins.
+/// File of a plant's quarantined plugins.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quarantine {
     file: PathBuf,
@@ -22,11 +24,11 @@ pub struct Quarantined {
     pub library: PathBuf,
     /// SHA-256 of its content, hexadecimal.
     pub sha256: String,
-    /// The last fault.
+    /// Last fault.
     pub why: String,
     /// Number of faults until then.
     pub faults: u64,
-    /// Since when.
+    /// Start of the quarantine.
     pub since: jiff::Timestamp,
 }
 
@@ -36,7 +38,7 @@ impl Quarantine {
         Self { file: history.with_file_name("quarantine.json") }
     }
 
-    /// Returns the libraries in quarantine, none without the file.
+    /// Returns the libraries in quarantine; none if the file is missing.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -49,7 +51,7 @@ impl Quarantine {
         }
     }
 
-    /// Releases a plugin, all of them without a name; returns those released.
+    /// Releases a plugin, or all plugins without a name; returns those released.
     ///
     /// # Errors
     /// The file cannot be read or written.
@@ -60,7 +62,7 @@ impl Quarantine {
         Ok(released)
     }
 
-    /// Returns the entry of a content; one that cannot be read counts as none.
+    /// Returns the entry of a library with this content; an unreadable file counts as empty.
     pub(super) fn find(&self, sha256: &str) -> Option<Quarantined> {
         self.list().ok()?.into_iter().find(|held| held.sha256 == sha256)
     }

@@ -1,4 +1,4 @@
-//! Scanner drivers: scans are pulled column by column.
+//! Scanner drivers: the host pulls a scan column by column.
 
 use std::time::Duration;
 
@@ -46,7 +46,7 @@ impl Scanner {
     /// Starts a scan and waits for its header.
     ///
     /// # Errors
-    /// The driver's reason, the deadline, or the fault in what it sent.
+    /// The driver's reason, the deadline, or the fault in the data that it sent.
     pub fn start(&self, spec: JobSpec, window: Option<&Window>) -> Result<RunningScan<'_>, PluginError> {
         let window = window.map(|window| self.0.input(window, None)).transpose()?;
         let mut job = self.0.run(spec, window.as_slice())?;
@@ -63,7 +63,7 @@ impl Scanner {
     }
 }
 
-/// A scan in progress: an iterator over its columns, checked against the header, in any order. Nothing follows an error.
+/// Scan in progress: an iterator over its columns in any order, checked against the header. Nothing follows an error.
 ///
 /// Cancelling the job's token or reaching its deadline ends the scan with an error. Dropping it before its end cancels
 /// the job and waits for the driver.
@@ -71,7 +71,7 @@ impl Scanner {
 pub struct RunningScan<'a> {
     job: RunningJob<'a>,
     header: ScanHeader,
-    /// Which columns have come.
+    /// Columns that have arrived.
     seen: Vec<bool>,
     columns: u32,
     points: u64,
@@ -86,10 +86,10 @@ impl RunningScan<'_> {
         &self.header
     }
 
-    /// Waits for the end of the scan; columns not taken are checked and dropped. Without `Ok` there was no scan.
+    /// Waits for the end of the scan; columns not taken are checked and dropped. Only `Ok` means a complete scan.
     ///
     /// # Errors
-    /// The driver's reason, the deadline, or the fault in what it sent.
+    /// The driver's reason, the deadline, or the fault in the data that it sent.
     pub fn finish(&mut self) -> Result<ScanEnd, PluginError> {
         self.by_ref().try_for_each(|column| column.map(drop))?;
         match self.end {
@@ -98,7 +98,7 @@ impl RunningScan<'_> {
         }
     }
 
-    /// Counts a column; each comes once, within what the header says.
+    /// Counts a column; each arrives once, within the bounds of the header.
     fn count(&mut self, column: &Column) -> Result<(), String> {
         let index = column.index;
         if index >= MAX_COLUMNS {

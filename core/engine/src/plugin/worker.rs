@@ -1,4 +1,5 @@
-//! Plugins in processes of their own: `platen worker`, a hidden verb of the same program, one for each configured plugin.
+//! Worker processes of plugins: `platen worker`, a hidden command of the same program, one process for each configured
+//! plugin.
 //!
 //! ```text
 //! host                                     worker
@@ -8,13 +9,14 @@
 //! | module | contents |
 //! |---|---|
 //! | `wire` | messages, one datagram each |
-//! | `memory`, `pool` | shared memory: inputs, read-only in the worker; a pool for what the plugin sends |
+//! | `memory`, `pool` | shared memory: inputs, read-only in the worker; a pool for the frames of the plugin |
 //! | `process` | the child process: start, log, end |
-//! | `link` | the host's end: requests, jobs, the deadline ladder |
+//! | `link` | the host's end: requests, jobs, escalation after the deadline |
 //! | `serve`, `outbox` | the worker's end |
 //! | `confine` | limits, landlock, seccomp |
 //!
-//! With `isolation = "in-process"` the same worker runs in a thread of the host, for a debugger: one protocol, one path.
+//! With `isolation = "in-process"` the same worker runs in a thread of the host, for a debugger. Protocol and code path
+//! are the same.
 
 mod confine;
 mod link;
@@ -42,7 +44,7 @@ pub struct Limits {
     pub memory: u64,
     /// Open files.
     pub files: u64,
-    /// Pool for frames under way to the host, bytes.
+    /// Pool for frames in transit to the host, bytes.
     pub pool: u64,
 }
 

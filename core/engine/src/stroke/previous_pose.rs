@@ -29,7 +29,8 @@ mod tests {
 
     #[test]
     fn u_goes_on_from_the_last_scan_and_turns_with_the_press() {
-        // Radians: of a spline's normal equations, which stiffen as points without noise ask for more smoothing.
+        // Rounding limit, radians, from a spline's normal equations: points without noise lead to more smoothing, which
+        // makes the equations stiffer.
         const ROUNDING: f64 = 1e-7;
         let mut fit = SplineFit::new(UniformKnots::new(0.0, 2.0, 4), UniformKnots::new(0.0, 1.0, 4));
         for i in 0..400 {

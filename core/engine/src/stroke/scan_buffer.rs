@@ -1,4 +1,4 @@
-//! Buffer of a whole scan, until its stroke is judged.
+//! Buffer of a whole scan until its stroke has a verdict.
 
 use platen_scan::{Column, ScanEnd, ScanHeader};
 

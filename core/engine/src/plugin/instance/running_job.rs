@@ -1,4 +1,4 @@
-//! A job of a plugin in progress: its frames as they come, its deadline, its cancellation.
+//! Running job of a plugin: its frames in order of arrival, its deadline, its cancellation.
 
 use std::sync::MutexGuard;
 use std::time::{Duration, Instant};
@@ -30,7 +30,7 @@ impl Emitted {
         self.buffer.as_ref()
     }
 
-    /// Whether the frame has the format of `T`.
+    /// Returns whether the frame has the format of `T`.
     pub fn is<T: Payload>(&self) -> bool {
         self.format.as_bytes() == T::FORMAT.to_bytes()
     }
@@ -48,7 +48,7 @@ impl Emitted {
 #[derive(Debug)]
 pub struct RunningJob<'a> {
     instance: &'a Instance,
-    /// Until the job has ended.
+    /// Held until the job has ended.
     state: Option<MutexGuard<'a, State>>,
     id: u64,
     deadline: Instant,
@@ -113,7 +113,7 @@ impl<'a> RunningJob<'a> {
         self.state.as_mut().and_then(|state| state.link.as_mut())
     }
 
-    /// Takes the end of a job: one that was stopped is reported as stopped, whatever the plugin returned.
+    /// Records the end of a job: one that was stopped is reported as stopped, whatever the plugin returned.
     fn end(&mut self, result: Result<(), CallError>) {
         let late = Instant::now() >= self.deadline;
         let cancelled = matches!(&result, Err(error) if error.status == status::CANCELLED);

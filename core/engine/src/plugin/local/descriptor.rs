@@ -1,4 +1,4 @@
-//! Reads the static tables that describe a plugin.
+//! Reader of the static tables that describe a plugin.
 #![allow(unsafe_code, reason = "reads the plugin's static tables")]
 
 use std::ffi::{CStr, c_char};
@@ -81,7 +81,7 @@ unsafe fn options(desc: &Desc) -> Result<Vec<OptionDecl>, String> {
         if place.is_null() {
             return Err(format!("its {} options are nowhere", desc.n_options));
         }
-        // SAFETY: the list has n_options elements, each as long as it says.
+        // SAFETY: the list has n_options elements, each as long as its struct_size.
         let raw = unsafe { RawOption::read(place.cast()) }
             .map_err(|size| format!("option {index} has {size} bytes, {} are needed", RawOption::LEAST))?;
         // SAFETY: as above.

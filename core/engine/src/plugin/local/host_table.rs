@@ -1,4 +1,4 @@
-//! The host's functions for plugins (`platen_host` of `platen.h`). Every argument is checked.
+//! Host functions that a plugin can call (`platen_host` of `platen.h`), with every argument checked.
 #![allow(unsafe_code, reason = "callbacks from the other side of the boundary")]
 
 use std::ffi::{c_char, c_int, c_void};
@@ -48,7 +48,7 @@ pub(super) fn empty_error() -> abi::Error {
     }
 }
 
-/// Returns message, device's code and hint as one line; without a message, the name of the status.
+/// Returns the message, the device's code and the hint as one line; without a message, the name of the status.
 pub(super) fn message(error: &abi::Error, status: abi::Status) -> String {
     let text = |chars: &[c_char]| {
         let bytes: Vec<u8> = chars.iter().map(|c| *c as u8).take_while(|b| *b != 0).collect();
@@ -145,7 +145,7 @@ unsafe extern "C" fn emit(_: *const abi::Host, job: u64, frame: *const abi::Fram
     if frame.is_null() {
         return abi::status::BAD_DATA;
     }
-    // SAFETY: the plugin's struct, as long as it says, alive for the call; so is its string.
+    // SAFETY: the plugin's struct, as long as its struct_size, alive for the call; so is its string.
     let (Ok(frame), format) = (unsafe { (abi::Frame::read(frame), text((*frame).format)) }) else {
         return abi::status::BAD_DATA;
     };

@@ -90,7 +90,7 @@ impl Instance {
         if raw.is_null() {
             return Err(unsound("it created no instance".into()));
         }
-        // SAFETY: the instance that the plugin made, as long as it says.
+        // SAFETY: the instance that the plugin made, as long as its struct_size.
         let table = unsafe { abi::Instance::read(raw) }.map_err(|size| {
             let (name, least) = (abi::Instance::NAME, abi::Instance::LEAST);
             unsound(format!("its {name} has {size} bytes, {least} are needed"))
@@ -131,7 +131,7 @@ impl Instance {
     /// Returns a table of the instance.
     fn extension<T: abi::Table>(&self, id: &std::ffi::CStr) -> Option<T> {
         let get = self.table.get_extension?;
-        // SAFETY: `[any]` call of a live instance; a table that it returns is as long as it says.
+        // SAFETY: `[any]` call of a live instance; a table that it returns is as long as its struct_size.
         unsafe {
             let table = get(self.raw, id.as_ptr()).cast::<T>();
             if table.is_null() { None } else { T::read(table).ok() }

@@ -1,4 +1,4 @@
-//! Jobs in progress in this process, for the callbacks of the host's table.
+//! Registry of the jobs in progress in this process, for the callbacks of the host's table.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

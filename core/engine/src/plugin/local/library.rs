@@ -1,4 +1,5 @@
-//! A plugin library in this process: inspected as data (ELF) first, symbols bound at once (`RTLD_NOW`), never unloaded.
+//! Loader of a plugin library: the file is checked as data (ELF) first, symbols are bound at once (`RTLD_NOW`), and it
+//! is never unloaded.
 #![allow(unsafe_code, reason = "the loader")]
 
 use std::collections::BTreeMap;
@@ -28,8 +29,8 @@ pub(in crate::plugin) struct Library {
 static LOADED: Mutex<BTreeMap<PathBuf, Arc<Library>>> = Mutex::new(BTreeMap::new());
 
 impl Library {
-    /// Loads a file, or returns the library already loaded from it. No code of the library runs before it is known to be a
-    /// plugin of this major version.
+    /// Loads a file, or returns the library already loaded from it. No code of the library runs before it is found to
+    /// be a plugin of this major version.
     ///
     /// # Errors
     /// Not a plugin, wrong version, failed to load.
@@ -61,8 +62,8 @@ impl Library {
     }
 }
 
-/// Reads the file as data: a truncated library would end the process inside the loader, and another kind of library
-/// would run its constructors. Returns its SHA-256.
+/// Checks the file as data and returns its SHA-256: a truncated library would end the process inside the loader, and
+/// another kind of library would run its constructors.
 fn look(path: &Path) -> Result<String, LoadFault> {
     let not_a_plugin = |why: &str| LoadFault::NotAPlugin(why.to_owned());
     let bytes = std::fs::read(path).map_err(|e| not_a_plugin(&format!("it cannot be read ({e})")))?;
@@ -86,7 +87,7 @@ fn look(path: &Path) -> Result<String, LoadFault> {
 /// Returns the names that a library exports, read from the file as data.
 ///
 /// # Errors
-/// Why it is no whole library for this machine.
+/// The reason why it is not a complete library for this machine.
 pub fn exported_symbols(path: &Path) -> Result<Vec<String>, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{} cannot be read ({e})", path.display()))?;
     let elf = whole(&bytes)?;
@@ -94,7 +95,7 @@ pub fn exported_symbols(path: &Path) -> Result<Vec<String>, String> {
     Ok(symbols.filter_map(|symbol| symbol.name().ok()).map(str::to_owned).collect())
 }
 
-/// Returns the library in these bytes, none of it cut off.
+/// Returns the library in these bytes if it is not truncated.
 fn whole(bytes: &[u8]) -> Result<ElfFile64<'_, object::Endianness>, String> {
     let elf = ElfFile64::<object::Endianness>::parse(bytes)
         .map_err(|_| "no library for this machine, or a damaged one".to_owned())?;
@@ -106,7 +107,7 @@ fn whole(bytes: &[u8]) -> Result<ElfFile64<'_, object::Endianness>, String> {
     if cut || elf.elf_section_table().is_empty() { Err("the file is cut off".into()) } else { Ok(elf) }
 }
 
-/// Returns a loading error with its sources, which contain the reason.
+/// Returns a loading error together with its sources, which contain the reason.
 fn reasons(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -121,14 +122,14 @@ fn open(path: &Path, sha256: String) -> Result<Library, LoadFault> {
     let failed = |e: libloading::Error| {
         LoadFault::FailedToLoad(format!("{}; install what it needs beside it", reasons(&e)))
     };
-    // SAFETY: the file is a library that says it is a plugin; who may write it may run code, by design.
+    // SAFETY: the file is a library that exports the entry of a plugin; whoever may write it may run code, by design.
     let handle = unsafe { Handle::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map_err(failed)?;
-    // SAFETY: the symbol's name carries the version of its type, and the struct is as long as it says.
+    // SAFETY: the symbol's name carries the version of its type, and the struct is as long as its struct_size.
     let entry = unsafe {
         let symbol = handle.get::<*const abi::Entry>(abi::ENTRY_SYMBOL).map_err(failed)?;
         abi::Entry::read(symbol.into_raw().cast::<abi::Entry>())
     };
-    // Never unloaded: its code may be in use by threads and thread locals until the process ends.
+    // Never unloaded: threads and thread-local storage may use its code until the process ends.
     std::mem::forget(handle);
     let entry = entry.map_err(|size| {
         LoadFault::NotAPlugin(format!(
@@ -171,10 +172,10 @@ fn describe(entry: &abi::Entry) -> Result<Vec<Descriptor>, String> {
     Ok(plugins)
 }
 
-/// Most plugins that a library may hold.
+/// Largest number of plugins in a library.
 const MOST: u32 = 64;
 
-/// Returns the formats that the host gives to a kind of plugin, and those that it takes.
+/// Returns the formats that the host passes to a kind of plugin, and the formats that it accepts from it.
 fn formats(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
         Kind::Scanner => (&["platen.window/1"], &["platen.scan/1", "platen.column/2", "platen.scan-end/1"]),

@@ -1,11 +1,16 @@
-//! Confinement of a worker: limits for every plugin; for flattenings and comparisons, which are pure functions, every file,
-//! socket, program and other process, once they are created.
+//! Sandbox of a worker: resource limits for every plugin, and isolation from the system for those that need no access
+//! to it.
 //!
-//! Landlock (landlock.io) takes files and ports away where the kernel has it; seccomp ends a process that makes any system call
-//! but those for memory, threads, clocks and the descriptors at hand. Scanner drivers stay free: their libraries need devices, sockets
-//! and licences.
+//! Flattenings and comparisons are pure functions. Once they are created, they lose access to every file, socket,
+//! program and other process:
 //!
-//! Limits: what a plugin opened before it was created stays open.
+//! - Landlock (landlock.io) removes access to files and ports where the kernel has it.
+//! - seccomp ends a process that makes a system call other than those for memory, threads, clocks and its open
+//!   descriptors.
+//!
+//! Scanner drivers are not isolated: their libraries need devices, sockets and licences.
+//!
+//! Limits: descriptors that a plugin opened before it was created stay open.
 #![allow(unsafe_code, reason = "a signal handler")]
 
 use std::collections::BTreeMap;
@@ -22,10 +27,10 @@ use seccompiler::{
 
 use super::Limits;
 
-/// Below the host, which talks to the press.
+/// Lower priority than the host, which communicates with the press.
 const NICE: i32 = 5;
 
-/// Limits this process.
+/// Sets the resource limits of this process.
 pub(super) fn limit(limits: &Limits) {
     let set = |resource, most| {
         let _ = setrlimit(resource, Rlimit { current: Some(most), maximum: Some(most) });
@@ -36,7 +41,7 @@ pub(super) fn limit(limits: &Limits) {
     let _ = nice(NICE);
 }
 
-/// Takes files away from this thread and those that it starts; returns what holds.
+/// Removes access to files from this thread and the threads that it starts; returns the isolation in force.
 pub(super) fn files() -> super::Confinement {
     let restrict = || -> Result<bool, RulesetError> {
         let newest = ABI::V5;
@@ -49,7 +54,7 @@ pub(super) fn files() -> super::Confinement {
     super::Confinement { landlock: restrict().unwrap_or(false), seccomp: false }
 }
 
-/// System calls of computing: memory, threads, clocks, the descriptors at hand, the end.
+/// System calls of computing: memory, threads, clocks, open descriptors, exit.
 const ALLOWED: &[i64] = &[
     libc::SYS_read,
     libc::SYS_write,
@@ -104,7 +109,7 @@ const ALLOWED_HERE: &[i64] = &[libc::SYS_poll, libc::SYS_time, libc::SYS_arch_pr
 #[cfg(not(target_arch = "x86_64"))]
 const ALLOWED_HERE: &[i64] = &[];
 
-/// Takes every other system call away from all threads; returns whether that holds.
+/// Removes access to every other system call from all threads; returns whether the filter is in force.
 pub(super) fn system_calls() -> bool {
     name_what_was_called();
     let arch = std::env::consts::ARCH;
@@ -113,7 +118,7 @@ pub(super) fn system_calls() -> bool {
         rules.extend(calls.contains(&libc::SYS_fstat).then(status_of_descriptors).flatten());
         SeccompFilter::new(rules, others, these, arch.try_into().ok()?).ok()?.try_into().ok()
     };
-    // A new process is told from a new thread by an argument that only `clone` shows: the C library falls back to it.
+    // A new process differs from a new thread in an argument that only `clone` shows: the C library falls back to it.
     let threads = fork_free(arch);
     let clone3 =
         program(&[libc::SYS_clone3], SeccompAction::Allow, SeccompAction::Errno(libc::ENOSYS as u32));
@@ -123,14 +128,14 @@ pub(super) fn system_calls() -> bool {
         .all(|program| program.as_ref().is_some_and(|program| apply_filter_all_threads(program).is_ok()))
 }
 
-/// The status of an open descriptor, by which the C library asks for what it prints to; never one of a path.
+/// Status of an open descriptor, which the C library reads before it prints; never the status of a path.
 fn status_of_descriptors() -> Option<(i64, Vec<SeccompRule>)> {
     let flag = libc::AT_EMPTY_PATH as u64;
     let empty = SeccompCondition::new(3, SeccompCmpArgLen::Dword, SeccompCmpOp::MaskedEq(flag), flag).ok()?;
     Some((libc::SYS_newfstatat, vec![SeccompRule::new(vec![empty]).ok()?]))
 }
 
-/// A filter under which `clone` makes threads only.
+/// Returns a filter under which `clone` makes threads only.
 fn fork_free(arch: &str) -> Option<BpfProgram> {
     let thread = libc::CLONE_THREAD as u64;
     let process =
@@ -142,7 +147,7 @@ fn fork_free(arch: &str) -> Option<BpfProgram> {
         .ok()
 }
 
-/// Lets a forbidden call say its number before it ends the process.
+/// Installs a handler that prints the number of a forbidden system call before the process ends.
 fn name_what_was_called() {
     // SAFETY: a handler that is safe in a signal: it writes, restores the default and raises the signal again.
     unsafe {
@@ -172,7 +177,7 @@ extern "C" fn named(_: libc::c_int, info: *const libc::siginfo_t, _: *const libc
     }
 }
 
-/// Ends the process without running anything more of it.
+/// Ends the process without running any more of its code.
 pub(super) fn end_at_once() -> ! {
     // SAFETY: ends the process.
     unsafe { libc::_exit(0) }

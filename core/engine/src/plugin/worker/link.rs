@@ -1,5 +1,6 @@
-//! The host's end of a worker: requests and their answers, a job and its frames, and the ladder for what does not answer:
-//! deadline, cancellation, grace, end.
+//! Host's end of a worker: requests and their answers, a job and its frames, and the escalation when no answer arrives.
+//!
+//! The steps of the escalation are: deadline, cancellation, grace period, end of the process.
 
 use std::fmt;
 use std::io;
@@ -27,21 +28,21 @@ pub(in crate::plugin) use super::serve::Place;
 const START_LIMIT: Duration = Duration::from_secs(5);
 /// Time for a plugin to return after its cancellation, and for a worker to end.
 pub(super) const GRACE: Duration = Duration::from_millis(500);
-/// Time in which a process whose connection has ended is gone.
+/// Time in which a process ends after its connection.
 const DEATH: Duration = Duration::from_secs(1);
 
-/// Reason why a worker did not do what it was asked for.
+/// Reason why a worker did not carry out a request.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::plugin) enum LinkError {
     /// The library cannot be used.
     Load(LoadFault),
     /// The plugin stated a failure.
     Call(CallError),
-    /// The worker ended, with how.
+    /// The worker ended; how it ended.
     Died(String),
     /// The plugin did not return in time, and its worker was ended.
     Hung(Duration),
-    /// The system gave no worker or no memory.
+    /// The system provided no process or no memory.
     System(String),
 }
 
@@ -54,7 +55,7 @@ impl From<io::Error> for LinkError {
 /// A worker with one plugin. Dropping it ends the worker.
 pub(in crate::plugin) struct Link {
     name: String,
-    /// `None` once it is given up, so that the worker sees its end.
+    /// `None` once the link is given up, so that the worker sees the end of the connection.
     socket: Option<Socket>,
     buffer: Vec<u8>,
     pool: SharedMemory,
@@ -75,7 +76,7 @@ impl fmt::Debug for Link {
     }
 }
 
-/// A message to the host, or why there is none.
+/// Message to the host, or the reason why there is none.
 enum Next {
     Message(ToHost),
     Late,
@@ -98,7 +99,7 @@ impl Link {
             }
             Place::Thread => {
                 let (ours, theirs) = Socket::pair()?;
-                // Ends with the connection; one that hangs is abandoned.
+                // It ends with the connection; a thread that hangs is abandoned.
                 thread::Builder::new().name(name.to_owned()).spawn(|| serve::serve(theirs, Place::Thread))?;
                 (None, ours)
             }
@@ -204,7 +205,7 @@ impl Link {
         self.opened
     }
 
-    /// Lets the next job open the plugin again.
+    /// Makes the next job open the plugin again.
     pub(in crate::plugin) fn reopen(&mut self) {
         self.opened = false;
     }
@@ -213,12 +214,12 @@ impl Link {
         self.confinement
     }
 
-    /// Returns the number of its process; `None` for a thread of the host.
+    /// Returns the process identifier; `None` for a thread of the host.
     pub(in crate::plugin) fn process_id(&self) -> Option<u32> {
         self.process.as_ref().map(Process::id)
     }
 
-    /// Reads what an idle worker has sent; an error when it has ended.
+    /// Reads the messages of an idle worker; an error if it has ended.
     pub(in crate::plugin) fn check(&mut self) -> Result<(), LinkError> {
         match self.next(Instant::now()) {
             Next::Late => Ok(()),
@@ -244,13 +245,13 @@ impl Link {
         self.send(&ToWorker::Run { job, inputs: named.collect() }, &beside)
     }
 
-    /// Cancels a job; what comes of it follows.
+    /// Cancels a job; its remaining frames and its end follow.
     pub(in crate::plugin) fn cancel(&mut self, job: u64) {
-        // A worker that has ended shows at the next message.
+        // A worker that has ended is detected at the next message.
         let _ = self.send(&ToWorker::Cancel(job), &[]);
     }
 
-    /// Returns the next frame or the end of a job; `None` when nothing comes until then.
+    /// Returns the next frame or the end of a job; `None` if none arrives in time.
     pub(in crate::plugin) fn next_of_job(
         &mut self,
         id: u64,
@@ -275,7 +276,7 @@ impl Link {
     }
 
     fn send(&self, message: &ToWorker, beside: &[BorrowedFd<'_>]) -> Result<(), LinkError> {
-        // A worker that has ended refuses: how it ended shows at the answer.
+        // The send to a worker that has ended fails; how it ended is found when the answer is read.
         match self.socket.as_ref().map(|socket| socket.send(message, beside)) {
             None | Some(Ok(())) => Ok(()),
             Some(Err(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -317,7 +318,7 @@ impl Link {
         LinkError::Died("it sent what nobody asked for".into())
     }
 
-    /// Returns how the worker ended, which its connection shows first.
+    /// Returns how the worker ended; the end of its connection is noticed before that of its process.
     fn died(&mut self) -> LinkError {
         self.socket = None;
         let how = match &mut self.process {
@@ -348,13 +349,13 @@ pub(in crate::plugin) enum JobEvent {
     Done(Result<(), CallError>),
 }
 
-/// Returns a number for a job, which no other job of this host has.
+/// Returns a number for a job that is unique in this host.
 pub(in crate::plugin) fn new_job() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// Returns the finest level of the host's log for plugins.
+/// Returns the most detailed level of the host's log for plugins.
 fn log_level() -> i32 {
     use tracing::Level;
     match () {

@@ -1,7 +1,7 @@
-//! Memory shared between host and worker: sealed memfds, mapped on both sides.
+//! Shared memory between host and worker: sealed memfds, mapped on both sides.
 //!
-//! A seal keeps either side from resizing it, which would kill the other by SIGBUS. An input is also sealed against new writable
-//! mappings before it is sent: the host wrote it, the worker can only read it.
+//! A seal prevents either side from resizing it, which would kill the other by SIGBUS. An input is also sealed against
+//! new writable mappings before it is sent: the host has written it, the worker can only read it.
 #![allow(unsafe_code, reason = "maps memory")]
 
 use std::io;
@@ -14,7 +14,7 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, mmap_anonymous, munmap};
 /// Size of a page of memory.
 pub(super) const PAGE: usize = 4096;
 
-/// A mapped memfd with an unmapped page before and behind it: what writes past its end is ended by the processor.
+/// Mapped memfd with an unmapped page before and behind it: a write past its end is stopped by the processor.
 #[derive(Debug)]
 pub(in crate::plugin) struct SharedMemory {
     fd: OwnedFd,
@@ -29,7 +29,7 @@ unsafe impl Send for SharedMemory {}
 unsafe impl Sync for SharedMemory {}
 
 impl SharedMemory {
-    /// Makes zeroed memory that nobody can resize.
+    /// Creates zeroed memory that cannot be resized.
     pub(in crate::plugin) fn new(bytes: usize) -> io::Result<Self> {
         let fd = memfd_create("platen", MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
         ftruncate(&fd, bytes as u64)?;
@@ -67,7 +67,7 @@ impl SharedMemory {
         Ok(Self { fd, data, bytes, writable })
     }
 
-    /// Allows no further writable mapping: what was written stays.
+    /// Forbids further writable mappings, so that the content is final.
     pub(in crate::plugin) fn seal(&self) -> io::Result<()> {
         Ok(fcntl_add_seals(&self.fd, SealFlags::FUTURE_WRITE | SealFlags::SEAL)?)
     }
@@ -80,7 +80,8 @@ impl SharedMemory {
         self.data.as_ptr()
     }
 
-    /// Copies a part; `None` beyond the end. The other side may write at the same time: the copy is what is checked.
+    /// Copies a part; `None` beyond the end. The other side may write at the same time, so the copy is checked, not the
+    /// original.
     pub(super) fn copy(&self, offset: u64, bytes: u64, into: &mut [u8]) -> Option<()> {
         let (start, n) = (usize::try_from(offset).ok()?, usize::try_from(bytes).ok()?);
         if start.checked_add(n)? > self.bytes || into.len() != n {

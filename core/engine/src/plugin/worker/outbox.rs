@@ -6,12 +6,12 @@ use std::time::{Duration, Instant};
 
 use super::wire::{Socket, ToHost};
 
-/// Log lines a second; more are counted only.
+/// Log lines a second; further lines are only counted.
 const LINES: u32 = 1000;
 /// Longest log line, characters.
 const LINE: usize = 2000;
 
-/// The worker's way to the host, for all threads.
+/// Connection of the worker to the host, shared by all threads.
 #[derive(Debug)]
 pub(in crate::plugin) struct Outbox {
     socket: Arc<Socket>,
@@ -25,7 +25,7 @@ struct Second {
     lines: u32,
 }
 
-/// The outbox of this process, when it is a worker.
+/// Outbox of this process, if it is a worker.
 static OUTBOX: OnceLock<Arc<Outbox>> = OnceLock::new();
 
 /// Returns the outbox of this process; `None` in the host.
@@ -38,7 +38,7 @@ impl Outbox {
         Arc::new(Self { socket, level, second: Mutex::new(Second { since: Instant::now(), lines: 0 }) })
     }
 
-    /// Makes it that of the process.
+    /// Makes it the outbox of the process.
     pub(super) fn publish(self: &Arc<Self>) {
         let _ = OUTBOX.set(Arc::clone(self));
     }

@@ -1,8 +1,9 @@
-//! The pool in which a plugin writes its frames: extents of one shared memory, given out by the worker, given back by the host.
+//! Frame pool of a plugin: parts of one shared memory, allocated by the worker and released by the host.
 //!
-//! The first page holds one number, the count of frames that the host has copied, in the order in which they were emitted. The worker waits on it (futex) when the pool
-//! is full: a slow host slows the plugin down, and nothing is lost. The lowest extent that fits is given out, so that the same
-//! pages are used again, which saves the page faults of fresh ones.
+//! The first page holds one number: the count of frames that the host has copied, in the order in which they were
+//! emitted. If the pool is full, the worker waits for that number to change (futex). A slow host therefore slows the
+//! plugin down, and no frame is lost. The lowest part that fits is allocated, so that the same pages are used again;
+//! this saves the page faults of new ones.
 #![allow(unsafe_code, reason = "a number in shared memory")]
 
 use std::collections::{BTreeMap, VecDeque};
@@ -15,10 +16,10 @@ use rustix::thread::futex;
 use super::memory::{PAGE, SharedMemory};
 use super::wire::timespec;
 
-/// Period at which one who waits looks whether its job was cancelled.
+/// Period at which a waiting thread checks whether its job was cancelled.
 const POLL: Duration = Duration::from_millis(20);
 
-/// Distance between extents: no two share a cache line.
+/// Distance between parts: no two share a cache line.
 const GRAIN: usize = 64;
 
 /// Returns the count of frames that the host has taken.
@@ -34,7 +35,7 @@ pub(super) fn release(memory: &SharedMemory) {
     let _ = futex::wake(taken, futex::Flags::empty(), 1);
 }
 
-/// Part of the pool.
+/// Part of the pool: an extent.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::plugin) struct Extent {
     pub(in crate::plugin) offset: usize,
@@ -42,13 +43,13 @@ pub(in crate::plugin) struct Extent {
 }
 
 impl Extent {
-    /// Returns the bytes that it takes of the pool.
+    /// Returns the number of bytes that it occupies in the pool.
     fn held(self) -> usize {
         self.bytes.max(1).next_multiple_of(GRAIN)
     }
 }
 
-/// Worker side.
+/// Worker's side of the pool.
 #[derive(Debug)]
 pub(in crate::plugin) struct Pool {
     memory: SharedMemory,
@@ -59,7 +60,7 @@ pub(in crate::plugin) struct Pool {
 struct State {
     /// Free parts: offset, length.
     free: BTreeMap<usize, usize>,
-    /// Frames under way to the host, in order, and the count at which each has been taken.
+    /// Frames in transit to the host, in order, and the count at which each has been copied.
     emitted: VecDeque<(u32, Extent)>,
     count: u32,
 }
@@ -89,7 +90,7 @@ impl State {
         Some(Extent { offset, bytes })
     }
 
-    /// Takes back what the host has copied.
+    /// Frees the parts that the host has copied.
     fn collect(&mut self, taken: u32) {
         while let Some((count, extent)) = self.emitted.front().copied()
             && taken.wrapping_sub(count) as i32 >= 0
@@ -108,7 +109,8 @@ impl Pool {
         Self { memory, state: Mutex::new(state) }
     }
 
-    /// Returns an extent; waits for one until `stopped`. `None` when stopped, or when the plugin itself holds what is missing.
+    /// Returns an extent; waits for one until `stopped`. `None` when stopped, or when the plugin itself holds the
+    /// missing parts.
     pub(in crate::plugin) fn allocate(&self, bytes: usize, stopped: impl Fn() -> bool) -> Option<Extent> {
         let taken = taken(&self.memory);
         loop {
@@ -123,17 +125,17 @@ impl Pool {
                     return None;
                 }
             }
-            // Returns at once when the count has changed since.
+            // Returns at once if the count has changed since.
             let _ = futex::wait(taken, futex::Flags::empty(), seen, Some(&timespec(POLL)));
         }
     }
 
-    /// Gives an extent back that will not be emitted.
+    /// Frees an extent that will not be emitted.
     pub(in crate::plugin) fn free(&self, extent: Extent) {
         self.state().give(extent);
     }
 
-    /// Sends an extent: `send` names it to the host; in the order of these calls the host takes them.
+    /// Sends an extent: `send` passes it to the host. The host copies extents in the order of these calls.
     pub(in crate::plugin) fn emit<T>(&self, extent: Extent, send: impl FnOnce() -> T) -> T {
         let mut state = self.state();
         state.count = state.count.wrapping_add(1);
@@ -206,7 +208,7 @@ mod tests {
                 .unwrap();
         let pool = Pool::new(memory);
         let all = pool.allocate(1024, || false).unwrap();
-        // The plugin holds all of it: nobody can give any back.
+        // The plugin holds all of it: no part can be freed.
         assert!(pool.allocate(1, || false).is_none());
         pool.emit(all, || ());
         assert!(pool.allocate(1, || true).is_none());

@@ -1,4 +1,4 @@
-//! A worker's process: started by the host, its output in the host's log, its whole process group ended with it.
+//! Process of a worker: the host starts it, puts its output in the log, and ends its whole process group with it.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, PipeReader};
@@ -14,10 +14,10 @@ use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
 
 use super::wire::{Socket, timespec};
 
-/// Variables of the environment that a worker keeps.
+/// Environment variables that a worker keeps.
 const KEPT: [&str; 9] =
     ["PATH", "HOME", "USER", "LANG", "LC_ALL", "TZ", "TMPDIR", "LD_LIBRARY_PATH", "LSAN_OPTIONS"];
-/// Lines of output kept for the report of a death.
+/// Lines of output kept for the report on the end of a worker.
 const LAST_LINES: usize = 20;
 /// Lines of output that reach the log each second.
 const LINES: u32 = 1000;
@@ -33,7 +33,8 @@ pub(super) struct Process {
     pump: thread::JoinHandle<()>,
 }
 
-/// Returns the program that has the verb `worker`: this one, or `platen` beside it or one folder up (tests, simulators).
+/// Returns the program that has the command `worker`: this one, or `platen` beside it or one folder up (tests,
+/// simulators).
 fn program() -> io::Result<PathBuf> {
     let this = std::env::current_exe()?;
     if this.file_stem().is_some_and(|name| name == "platen") {
@@ -49,7 +50,7 @@ fn program() -> io::Result<PathBuf> {
 }
 
 impl Process {
-    /// Starts a worker for a library, of which the log calls the output `name`.
+    /// Starts a worker for a library; the log shows its output under `name`.
     pub(super) fn start(name: &str, library: &Path) -> io::Result<(Self, Socket)> {
         let (ours, theirs) = Socket::pair()?;
         let (output, writer) = io::pipe()?;
@@ -74,16 +75,16 @@ impl Process {
         self.child.id()
     }
 
-    /// Waits for the end of a process that is expected to end, then ends what is left of its group. Returns how it ended.
+    /// Waits for the end of a process that is expected to end, then ends the rest of its group. Returns how it ended.
     pub(super) fn end(&mut self, grace: Duration) -> String {
         let group = Pid::from_child(&self.child);
         let by_itself = pidfd_open(group, PidfdFlags::empty()).is_ok_and(|ended| {
             poll(&mut [PollFd::new(&ended, PollFlags::IN)], Some(&timespec(grace))).is_ok_and(|n| n > 0)
         });
-        // Until the leader is waited for, its number belongs to nobody else.
+        // Until the leader has been waited for, its process identifier is not reused.
         let _ = kill_process_group(group, Signal::KILL);
         let status = self.child.wait();
-        // The output ends with the group, unless something has left it.
+        // The output ends with the group, unless a process has left the group.
         let until = Instant::now() + LAST_OUTPUT;
         while !self.pump.is_finished() && Instant::now() < until {
             thread::park_timeout(Duration::from_millis(1));
@@ -101,7 +102,7 @@ impl Process {
     }
 }
 
-/// Returns how a process ended, for people.
+/// Returns how a process ended, as readable text.
 fn how(status: ExitStatus) -> String {
     let Some(signal) = status.signal() else {
         return format!("exit code {}", status.code().unwrap_or_default());
@@ -149,7 +150,7 @@ fn pump(plugin: &str, output: PipeReader, kept: &Mutex<VecDeque<String>>) {
     }
 }
 
-/// Returns a text that leaves a terminal alone.
+/// Returns the text without the characters that control a terminal.
 pub(in crate::plugin) fn printable(text: &str) -> String {
     let shown = |c: char| if c.is_control() && c != '\t' { '\u{fffd}' } else { c };
     text.chars().map(shown).collect()

@@ -1,7 +1,8 @@
-//! The worker's end: loads a library, creates one plugin, and carries out the host's requests one after another.
+//! Worker's end of the connection: loads a library, creates one plugin, and carries out the host's requests one after
+//! another.
 //!
-//! The plugin's `[inst]` calls all come from this thread; a second one reads the socket and cancels. The worker ends with the
-//! socket: nothing of a host that died stays behind.
+//! The plugin's `[inst]` calls all come from this thread; a second one reads the socket and cancels jobs. The worker
+//! ends when the socket closes, so no worker outlives its host.
 #![allow(unsafe_code, reason = "cancels through the plugin's table")]
 
 use std::io;
@@ -20,22 +21,22 @@ use super::wire::{CallError, Job, LoadFault, PROTOCOL, Received, Socket, ToHost,
 use super::{Confinement, confine};
 use crate::plugin::local::{self, Canceller, Input, Instance, Library};
 
-/// Time for a plugin to return and to close when the host is gone.
+/// Time for a plugin to return and to close after the host has ended.
 const LAST_GRACE: Duration = Duration::from_millis(500);
 
-/// Whose process it is.
+/// Process that the worker runs in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::plugin) enum Place {
-    /// The worker's own: limits and confinement apply.
+    /// A process of its own: limits and confinement apply.
     Process,
-    /// The host's.
+    /// A thread of the host.
     Thread,
 }
 
-/// Serves the host at standard input, the verb `platen worker`.
+/// Serves the host at standard input (command `platen worker`).
 ///
 /// # Errors
-/// Standard input is no such socket.
+/// Standard input is not such a socket.
 pub fn serve_stdin() -> io::Result<()> {
     let socket = io::stdin().as_fd().try_clone_to_owned()?;
     if rustix::net::sockopt::socket_type(&socket).ok() != Some(rustix::net::SocketType::SEQPACKET) {
@@ -48,7 +49,7 @@ pub fn serve_stdin() -> io::Result<()> {
 pub(super) fn serve(socket: Socket, place: Place) {
     let socket = Arc::new(socket);
     let mut buffer = Vec::new();
-    // Before the host has heard that a library is loaded it asks for nothing else.
+    // The host sends no other request before the library is reported as loaded.
     let Received::Message(ToWorker::Load { protocol, library, limits, log_level, pool_bytes }, beside) =
         socket.receive(None, &mut buffer)
     else {
@@ -95,7 +96,7 @@ fn end(library: &Library, place: Place) {
     }
 }
 
-/// A request for the plugin's thread.
+/// Request for the plugin's thread.
 enum Request {
     Open,
     Estimate(Option<[f64; 4]>),
@@ -112,7 +113,7 @@ struct Worker {
 }
 
 impl Worker {
-    /// Carries out requests until the host is gone.
+    /// Carries out requests until the host has ended.
     fn work(&self, mut instance: Instance, mut confinement: Confinement, confine: bool) {
         let canceller = Mutex::new(Some(instance.canceller()));
         let (requests, inbox) = channel();
@@ -123,7 +124,7 @@ impl Worker {
                 return;
             }
             if confine {
-                // All threads, and all that they start.
+                // All threads, and all threads that they start.
                 confinement.seccomp = confine::system_calls();
             }
             if self.outbox.send(&ToHost::Created(Ok(confinement))).is_ok() {
@@ -151,7 +152,7 @@ impl Worker {
             };
             if self.outbox.send(&answer).is_err() {
                 if self.place == Place::Process {
-                    // The plugin closed the socket, and the thread that reads from it would never know.
+                    // The plugin closed the socket; the thread that reads from it would not notice.
                     confine::end_at_once();
                 }
                 return;

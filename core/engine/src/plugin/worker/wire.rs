@@ -1,7 +1,7 @@
-//! Messages between host and worker: one datagram each (`SOCK_SEQPACKET`), in postcard's encoding; memory goes beside them as
-//! descriptors (`SCM_RIGHTS`).
+//! Messages between host and worker: one datagram each (`SOCK_SEQPACKET`), in postcard's encoding.
 //!
-//! No pointer crosses, and nothing large: frames lie in shared memory, and a message names the place.
+//! No pointers and no large data are sent. Frames lie in shared memory, and a message contains their offset. Shared
+//! memory itself is passed as descriptors beside a message (`SCM_RIGHTS`).
 
 use std::io::{self, IoSlice, IoSliceMut};
 use std::mem::MaybeUninit;
@@ -21,18 +21,18 @@ use serde::{Deserialize, Serialize};
 use super::{Confinement, Limits};
 use crate::plugin::Descriptor;
 
-/// Changes with every change of a message: host and worker are of one build.
+/// Protocol version; it changes with every change of a message. Host and worker are of one build.
 pub(super) const PROTOCOL: u32 = 1;
 
 /// Largest message; the system's default for a socket's buffer is 208 KiB.
 const MESSAGE_BYTES: usize = 192 << 10;
-/// Largest number of descriptors beside a message.
+/// Largest number of descriptors passed with a message.
 const DESCRIPTORS: usize = 8;
 
 /// Host to worker.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum ToWorker {
-    /// First. The pool comes beside it.
+    /// First message. The pool is passed with it.
     Load {
         protocol: u32,
         library: PathBuf,
@@ -46,11 +46,11 @@ pub(super) enum ToWorker {
         confine: bool,
     },
     Open,
-    /// Azimuth start and width, elevation least and most, radians.
+    /// Start and width of the azimuth, smallest and largest elevation, radians.
     Estimate(Option<[f64; 4]>),
     Health,
     Discover,
-    /// Inputs come beside it, in order.
+    /// The inputs are passed with it, in order.
     Run {
         job: Job,
         inputs: Vec<Input>,
@@ -58,7 +58,7 @@ pub(super) enum ToWorker {
     Cancel(u64),
 }
 
-/// A job; times of `CLOCK_MONOTONIC` unless named utc.
+/// A job; times are of `CLOCK_MONOTONIC` unless named utc.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(in crate::plugin) struct Job {
     pub(in crate::plugin) id: u64,
@@ -84,7 +84,7 @@ pub(in crate::plugin) enum ToHost {
     Estimated(Option<f64>),
     Health(Option<Health>),
     Discovered(Result<Vec<Device>, CallError>),
-    /// Place in the pool.
+    /// Offset in the pool.
     Frame {
         job: u64,
         format: String,
@@ -110,7 +110,7 @@ pub(in crate::plugin) enum ToHost {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::plugin) struct LoadedLibrary {
     pub(in crate::plugin) abi_minor: u32,
-    /// Of the file, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub(in crate::plugin) sha256: String,
     pub(in crate::plugin) plugins: Vec<Descriptor>,
 }
@@ -123,7 +123,7 @@ pub(in crate::plugin) enum LoadFault {
     FailedToLoad(String),
 }
 
-/// Failure that a plugin stated.
+/// Failure that a plugin reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::plugin) struct CallError {
     pub(in crate::plugin) status: i32,
@@ -131,7 +131,7 @@ pub(in crate::plugin) struct CallError {
     pub(in crate::plugin) message: String,
 }
 
-/// State of an instrument, as of the boundary; NaN where it is not known.
+/// State of an instrument, as at the plugin boundary; NaN where it is unknown.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(in crate::plugin) struct Health {
     pub(in crate::plugin) flags: u32,
@@ -156,9 +156,9 @@ pub(super) struct Socket(OwnedFd);
 #[derive(Debug)]
 pub(super) enum Received<T> {
     Message(T, Vec<OwnedFd>),
-    /// Nothing came in time.
+    /// No message arrived in time.
     Late,
-    /// The other side is gone, or sent what is no message.
+    /// The other side has ended, or has sent an invalid message.
     Ended,
 }
 
@@ -192,7 +192,7 @@ impl Socket {
         }
     }
 
-    /// Waits for a message until `until`, for ever without it. `buffer` is kept from call to call.
+    /// Waits for a message until `until`, or without limit if it is `None`. `buffer` is reused from call to call.
     pub(super) fn receive<T: DeserializeOwned>(
         &self,
         until: Option<Instant>,
@@ -226,7 +226,7 @@ impl Socket {
         }
     }
 
-    /// Returns whether something is there to be read, the end included.
+    /// Returns whether data or the end of the connection can be read.
     fn wait(&self, until: Option<Instant>) -> io::Result<bool> {
         loop {
             let left = until.map(|until| until.saturating_duration_since(Instant::now()));
