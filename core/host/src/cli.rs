@@ -1,6 +1,7 @@
-//! Command line of `platen`: one module for each verb. Results go to stdout, the log to stderr.
+//! Command line of `platen`, with one module for each command (verb). Results go to stdout, the log to stderr.
 //!
-//! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON document.
+//! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON
+//! document.
 
 mod advise;
 pub mod bench;
@@ -78,7 +79,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// Returns the catalogue of the plugin folders, that of `--plugins` first.
+    /// Returns the catalogue of the plugin folders; the folder of `--plugins` is searched first.
     pub fn catalogue(&self) -> Catalogue {
         let isolation = if self.in_process { Isolation::InProcess } else { Isolation::Process };
         Catalogue::new(self.plugins.as_deref()).isolated(isolation)
@@ -223,7 +224,7 @@ pub fn main() -> ExitCode {
     })
 }
 
-/// Runs the command line of `platen-bench`: that of `platen` with `bench` and `press soak` alone.
+/// Runs the command line of `platen-bench`: the commands `bench` and `press soak` of `platen`.
 pub fn main_of_bench(run: impl FnOnce(&Common, BenchVerb<'_>) -> Result<ExitCode, CliError>) -> ExitCode {
     run_program(|cli| {
         let verb = match &cli.verb {
@@ -244,7 +245,7 @@ fn run_program(run: impl FnOnce(&Cli) -> Result<ExitCode, CliError>) -> ExitCode
         Ok(cli) => cli,
         Err(error) => {
             let code = if error.use_stderr() { 2 } else { 0 };
-            // Nothing is left to report a closed pipe to.
+            // A closed pipe cannot be reported anywhere.
             let _ = error.print();
             return ExitCode::from(code);
         }

@@ -1,4 +1,4 @@
-//! Comparisons, verdict and document of a measured plate, the same for `run`, `measure` and `remeasure`.
+//! Judgement of a measured plate: comparisons, verdict and document, the same for `run`, `measure` and `remeasure`.
 
 use std::time::Instant;
 
@@ -15,21 +15,21 @@ use platen_shape::{Measured, Scanned};
 
 use crate::plugin_records;
 
-/// Circumstances of a measurement beside its surfaces.
+/// Circumstances of a measurement besides its surfaces.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Circumstances<'a> {
     pub(crate) plant: &'a PlantFile,
     pub(crate) plate: &'a PlateFile,
-    /// Valid calibration of the scanner; without one the range error of its data sheet counts.
+    /// Valid calibration of the scanner; without one the range error of its data sheet is used.
     pub(crate) calibration: Option<&'a Calibration>,
-    /// Scanner of a host; none of a file.
+    /// Scanner of a host; none for a file.
     pub(crate) scanner: Option<&'a Instance>,
     pub(crate) stroke: Option<u64>,
     /// Whether the plate rests on other supports than at the stroke before.
     pub(crate) supports_changed: bool,
 }
 
-/// Judged plate.
+/// Plate with its verdict.
 #[derive(Debug)]
 pub(crate) struct Judgement {
     pub(crate) record: ResultRecord,

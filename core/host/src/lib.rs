@@ -1,4 +1,4 @@
-//! The program `platen`: command line, and `run`, which serves a press.
+//! Library of the program `platen`: the command line, and `run`, which serves a press.
 
 pub mod cli;
 mod judgement;

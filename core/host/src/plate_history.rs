@@ -1,5 +1,7 @@
-//! The history of a plate for its advisor, gathered from the record: strokes with the press's depth and the bends they made, the die, and
-//! what like plates taught.
+//! History of a plate, collected from the record for the advisor plugin.
+//!
+//! It contains the strokes with the depth of the press and the bends that they made, the die, and the parameters
+//! learned from similar plates.
 
 use std::collections::BTreeSet;
 
@@ -19,15 +21,16 @@ use platen_report::bend_figures::{BendFigures, bend_figures};
 use platen_report::output_folder;
 use platen_shape::{Surface, TargetSurface};
 
-/// Distance of a bend from the advised line, metres, and difference of depth, share, up to which a stroke tells where the die is and how the ram
-/// scatters: it was meant as advised.
+/// Largest distance of a bend from the advised line, metres, and largest relative difference of depth for a stroke that
+/// was meant as advised. Only such a stroke gives the position of the die and the scatter of the ram.
 const MEANT: (f64, f64) = (0.1, 0.25);
-/// Distance of a bend from its place, metres, and difference of depth, standard deviations of the ram and metres at least, up to which the advised
-/// interval of the gap is the stroke's own.
+/// Largest distance of a bend from its place, metres, and largest difference of depth, in standard deviations of the
+/// ram and at least in metres, for a stroke that was pressed as advised. Only then does the advised interval of the gap
+/// apply to the stroke.
 const FOLLOWED: (f64, f64, f64) = (0.03, 3.0, 0.3e-3);
-/// Plates that are looked through for like ones, the newest.
+/// Number of newest plates that are searched for similar ones.
 const LOOKED_THROUGH: usize = 200;
-/// Depth law of a plate without a steel, as the shipped advisor assumes it, pascals.
+/// Yield strength of the depth law for a plate without a steel, as the shipped advisor assumes it, pascals.
 const YIELD: f64 = 440e6;
 
 /// A plate as just measured.
@@ -40,12 +43,12 @@ pub(crate) struct MeasuredPlate {
     pub(crate) steel: Option<Steel>,
     pub(crate) task: Task,
     pub(crate) templates: Vec<TemplateFinding>,
-    /// Bends since the scan before; `None` when no comparison told them.
+    /// Bends since the previous scan; `None` if no comparison reported them.
     pub(crate) bends: Option<Vec<Bend>>,
 }
 
 impl MeasuredPlate {
-    /// Collects what the advisor needs of a measurement.
+    /// Collects the data of a measurement that the advisor needs.
     pub(crate) fn new(
         (run_id, key): (u32, StrokeKey),
         data: &StrokeData,
@@ -88,7 +91,8 @@ fn bends(report: &Report) -> Vec<Bend> {
     bends
 }
 
-/// Returns the surface from which the strokes of a run's plate count: the blank's, else that of its first measured stroke.
+/// Returns the surface from which the strokes of a run's plate are counted: that of the blank, else that of its first
+/// measured stroke.
 pub(crate) fn origin(archive: &Archive, run_id: u32) -> Option<Surface> {
     let blank = archive.baseline(run_id).ok().flatten();
     let first = || {
@@ -104,7 +108,8 @@ fn is_measured(stroke: &Stroke) -> bool {
     !stroke.dry_run && stroke.verdict.is_some_and(|verdict| verdict != Verdict::NotMeasured)
 }
 
-/// Gathers the history up to a measured stroke, with the score of the advice before it. The advice itself is still to be filled in.
+/// Collects the history up to a measured stroke, with the score of the advice before it. The advice itself is still to
+/// be filled in.
 ///
 /// # Errors
 /// The record cannot be read.
@@ -160,7 +165,7 @@ pub(crate) fn gather(
     })
 }
 
-/// Returns the die of the number that the press tells; the only one, where it tells none.
+/// Returns the die with the number that the press reports; if it reports none, the only die of the plant file.
 fn die(plant: &PlantFile, data: &StrokeData) -> Option<Die> {
     match (data.die_id, &plant.dies[..]) {
         (Some(id), dies) => dies.iter().find(|die| die.id == id).cloned(),
@@ -180,7 +185,7 @@ fn kind(target: &Target) -> String {
     format!("{shape}, {:?}", target.scanned_face).to_lowercase()
 }
 
-/// Returns the stroke that was just measured, as the record has it.
+/// Returns the stroke that was just measured, in the form of the record.
 fn pressed(
     archive: &Archive,
     plant: &PlantFile,
@@ -188,7 +193,7 @@ fn pressed(
     before: &Stroke,
     earlier: Option<&AdviceRecord>,
 ) -> Result<PressedStroke, platen_history::Error> {
-    // Another stroke in between left its bend among this one's: the depth then belongs to one of two.
+    // Another stroke in between also made a bend, so the depth cannot be assigned to one of the two.
     let between = has_other_strokes_between(archive, plant, measured, before)?;
     let bends = measured.bends.clone().filter(|_| earlier.is_some());
     // On other supports the plate's own weight changes the bends.
@@ -209,8 +214,9 @@ fn pressed(
     Ok(PressedStroke { wanted, ..stroke })
 }
 
-/// Returns whether a plate was pressed between two measurements: by a stroke that was not measured, or by one that only the counter of the press
-/// knows, as while the host was away. In another session the counter tells nothing.
+/// Returns whether a plate was pressed between two measurements: by a stroke that was not measured, or by one that only
+/// the counter of the press shows, for example while the host was stopped. In another session the counter cannot be
+/// compared.
 fn has_other_strokes_between(
     archive: &Archive,
     plant: &PlantFile,
@@ -325,7 +331,7 @@ fn target(task: &Task) -> Option<TargetSurface> {
     TargetSurface::new(task.target.as_ref()?, task.width, task.height, task.thickness).ok()
 }
 
-/// Returns what the newest like plates taught of the press; `None` without one.
+/// Returns the press parameters learned from the newest similar plates; `None` without one.
 fn like(
     archive: &Archive,
     most: usize,
@@ -344,7 +350,8 @@ fn like(
     like_plates(&law, &models.take(most).collect::<Vec<_>>())
 }
 
-/// Returns what the last advice on a plate had learned, if the plate is like this class and taught anything.
+/// Returns the parameters that the last advice on a plate learned, if the plate is similar to this class and the advice
+/// learned any.
 fn last_model(archive: &Archive, plate: u32, class: &PlateClass) -> Option<PressModel> {
     let strokes = archive.strokes(&Filter { plate: Some(plate), ..Filter::default() }).ok()?;
     let document = strokes.into_iter().rev().filter(is_measured).find_map(|stroke| stroke.document)?;

@@ -1,9 +1,9 @@
-//! The plugins behind a measurement, for its document.
+//! Records of the plugins of a measurement, for its document.
 
 use platen_engine::plugin::Instance;
 use platen_report::result::PluginRecord;
 
-/// Returns the records of these plugins, and asks each whether it was repeated.
+/// Returns the records of these plugins, and whether a job of each was repeated.
 pub(crate) fn records<'a>(instances: impl IntoIterator<Item = &'a Instance>) -> Vec<PluginRecord> {
     let record = |instance: &Instance| PluginRecord {
         kind: instance.descriptor().kind.name().to_owned(),

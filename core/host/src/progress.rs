@@ -1,4 +1,4 @@
-//! Progress line on stderr; silent where stderr is no terminal.
+//! Progress line on stderr; nothing is printed if stderr is not a terminal.
 
 use std::io::{IsTerminal, Write as _};
 
@@ -20,7 +20,7 @@ pub fn done() {
 fn show(text: &str) {
     let mut stderr = std::io::stderr();
     if stderr.is_terminal() {
-        // Progress that cannot be shown is no failure.
+        // A progress line that cannot be printed is not a failure.
         let _ = write!(stderr, "{text}").and_then(|()| stderr.flush());
     }
 }

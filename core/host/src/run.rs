@@ -1,22 +1,22 @@
-//! `platen run`: the press triggers, the plate is measured, the result goes back.
+//! Command `platen run`: after a trigger of the press the plate is measured and the result is written to the press.
 //!
 //! | part | task |
 //! |---|---|
 //! | press side ([`platen_press::run_press`]) | link, handshake, registers |
 //! | `measurement_worker` | scans and measures one stroke at a time, on a thread of its own |
 //! | dispatcher (this module) | passes messages between the two, stops both |
-//! | `journal` | steps of a stroke in the history, before each promise to the press |
-//! | `previous_scans`, `region` | the stroke before and the baseline, from the history; the window of the next scan |
+//! | `journal` | steps of a stroke in the history, written before the press is informed |
+//! | `previous_scans`, `region` | the previous stroke and the baseline, from the history; the window of the next scan |
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
 //! | `scan_store` | copies of kept scans in a store, by the rule of the plant file |
 //! | `screen` | the browser pages, where the plant file has `[screen]` |
-//! | `advice` | the next stroke, after the result, where the plant file has `[advice]` |
+//! | `advice` | advice on the next stroke, after the result, where the plant file has `[advice]` |
 //! | `alarms` | an alarm to the log, the record, the status and the pages |
-//! | `forward`, `forward_record` | watch of `platen forward` and its state, where the plant file has `[forward]` |
+//! | `forward`, `forward_record` | monitoring of `platen forward` and its state, where the plant file has `[forward]` |
 //! | `status`, `prometheus`, `disk` | the state of the host for `platen status` |
 //! | `clock` | synchronisation and jumps of the machine's clock |
-//! | `stopping` | requests to stop, between two plates |
-//! | `figures` | findings to figures of the press's registers |
+//! | `stopping` | requests to stop, carried out between two plates |
+//! | `figures` | conversion of findings to figures of the press's registers |
 
 mod advice;
 mod alarms;
@@ -86,13 +86,13 @@ pub enum HostError {
     /// The system has no thread for the measurement worker.
     #[error("no thread for measuring: {0}")]
     Thread(std::io::Error),
-    /// The measurement worker ended on its own.
+    /// The measurement worker ended unexpectedly.
     #[error("measuring has ended: {0}; restart platen")]
     Worker(String),
 }
 
-/// Runs until `stop` turns true; the press's registers are then safe. `pages` are served meanwhile. `strokes` receives one report per stroke, measured or
-/// not.
+/// Runs until `stop` becomes true; the press's registers are then safe. `pages` are served meanwhile. `strokes`
+/// receives one report for each stroke, measured or not.
 ///
 /// # Errors
 /// [`HostError`]; nothing was written to the press when the start fails.
@@ -165,7 +165,7 @@ pub async fn run(
             changed = stop.changed() => {
                 service::stopping();
                 if changed.is_err() || *stop.borrow() {
-                    // The press side answers by making the registers safe; then it ends.
+                    // The press side makes the registers safe; then it ends.
                     let _ = host.answers.send(platen_press::Answer::Stop);
                 }
                 if changed.is_err() {
@@ -244,7 +244,7 @@ fn dispatch(
                 });
                 *scanning = Some((*key, token.clone()));
             }
-            // The dispatcher notices a worker that has ended.
+            // The dispatcher detects the end of the worker.
             let _ = commands.send((command, token));
         }
         Order::Alarm { code, stroke, detail } => alarms.raise(code, stroke, detail.as_deref()),

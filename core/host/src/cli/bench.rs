@@ -1,7 +1,8 @@
-//! `platen bench` and `platen press soak`: their arguments, and the start of `platen-bench`, the program that runs them.
+//! Commands `platen bench` and `platen press soak`: their arguments, and the start of the program `platen-bench` that
+//! runs them.
 //!
-//! `platen-bench` parses the same command line as `platen`, so that help, man pages and refusals have one source. It is a
-//! program of its own because a plant's computer does not need it.
+//! `platen-bench` parses the same command line as `platen`, so that help, man pages and usage errors have one source.
+//! It is a separate program because the computer of a plant does not need it.
 
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
@@ -177,7 +178,7 @@ fn reflectivity(text: &str) -> Result<f64, String> {
     reflectivity.ok_or_else(|| "give a number of 0.01 to 1".to_owned())
 }
 
-/// Replaces this process by `platen-bench`, which lies beside it, with the same arguments.
+/// Replaces this process by `platen-bench` from the same folder, with the same arguments.
 pub(super) fn start() -> Result<ExitCode, CliError> {
     let program =
         std::env::current_exe()?.with_file_name(format!("platen-bench{}", std::env::consts::EXE_SUFFIX));

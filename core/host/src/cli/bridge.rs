@@ -1,4 +1,4 @@
-//! `platen bridge`: a scan bridge over TCP against its protocol.
+//! Command `platen bridge`: conformance tests of a scan bridge over TCP.
 
 use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::path::PathBuf;

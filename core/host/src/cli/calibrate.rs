@@ -1,10 +1,15 @@
-//! `platen calibrate`: correlated and systematic errors of a scanner, from repeated scans of one plate.
+//! Command `platen calibrate`: correlated and systematic errors of a scanner, estimated from repeated scans of one
+//! plate.
 //!
-//! Each pair of scans of an unbent plate (a null pair) differs by noise, which every scan states, and by errors that
-//! are correlated over the plate. `sigma_correlated` is the error with which 5 % of the area of all pairs lies above the level of
-//! detection: its nominal rate. Gaps under
-//! templates on an artefact of known shape give `sigma_true`: the systematic error with which the stated uncertainty covers
-//! 95 % of them. Formulas: `platen_shape::inspection::calibration`.
+//! Two scans of an unbent plate (a null pair) differ by noise, which every scan states, and by errors that are
+//! correlated over the plate.
+//!
+//! - `sigma_correlated` is the error with which 5 % of the area of all null pairs lies above the level of detection,
+//!   which is the nominal rate.
+//! - `sigma_true` needs an artefact of known shape. It is the systematic error with which the stated uncertainty covers
+//!   95 % of the gaps under templates on it.
+//!
+//! Formulas: `platen_shape::inspection::calibration`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,14 +31,14 @@ use crate::progress;
 
 use serde::Serialize;
 
-/// Largest plausible difference of scans of an untouched plate, one sigma, metres; beyond it the plate was bent or moved on
-/// its supports.
+/// Largest plausible difference between scans of an untouched plate, one sigma, metres. Above it the plate was bent or
+/// moved on its supports.
 const NULL_LIMIT: f64 = 2e-3;
 
 /// Share of an unchanged plate above the level of detection: that of 1.96 standard deviations.
 const NOMINAL: f64 = 0.05;
 
-/// Fewest pairs of a steady estimate: below, it scatters by a quarter or more.
+/// Fewest pairs of a stable estimate: with fewer it scatters by a quarter or more.
 const FEW_PAIRS: usize = 6;
 
 #[derive(Debug, Args)]
@@ -77,7 +82,7 @@ struct Summary {
     /// Systematic error of a gap, one sigma; null without an artefact.
     sigma_true_mm: Option<f64>,
     pairs: Vec<PairRecord>,
-    /// Gaps under templates on the artefact, one record a chord.
+    /// Gaps under templates on the artefact, one record for each chord.
     artefact: Vec<GapRecord>,
     file: PathBuf,
 }
@@ -182,7 +187,7 @@ struct NullPair<const N: usize> {
     figures: [f64; N],
 }
 
-/// Returns the figures of `names` of every null pair: of every two of the scans.
+/// Returns the figures `names` of every null pair, that is of every two of the scans.
 fn null_figures<const N: usize>(
     rig: &Pipeline,
     plate: &PlateFile,
@@ -212,8 +217,8 @@ fn null_figures<const N: usize>(
     Ok(pairs)
 }
 
-/// Compares every two of the scans: difference along the normal after rigid alignment, the noise stated for it, and the excess of
-/// all differences over their noise.
+/// Compares every two of the scans: difference along the normal after rigid alignment, the noise stated for it, and the
+/// excess of all differences over their noise.
 fn null_pairs(
     rig: &Pipeline,
     plate: &PlateFile,
@@ -229,9 +234,10 @@ fn null_pairs(
     Ok((records, pooled.excess()))
 }
 
-/// Returns the correlated error, one sigma, with which the null pairs show change over [`NOMINAL`] of their area: 0 where noise
-/// alone shows less, else by bisection. A scanner's range error is periodic and bounded: 1.96 times its root mean square lies beyond
-/// its crests, so that a level of detection by the excess of the scatter would hide changes (0 to 1 % of the area instead of 5 %).
+/// Returns the correlated error, one sigma, with which the null pairs show change over [`NOMINAL`] of their area. It is
+/// 0 where noise alone shows less, else it is found by bisection. The range error of a scanner is periodic and bounded:
+/// 1.96 times its root mean square exceeds its amplitude. A level of detection from the excess of the scatter would
+/// therefore hide changes (0 to 1 % of the area instead of 5 %).
 fn nominal_sigma(rig: &Pipeline, plate: &PlateFile, surfaces: &[Surface]) -> Result<f64, CliError> {
     let is_quiet = |sigma: f64| -> Result<bool, CliError> {
         let shares = null_figures(rig, plate, surfaces, sigma, ["displacement.above_lod"])?;
@@ -243,7 +249,7 @@ fn nominal_sigma(rig: &Pipeline, plate: &PlateFile, surfaces: &[Surface]) -> Res
     }
     let [mut low, mut high] = [0.0, NULL_LIMIT];
     while high - low > 0.02 * high && high > 1e-6 {
-        // Halves the logarithm once the scale is known.
+        // Bisects the logarithm once both bounds are positive.
         let middle = if low > 0.0 { (low * high).sqrt() } else { 0.25 * high };
         *(if is_quiet(middle)? { &mut high } else { &mut low }) = middle;
     }

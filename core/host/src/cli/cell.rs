@@ -1,6 +1,7 @@
-//! Simulated press as a child process, `platen-sim press`, and its control port.
+//! Client of a simulated press: `platen-sim press` as a child process, with its control port.
 //!
-//! The control port takes one JSON object a line and answers with one: counts, registers, accepted results.
+//! Each request to the control port is one JSON object on a line, and so is each answer: counts, registers, accepted
+//! results.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -33,9 +34,9 @@ pub struct AcceptedResult {
     /// Session of the stroke.
     pub session_id: u16,
     attempt: u16,
-    /// From trigger to the host's echo, milliseconds, on the press's clock.
+    /// Time from the trigger to the host's echo, milliseconds, on the press's clock.
     pub accepted_ms: f64,
-    /// From trigger to the result, milliseconds.
+    /// Time from the trigger to the result, milliseconds.
     pub result_ms: f64,
     /// Words of the host's block.
     pub words: Vec<u16>,
@@ -53,7 +54,7 @@ fn failed(what: &str) -> impl Fn(std::io::Error) -> CliError + '_ {
 }
 
 impl Cell {
-    /// Starts the program that lies beside this one; `options` override the file.
+    /// Starts `platen-sim` from the folder of this program; `options` override the file.
     ///
     /// # Errors
     /// The program is missing, or ends before it prints its ports.
@@ -111,7 +112,7 @@ impl Cell {
     /// Sends a line to the control port and reads the part of the answer at a JSON pointer.
     ///
     /// # Errors
-    /// The control port does not answer, or not with such a part.
+    /// The control port does not answer, or its answer has no such part.
     pub fn read<T: DeserializeOwned>(&mut self, question: &str, pointer: &str) -> Result<T, CliError> {
         let part = self.ask(question)?.pointer_mut(pointer).map(Json::take).unwrap_or_default();
         serde_json::from_value(part).map_err(|e| CliError::Failed(format!("simulated press: {e}")))

@@ -1,7 +1,7 @@
-//! `platen check`: everything that can be checked without hardware, with every fault at once.
+//! Command `platen check`: checks everything that needs no hardware, and reports all faults at once.
 //!
-//! A fault hides no other: plugins, their options and the plate files are checked also where other parts of the plant file
-//! are faulty.
+//! A fault does not hide others: plugins, their options and the plate files are also checked when other parts of the
+//! plant file are faulty.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -66,7 +66,7 @@ fn check_plant(survey: Survey, catalogue: &Catalogue) -> Vec<Fault> {
             Err(error) => error.into_faults(),
         })),
         Err(error) if survey.has_press => faults.push(Fault { message: error.to_string(), ..at }),
-        // A plant that measures single files needs no folder of plates.
+        // A plant that only measures single files needs no folder of plates.
         Err(_) => {}
     }
     faults

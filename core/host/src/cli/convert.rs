@@ -1,4 +1,4 @@
-//! `platen convert`: a scan file in another format.
+//! Command `platen convert`: writes a scan file in another format.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,5 @@
-//! `platen demo`: a simulated press bends a plate and the host measures it, over real sockets and plugin libraries.
+//! Command `platen demo`: a simulated press bends a plate and the host measures it, over real sockets and plugin
+//! libraries.
 
 mod files;
 mod operator;
@@ -112,7 +113,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let registers = cell.registers()?;
         stop.send_replace(true);
         let ended = host.await;
-        // The press may have its last result before the report of it is written, as on a slow computer.
+        // The press may receive its last result before the report on it is written, as on a slow computer.
         while let Ok(report) = strokes.try_recv() {
             reports.push(report);
         }
@@ -182,7 +183,8 @@ fn summary(
     }
     let passed =
         reports.last().and_then(|r| r.result.as_ref().ok()).is_some_and(|r| r.verdict == Verdict::Pass);
-    // The commit word and its tail agree, and name the last stroke: result_seq, result_seq_tail, result_stroke_id.
+    // The commit word and its copy at the end of the block agree and identify the last stroke: result_seq,
+    // result_seq_tail, result_stroke_id.
     let correct = registers
         .as_deref()
         .zip(reports.last())

@@ -1,4 +1,4 @@
-//! `platen forward`: sends the record to the sinks of the plant file, in a process of its own beside the host.
+//! Command `platen forward`: sends the record to the sinks of the plant file, in a process of its own beside the host.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -90,7 +90,7 @@ fn send(common: &Common, command: &Command, plant: &PlantFile) -> Result<ExitCod
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let status = runtime.block_on(async {
         let stop = stop_signal()?;
-        // Without systemd there is nobody to tell.
+        // Fails without systemd, which does not matter.
         let _ = sd_notify::notify(&[NotifyState::Ready]);
         let start = command.from.unwrap_or(Start::Cursor);
         Ok::<_, CliError>(forward(plant, start, command.until_sent, stop).await?)

@@ -1,4 +1,4 @@
-//! `platen generate`: man pages and shell completions, from the definitions of the command line.
+//! Command `platen generate`: man pages and shell completions from the definitions of the command line.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! `platen inspect`: what is in a scan file, and how it was oriented.
+//! Command `platen inspect`: describes the content of a scan file and its orientation.
 
 mod picture;
 

@@ -1,4 +1,4 @@
-//! `platen measure`: measures the plate in one scan file, against earlier scans where they are given.
+//! Command `platen measure`: measures the plate in one scan file, and compares it with earlier scans if they are given.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -60,12 +60,12 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let catalogue = common.catalogue();
     let (plant, plate) = command.setup.load()?;
     let calibration = plant.calibration.as_ref().and_then(|wanted| {
-        // A file has no record of the scanner's warm-up: it counts as warm.
+        // A file contains no record of the scanner's warm-up; the scanner counts as warm.
         let calibration = calibration::in_force(wanted, Timestamp::now(), wanted.warm_up);
         calibration.map_err(|why| tracing::warn!("{why}")).ok()
     });
     let mut rig = Pipeline::of(&plant, &catalogue)?;
-    // In the order in which they were taken: the corner (0, 0) is carried from one to the next.
+    // In the order of acquisition: the corner (0, 0) is carried from one scan to the next.
     let mut measure = |scan: &Path, last: Option<PreviousPose<'_>>, baseline: Baseline<'_>| {
         measure_file(&catalogue, &mut rig, scan, &plate, last, baseline)
     };
@@ -130,7 +130,7 @@ pub(super) fn measure_file(
     Ok((scanned, measured))
 }
 
-/// Reads one scan file through the driver `faro-file` and finds the plate in it; the inner error is the plate's.
+/// Reads one scan file with the driver `faro-file` and finds the plate in it; the inner error is about the plate.
 pub(crate) fn scan_file(
     catalogue: &Catalogue,
     scan: &Path,
@@ -187,7 +187,7 @@ fn print(record: &ResultRecord) -> Result<(), CliError> {
     ))
 }
 
-/// Whole millimetres, 0 without a sign.
+/// Formats whole millimetres, 0 without a sign.
 fn millimetres(x: f64) -> String {
     format!("{:.0}", x.round() + 0.0)
 }

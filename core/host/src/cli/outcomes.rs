@@ -1,4 +1,4 @@
-//! Outcomes of conformance tests: a line each as they come, their sum, and JUnit's XML.
+//! Output of conformance tests: one line for each outcome as it arrives, the totals, and JUnit's XML.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -7,7 +7,7 @@ use platen_conformance::{Outcome, Verdict, junit};
 
 use super::{CliError, Common, output};
 
-/// Prints an outcome, and below a failure the command that repeats it.
+/// Prints an outcome, and after a failure the command that repeats it.
 pub(super) fn tell(common: &Common, outcome: &Outcome, again: &str) -> Result<(), CliError> {
     if common.json {
         return Ok(());
@@ -28,7 +28,8 @@ pub(super) fn tell(common: &Common, outcome: &Outcome, again: &str) -> Result<()
     Ok(())
 }
 
-/// Prints the sum, writes the XML, and returns 1 when a test has failed. `what` was tested, named `key` in the JSON, by `kit`.
+/// Prints the totals, writes the XML, and returns 1 if a test has failed. `what` is the tested object, `key` its name
+/// in the JSON, `kit` the version of the tests.
 pub(super) fn sum(
     common: &Common,
     (key, what, kit): (&str, &str, &str),

@@ -1,4 +1,4 @@
-//! Output of the verbs: lines, JSON and tables on stdout, errors on stderr.
+//! Output of the commands: lines, JSON and tables on stdout, errors on stderr.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub fn either(common: &Common, document: &impl serde::Serialize, text: &str) -> 
     if common.json { json(document) } else { line(text) }
 }
 
-/// Formats a number that may be unknown; then the cell stays empty.
+/// Formats a number; an unknown one gives an empty cell.
 pub fn number(value: Option<f64>, digits: usize) -> String {
     value.map(|value| format!("{value:.digits$}")).unwrap_or_default()
 }
@@ -35,7 +35,7 @@ pub fn titled(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Result
     table(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
 
-/// Prints a table: columns as wide as their widest cell, the first row is the head.
+/// Prints a table: columns as wide as their widest cell; the first row is the head.
 pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
     let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |k: usize| {
@@ -52,11 +52,12 @@ pub fn table(rows: &[Vec<String>]) -> Result<(), CliError> {
 
 /// Prints one error line to stderr.
 pub fn error(text: &str) {
-    // Nowhere is left to report a failing stderr.
+    // A failing stderr cannot be reported anywhere.
     let _ = writeln!(std::io::stderr(), "platen: {text}");
 }
 
-/// Makes an empty folder for the files of a verb, replacing only one that an earlier run of the verb made.
+/// Creates an empty folder for the files of a command; it replaces only a folder that an earlier run of the command
+/// made.
 ///
 /// # Errors
 /// The folder exists and is not marked with `.platen-VERB`, or the system refuses.

@@ -1,4 +1,4 @@
-//! `platen plate new`: plate files and the list of blanks from the zones of a tank.
+//! Command `platen plate new`: plate files and the list of blanks from the zones of a tank.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -91,7 +91,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns lines that are too short for the rule's board, in words; and an empty rule.
+/// Returns a sentence on the lines that are too short for the template of the rule, and on an empty rule.
 fn not_judged(tank: &Tank, zone: &Zone, plate: &Plate) -> Option<String> {
     let Some(rule) = zone.rule.and_then(|rule| tank.rules.get(rule)) else {
         return Some("no rule: nothing will be judged".into());

@@ -1,4 +1,4 @@
-//! `platen plugins`: the installed plugins and their options.
+//! Command `platen plugins`: the installed plugins and their options.
 
 mod check;
 mod new;
@@ -124,7 +124,7 @@ fn pair(text: &str) -> Result<(String, String), String> {
 fn find(common: &Common, name: &str, options: &[(String, String)]) -> Result<ExitCode, CliError> {
     let values = options.iter().map(|(name, value)| format!("{name} = {}\n", Json::from(value.as_str())));
     let options: String = values.collect();
-    // As a plant file would name it, so that its options are checked.
+    // Written as in a plant file, so that its options are checked.
     let text = format!(
         "[plant]\nname = \"find\"\n[scanner]\nplugin = {}\n[scanner.options]\n{options}",
         Json::from(name)

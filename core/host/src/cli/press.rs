@@ -1,6 +1,6 @@
-//! `platen press`: register map, contents of the registers, and tests of link and handshake.
+//! Command `platen press`: register map, contents of the registers, and tests of link and handshake.
 //!
-//! `test` and `write-test` write to the press, `soak` to a simulated press of its own; all other verbs only read.
+//! `test` and `write-test` write to the press, `soak` to a simulated press of its own; all other subcommands only read.
 
 mod line;
 mod recording;
@@ -41,7 +41,7 @@ pub(super) struct Command {
 }
 
 impl Command {
-    /// The arguments of `soak`, where that is the verb.
+    /// Returns the arguments of `soak`, if it is the subcommand.
     pub(super) fn soak(&self) -> Option<&SoakArguments> {
         match &self.verb {
             Verb::Soak(arguments) => Some(arguments),
@@ -183,16 +183,16 @@ enum Verb {
     },
 }
 
-/// Failure of a verb, by who must act.
+/// Failure of a subcommand, by the person who must act.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// Plant file, command line or system.
     #[error(transparent)]
     Cli(#[from] CliError),
-    /// No answer of the press, or a wrong one.
+    /// The press does not answer, or answers wrongly.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// A handshake that does not work over a link that does.
+    /// The handshake fails although the link works.
     #[error("{0}")]
     Handshake(String),
 }

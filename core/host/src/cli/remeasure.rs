@@ -1,4 +1,4 @@
-//! `platen remeasure`: measures the strokes of a record again from their kept scans.
+//! Command `platen remeasure`: measures the strokes of a record again from their kept scans.
 
 mod remeasurer;
 
@@ -68,7 +68,7 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// Returns the strokes of this part: every n-th plate, each with its strokes in their order.
+    /// Returns the strokes of this part: every n-th plate, with its strokes in their order.
     fn of(self, strokes: Vec<Stroke>) -> Vec<Stroke> {
         let mut plates: BTreeMap<u32, Vec<Stroke>> = BTreeMap::new();
         for stroke in strokes {
@@ -129,7 +129,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::from(u8::from(!counts.failed.is_empty())))
 }
 
-/// Whether two paths name one folder.
+/// Returns whether two paths denote the same folder.
 fn same(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
@@ -144,7 +144,7 @@ fn selected(archive: &Archive, command: &Command) -> Result<Vec<Stroke>, CliErro
     Ok(strokes)
 }
 
-/// Numbers of strokes, by what became of them.
+/// Numbers of strokes by outcome.
 #[derive(Debug, Default)]
 struct Counts {
     measured: usize,

@@ -1,4 +1,4 @@
-//! `platen run`: serves a press until SIGTERM or Ctrl-C.
+//! Command `platen run`: serves a press until SIGTERM or Ctrl-C.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,7 +37,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         let (reports, mut strokes) = mpsc::unbounded_channel();
         let printer = tokio::spawn(async move {
             while let Some(report) = strokes.recv().await {
-                // A closed output does not stop the press.
+                // A closed output must not stop the press.
                 let _ = print(&report, json);
             }
         });
@@ -49,7 +49,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     Ok(ExitCode::SUCCESS)
 }
 
-/// Builds the runtime of the press side: two workers, so that polling does not wait for a scan.
+/// Builds the runtime of the press side with two worker threads, so that polling does not wait for a scan.
 ///
 /// # Errors
 /// The system gives no threads.
@@ -57,7 +57,7 @@ pub fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     Ok(tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?)
 }
 
-/// Returns a signal that turns true on SIGTERM and Ctrl-C.
+/// Returns a signal that becomes true on SIGTERM and Ctrl-C.
 ///
 /// # Errors
 /// The signals cannot be caught.

@@ -1,4 +1,4 @@
-//! `platen scan`: one scan of the plant's scanner to a file.
+//! Command `platen scan`: writes one scan of the plant's scanner to a file.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -59,7 +59,7 @@ fn window(text: &str) -> Result<Window, String> {
         .ok_or_else(|| "give a width of 0 to 360 and elevations from -90 up to 90".to_owned())
 }
 
-/// Refuses a file that cannot be written before anything is read or scanned for it.
+/// Refuses an output file that cannot be written, before a scan is read or acquired for it.
 pub(super) fn check_output(path: &Path) -> Result<(), CliError> {
     Format::of(path)?;
     if path.exists() {

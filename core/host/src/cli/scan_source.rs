@@ -1,4 +1,5 @@
-//! Scans of `measure`, `inspect`, `convert` and `scan`: from a file by the driver `faro-file`, or from the plant's scanner.
+//! Source of the scans for `measure`, `inspect`, `convert` and `scan`: a file read by the driver `faro-file`, or the
+//! plant's scanner.
 
 use std::path::Path;
 use std::time::Duration;
@@ -14,7 +15,7 @@ use platen_engine::plugin::{CancelToken, Catalogue, JobSpec, PluginError, Runnin
 
 /// Longest time to read a file: minutes for the finest full dome.
 pub(super) const READ_LIMIT: Duration = Duration::from_secs(1800);
-/// Columns between two displays of the progress.
+/// Columns between two updates of the progress display.
 const SHOW_EVERY: u32 = 32;
 
 /// Opens the file driver for one file; `cloud` chooses one of several scans, from 1.
@@ -35,7 +36,7 @@ pub(super) struct ShownScan<'a> {
     columns: u32,
 }
 
-/// Starts a scan that is shown as `what` and stops on Ctrl-C. Its errors begin with `file`.
+/// Starts a scan that is displayed under the name `what` and stops on Ctrl-C. Its errors begin with `file`.
 pub(super) fn follow<'a>(
     scanner: &'a Scanner,
     limit: Duration,
@@ -94,8 +95,8 @@ fn failed(file: Option<&Path>, error: PluginError) -> CliError {
     )
 }
 
-/// Returns a token that Ctrl-C cancels, so that an interrupted scan leaves nothing behind. Where the system has no thread
-/// for that, Ctrl-C ends the program at once.
+/// Returns a token that Ctrl-C cancels, so that an interrupted scan leaves no partial file. If the system has no thread
+/// for it, Ctrl-C ends the program at once.
 fn interrupt() -> CancelToken {
     let token = CancelToken::default();
     let cancelled = token.clone();

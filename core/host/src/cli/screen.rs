@@ -1,4 +1,4 @@
-//! `platen screen`: the token of the browser pages.
+//! Command `platen screen`: creates the access token of the browser pages.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;

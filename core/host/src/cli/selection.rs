@@ -1,4 +1,4 @@
-//! Selection of strokes on record: arguments of `history list`, `history export` and `remeasure`.
+//! Selection of recorded strokes: arguments of `history list`, `history export` and `remeasure`.
 
 use clap::Args;
 use jiff::Timestamp;

@@ -1,4 +1,4 @@
-//! `platen status`: the state of a running host, from the status file in its output folder.
+//! Command `platen status`: the state of a running host, from the status file in its output folder.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,7 +9,7 @@ use platen_plant::PlantFile;
 use super::{CliError, Common, output};
 use crate::run::{ForwardRecord, StatusRecord};
 
-/// Age of the status beyond which the host is not running, or hangs, seconds.
+/// Age of the status above which the host does not run, or hangs, seconds.
 const STALE_S: f64 = 5.0;
 
 #[derive(Debug, Args)]
@@ -82,7 +82,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
             free.unwrap_or_default(),
             status.records_lost
         ))?;
-        // Of this moment: the forwarder runs also without the host.
+        // Read now: the forwarder also runs without the host.
         let forward = plant.forward.as_ref().map(|_| ForwardRecord::load(folder));
         for (name, line) in forward.iter().flat_map(ForwardRecord::lines) {
             output::line(&format!("{name}: {line}"))?;

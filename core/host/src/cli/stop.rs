@@ -1,4 +1,4 @@
-//! `platen stop`: ends a running host, at once or when no plate is in hand.
+//! Command `platen stop`: ends a running host, at once or when no plate is being worked on.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,9 +10,9 @@ use platen_plant::PlantFile;
 use super::{CliError, Common, output};
 use crate::run::{StopRequest, stop_request};
 
-/// Longest time until a running host has taken the request.
+/// Longest time until a running host has accepted the request.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Time between two looks at the request.
+/// Interval between checks of the request.
 const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! `platen systemd`: the drop-in of the unit `platen@` with what the plant file needs of the machine.
+//! Command `platen systemd`: prints the drop-in of the unit `platen@` with the resources that the plant file needs.
 
 use std::fmt::Write as _;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -25,7 +25,7 @@ pub(super) struct Command {
 
 pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliError> {
     let plant = PlantFile::load(&command.plant)?;
-    // The unit's own folder of state carries the name of its plant file.
+    // The unit's own state folder has the name of its plant file.
     let state = Path::new("/var/lib/platen").join(command.plant.file_stem().unwrap_or_default());
     let needs = Needs::of(&plant, &state);
     let text = needs.drop_in(&command.plant);
@@ -43,7 +43,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
 struct Needs {
     /// Addresses; `any` where the host listens for all.
     addresses: Vec<String>,
-    /// Names of hosts whose addresses are not known here.
+    /// Host names whose addresses cannot be determined here.
     names: Vec<String>,
     /// Serial lines.
     devices: Vec<PathBuf>,
@@ -56,7 +56,7 @@ impl Needs {
         let mut needs = Self::default();
         match plant.press.as_ref().map(|press| &press.link.transport) {
             Some(Transport::Tcp(socket) | Transport::RtuOverTcp(socket, _)) => {
-                // A host that serves the registers names the addresses that may connect instead.
+                // If the host serves the registers, the plant file lists the addresses that may connect.
                 match plant.press.as_ref().map(|press| press.role) {
                     Some(Role::Server) => socket.peers.iter().for_each(|peer| needs.host(&peer.to_string())),
                     _ => needs.host(&socket.host),
@@ -73,7 +73,7 @@ impl Needs {
             }
         }
         if plant.screen.as_ref().is_some_and(|screen| !screen.listen.ip().is_loopback()) {
-            // The pages' readers are not in the plant file.
+            // The plant file does not list the computers that read the pages.
             needs.addresses.push("any".into());
         }
         let folders = [Some(plant.output.folder.as_path()), plant.output.history.parent()];

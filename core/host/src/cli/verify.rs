@@ -1,4 +1,4 @@
-//! `platen verify`: offsets of dark discs painted on a plate from the markers of its plate file.
+//! Command `platen verify`: offsets of dark discs painted on a plate from the markers of its plate file.
 
 mod picture;
 

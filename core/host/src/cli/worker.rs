@@ -1,4 +1,4 @@
-//! `platen worker`: the process of one plugin, which the host starts with a socket as its standard input.
+//! Command `platen worker`: the process of one plugin, which the host starts with a socket as its standard input.
 
 use std::process::ExitCode;
 

@@ -1,5 +1,6 @@
-//! Advice after a result: gathered, asked for, recorded and shown on a thread of its own, so that neither the press nor the next stroke
-//! ever waits for it.
+//! Advice after a result: collected, computed, recorded and shown on a thread of its own.
+//!
+//! Neither the press nor the next stroke ever waits for it.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -20,7 +21,7 @@ use tokio::sync::mpsc::UnboundedSender;
 use super::screen::{Event, Teller};
 use crate::plate_history::{self, MeasuredPlate};
 
-/// A result that waits for its advice.
+/// Result for which advice is to be computed.
 #[derive(Debug)]
 pub(super) struct AdviceJob {
     pub(super) measured: MeasuredPlate,
@@ -29,7 +30,7 @@ pub(super) struct AdviceJob {
     pub(super) folder: PathBuf,
     /// Time of the result.
     pub(super) since: Instant,
-    /// Cancelled by the next stroke, also before the advisor has begun.
+    /// Token that the next stroke cancels, also before the advisor has begun.
     token: CancelToken,
 }
 
@@ -39,7 +40,7 @@ impl AdviceJob {
     }
 }
 
-/// Way to the advisor's thread. Does nothing where the plant file has no `[advice]`.
+/// Connection to the advisor's thread. Does nothing where the plant file has no `[advice]`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct AdviceDesk(Option<Arc<Desk>>);
 
@@ -51,7 +52,7 @@ struct Desk {
 }
 
 impl AdviceDesk {
-    /// Starts the thread.
+    /// Starts the advisor's thread.
     ///
     /// # Errors
     /// The system has no thread.
@@ -76,12 +77,12 @@ impl AdviceDesk {
         Ok(Self(Some(desk)))
     }
 
-    /// Returns whether advice is wanted, so that a job is worth making.
+    /// Returns whether advice is enabled, so that a job is needed.
     pub(super) fn is_open(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Hands over a result.
+    /// Passes a result to the thread.
     pub(super) fn ask(&self, job: AdviceJob) {
         if let Some(desk) = &self.0 {
             *desk.newest.lock().unwrap_or_else(PoisonError::into_inner) = job.token.clone();
@@ -90,7 +91,7 @@ impl AdviceDesk {
         }
     }
 
-    /// Ends the advice that waits or is in progress: the next stroke has been made, or the plate has gone.
+    /// Cancels the advice that is queued or in progress: the next stroke has been made, or the plate has been removed.
     pub(super) fn cancel(&self) {
         if let Some(desk) = &self.0 {
             desk.newest.lock().unwrap_or_else(PoisonError::into_inner).cancel();
@@ -104,13 +105,13 @@ struct Thread {
     catalogue: Catalogue,
     screen: Teller,
     answers: UnboundedSender<Answer>,
-    /// The plugin, once it could be created.
+    /// The plugin, once it has been created.
     advisor: Option<Advisor>,
 }
 
 impl Thread {
     fn serve(mut self, inbox: &Receiver<AdviceJob>) {
-        // The first stroke does not wait for the plugin's start; what is wrong with it is said then.
+        // The plugin is started before the first stroke; an error is reported with that stroke.
         let _ = self.advisor();
         while let Ok(job) = inbox.recv() {
             let run_id = job.measured.run_id;
@@ -130,7 +131,7 @@ impl Thread {
                 .advise(&record.history, &job.surface, origin.as_ref(), job.token.clone())
                 .map_err(|e| e.to_string())
         });
-        // Also an advice that was ready a moment later: nobody has seen it.
+        // This includes an advice that was ready a moment later: it was not shown.
         let advice = if job.token.is_cancelled() { Ok(platen_advice::too_late()) } else { advice };
         (record.advice, record.failed) = match advice {
             Ok(advice) => (Some(advice), None),
@@ -156,7 +157,8 @@ impl Thread {
         Ok(self.advisor.insert(advisor))
     }
 
-    /// Writes the advice, and passes it on to registers and pages. Of one that came too late they hear with the next.
+    /// Writes the advice, and passes it on to registers and pages. They receive a late advice together with the next
+    /// one.
     fn keep(&self, folder: &Path, record: AdviceRecord) {
         if let Err(why) = record.write(folder) {
             tracing::warn!(run_id = record.run_id, "the advice is not on record: {why}");

@@ -9,7 +9,7 @@ use platen_model::{Code, Language, StrokeKey};
 use super::screen::{Event, Teller};
 use super::status::NewestAlarm;
 
-/// Passes alarms on. Those of the press side are in its registers already.
+/// Passes alarms on. Alarms of the press side are already in its registers.
 #[derive(Clone)]
 pub(super) struct Alarms {
     pub(super) history: Arc<Mutex<History>>,
@@ -18,7 +18,7 @@ pub(super) struct Alarms {
 }
 
 impl Alarms {
-    /// Raises an alarm, of a stroke or not.
+    /// Raises an alarm, with or without a stroke.
     pub(super) fn raise(&self, code: Code, stroke: Option<StrokeKey>, detail: Option<&str>) {
         self.screen.tell(Event::Alarm(code));
         let alarm = code.alarm();

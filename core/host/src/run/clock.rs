@@ -1,10 +1,11 @@
-//! Clock of the machine: whether it is synchronised, the bound of its error, and its jumps.
+//! Monitoring of the machine's clock: its synchronisation, the bound of its error, and its jumps.
 //!
-//! Once a second the realtime clock is compared with the monotonic one. A difference that changes by more than [`LEAST_JUMP`] is a
-//! jump: a warning in the log and an event in the record, with both times. No order and no age inside the host depends on the realtime
-//! clock. Alarm 503 is raised once after an hour without synchronisation.
+//! Once a second the realtime clock is compared with the monotonic one. If their difference changes by more than
+//! [`LEAST_JUMP`], the clock has jumped. The log then contains a warning and the record an event with both times. Alarm
+//! 503 is raised once after an hour without synchronisation. No order and no age inside the host depends on the
+//! realtime clock.
 //!
-//! Limit: the monotonic clock stands still while the machine sleeps, which looks like a jump forward.
+//! Limits: the monotonic clock stops while the machine sleeps; this is reported as a jump forward.
 
 mod kernel;
 
@@ -15,14 +16,14 @@ use jiff::{SignedDuration, Timestamp};
 use platen_history::History;
 use platen_report::result::ClockRecord;
 
-/// Least jump that is recorded: slewing corrects far less in a second.
+/// Smallest jump that is recorded; slewing corrects far less in a second.
 const LEAST_JUMP: SignedDuration = SignedDuration::from_millis(500);
 /// Time without synchronisation until the alarm.
 const PATIENCE: Duration = Duration::from_secs(3600);
-/// Time between two looks.
+/// Time between two comparisons.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// State of the clock, shared by those who record it.
+/// State of the clock, shared with the parts of the host that record it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clock(Arc<Mutex<State>>);
 
@@ -33,18 +34,18 @@ struct State {
 }
 
 impl Clock {
-    /// Returns the state of synchronisation; `None` where the system does not tell.
+    /// Returns the state of synchronisation; `None` where the system does not report it.
     pub(super) fn record(&self) -> Option<ClockRecord> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).now
     }
 
-    /// Whether the clock has not been synchronised for [`PATIENCE`].
+    /// Returns whether the clock has not been synchronised for [`PATIENCE`].
     pub(super) fn is_overdue(&self) -> bool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).overdue
     }
 }
 
-/// Looks at the clock until it is dropped; `raise` is called when the alarm is due.
+/// Compares the clocks until the future is dropped; `raise` is called when the alarm is due.
 pub(super) async fn keep(clock: Clock, history: Arc<Mutex<History>>, raise: impl Fn()) {
     let mut every = tokio::time::interval(PERIOD);
     every.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -80,7 +81,7 @@ pub(super) async fn keep(clock: Clock, history: Arc<Mutex<History>>, raise: impl
 /// Jump of the realtime clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Jump {
-    /// Time that the clock would tell without the jump.
+    /// Time that the clock would show without the jump.
     expected: Timestamp,
     found: Timestamp,
 }
@@ -145,7 +146,7 @@ mod tests {
         });
         assert_eq!(look(3, 499 - 86_400_000), None);
         assert!(look(4, 0).unwrap().starts_with("the clock was set forward by 86399.5 s"));
-        // A machine under load looks late: no jump.
+        // A late comparison on a machine under load is not a jump.
         assert_eq!(look(60, 0), None);
     }
 

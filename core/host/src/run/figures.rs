@@ -4,8 +4,8 @@ use platen_model::{Figures, Measure, Measurement, Report, Timestamp, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::Measured;
 
-/// Returns the result for the press. `source` is the report of the one comparison whose figures fill the registers; a figure that it did
-/// not give is absent, and its register holds the invalid value.
+/// Returns the result for the press. `source` is the report of the one comparison whose figures fill the registers. A
+/// figure that the report does not contain is absent, and its register holds the invalid value.
 pub(super) fn measurement(
     measured: &Measured,
     source: Option<&Report>,

@@ -1,6 +1,7 @@
-//! Watches `platen forward`: its sinks in the status, and an alarm when one is far behind or keeps this press's strokes apart.
+//! Monitoring of `platen forward`: the state of its sinks for the status, and two alarms.
 //!
-//! The forwarder is a process of its own; it leaves its state in a file of the output folder. One that does not run is behind, too.
+//! The forwarder is a process of its own, which keeps its state in a file of the output folder. An alarm is raised if a
+//! sink is far behind or keeps the strokes of this press separate. A forwarder that does not run also counts as behind.
 
 use std::path::PathBuf;
 use std::sync::PoisonError;
@@ -12,12 +13,12 @@ use platen_model::Code;
 use super::alarms::Alarms;
 use super::forward_record::{ForwardRecord, ForwardState};
 
-/// Time between two looks.
+/// Time between two reads of the state.
 const PERIOD: Duration = Duration::from_secs(1);
-/// How far a sink may be behind.
+/// Longest accepted delay of a sink.
 const BEHIND: Duration = Duration::from_secs(3600);
 
-/// Looks at the forwarder's state each second, for ever.
+/// Reads the forwarder's state each second, for ever.
 pub(super) async fn watch(folder: PathBuf, state: ForwardState, alarms: Alarms) {
     let mut since_alive = Instant::now();
     let mut raised = Raised::default();
@@ -34,7 +35,7 @@ pub(super) async fn watch(folder: PathBuf, state: ForwardState, alarms: Alarms) 
     }
 }
 
-/// Alarms that stand: each is raised once, and again after it has gone.
+/// Active alarms: each is raised once, and again after it has ended.
 #[derive(Debug, Default)]
 struct Raised {
     behind: bool,
@@ -42,7 +43,7 @@ struct Raised {
 }
 
 impl Raised {
-    /// Returns the alarms that this state raises anew.
+    /// Returns the alarms that become active with this state.
     fn next(&mut self, record: &ForwardRecord, silent: Duration) -> Vec<(Code, String)> {
         let late = |sink: &&SinkStatus| sink.behind_s.is_some_and(|s| s > BEHIND.as_secs_f64());
         let behind = match record.sinks.iter().find(late) {

@@ -1,4 +1,5 @@
-//! State of `platen forward` as the host and `platen status` tell it, from the file that the forwarder keeps in the output folder.
+//! State of `platen forward` for the host and `platen status`, from the file that the forwarder keeps in the output
+//! folder.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -6,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use platen_forward::{ForwardStatus, SinkStatus};
 use serde::{Deserialize, Serialize};
 
-/// Age of its state from which on the forwarder does not run, seconds.
+/// Age of the state above which the forwarder does not run, seconds.
 const STALE_S: f64 = 10.0;
 
 /// State of the forwarding as the host sees it.
@@ -17,12 +18,12 @@ pub(super) type ForwardState = Arc<Mutex<Option<ForwardRecord>>>;
 pub struct ForwardRecord {
     /// Whether `platen forward` runs.
     pub running: bool,
-    /// Its sinks, as it last told.
+    /// Its sinks, as last reported.
     pub sinks: Vec<SinkStatus>,
 }
 
 impl ForwardRecord {
-    /// Reads what the forwarder left in an output folder.
+    /// Reads the state file of the forwarder in an output folder.
     #[must_use]
     pub fn load(folder: &Path) -> Self {
         let found = ForwardStatus::load(folder).ok().flatten();
@@ -32,7 +33,7 @@ impl ForwardRecord {
         Self { running, sinks: found.map(|status| status.sinks).unwrap_or_default() }
     }
 
-    /// Returns one line for each sink; one in all where the forwarder has never run.
+    /// Returns one line for each sink; a single line if the forwarder has never run.
     #[must_use]
     pub fn lines(&self) -> Vec<(String, String)> {
         let not = if self.running { "" } else { "platen forward does not run; as it last told: " };

@@ -1,4 +1,4 @@
-//! The journal of the press side, kept in the history.
+//! Journal of the press side, kept in the history.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -1,7 +1,10 @@
-//! The measurement worker: scans and measures one stroke at a time, on a thread of its own.
+//! Measurement worker of `platen run`: scans and measures one stroke at a time, on a thread of its own.
 //!
-//! Scan: window of the last stroke, else base window; evaluation: measurement, comparisons, verdict, documents, answer to the
-//! press; then pictures and report. Between strokes it connects to the scanner and reports readiness to the press side.
+//! 1. Scan, in the window of the last stroke or else in the base window.
+//! 2. Evaluation: measurement, comparisons, verdict, documents, answer to the press.
+//! 3. Pictures and report.
+//!
+//! Between strokes the worker connects to the scanner and reports readiness to the press side.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
@@ -38,7 +41,7 @@ use crate::plate_history::MeasuredPlate;
 
 /// Deadline of a scan without an estimate of its driver: a full dome takes minutes.
 const SCAN_LIMIT: Duration = Duration::from_secs(900);
-/// Least estimate passed to the press side: networks stall, computers are busy.
+/// Smallest estimate passed to the press side, as networks may stall and computers be busy.
 const LEAST_ESTIMATE: Duration = Duration::from_secs(10);
 /// Deadline for a scanner to connect.
 const OPEN_LIMIT: Duration = Duration::from_secs(60);
@@ -50,7 +53,7 @@ const RETRY: Duration = Duration::from_secs(2);
 pub struct StrokeReport {
     /// The stroke.
     pub key: StrokeKey,
-    /// A scan of the blank.
+    /// The stroke is a scan of the blank.
     pub baseline: bool,
     /// Its result document, or the reason why there is none.
     pub result: Result<Box<ResultRecord>, String>,
@@ -60,7 +63,7 @@ pub struct StrokeReport {
     pub elapsed: Duration,
 }
 
-/// The stroke between its scan and its result.
+/// Stroke between its scan and its result.
 #[derive(Debug)]
 struct ActiveStroke {
     key: StrokeKey,
@@ -88,13 +91,13 @@ pub(super) struct MeasurementWorker {
     plant: PlantFile,
     catalogue: Catalogue,
     pipeline: Pipeline,
-    /// The driver, once it could be created.
+    /// Driver, once it has been created.
     scanner: Option<Scanner>,
     connected: bool,
     region: Region,
     /// Duration of a scan of the base window; `None` for a driver without scan planning.
     estimate: Option<Duration>,
-    /// Time since when the scanner has been connected.
+    /// Time at which the scanner was connected.
     in_reach: Option<Instant>,
     /// Readiness as last reported to the press side.
     reported: Option<Result<(), Code>>,
@@ -177,7 +180,7 @@ impl MeasurementWorker {
         let _ = self.receivers.answers.send(answer);
     }
 
-    /// Connects to the scanner where it is not, and sees whether its driver still lives where it is.
+    /// Connects to the scanner if it is not connected; otherwise checks that its driver still runs.
     fn look_after_scanner(&mut self) {
         if let Some(scanner) = self.scanner.as_ref().filter(|_| self.connected)
             && let Err(why) = scanner.instance().check()
@@ -221,8 +224,8 @@ impl MeasurementWorker {
         wanted.map(|wanted| calibration::in_force(wanted, jiff::Timestamp::now(), in_reach)).transpose()
     }
 
-    /// Reports to the press side whether strokes can be measured, when that has changed: without a valid calibration no
-    /// measurement could be judged, without its plugins none made.
+    /// Reports to the press side whether strokes can be measured, if that has changed. Without a valid calibration a
+    /// measurement cannot be judged; without its plugins it cannot be made.
     fn report_readiness(&mut self) {
         if self.in_reach.is_none() {
             return;
@@ -246,7 +249,8 @@ impl MeasurementWorker {
         let scanner = self.scanner.iter().map(Scanner::instance);
         let mut states: Vec<PluginStatus> =
             scanner.chain(self.pipeline.instances()).filter_map(PluginStatus::of).collect();
-        // A driver that cannot tell is no fault; one that does not answer is found by the next look after it.
+        // A driver that does not report a state is not at fault; one that does not answer is found by the next check
+        // after it.
         let scanner = self.scanner.as_ref().filter(|_| self.connected);
         let health = scanner.and_then(|scanner| scanner.instance().health().ok().flatten());
         if let (Some(state), Some(health)) = (states.first_mut(), health) {
@@ -297,7 +301,7 @@ impl MeasurementWorker {
         }
     }
 
-    /// Returns the way of a scan's progress to the pages, percent by percent.
+    /// Returns a receiver that forwards a scan's progress to the pages, percent by percent.
     fn shown_progress(&self, key: StrokeKey) -> ProgressSink {
         if !self.receivers.screen.is_heard() {
             return ProgressSink::default();
@@ -311,8 +315,8 @@ impl MeasurementWorker {
         })
     }
 
-    /// Scans in the window of the last stroke's plate, if there is one, else in the base window. A plate that has moved out of
-    /// its window is scanned again in the base window.
+    /// Scans in the window of the last stroke's plate if there is one, else in the base window. If the plate has moved
+    /// out of its window, the scan is repeated in the base window.
     fn acquire(
         &self,
         scanner: &Scanner,
@@ -344,7 +348,7 @@ impl MeasurementWorker {
         Ok(scanned)
     }
 
-    /// Returns the window round the last stroke's plate, if its scan takes less time.
+    /// Returns the window round the last stroke's plate if a scan of it takes less time.
     fn quicker(&self, scanner: &Scanner) -> Option<&Window> {
         let window = self.region.plate.as_ref()?;
         let takes = scanner.estimate(Some(window), OPEN_LIMIT).ok()??;
@@ -359,7 +363,7 @@ impl MeasurementWorker {
     }
 
     fn report(&self, report: StrokeReport) {
-        // The observer may have gone.
+        // The observer may have ended.
         let _ = self.receivers.strokes.send(report);
     }
 
@@ -384,7 +388,7 @@ impl MeasurementWorker {
                 let elapsed = started.elapsed();
                 self.ask_for_advice(&stroke, &task, &surface, &reports, folder.as_deref());
                 self.show(stroke.run_id, &record, &reports);
-                // The press waits for its answer, not for pictures.
+                // The press waits for its answer, but not for pictures.
                 if let Some(folder) = &folder {
                     self.illustrate(&stroke, folder, &record, &surface, &reports);
                 }
@@ -398,7 +402,7 @@ impl MeasurementWorker {
         self.archive.keep(stroke.run_id, folder, buffer);
     }
 
-    /// Passes a result on to the pages, if there are any.
+    /// Passes a result on to the pages if they are served.
     fn show(&self, run_id: u32, record: &ResultRecord, reports: &[Result<Report, PluginError>]) {
         if !self.receivers.screen.is_heard() {
             return;
@@ -414,7 +418,8 @@ impl MeasurementWorker {
         self.receivers.screen.tell(Event::Measured(Box::new(measured)));
     }
 
-    /// Hands a result over to the advisor, if there is one. Trials teach nothing, and a result without files has no place for advice.
+    /// Passes a result to the advisor if there is one. Trials are not used for learning, and a result without files has
+    /// no place for advice.
     fn ask_for_advice(
         &self,
         stroke: &ActiveStroke,
@@ -497,7 +502,7 @@ impl MeasurementWorker {
         self.history.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes the documents and records their place. A full disk loses the record, not the result.
+    /// Writes the documents and records their place. If the disk is full, the record is lost but not the result.
     fn keep(&mut self, stroke: &ActiveStroke, record: &ResultRecord, surface: &Surface) -> Option<PathBuf> {
         let folder = self.folder(stroke.run_id);
         let written =
@@ -516,7 +521,7 @@ impl MeasurementWorker {
     }
 
     /// Writes pictures, table and mesh beside the documents, and the plate's report. They can be made again from the
-    /// documents: their loss is no fault of the stroke.
+    /// documents, so their loss is not a fault of the stroke.
     fn illustrate(
         &self,
         stroke: &ActiveStroke,
@@ -527,7 +532,7 @@ impl MeasurementWorker {
     ) {
         let sound: Vec<&Report> = reports.iter().flatten().collect();
         let draw = || -> Result<(), Box<dyn std::error::Error>> {
-            // A reader of its own: the journal never waits for a picture.
+            // A separate reader: the journal never waits for a picture.
             let archive = platen_history::Archive::open(&self.plant.output.history)?;
             let strokes = history_view::strokes_until(&archive, stroke.run_id, record)?;
             output_folder::illustrate(folder, record, surface, &sound, &strokes)?;
@@ -541,7 +546,7 @@ impl MeasurementWorker {
     }
 }
 
-/// Returns the alarm code and the sentence for people.
+/// Returns the alarm code and the readable sentence.
 fn refusal(error: &NotMeasured) -> (Code, String) {
     let code = match error {
         NotMeasured::Scanner(PluginError::Stopped { .. } | PluginError::Hangs { .. }) => Code::ScanTimeout,

@@ -15,22 +15,22 @@ pub struct PluginStatus {
     pub kind: String,
     /// Name.
     pub plugin: String,
-    /// Number of its process; null in the host's own process, and while it has none.
+    /// Process identifier; null in the host's own process, and while it has no process.
     pub process: Option<u32>,
     /// Private memory of its process, MiB.
     pub memory_mib: Option<u64>,
-    /// What it is kept from.
+    /// Sandbox in force.
     pub confinement: String,
-    /// Faults since the start of the host; each cost it its process.
+    /// Faults since the start of the host; after each the process is replaced.
     pub faults: u64,
-    /// Why it is not in use; null while it is.
+    /// Reason why it is out of use; null while it is in use.
     pub out_of_use: Option<String>,
-    /// State of the instrument, where its driver tells it.
+    /// State of the instrument, if its driver reports it.
     #[serde(default)]
     pub instrument: Option<InstrumentStatus>,
 }
 
-/// State of a scanner; null is not known.
+/// State of a scanner; null is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentStatus {
     /// Temperature inside, degrees Celsius.
@@ -39,7 +39,7 @@ pub struct InstrumentStatus {
     pub battery: Option<f64>,
     /// Angle between the vertical axis and the plumb line, degrees.
     pub tilt_deg: Option<f64>,
-    /// Mirror or window must be cleaned.
+    /// The mirror or the window must be cleaned.
     pub dirty: bool,
     /// It runs on its battery.
     pub on_battery: bool,
@@ -61,7 +61,7 @@ impl From<Health> for InstrumentStatus {
 }
 
 impl InstrumentStatus {
-    /// Returns what is known, in one line.
+    /// Returns the known values in one line.
     fn line(self) -> String {
         let parts = [
             self.temperature_c.map(|it| format!("{it:.1} \u{b0}C")),

@@ -7,14 +7,14 @@ use platen_shape::{Blank, Surface};
 #[derive(Debug)]
 pub(crate) struct Earlier {
     pub(crate) surface: Surface,
-    /// Outline that its (u, v) refer to, where a scan of the blank gave one.
+    /// Outline to which its (u, v) refer, if a scan of the blank gave one.
     pub(crate) blank: Option<Blank>,
     pub(crate) supports: Option<String>,
     /// Feed rotation as reported by the press, radians.
     pub(crate) plate_rot: Option<f64>,
 }
 
-/// The stroke before a run, and the scan of the blank.
+/// Stroke before a run, and scan of the blank.
 #[derive(Debug, Default)]
 pub(crate) struct PreviousScans {
     pub(crate) before: Option<Earlier>,
@@ -22,7 +22,7 @@ pub(crate) struct PreviousScans {
 }
 
 impl PreviousScans {
-    /// Reads those on record whose files exist; the log names the others.
+    /// Reads the recorded scans whose files exist; the log lists the others.
     pub(crate) fn of(archive: &Archive, run_id: u32) -> Self {
         Self { before: load(archive.before(run_id)), baseline: load(archive.baseline(run_id)) }
     }

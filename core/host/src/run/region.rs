@@ -1,4 +1,4 @@
-//! Scan windows: the part of the dome where the plate can be, instead of the whole hall.
+//! Scan windows: the part of the scanner's field of view where the plate can be, instead of the whole hall.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -7,14 +7,14 @@ use platen_scan::{Window, wrap_azimuth};
 use platen_shape::outline::Outline;
 use platen_shape::{RegionOfInterest, Scanned, Vec3};
 
-/// Margin round the last stroke's plate, metres: its edges rise by some centimetres a stroke, and a press feeds it by a few
-/// decimetres. A plate that moved farther is scanned again in the base window.
+/// Margin round the last stroke's plate, metres: its edges rise by some centimetres in a stroke, and a press feeds it
+/// by a few decimetres. If the plate has moved farther, the scan is repeated in the base window.
 const ROOM: f64 = 0.5;
 
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     choice: ScanWindow,
-    /// Window for a plate without a previous scan: the region of interest; `None` is the whole dome.
+    /// Window for a plate without a previous scan: the region of interest; `None` is the whole field of view.
     pub(super) base: Option<Window>,
     /// Window round the last stroke's plate, margin included.
     pub(super) plate: Option<Window>,
@@ -33,7 +33,7 @@ impl Region {
     }
 }
 
-/// Whether the plate reaches the border of the window, so that a part of it may lie outside.
+/// Returns whether the plate reaches the border of the window, so that a part of it may lie outside.
 pub(super) fn is_cut_off(scanned: &Scanned) -> bool {
     let header = &scanned.header;
     let columns = scanned.warm_up_columns + 1..header.n_columns.saturating_sub(1);
@@ -41,10 +41,10 @@ pub(super) fn is_cut_off(scanned: &Scanned) -> bool {
     scanned.patch.samples.iter().any(|s| !columns.contains(&s.column) || !rows.contains(&s.row))
 }
 
-/// Returns the directions of a box; `None` where the scanner stands in, above or below it.
+/// Returns the directions of a box; `None` if the scanner is in, above or below it.
 fn of_box(region: &RegionOfInterest) -> Option<Window> {
     let (min, max) = (region.min, region.max);
-    // The points of its plan nearest to the scanner and farthest from it.
+    // Points of its plan view that are nearest to the scanner and farthest from it.
     let near = |k: usize| 0.0_f64.clamp(min[k], max[k]);
     let far = |k: usize| min[k].abs().max(max[k].abs());
     let (near, far) = (near(0).hypot(near(1)), far(0).hypot(far(1)));
@@ -62,7 +62,7 @@ fn of_box(region: &RegionOfInterest) -> Option<Window> {
     })
 }
 
-/// Returns the directions of points with a margin round each; `None` for points all round the scanner.
+/// Returns the directions of points with a margin round each; `None` if the points surround the scanner.
 fn round<'a>(points: impl Iterator<Item = &'a Vec3> + Clone) -> Option<Window> {
     let room = |distance: f64| (ROOM / distance.max(ROOM)).asin();
     let azimuth = |p: &Vec3| (p.y.atan2(p.x), room(p.x.hypot(p.y)));
@@ -94,7 +94,7 @@ mod tests {
         RegionOfInterest { min: min.into(), max: max.into() }
     }
 
-    /// Points all over a box: its window must hold them all, and not be wider than they need.
+    /// Checks points all over a box: its window must contain them all, and must not be wider than necessary.
     #[track_caller]
     fn check(min: [f64; 3], max: [f64; 3]) {
         let window = of_box(&region(min, max)).unwrap();
@@ -145,7 +145,7 @@ mod tests {
         }
         let beyond = Vec3::new(5.0, -1.0 - 1.2 * ROOM, -3.5);
         assert!(!window.contains(Direction::of(beyond.into())));
-        // Across the seam of the azimuth, and round the scanner.
+        // Across the seam of the azimuth, and around the scanner.
         let behind = [[-5.0, -1.0, -3.0], [-5.0, 1.0, -3.0]].map(Vec3::from);
         assert!(round(behind.iter()).unwrap().contains(Direction { azimuth: PI, elevation: -0.5 }));
         let all_round = [[1.0, 0.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]].map(Vec3::from);

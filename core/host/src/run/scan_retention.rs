@@ -1,9 +1,11 @@
 //! Retention of raw scans beside their results.
 //!
-//! A scan stays in memory until its result has gone to the press; then a thread of its own writes it as
-//! `run-NNNNNN/scan.e57`, which `platen measure` reads back to the last bit. Scans older than the plant file allows are
-//! removed; no other file is. Results have priority: when the disk runs low, or while the scan before is still being
-//! written, the scan is not kept and the log names the reason.
+//! A scan stays in memory until its result has been sent to the press. Then a thread of its own writes it as
+//! `run-NNNNNN/scan.e57`; `platen measure` reads it back without any change of a bit. Scans older than the plant file
+//! allows are removed, and no other file is.
+//!
+//! Results have priority. If the disk is nearly full, or the previous scan is still being written, the scan is not kept
+//! and the log gives the reason.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -22,7 +24,7 @@ use super::disk;
 use super::scan_store::Waker;
 use crate::sha256;
 
-/// Bytes of a disk reserved for results and history.
+/// Bytes of the disk reserved for results and history.
 const RESERVE: u64 = 1 << 30;
 /// Bytes of a cell in the file: three f64, state, intensity, row and column.
 const CELL_BYTES: u64 = 31;
@@ -64,7 +66,7 @@ impl ScanRetention {
         });
         match thread {
             Ok(thread) if age != Some(Duration::ZERO) => Self { orders: Some(orders), thread: Some(thread) },
-            // Without orders it removes what is too old, and ends.
+            // Without a channel for orders the thread removes old scans and ends.
             Ok(thread) => Self { orders: None, thread: Some(thread) },
             Err(error) => {
                 tracing::error!("scans are not kept: no thread for them: {error}");
@@ -98,15 +100,15 @@ impl Drop for ScanRetention {
     fn drop(&mut self) {
         self.orders = None;
         if let Some(thread) = self.thread.take() {
-            // A thread that failed has said so.
+            // A thread that failed has logged the reason.
             let _ = thread.join();
         }
     }
 }
 
-/// Writes scans as they come; `kept` gets the run and the digest of each.
+/// Writes scans as they arrive; `kept` receives the run and the digest of each.
 fn serve(results: &Path, age: Option<Duration>, inbox: &Receiver<Order>, kept: impl Fn(u32, &str)) {
-    // Ages run on the monotonic clock while the host lives: a clock that is set forward removes nothing.
+    // Ages are measured on the monotonic clock while the host runs: setting the clock forward removes nothing.
     let (start, since) = (SystemTime::now(), Instant::now());
     let clean = || {
         clean(results, age, start + since.elapsed()).unwrap_or_else(|e| {
@@ -144,7 +146,7 @@ fn save(path: &Path, header: &ScanHeader, columns: Vec<Column>, end: &ScanEnd) -
     file.persist(written).map(drop)
 }
 
-/// Refuses a scan of `needed` bytes that would take of the [`RESERVE`].
+/// Refuses a scan of `needed` bytes that would reduce the [`RESERVE`].
 fn check_room(needed: u64, free: u64) -> Result<(), String> {
     if free >= needed.saturating_add(RESERVE) {
         return Ok(());
@@ -178,7 +180,7 @@ fn clean(results: &Path, age: Option<Duration>, now: SystemTime) -> std::io::Res
     Ok(())
 }
 
-/// Whether a file is a scan that is too old, or a partial file of another process.
+/// Returns whether a file is a scan that is too old, or a partial file of another process.
 fn remove(name: &str, age: Option<Duration>, modified: SystemTime, now: SystemTime) -> bool {
     let old = |limit| now.duration_since(modified).is_ok_and(|age| age > limit);
     let half =
@@ -235,7 +237,7 @@ mod tests {
         clean(&folder, Some(60 * DAY), now).unwrap();
         assert!(!old.exists());
         kept.iter().for_each(|path| assert!(path.exists(), "{}", path.display()));
-        // A clock that was set back removes nothing.
+        // Setting the clock back removes nothing.
         clean(&folder, Some(60 * DAY), now - 900 * DAY).unwrap();
         clean(&folder, Some(Duration::ZERO), now).unwrap();
         assert!(!kept[0].exists() && kept[1].exists());

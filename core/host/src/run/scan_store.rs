@@ -1,10 +1,12 @@
-//! Store of raw scans: copies of kept scans under their SHA-256, `scans/ab/SHA256.e57`, by the rule of the plant file.
+//! Store of raw scans: copies of kept scans under their SHA-256, `scans/ab/SHA256.e57`, selected by a rule of the plant
+//! file.
 //!
-//! The store holds what outlives `keep_scans`: it may be a share or the folder of an object store. Which scans belong there follows from the record
-//! alone, so that a scan that could not be copied is copied later: after the next scan, or at the next start. A thread of its own
-//! copies; a store that hangs stops neither results nor the keeping of scans. Nothing is removed from the store.
+//! The store contains the scans that are kept longer than `keep_scans`. It may be a network share or the folder of an
+//! object store. The record alone determines which scans belong there, so a scan that could not be copied is copied
+//! later: after the next scan, or at the next start. A thread of its own copies; a store that hangs stops neither the
+//! results nor the retention of scans. Nothing is removed from the store.
 //!
-//! Limit: the last stroke of a plate is known with the first one of the next plate.
+//! Limits: the last stroke of a plate is only known once the first stroke of the next plate is recorded.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -23,20 +25,20 @@ use sha2::{Digest as _, Sha256};
 
 use crate::sha256;
 
-/// Strokes that are looked at after a scan; at the start all are.
+/// Number of newest strokes checked after a scan; all strokes are checked at the start.
 const NEWEST: u32 = 200;
-/// Time after a scan until its result is on record for certain.
+/// Time after a scan until its result is certainly recorded.
 const SETTLED: Duration = Duration::from_secs(10);
 /// Bytes copied at a time.
 const CHUNK: usize = 1 << 20;
 
-/// Wakes the store when a scan was kept.
+/// Notifies the store when a scan was kept.
 #[derive(Debug, Clone)]
 pub(super) struct Waker(SyncSender<()>);
 
 impl Waker {
     pub(super) fn wake(&self) {
-        // A full channel has woken it already.
+        // A full channel already contains a notification.
         let _ = self.0.try_send(());
     }
 }
@@ -75,7 +77,7 @@ impl Copier {
         }
     }
 
-    /// Copies what belongs into the store and is not there; the first failure ends it until the next time.
+    /// Copies scans that belong into the store and are missing; the first failure ends the pass until the next one.
     fn sweep(&self, newest: Option<u32>) {
         let strokes = Archive::open(&self.record)
             .and_then(|archive| archive.strokes(&Filter { newest, ..Filter::default() }));
@@ -113,7 +115,7 @@ fn wanted<'a>(strokes: &'a [Stroke], rule: &ScanStore) -> Vec<&'a Stroke> {
     for stroke in strokes.iter().filter(|stroke| !stroke.dry_run) {
         last.insert(stroke.plate, stroke.run_id);
     }
-    // The plate of the newest stroke may go on.
+    // The plate of the newest stroke may not be finished.
     if let Some(newest) = strokes.last() {
         last.remove(&newest.plate);
     }
@@ -131,7 +133,7 @@ fn wanted<'a>(strokes: &'a [Stroke], rule: &ScanStore) -> Vec<&'a Stroke> {
         .collect()
 }
 
-/// Draws a share of all strokes, the same at every time of asking.
+/// Selects a share of all strokes at random, with the same outcome at every call.
 fn sampled(stroke: &Stroke, share: f64) -> bool {
     let digest = Sha256::digest(format!("{} {}", stroke.key.press, stroke.run_id));
     let drawn = digest.iter().take(4).fold(0_u32, |number, byte| number << 8 | u32::from(*byte));
@@ -145,7 +147,8 @@ struct Stored {
     sha256: String,
 }
 
-/// Copies a scan under its SHA-256, read once, unless it is there; it appears whole, by one rename.
+/// Copies a scan under its SHA-256, unless it is already there. The scan is read once; the copy appears complete, by
+/// one rename.
 fn put(store: &Path, scan: &Path, part: &str) -> io::Result<Stored> {
     let scans = store.join("scans");
     std::fs::create_dir_all(&scans)?;

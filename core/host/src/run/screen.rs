@@ -1,8 +1,9 @@
-//! The browser pages of this host: what `platen-screen` shows, collected from press side, worker, record and files.
+//! Browser pages of a running host: the data that `platen-screen` displays, collected from press side, worker, record
+//! and files.
 //!
-//! [`Screen::keep`] follows the state of the press side and the events of dispatcher and worker, and publishes a snapshot whenever one
-//! of them changes (`snapshot`: rules R3 to R6 as pure functions). `site` answers the pages' queries of record and files, `engineer`
-//! those of the engineer's page.
+//! [`Screen::keep`] follows the state of the press side and the events of dispatcher and worker. It publishes a
+//! snapshot whenever one of them changes (`snapshot`: rules R3 to R6 as pure functions). `site` answers the pages'
+//! queries of record and files, `engineer` the queries of the engineer's page.
 
 mod engineer;
 mod site;
@@ -33,7 +34,7 @@ pub enum ScreenError {
     /// The token cannot be used.
     #[error("[screen]: {0}")]
     Token(#[from] TokenError),
-    /// Other computers could read the pages, without a token.
+    /// Without a token, other computers could read the pages.
     #[error(
         "[screen]: {0} is open to other computers; make a token with `platen screen token FILE` and name it as token_file"
     )]
@@ -48,7 +49,7 @@ pub enum ScreenError {
 pub(super) enum Event {
     /// A stroke is being scanned.
     Accepted { key: StrokeKey, run_id: u32, data: Box<StrokeData> },
-    /// So much of a stroke is scanned, as the driver says.
+    /// Share of a stroke that is scanned, as reported by the driver.
     Scanned { key: StrokeKey, percent: u8 },
     /// The plate is finished.
     PartEnded,
@@ -58,7 +59,7 @@ pub(super) enum Event {
     Scanner { ready: Result<(), Code>, estimate_s: Option<f64> },
     /// A stroke was measured; sent after the answer to the press.
     Measured(Box<MeasuredStroke>),
-    /// The place of the next hit after this stroke was bent before.
+    /// The position of the next hit after this stroke has been bent before.
     Again(u32),
     /// Advice after a measured stroke.
     Advised(Box<AdviceRecord>),
@@ -69,7 +70,7 @@ pub(super) enum Event {
 pub(super) struct MeasuredStroke {
     pub(super) run_id: u32,
     pub(super) record: Arc<ResultRecord>,
-    /// Fields of one component, which have maps.
+    /// Fields with one component, which have maps.
     pub(super) fields: Vec<Arc<Field>>,
     /// Strokes of the plate up to this one, oldest first.
     pub(super) strokes: Vec<StripPoint>,
@@ -88,12 +89,12 @@ impl MeasuredStroke {
     }
 }
 
-/// Way to the pages for dispatcher and worker; does nothing where no pages are served.
+/// Connection to the pages for dispatcher and worker; does nothing where no pages are served.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Teller(Option<UnboundedSender<Event>>);
 
 impl Teller {
-    /// Returns whether pages are served, so that an event is worth making.
+    /// Returns whether pages are served, so that an event is needed.
     pub(super) fn is_heard(&self) -> bool {
         self.0.is_some()
     }
@@ -119,7 +120,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Open address of the pages, before the host runs.
+/// Opened address of the pages, before the host runs.
 #[derive(Debug)]
 pub struct Pages {
     listener: Listener,
@@ -141,7 +142,7 @@ impl Pages {
         Ok(Some(Self { listener, access: Access { token, names: wanted.names.clone() } }))
     }
 
-    /// Returns the address for people.
+    /// Returns the address as readable text.
     pub fn address(&self) -> String {
         format!("http://{}/", self.listener.address())
     }
@@ -208,7 +209,8 @@ impl Screen {
         }
     }
 
-    /// Finds out, beside everything else, whether an earlier stroke bent the plate where the next hit should be.
+    /// Determines, without delaying other work, whether an earlier stroke bent the plate at the position of the next
+    /// hit.
     fn look_for_earlier_bends(&self, event: &Event) {
         let Event::Measured(measured) = event else { return };
         let next = measured.record.next.as_ref().and_then(Next::place);

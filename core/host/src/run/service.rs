@@ -1,7 +1,8 @@
-//! State of the host for systemd, `sd_notify(3)`: ready, what it does, and its watchdog.
+//! Service state for systemd, `sd_notify(3)`: readiness, status text, and the watchdog.
 //!
-//! The status of the press side changes with each cycle that polls the press. Each change feeds the watchdog; a cycle that hangs feeds
-//! nothing, and systemd restarts the host. The mode `off` has no cycle and is fed by time.
+//! The status of the press side changes with each cycle that polls the press. Each change resets the watchdog. If a
+//! cycle hangs, the watchdog is not reset and systemd restarts the host. The mode `off` has no cycle; there a timer
+//! resets the watchdog.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,7 @@ use platen_press::Status;
 use sd_notify::NotifyState;
 use tokio::sync::watch;
 
-/// Shortest time between two feedings.
+/// Shortest time between two resets of the watchdog.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Notifies systemd until the press side ends. Does nothing where systemd did not start the host.
@@ -45,8 +46,8 @@ pub(super) async fn keep(mode: Mode, mut status: watch::Receiver<Status>) {
     }
 }
 
-/// Tells systemd that the host is stopping.
+/// Notifies systemd that the host is stopping.
 pub(super) fn stopping() {
-    // Without systemd there is nobody to tell.
+    // Fails without systemd, which does not matter.
     let _ = sd_notify::notify(&[NotifyState::Stopping]);
 }

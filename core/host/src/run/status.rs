@@ -21,7 +21,7 @@ use super::plugin_status::{PluginStates, PluginStatus};
 use super::service;
 use super::stopping::{PlateInHand, StopRequest, restart_pending};
 
-/// The newest alarm, set by the dispatcher.
+/// Newest alarm, set by the dispatcher.
 pub(super) type NewestAlarm = Arc<Mutex<Option<(jiff::Timestamp, String)>>>;
 
 /// Facts from outside the press side.
@@ -38,7 +38,7 @@ pub(super) struct Beside {
     pub(super) plate: PlateInHand,
 }
 
-/// Its name in the output folder.
+/// Name of the status file in the output folder.
 const FILE: &str = "status.json";
 
 /// State of the handshake between two strokes.
@@ -47,8 +47,8 @@ const IDLE: &str = "idle";
 /// Time from a reset until the press side has reported its state after it.
 const RESET_SHOWS: Duration = Duration::from_millis(400);
 
-/// The file by which `platen press reset` requests a reset of the running host: write access to the output folder is the
-/// permission.
+/// Returns the file by which `platen press reset` requests a reset of the running host. Permission is given by write
+/// access to the output folder.
 pub fn reset_request(folder: &Path) -> PathBuf {
     folder.join("reset.request")
 }
@@ -76,9 +76,9 @@ pub struct StatusRecord {
     pub strokes: u64,
     /// Results with a measurement.
     pub measured: u64,
-    /// Results without.
+    /// Results without a measurement.
     pub not_measured: u64,
-    /// Strokes missed.
+    /// Missed strokes.
     pub missed: u64,
     /// Median and 99 % of trigger to busy, milliseconds.
     pub trigger_to_busy_ms: [Option<f64>; 2],
@@ -86,22 +86,22 @@ pub struct StatusRecord {
     pub stroke_to_result_ms: [Option<f64>; 2],
     /// Median and 99 % of result to acknowledge, milliseconds.
     pub result_to_ack_ms: [Option<f64>; 2],
-    /// Median and 99 % of a record of the journal until it would survive a power cut, milliseconds.
+    /// Median and 99 % of the time until a record of the journal would survive a power cut, milliseconds.
     pub journal_ms: [Option<f64>; 2],
     /// Results that the press did not acknowledge in time.
     pub ack_timeouts: u64,
-    /// Reads that found the press writing its block.
+    /// Reads during which the press was writing its block.
     pub torn_reads: u64,
-    /// Reads that found the host's own block changed by the press.
+    /// Reads in which the press had changed the host's own block.
     pub rewrites: u64,
-    /// Seconds that the result in hand has waited for the press; null when none waits. There is never more than one: no
-    /// stroke is accepted before it is delivered.
+    /// Time for which the present result has waited for the press, seconds; null when none waits. At most one waits: no
+    /// stroke is accepted before the result is delivered.
     pub result_waits_s: Option<f64>,
     /// Bytes free where results are written; null where unknown.
     pub disk_free: Option<u64>,
     /// Records of the history and result folders that could not be written.
     pub records_lost: u64,
-    /// Seconds out of synchronisation with the press, without the present loss.
+    /// Time out of synchronisation with the press, seconds, without the present loss.
     pub link_down_s: f64,
     /// Counters of the link.
     pub link: LinkRecord,
@@ -116,13 +116,13 @@ pub struct StatusRecord {
     /// Forwarding of the record; null where the plant file has none.
     #[serde(default)]
     pub forward: Option<ForwardRecord>,
-    /// Clock of the host; null where the system does not tell.
+    /// Clock of the host; null where the system does not report it.
     #[serde(default)]
     pub clock: Option<ClockRecord>,
     /// Whether the program was replaced since the start, so that the next start takes another one.
     #[serde(default)]
     pub restart_pending: bool,
-    /// Whether the host stops at the end of the plate in hand.
+    /// Whether the host stops at the end of the present plate.
     #[serde(default)]
     pub stop_asked: bool,
 }
@@ -144,7 +144,7 @@ pub struct LinkRecord {
     pub timeouts: u64,
     /// Refusals by Modbus exception code.
     pub exceptions: BTreeMap<u8, u64>,
-    /// Round trips by time: how many up to 1, 2, 5, 10, 20, 50, 100, 200, 500 ms, and longer.
+    /// Round trips by time: number up to 1, 2, 5, 10, 20, 50, 100, 200, 500 ms, and longer.
     pub round_trips: Vec<u64>,
 }
 
@@ -210,13 +210,14 @@ impl StatusRecord {
     /// Reads the file that a host keeps in its output folder.
     ///
     /// # Errors
-    /// When there is none, or it cannot be read.
+    /// The file is missing or cannot be read.
     pub fn load(folder: &Path) -> std::io::Result<Self> {
         Ok(serde_json::from_slice(&std::fs::read(folder.join(FILE))?)?)
     }
 }
 
-/// Keeps the file up to date, at most once a second but at once when the state changes; hands on requests for a reset and for a stop.
+/// Updates the file at most once a second, but at once when the state changes; passes on requests for a reset and for a
+/// stop.
 pub(super) async fn keep(
     folder: PathBuf,
     press: Press,
@@ -241,7 +242,7 @@ pub(super) async fn keep(
         if std::fs::remove_file(&request).is_ok() {
             tracing::warn!("faults are reset by `platen press reset`");
             reset_at = Some(jiff::Timestamp::now());
-            // A press side that has ended has no faults any more.
+            // A press side that has ended has no faults left.
             let _ = answers.send(Answer::Reset);
             tokio::time::sleep(RESET_SHOWS).await;
         }

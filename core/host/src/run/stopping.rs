@@ -1,10 +1,10 @@
-//! Requests to stop a running host, and when one may be carried out: not in the middle of a plate.
+//! Requests to stop a running host, and the condition for carrying one out: not in the middle of a plate.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time without a stroke after which a plate counts as done, for presses that signal no end of part.
+/// Time without a stroke after which a plate counts as finished, for presses that signal no end of part.
 const QUIET: Duration = Duration::from_secs(600);
 
 /// Kind of a stop request.
@@ -12,7 +12,7 @@ const QUIET: Duration = Duration::from_secs(600);
 pub enum StopRequest {
     /// Stop now.
     AtOnce,
-    /// Stop when no plate is in hand.
+    /// Stop when no plate is being worked on.
     WhenIdle,
 }
 
@@ -26,7 +26,7 @@ impl StopRequest {
         }
     }
 
-    /// Takes the request from the output folder, if there is one. An unfinished text asks for the gentler way.
+    /// Takes the request from the output folder, if there is one. An incomplete text counts as [`Self::WhenIdle`].
     pub(super) fn take(folder: &Path) -> Option<Self> {
         let path = stop_request(folder);
         let text = std::fs::read_to_string(&path).ok()?;
@@ -35,33 +35,33 @@ impl StopRequest {
     }
 }
 
-/// The file by which `platen stop` asks the running host: write access to the output folder is the permission.
+/// Returns the file of a stop request by `platen stop`. Permission is given by write access to the output folder.
 pub fn stop_request(folder: &Path) -> PathBuf {
     folder.join("stop.request")
 }
 
-/// The plate in hand, as far as stopping goes.
+/// Plate in progress, as far as stopping is concerned.
 #[derive(Debug, Clone, Default)]
 pub(super) struct PlateInHand(Arc<Mutex<Option<Instant>>>);
 
 impl PlateInHand {
-    /// Notes a stroke.
+    /// Records a stroke.
     pub(super) fn stroke(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
     }
 
-    /// Notes the end of the part.
+    /// Records the end of the part.
     pub(super) fn ended(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Whether no plate is in hand.
+    /// Returns whether no plate is in progress.
     pub(super) fn is_none(&self) -> bool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).is_none_or(|last| last.elapsed() >= QUIET)
     }
 }
 
-/// Whether the file of the running program was replaced, as by an upgrade: the next start takes the new one.
+/// Returns whether the file of the running program was replaced, as by an upgrade: the next start uses the new one.
 pub(super) fn restart_pending() -> bool {
     std::fs::read_link("/proc/self/exe").is_ok_and(|path| path.to_string_lossy().ends_with(" (deleted)"))
 }

@@ -1,4 +1,4 @@
-//! Files of the demo: those of `config/` with the assigned ports and an output folder of their own.
+//! Files of the demo: the files of `config/` with the assigned ports and an output folder of their own.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -12,19 +12,19 @@ const PLATE: &str = include_str!("../../../../../config/plates/plate-009.toml");
 
 /// Die of the demo's press.
 const DIE: &str = "\n[[die]]\nid = 4\nopening_mm = 360.0\nedge_mm = 200.0\n";
-/// Limits for a slow or emulated computer; a demo waits for nothing else.
+/// Time limits for a slow or emulated computer; a demo waits for nothing else.
 const TIMEOUTS: &str =
     "\n[press.timeouts]    # a slow computer may take its time\nscan_ms = 120000\nevaluate_ms = 120000\n";
 
-/// Makes the demo's folder with its plate file, replacing an earlier demo only.
+/// Creates the demo's folder with its plate file; it replaces the folder of an earlier demo only.
 pub(super) fn prepare(out: &Path) -> Result<(), CliError> {
     output::fresh_folder(out, "demo")?;
     std::fs::create_dir(out.join("plates"))?;
     Ok(std::fs::write(out.join("plates/plate-009.toml"), PLATE)?)
 }
 
-/// Writes the press's file, with a pause between two strokes where one is given, seconds, and a ram that is driven to ordered depths
-/// where strokes are advised.
+/// Writes the press's file. It contains a pause between two strokes (seconds) if one is given, and a ram that is driven
+/// to ordered depths if strokes are advised.
 pub(super) fn press_file(
     out: &Path,
     pace_s: Option<u32>,

@@ -1,4 +1,4 @@
-//! Operator of the demo's press: presses as advised, or as he is used to.
+//! Simulated operator of the demo's press, who follows the advice or presses by habit.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,9 +15,10 @@ use crate::cli::cell::Cell;
 
 /// Most strokes of a demo with advice.
 pub(super) const MOST_ADVISED: u32 = 30;
-/// Time in which an advice is on record.
+/// Time within which an advice is recorded.
 const LIMIT: Duration = Duration::from_secs(5);
-/// The habit of an operator without advice: feed, first place and last, millimetres; depth of the pass and of a correction.
+/// Habit of an operator without advice: feed, first and last position, millimetres; depth of the pass and of a
+/// correction.
 const FEED_MM: f64 = 250.0;
 const REACH_MM: [f64; 2] = [250.0, 2750.0];
 const DEPTH_MM: [f64; 2] = [4.5, 3.6];
@@ -51,7 +52,7 @@ impl Operator {
             (Self::Follow, Some(Step::TurnOver(next))) => as_advised(&next, size, true),
             _ => by_habit(record, size, strokes),
         };
-        // The press takes an order once it rests.
+        // The press accepts an order once it is at rest.
         let end = Instant::now() + LIMIT;
         loop {
             let answer = cell.ask(&json!({ "do": { "order": order } }).to_string())?;
@@ -66,7 +67,7 @@ impl Operator {
     }
 }
 
-/// Reads the advice of a stroke once it is there; `None` when it does not come.
+/// Reads the advice of a stroke once it is recorded; `None` if it is not recorded in time.
 fn advice(folder: &Path) -> Result<Option<AdviceRecord>, CliError> {
     let end = Instant::now() + LIMIT;
     while Instant::now() < end {
@@ -78,7 +79,7 @@ fn advice(folder: &Path) -> Result<Option<AdviceRecord>, CliError> {
     Ok(None)
 }
 
-/// The press counts places from the middle of the plate, across the die.
+/// Makes an order; positions at the press are measured from the middle of the plate, across the die.
 fn stroke(at_mm: [f64; 2], axis_deg: f64, depth_mm: f64, size: [f64; 2], turned_over: bool) -> Json {
     let (sin, cos) = axis_deg.to_radians().sin_cos();
     let across = (at_mm[0] - 0.5 * size[0]) * sin - (at_mm[1] - 0.5 * size[1]) * cos;
@@ -91,7 +92,7 @@ fn as_advised(next: &NextBend, size: [f64; 2], turned_over: bool) -> Json {
     stroke(middle, next.direction.to_degrees(), depth, size, turned_over)
 }
 
-/// One pass at an even feed, then the place of the next hit that the result names.
+/// Makes one pass at an even feed, then a hit at the position that the result gives for the next one.
 fn by_habit(record: &ResultRecord, size: [f64; 2], strokes: u32) -> Json {
     let pass = REACH_MM[0] + FEED_MM * f64::from(strokes);
     match record.next.as_ref().and_then(Next::place) {

@@ -1,4 +1,4 @@
-//! `platen history advice`: how the strokes came out against the advice before them.
+//! Command `platen history advice`: compares the outcome of strokes with the advice before them.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -72,7 +72,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     rams.iter().try_for_each(|(die, ram)| output::line(&ram.words(*die)))
 }
 
-/// Wanted less reached depths over one die, and the board that was last used there.
+/// Reached minus wanted depths over one die, and the template (board) that was last used there.
 #[derive(Debug)]
 struct Ram {
     offs: Vec<f64>,
@@ -81,7 +81,7 @@ struct Ram {
 }
 
 impl Ram {
-    /// Adds the stroke that an advice follows, where it was pressed as advised before and the press told its depth.
+    /// Adds the stroke before this advice, if it was pressed as advised and the press reported its depth.
     fn add(rams: &mut BTreeMap<u16, Self>, record: &AdviceRecord) {
         let Some(die) = &record.history.die else { return };
         let ram = rams.entry(die.id).or_insert(Self { offs: Vec::new(), opening: die.opening, board: None });
@@ -152,7 +152,7 @@ fn row(stroke: &Stroke, show: &str, score: &Score) -> Vec<String> {
     ]
 }
 
-/// Counts of strokes inside and in all.
+/// Number of strokes inside the interval, and number of all strokes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Count {
     inside: usize,

@@ -1,4 +1,4 @@
-//! `platen history backup`, `verify` and `restore`: a record with its documents, copied while the host runs.
+//! Commands `platen history backup`, `verify` and `restore`: the record with its documents, copied while the host runs.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -53,7 +53,7 @@ struct Manifest {
     /// Time of the copy, UTC.
     made: jiff::Timestamp,
     strokes: usize,
-    /// Newest stroke; null of an empty record.
+    /// Newest stroke; null for an empty record.
     last_run: Option<u32>,
     files: Vec<Copied>,
 }
@@ -79,14 +79,14 @@ pub(super) fn backup(common: &Common, command: &Backup) -> Result<(), CliError> 
             folder.display()
         )));
     }
-    // A half backup has another name.
+    // An incomplete backup has another name.
     let part = PathBuf::from(format!("{}.part", folder.display()));
     if part.exists() {
         std::fs::remove_dir_all(&part).map_err(failed(&part))?;
     }
     std::fs::create_dir_all(&part).map_err(failed(&part))?;
     archive.copy_to(&part.join(DATABASE))?;
-    // The strokes of the copy: the host may have gone on.
+    // Strokes of the copy; the host may have recorded others since.
     let strokes = Archive::open(&part.join(DATABASE))?.strokes(&Filter::default())?;
     let mut files = vec![described(&part, Path::new(DATABASE))?];
     let documents: Vec<_> =
@@ -163,7 +163,7 @@ pub(super) fn restore(common: &Common, command: &Restore) -> Result<(), CliError
         if let Some(folder) = to.parent() {
             std::fs::create_dir_all(folder).map_err(failed(folder))?;
         }
-        // Copied, never linked: the backup stays as it is.
+        // Copied, never linked: the backup must not change.
         std::fs::copy(command.folder.join(&file.path), &to).map_err(failed(&to))?;
     }
     progress::done();
@@ -192,7 +192,7 @@ pub(super) fn restore(common: &Common, command: &Restore) -> Result<(), CliError
     )
 }
 
-/// Checks a backup: every file against the manifest, the database by SQLite, a document for each measured stroke.
+/// Checks a backup: every file against the manifest, the database with SQLite, a document for each measured stroke.
 fn verified(folder: &Path) -> Result<Manifest, CliError> {
     let path = folder.join(MANIFEST);
     let text = std::fs::read(&path)
@@ -234,13 +234,15 @@ fn described(folder: &Path, relative: &Path) -> Result<Copied, CliError> {
     Ok(Copied { path: relative.to_owned(), bytes, sha256 })
 }
 
-/// Returns whether a file of a stroke belongs into a backup: not what is still being written, under a name of its own.
+/// Returns whether a file of a stroke belongs to a backup. Files that are still being written have temporary names and
+/// are left out.
 fn is_wanted(file: &OsStr, scans: bool) -> bool {
     Path::new(file).extension().is_none_or(|extension| extension != "part")
         && (scans || file != output_folder::SCAN)
 }
 
-/// Documents are replaced by a rename and never changed in place, so a link keeps what it is; across file systems they are copied.
+/// Links a document, or copies it across file systems. Documents are replaced by a rename and never changed in place,
+/// so a link keeps the content.
 fn link_or_copy(from: &Path, to: &Path) -> Result<(), CliError> {
     match std::fs::hard_link(from, to) {
         Ok(()) => Ok(()),

@@ -1,4 +1,4 @@
-//! `platen history compare`: two strokes compared in the plate's coordinates (u, v).
+//! Command `platen history compare`: two strokes compared in the plate's coordinates (u, v).
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ use crate::progress;
 
 use serde_json::json;
 
-/// The comparisons that need two surfaces.
+/// Comparisons that need two surfaces.
 const COMPARISONS: [&str; 2] = ["displacement", "curvature"];
 
 #[derive(Debug, Args)]
@@ -52,7 +52,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     let document =
         |stroke: &Stroke| stroke.document.as_deref().map(history_view::read_document).unwrap_or_default();
     let (earlier, document) = (document(&first), document(&second));
-    // The calibration in force today, whatever the age of the record.
+    // The present calibration, whatever the age of the record.
     let calibration = plant.calibration.as_ref().and_then(|wanted| Calibration::load(&wanted.file).ok());
     let assumed = || ScannerError::assumed(plant.range_error, document.range_error(), &now);
     let scanner =
@@ -116,7 +116,7 @@ fn surface(stroke: &Stroke) -> Result<Surface, CliError> {
     output_folder::surface_beside(document).map_err(refused)
 }
 
-/// Refuses plates of different size: their (u, v) do not name the same places.
+/// Refuses plates of different size: their coordinates (u, v) do not denote the same points.
 fn same_size(first: &Stroke, before: &Surface, second: &Stroke, now: &Surface) -> Result<(), CliError> {
     let size = |s: &Surface| format!("{:.1} x {:.1} mm", mm(s.width()), mm(s.height()));
     let [before, now] = [size(before), size(now)];

@@ -1,4 +1,5 @@
-//! `platen history export`: the strokes of a history as one table, CSV or Parquet, or as a Parquet file a month.
+//! Command `platen history export`: the strokes of a history as one table (CSV or Parquet), or as one Parquet file for
+//! each month.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -83,7 +84,8 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
     output::either(common, &serde_json::json!({ "file": out, "strokes": strokes.len() }), &text)
 }
 
-/// Adds the stroke's score against the advice before it to its figures, so that coverage can be counted from the table.
+/// Adds the stroke's score against the advice before it to its figures, so that the coverage of the intervals can be
+/// computed from the table.
 fn add_advice(stroke: &mut Stroke) {
     let record = stroke.document.as_ref().map(|document| AdviceRecord::beside(document));
     let score = match record {
@@ -130,7 +132,7 @@ fn by_month(common: &Common, folder: &Path, site: &str, strokes: &[Stroke]) -> R
     output::either(common, &serde_json::json!({ "files": files, "strokes": strokes.len() }), &text)
 }
 
-/// Escapes a name for a folder of Hive's layout: percent encoding, which DuckDB and pyarrow decode.
+/// Escapes a name for a folder in Hive's layout: percent encoding, which DuckDB and pyarrow decode.
 fn escaped(name: &str) -> String {
     name.bytes().fold(String::new(), |mut text, byte| {
         if byte.is_ascii_alphanumeric() || b"-_.".contains(&byte) {

@@ -32,7 +32,7 @@ impl FromStr for RunRef {
 }
 
 impl RunRef {
-    /// Returns the stroke, the newest where a plate has several of this label.
+    /// Returns the stroke; the newest one where a plate has several with this label.
     pub(super) fn find(&self, archive: &Archive) -> Result<Stroke, CliError> {
         match self {
             Self::Run(run_id) => Ok(archive.stroke(*run_id)?),

@@ -1,4 +1,4 @@
-//! `platen history sequence`: the bending sequence of a plate as figures.
+//! Command `platen history sequence`: figures of a plate's bending sequence.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `platen history skill`: figures of crews, codes and not names.
+//! Command `platen history skill`: figures of crews, which are identified by codes and not by names.
 
 use std::path::PathBuf;
 

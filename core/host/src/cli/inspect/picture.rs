@@ -1,7 +1,7 @@
-//! Picture of a scan in the scanner's view: equirectangular, every pixel the same angle.
+//! Picture of a scan in the scanner's view: equirectangular projection, with the same angle for every pixel.
 //!
-//! Colour is the range of the nearest surface, histogram-equalised from dark violet (near) to yellow (far); brightness is
-//! the intensity; black is no return.
+//! The colour is the range of the nearest surface, histogram-equalised from dark violet (near) to yellow (far). The
+//! brightness is the intensity. Black is no return.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -9,14 +9,14 @@ use std::path::Path;
 
 use platen_scan::{Column, ScanHeader, State};
 
-/// Largest picture, pixels.
+/// Largest size of the picture, pixels.
 const WIDTH: f64 = 1600.0;
 const HEIGHT: f64 = 1200.0;
-/// Part of a pixel that rounding may add to a whole number of them.
+/// Part of a pixel that rounding may add to a whole number of pixels.
 const ROUNDING: f64 = 1e-6;
 /// Brightness of the weakest echo.
 const DIM: f64 = 0.5;
-/// Nothing came back.
+/// Colour of a pixel without a return.
 const NOTHING: [u8; 3] = [0, 0, 0];
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -31,7 +31,7 @@ struct Pixel {
 pub(super) struct RangePicture {
     width: usize,
     height: usize,
-    /// Pixels between columns and between rows.
+    /// Pixels from one column to the next, and from one row to the next.
     per_column: f64,
     per_row: f64,
     pixels: Vec<Pixel>,
@@ -72,12 +72,12 @@ impl RangePicture {
         (self.width, self.height)
     }
 
-    /// Writes a new file, all of it or nothing.
+    /// Writes a new file, either completely or not at all.
     pub(super) fn write(&self, path: &Path) -> Result<(), png::EncodingError> {
         let part = path.with_extension(format!("png.{}.part", std::process::id()));
         let written = self.encode(&part).and_then(|()| Ok(std::fs::rename(&part, path)?));
         if written.is_err() {
-            // What cannot be removed is named `.part`.
+            // A file that cannot be removed is named `.part`.
             let _ = std::fs::remove_file(&part);
         }
         written
@@ -106,13 +106,13 @@ impl RangePicture {
     }
 }
 
-/// Pixels that a row or column covers, one at least.
+/// Returns the pixels that a row or column covers, at least one.
 fn covered(index: usize, per: f64, n: usize) -> std::ops::Range<usize> {
     let from = ((index as f64 * per) as usize).min(n.saturating_sub(1));
     from..(((index + 1) as f64 * per) as usize).clamp(from + 1, n.max(from + 1))
 }
 
-/// Share of the other values below each value; NaN stays NaN.
+/// Returns the share of the other values below each value; NaN stays NaN.
 fn ranks(values: &[f32]) -> Vec<f64> {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|value| !value.is_nan()).collect();
     sorted.sort_by(f32::total_cmp);
@@ -124,7 +124,7 @@ fn ranks(values: &[f32]) -> Vec<f64> {
     values.iter().map(|value| if value.is_nan() { f64::NAN } else { rank(*value) }).collect()
 }
 
-/// The "viridis" scale (S. van der Walt and N. Smith, 2015), even in lightness, at nine places.
+/// Colour scale "viridis" (S. van der Walt and N. Smith, 2015), uniform in lightness, at nine positions.
 const SCALE: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
     [71.0, 44.0, 122.0],

@@ -1,4 +1,4 @@
-//! `platen plugins check`: conformance tests of a plugin library.
+//! Command `platen plugins check`: conformance tests of a plugin library.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -114,12 +114,13 @@ fn tell(common: &Common, command: &Command, outcome: &Outcome) -> Result<(), Cli
 /// Name and level of the test that needs a second process of this program.
 const ISOLATION: (&str, u8) = ("answer.isolation", 2);
 
-/// Returns the last line: the plugin may have printed others before it.
+/// Returns the last line; the plugin may have printed others before it.
 fn last_line(text: &[u8]) -> String {
     String::from_utf8_lossy(text).lines().last().unwrap_or_default().trim().to_owned()
 }
 
-/// Compares the answers of a worker with those of a thread of another process of this program, which the plugin may end.
+/// Compares the answers of a worker with the answers of a thread in another process of this program, which the plugin
+/// may crash.
 fn in_both_isolations(
     common: &Common,
     command: &Command,

@@ -1,5 +1,6 @@
-//! `platen plugins new`: a folder with a plugin that builds and works, to be changed. Nothing is fetched: the examples of
-//! `plugins/examples` and `drivers/examples` lie in the program.
+//! Command `platen plugins new`: creates a folder with a working plugin as a starting point.
+//!
+//! Nothing is downloaded: the examples of `plugins/examples` and `drivers/examples` are part of the program.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -53,7 +54,7 @@ const HEADER_CPP: &str = include_str!("../../../../abi/include/platen.hpp");
 const SURFACE: &str = include_str!("../../../../abi/include/platen_surface.h");
 const HARMONIC_MAP: &str = include_str!("../../../../../plugins/examples/harmonic_map.h");
 
-/// How a flattening or comparison is tried: on a simulated plate.
+/// Commands that try a flattening or comparison on a simulated plate.
 const MEASURE: &str = "platen-sim scanner simulated.toml --out scan.e57\n\
                        platen --plugins FOLDER measure scan.e57 --plate plate.toml --plant plant.toml";
 
@@ -155,7 +156,7 @@ fn sources(command: &Command) -> Result<PathBuf, CliError> {
     })
 }
 
-/// Returns the command that builds the plugin, its library, and the folder of that.
+/// Returns the command that builds the plugin, its library, and the folder of the library.
 fn commands(command: &Command) -> (&'static str, String, &'static str) {
     let file = format!("lib{}.so", command.name.replace('-', "_"));
     match command.lang {
@@ -185,7 +186,7 @@ fn files(command: &Command, platen: &Path) -> Vec<File> {
         Kind::Flattening | Kind::Comparison => format!(", features = [\"{kind}\"]"),
     };
     let filled = |text: &str| {
-        // A string of JSON is one of TOML.
+        // A JSON string literal is a valid TOML basic string.
         let platen = serde_json::Value::from(platen.join("core/sdk").to_string_lossy()).to_string();
         let using = using.replace("FOLDER", folder);
         [

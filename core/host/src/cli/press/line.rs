@@ -1,4 +1,4 @@
-//! `check`, `ping` and `scan-unit`: the link to the press.
+//! Commands `check`, `ping` and `scan-unit`: tests of the link to the press.
 
 use std::ops::RangeInclusive;
 use std::process::ExitCode;
@@ -15,7 +15,7 @@ use serde_json::json;
 
 pub(super) type Units = RangeInclusive<u8>;
 
-/// Reads `1..10`, both ends included, or one number.
+/// Parses `1..10`, both ends included, or one number.
 pub(super) fn units(text: &str) -> Result<Units, String> {
     let number = |text: &str| text.parse::<u8>().map_err(|e| format!("`{text}`: {e}; write 1..10"));
     match text.split_once("..") {
@@ -52,7 +52,7 @@ fn exchanges(press: &Press) -> Vec<Exchange> {
     exchanges
 }
 
-/// Prints what follows from the plant file alone: allow-list, exchanges and their time on the line.
+/// Prints everything that follows from the plant file alone: allow-list, exchanges and their time on the line.
 pub(super) fn check(common: &Common, press: &Press) -> Result<(), Failure> {
     let serial = match &press.link.transport {
         Transport::Rtu(serial, _) => Some(serial),
@@ -172,7 +172,7 @@ pub(super) fn ping(common: &Common, press: &Press, count: u32) -> Result<(), Fai
     Ok(())
 }
 
-/// Reads one register of each unit id; exit code 0 when one answers.
+/// Reads one register of each unit id; exit code 0 if at least one answers.
 pub(super) fn scan_units(common: &Common, press: &Press, units: &Units) -> Result<ExitCode, Failure> {
     let one = Block { count: 1, ..press.map.read };
     let mut found = Vec::new();

@@ -1,7 +1,7 @@
-//! `record` and `replay`: changes of both blocks as JSON lines, and the handshake run on them again.
+//! Commands `record` and `replay`: changes of both blocks as JSON lines, and a replay of them to the handshake.
 //!
-//! A line is a read with changed contents: `t_mono_us` since the start, `t_utc`, `dir` (read), `unit`, `fc`, `addr`
-//! and `words`, or `exception` or `error` instead of the words.
+//! A line is a read with changed contents. It has `t_mono_us` since the start, `t_utc`, `dir` (read), `unit`, `fc`,
+//! `addr` and `words`; instead of the words a failed read has `exception` or `error`.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

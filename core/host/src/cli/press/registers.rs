@@ -1,4 +1,4 @@
-//! `dump`, `watch` and `probe-order`: contents of the registers.
+//! Commands `dump`, `watch` and `probe-order`: contents of the registers.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -17,7 +17,7 @@ const CHUNK: u32 = 8;
 /// Zero-based addresses, the end excluded.
 pub(super) type Range = std::ops::Range<u32>;
 
-/// Reads `0..200`.
+/// Parses `0..200`.
 pub(super) fn range(text: &str) -> Result<Range, String> {
     let wrong = || format!("`{text}` is no range of registers; write 0..200");
     let (first, end) = text.split_once("..").ok_or_else(wrong)?;
@@ -89,7 +89,7 @@ pub(super) fn dump(
     Ok(output::titled("block | field | value", rows)?)
 }
 
-/// Reads any holding registers; those in a chunk that the press refuses are read one by one.
+/// Reads any holding registers; if the press refuses a chunk, its registers are read one by one.
 async fn read_range(client: &mut Client<ModbusLink>, range: Range) -> Result<Vec<(u32, u16)>, LinkError> {
     client.connect().await?;
     let mut words = Vec::new();

@@ -1,4 +1,4 @@
-//! `reset`: clears the latched faults of a running host.
+//! Command `reset`: clears the latched faults of a running host.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -8,12 +8,12 @@ use platen_plant::PlantFile;
 use super::{CliError, Common, Failure, output};
 use crate::run::{StatusRecord, reset_request};
 
-/// Longest wait for the host, which looks for requests once a second.
+/// Longest wait for the host, which checks for requests once a second.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Interval of looking for its answer.
+/// Interval between checks for its answer.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Requests a reset; exit code 0 when the host carried it out and reports no fault.
+/// Requests a reset; exit code 0 if the host carried it out and reports no fault.
 pub(super) fn run(common: &Common, plant: &PlantFile) -> Result<ExitCode, Failure> {
     let folder = &plant.output.folder;
     let request = reset_request(folder);
@@ -29,7 +29,7 @@ pub(super) fn run(common: &Common, plant: &PlantFile) -> Result<ExitCode, Failur
         }
         std::thread::sleep(LOOK);
     }
-    // The host writes its status anew once it has carried out the request.
+    // The host writes its status again once it has carried out the request.
     let status = loop {
         let status = StatusRecord::load(folder)?;
         if status.reset_at.is_some_and(|at| at >= asked) {

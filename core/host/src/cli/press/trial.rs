@@ -1,6 +1,7 @@
-//! `test`: the handshake at the real press, step by step, with a stand-in for scanner and evaluation.
+//! Command `test`: the handshake at the real press, step by step, with a substitute for scanner and evaluation.
 //!
-//! Results carry the bit `simulated`: a press that follows the rules of the map displays them and does not use them.
+//! Results have the bit `simulated` set: a press that follows the rules of the register map displays them and does not
+//! use them.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -31,7 +32,7 @@ pub fn stand_in(key: StrokeKey) -> Measurement {
     Measurement { judgement: Verdict::Fail.into(), figures, scanned_at: None, warning: None }
 }
 
-/// Order that the stand-in received.
+/// Order that the substitute received.
 #[derive(Debug)]
 pub enum Seen {
     /// Scan of a stroke.
@@ -40,7 +41,8 @@ pub enum Seen {
     Alarm(Code, Option<String>),
 }
 
-/// Answers every order at once, as scanner and evaluation, and forwards scans and alarms until the press side ends.
+/// Answers every order at once in place of scanner and evaluation, and forwards scans and alarms until the press side
+/// ends.
 pub async fn serve(
     mut orders: mpsc::UnboundedReceiver<Order>,
     answers: mpsc::UnboundedSender<Answer>,
@@ -63,7 +65,7 @@ pub async fn serve(
     }
 }
 
-/// One step of the handshake: figure against limit.
+/// One step of the handshake: measured figure and its limit.
 #[derive(serde::Serialize)]
 struct Step {
     #[serde(rename = "step")]
@@ -157,7 +159,7 @@ async fn trial(press: &Press, strokes: u32, patience: Duration) -> Result<Report
 /// Waits for a state of the host.
 ///
 /// # Errors
-/// `what` did not come in time, or the press side ended.
+/// `what` did not occur in time, or the press side ended.
 async fn until(
     status: &mut tokio::sync::watch::Receiver<Status>,
     what: &str,
@@ -207,7 +209,7 @@ async fn strokes_of(
         until(status, "the next stroke", patience, |status| status.metrics.strokes > seen).await?;
         let limit = press.link.response_timeout * 4 + Duration::from_secs(2);
         let after = until(status, "the result", limit, |status| published(status) > seen).await?;
-        // The status shows only the last of strokes that come faster than it is read.
+        // If strokes come faster than the status is read, it shows only the last of them.
         seen = published(&after);
         one_stroke(press, &after, report);
         acknowledged(press, seen, status, report).await?;
@@ -235,7 +237,8 @@ fn one_stroke(press: &Press, status: &Status, report: &mut Report) {
     report.add(format!("{name}: result"), text, "no error", error.is_none());
 }
 
-/// Reports the acknowledge. A press that refuses simulated results, as it should, sends none: the step is good either way.
+/// Reports the acknowledge. A press that refuses simulated results, as it should, sends none; the step passes in either
+/// case.
 async fn acknowledged(
     press: &Press,
     n: u64,

@@ -1,7 +1,8 @@
-//! `write-test`: a pattern in each figure of the host's block, for comparison with the screen of the press.
+//! Command `write-test`: writes a pattern to each figure of the host's block, for comparison with the screen of the
+//! press.
 //!
-//! Status, echoes, heartbeat and counters stay 0, so that no press takes the pattern for a result. Every write goes through
-//! the allow-list; at the end all figures hold their "no value" word again.
+//! Status, echoes, heartbeat and counters stay 0, so that no press accepts the pattern as a result. Every write is
+//! checked against the allow-list. At the end all figures hold their "no value" word again.
 
 use std::io::{BufRead, IsTerminal, Write};
 use std::process::ExitCode;
@@ -16,7 +17,7 @@ use super::{CliError, Common, Failure, output};
 
 use serde_json::json;
 
-/// Time of watching for a running host: two heartbeats at least.
+/// Time of the check for a running host: at least two heartbeats.
 const WATCH: Duration = Duration::from_millis(1500);
 
 struct Written {
@@ -26,7 +27,7 @@ struct Written {
     confirmed: Option<bool>,
 }
 
-/// Runs the test; exit code 0 when every pattern was read back and none was denied at the screen.
+/// Runs the test; exit code 0 if every pattern was read back and none was rejected at the screen.
 pub(super) fn run(common: &Common, press: &Press) -> Result<ExitCode, Failure> {
     let mut press = press.clone();
     if !press.mode.writes() {
@@ -69,7 +70,7 @@ fn figures(press: &Press) -> Vec<Output> {
     figures
 }
 
-/// Returns a result of which only this field has a figure, different from every other step's.
+/// Returns a result in which only this field has a figure; the figure differs in every step.
 fn image(press: &Press, field: Output, step: usize) -> HostImage {
     let Some(place) = press.map.output(field) else { return HostImage::default() };
     let raw = (11 * (step + 1)) as f64;
@@ -104,7 +105,7 @@ async fn reach(press: &Press, client: &mut Client<ModbusLink>) -> Result<(), Fai
     }
 }
 
-/// Refuses to write to a press that a host writes to.
+/// Refuses to write to a press to which a host is writing.
 async fn alone(press: &Press, client: &mut Client<ModbusLink>) -> Result<(), Failure> {
     reach(press, client).await?;
     let block = press.map.write;
@@ -166,7 +167,7 @@ mod tests {
     use super::*;
     use platen_plant::press::Link;
 
-    /// No pattern may look like a result: status, echoes, sequence and owner are 0 in every step.
+    /// Checks that no pattern is a valid result: status, echoes, sequence and owner are 0 in every step.
     #[test]
     fn a_pattern_is_never_a_result() {
         let press = Press::pph1("Press 3", 3, Link::tcp("192.0.2.10", 502, 1));

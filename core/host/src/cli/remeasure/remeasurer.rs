@@ -1,11 +1,12 @@
-//! Strokes on record, measured again from their kept scans, as `platen measure` measures them.
+//! Repeated measurement of recorded strokes from their kept scans, with the method of `platen measure`.
 //!
-//! A stroke is compared with the surfaces of the stroke before and of the blank, measured again from their scans too where those are
-//! kept, else with the surfaces on record. The corner (0, 0) continues from the pose on record. Each result goes into a folder of
-//! its own with its [`Inputs`]; where a result with the same inputs is there already, nothing is measured.
+//! A stroke is compared with the surfaces of the previous stroke and of the blank. Where their scans are kept, these
+//! surfaces are measured again too; otherwise the recorded surfaces are used. The corner (0, 0) is continued from the
+//! recorded pose. Each result is written to a folder of its own, together with its [`Inputs`]. If the folder already
+//! has a result with the same inputs, nothing is measured.
 //!
-//! Limits: the plate file is today's file of the stroke's recipe, not that of the day of the stroke; the calibration is the one of the plant
-//! file, unless it was too old at the time of the stroke.
+//! Limits: the plate file is the present file of the stroke's recipe, not the file at the time of the stroke. The
+//! calibration is that of the plant file, unless it was too old at the time of the stroke.
 
 mod comparison;
 mod inputs;
@@ -38,7 +39,7 @@ pub(crate) use part::{Row, table};
 
 /// Version of `remeasured.json`.
 const SCHEMA: &str = "platen.remeasured/1";
-/// Written last into the folder of a result, which is complete with it.
+/// File that is written last to the folder of a result: a result with it is complete.
 const MARK: &str = "remeasured.json";
 
 /// Result of a stroke that was measured again: `remeasured.json` beside the result's document.
@@ -56,7 +57,7 @@ pub(crate) struct Remeasured {
     pub(crate) figures: BTreeMap<String, f64>,
 }
 
-/// Outcome of measuring a stroke again.
+/// Outcome of a repeated measurement.
 #[derive(Debug)]
 pub(crate) enum Outcome {
     /// Measured now.
@@ -67,7 +68,8 @@ pub(crate) enum Outcome {
     NoScan,
 }
 
-/// Measures strokes of one record again, one after the other. Plates come one after the other, each with its strokes in their order.
+/// Measures strokes of one record again. The caller passes one plate after the other, each with its strokes in their
+/// order.
 #[derive(Debug)]
 pub(crate) struct Remeasurer<'a> {
     plant: &'a PlantFile,
@@ -122,7 +124,7 @@ impl<'a> Remeasurer<'a> {
     /// Measures one stroke, unless its result is there already.
     ///
     /// # Errors
-    /// A file or a plugin fails; a stroke that cannot be measured is a result with its reason.
+    /// A file or a plugin fails; a stroke that cannot be measured gives a result with the reason.
     pub(crate) fn measure(&mut self, stroke: &Stroke) -> Result<Outcome, CliError> {
         if self.plate.replace(stroke.plate) != Some(stroke.plate) {
             self.scans.clear();
@@ -217,7 +219,7 @@ impl<'a> Remeasurer<'a> {
         Ok(())
     }
 
-    /// Scans and measures the shape; the inner error is the plate's.
+    /// Scans and measures the shape; the inner error is about the plate.
     fn shape(
         &mut self,
         stroke: &Stroke,
@@ -260,7 +262,7 @@ impl<'a> Remeasurer<'a> {
         })
     }
 
-    /// Returns the surface of an earlier stroke: measured again, else that on record.
+    /// Returns the surface of an earlier stroke: measured again if possible, otherwise the recorded one.
     fn reference(
         &mut self,
         stroke: Option<Stroke>,
@@ -303,7 +305,7 @@ impl<'a> Remeasurer<'a> {
             .ok())
     }
 
-    /// Returns the kept scan of a stroke: beside its result, else where the record says.
+    /// Returns the kept scan of a stroke: beside its result, or at the place in the record.
     fn kept(&mut self, stroke: &Stroke) -> Result<Option<KeptScan>, CliError> {
         if let Some(known) = self.scans.get(&stroke.run_id) {
             return Ok(known.clone());
@@ -340,8 +342,8 @@ impl<'a> Remeasurer<'a> {
 
     fn calibration(&self, stroke: &Stroke) -> Option<Calibration> {
         let wanted = self.plant.calibration.as_ref()?;
-        // The record has no warm-up of the scanner: it counts as warm.
-        // A calibration made after the stroke counts: to measure again with it is why it was made.
+        // The record contains no warm-up of the scanner; the scanner counts as warm. A calibration made after the
+        // stroke is valid: strokes are often measured again because of a new calibration.
         let made = Calibration::load(&wanted.file).map(|calibration| calibration.made).ok();
         let now = made.unwrap_or(stroke.accepted).max(stroke.accepted);
         let valid = calibration::in_force(wanted, now, wanted.warm_up);
@@ -359,7 +361,7 @@ fn read(folder: &Path) -> Option<Remeasured> {
     serde_json::from_slice(&text).ok().filter(|done: &Remeasured| done.schema == SCHEMA)
 }
 
-/// Removes a result with other inputs, and what an interrupted run has left.
+/// Removes a result with other inputs, and the remains of an interrupted run.
 fn clear(folder: &Path) -> Result<(), CliError> {
     match std::fs::remove_dir_all(folder) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(failed(folder)(error)),

@@ -1,4 +1,4 @@
-//! Picture of the scan's intensities with the measured edges, lines and markers over it, as SVG.
+//! Picture of the scan's intensities with the measured edges, lines and markers drawn over it, as SVG.
 
 use std::fmt::Write as _;
 
@@ -17,11 +17,11 @@ const GRAYS: [f64; 2] = [0.25, 1.5];
 /// Margin round the plate, pixels.
 const MARGIN: f64 = 40.0;
 
-/// Map from directions to pixels. Seen from the scanner, azimuths grow to the left.
+/// Mapping from directions to pixels. Seen from the scanner, azimuths increase to the left.
 struct View {
     /// Horizontal direction of the plate's centre.
     forward: [f64; 2],
-    /// Azimuth from there of column 0, and elevation of row 0.
+    /// Azimuth of column 0 relative to `forward`, and elevation of row 0.
     origin: [f64; 2],
     step: [f64; 2],
     /// First and last column, first and last row.
@@ -68,7 +68,7 @@ impl View {
         [x * self.scale[0], y * self.scale[1]]
     }
 
-    /// Encodes the intensities as PNG, one pixel a cell, transparent where the plate was not seen.
+    /// Encodes the intensities as PNG, one pixel for each cell, transparent where the plate was not seen.
     fn intensities(&self, patch: &Patch) -> Result<Vec<u8>, png::EncodingError> {
         let (n_x, n_y) = (self.columns[1] - self.columns[0] + 1, self.rows[1] - self.rows[0] + 1);
         let mut intensities: Vec<u16> = patch.samples.iter().map(|s| s.intensity).collect();

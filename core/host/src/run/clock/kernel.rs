@@ -1,4 +1,4 @@
-//! State of the system clock as the kernel keeps it, `adjtimex(2)` in its reading form, which requires no privilege.
+//! Synchronisation state of the system clock, read from the kernel with `adjtimex(2)`; reading requires no privilege.
 
 #![allow(unsafe_code, reason = "a system call without a safe binding")]
 
@@ -6,7 +6,7 @@ use platen_report::result::ClockRecord;
 
 /// Returns the state of synchronisation; `None` where the system call is refused.
 pub(super) fn state() -> Option<ClockRecord> {
-    // SAFETY: timex consists of integers, for which zero is a value; modes = 0 makes the call read only.
+    // SAFETY: timex consists of integers, for which zero is a valid value; with modes = 0 the call only reads.
     let (state, timex) = unsafe {
         let mut timex: libc::timex = std::mem::zeroed();
         (libc::adjtimex(&raw mut timex), timex)

@@ -16,7 +16,7 @@ use crate::run::status::{Beside, StatusRecord};
 /// Strokes of the timeline.
 const TIMELINE: u32 = 20;
 
-/// Where the figures come from.
+/// Sources of the figures.
 #[derive(Debug)]
 pub(super) struct Installation {
     pub(super) plant: PlantFile,
@@ -26,13 +26,13 @@ pub(super) struct Installation {
 }
 
 impl Installation {
-    /// Returns the status record of this moment, as `platen status` prints it.
+    /// Returns the present status record, as `platen status` prints it.
     pub(super) fn status(&self, board: &Board) -> StatusRecord {
         StatusRecord::of(&self.press, &self.plant.output.folder, &lock(&board.status).0, &self.beside, None)
     }
 }
 
-/// Collects the figures of this moment.
+/// Collects the present figures.
 pub(super) fn figures(site: &Installation, board: &Board, archive: Option<&Archive>) -> Engineer {
     Engineer {
         registers: registers(site, board),
@@ -165,7 +165,7 @@ fn status(site: &Installation, board: &Board) -> Vec<(String, String)> {
     rows.into_iter().map(|(name, value)| (name.to_owned(), value)).chain(sinks).collect()
 }
 
-/// Counts of round trips by their time.
+/// Formats counts of round trips by their time.
 fn round_trips(counts: &[u64]) -> String {
     let limits = ROUND_TRIP_LIMITS_MS.iter().map(|ms| format!("up to {ms} ms")).chain(["longer".to_owned()]);
     let parts = limits.zip(counts).filter(|(_, n)| **n > 0).map(|(limit, n)| format!("{n} {limit}"));
@@ -183,7 +183,7 @@ fn files(site: &Installation) -> Vec<(String, String)> {
     files.map(|path| (path.display().to_string(), checksum(&path))).collect()
 }
 
-/// Returns the checksum of a file, or why it cannot be read.
+/// Returns the checksum of a file, or the reason why it cannot be read.
 fn checksum(path: &Path) -> String {
     match std::fs::read(path) {
         Ok(bytes) => format!("crc32c {:08x}", crc32c::crc32c(&bytes)),

@@ -1,4 +1,5 @@
-//! Answers of the host to the pages: strokes and plates of the record, documents and files of strokes, maps of the newest one.
+//! Answers of the host to the pages: recorded strokes and plates, documents and files of strokes, maps of the newest
+//! stroke.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -24,9 +25,9 @@ use super::{Beside, Board, MeasuredStroke, lock};
 
 /// Nodes along each side of the mesh.
 const NODES: usize = 101;
-/// Plates in the list, the newest.
+/// Number of newest plates in the list.
 const PLATES: usize = 100;
-/// Age up to which the engineer's figures are shown again, however many read them.
+/// Age up to which the engineer's figures are reused, for any number of readers.
 const FRESH: Duration = Duration::from_millis(500);
 
 /// Source of the pages.
@@ -35,7 +36,7 @@ pub(super) struct Site {
     board: Arc<Board>,
     installation: Installation,
     catalogue: Catalogue,
-    /// Sequences by plate, with the number of strokes for which they were made.
+    /// Sequences by plate, with the number of strokes at which they were computed.
     sequences: Mutex<HashMap<u32, (usize, Option<Sequence>)>>,
     engineer: Mutex<Option<(Instant, Engineer)>>,
 }
@@ -66,7 +67,7 @@ impl Site {
         }
     }
 
-    /// Opens the record; a reader of its own, so that the journal never waits for a page.
+    /// Opens the record with a separate reader, so that the journal never waits for a page.
     fn archive(&self) -> Result<Archive, SourceError> {
         Archive::open(&self.installation.plant.output.history).map_err(unreadable)
     }
@@ -97,7 +98,8 @@ impl Site {
         lock(&self.board.facts).measured().filter(|measured| measured.run_id == run).cloned()
     }
 
-    /// Returns whether a stroke of the plate up to this one bent it at a place (u, v); false where that cannot be told.
+    /// Returns whether a stroke of the plate up to this one bent it at a place (u, v); false if that cannot be
+    /// determined.
     pub(super) fn was_bent(&self, run: u32, place_mm: [f64; 2]) -> bool {
         let sequence = self.stroke(run).and_then(|stroke| self.sequence(stroke.plate)).ok().flatten();
         let strokes = sequence.map(|sequence| sequence.strokes).unwrap_or_default();
@@ -126,7 +128,7 @@ impl Source for Site {
     }
 
     fn cycle_age(&self) -> Duration {
-        // Switched off, there is no cycle.
+        // In mode `off` there is no cycle.
         if self.installation.press.mode == Mode::Off {
             Duration::ZERO
         } else {

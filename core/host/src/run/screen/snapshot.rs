@@ -1,4 +1,4 @@
-//! The snapshot as a function of the status of the press side and of what dispatcher and worker have told.
+//! Snapshot for the pages, as a function of the press side's status and of the events of dispatcher and worker.
 //!
 //! | rule | where |
 //! |---|---|
@@ -34,20 +34,20 @@ pub(super) struct Facts {
     scanner: ScannerPart,
     hand: Option<Hand>,
     measured: Option<MeasuredStroke>,
-    /// A result of an earlier start whose record was looked for.
+    /// Result of an earlier start whose record has been searched for.
     recalled: Option<u32>,
-    /// A stroke after which the place of the next hit was bent before.
+    /// Stroke after which the position of the next hit has been bent before.
     again: Option<u32>,
-    /// The newest advice.
+    /// Newest advice.
     advice: Option<Box<AdviceRecord>>,
     /// Record of the last stroke of a part that has ended.
     ended: Option<u32>,
     raised: BTreeMap<Code, u64>,
-    /// Alarms that stand, with the time since when.
+    /// Active alarms, with their start times.
     standing: BTreeMap<Code, i64>,
 }
 
-/// The stroke in hand.
+/// Stroke in progress.
 #[derive(Debug)]
 struct Hand {
     key: StrokeKey,
@@ -105,7 +105,7 @@ impl Facts {
         }
     }
 
-    /// Notes which alarms stand, and since when.
+    /// Records the active alarms and their start times.
     pub(super) fn observe(&mut self, status: &Status) {
         let now: Vec<Code> =
             [status.link_error, status.host.error, status.host.warning].into_iter().flatten().collect();
@@ -115,13 +115,13 @@ impl Facts {
         }
     }
 
-    /// Returns whether the record of a result is here or on its way, or was looked for.
+    /// Returns whether the record of a result is present or expected, or has been searched for.
     pub(super) fn knows(&self, run_id: u32) -> bool {
         let is_in_hand = self.hand.as_ref().is_some_and(|hand| hand.run_id == run_id);
         is_in_hand || self.recalled == Some(run_id) || self.record_of(run_id).is_some()
     }
 
-    /// Takes the record of a result that was published before this start.
+    /// Adds the record of a result that was published before this start.
     pub(super) fn recall(
         &mut self,
         run_id: u32,
@@ -190,7 +190,7 @@ impl Facts {
         (is_last && self.ended != Some(result.run_id) && in_hand(result, data, press)).then_some(result)
     }
 
-    /// Returns the result with what its document and the advice add.
+    /// Returns the result with the additions from its document and the advice.
     fn shown(&self, result: &Publication, measured: Option<&MeasuredStroke>) -> ResultPart {
         let record = measured.map(|measured| &*measured.record);
         let worst = record.and_then(worst_template).map(|template| Worst {
@@ -275,8 +275,8 @@ impl Facts {
     }
 }
 
-/// Returns whether a result is that of the plate and stroke at the press: as long as the press names no other session, stroke, part or
-/// recipe.
+/// Returns whether a result belongs to the plate and stroke at the press, that is, the press reports no other session,
+/// stroke, part or recipe.
 fn in_hand(result: &Publication, data: Option<&StrokeData>, press: &PressImage) -> bool {
     let differs = |then: Option<u32>, now: Option<u32>| now.is_some() && then.is_some() && now != then;
     let recipe = |data: &StrokeData| data.recipe_id.map(u32::from);
@@ -350,7 +350,7 @@ mod tests {
         facts.snapshot(status, 0).result.map(|result| result.verdict)
     }
 
-    /// A change of the status after which the pass must be gone.
+    /// Checks that a change of the status removes the pass.
     #[track_caller]
     fn hides(change: impl Fn(&mut Facts, &mut Status)) {
         let (mut facts, mut status) = passed();
@@ -373,7 +373,7 @@ mod tests {
         for work in [Work::Accepted, Work::Scanning, Work::Evaluating, Work::Aborted, Work::Publish] {
             hides(|_, status| status.state.work = work);
         }
-        // The registers already name the next stroke.
+        // The registers already contain the next stroke.
         hides(|_, status| status.host.ack_stroke_id = 5);
         hides(|_, status| status.host.attempt = 1);
     }
@@ -396,7 +396,7 @@ mod tests {
         hides(|_, status| press(status, |press| press.data.recipe_id = Some(10)));
         hides(|_, status| press(status, |press| press.session_id = 3));
         hides(|_, status| press(status, |press| (press.trigger, press.stroke_id) = (true, 5)));
-        // What the press does not say hides nothing.
+        // A value that the press does not report hides nothing.
         let (facts, mut status) = passed();
         press(&mut status, |press| press.data = StrokeData::default());
         assert_eq!(verdict(&facts, &status), Some(Verdict::Pass));

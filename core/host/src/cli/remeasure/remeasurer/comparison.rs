@@ -1,7 +1,7 @@
-//! Difference of a result to the first one of its stroke.
+//! Difference between a repeated result and the first result of its stroke.
 //!
-//! The uncertainty of a difference is the root of the sum of the squares of both (95 %), as if they were independent. Both come from one scan and
-//! share its noise, so it is an upper bound.
+//! The uncertainty of a difference is the root sum of squares of both uncertainties (95 %), as if they were
+//! independent. Both results come from one scan and share its noise, so it is an upper bound.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use platen_report::result::ResultRecord;
 
 use super::Remeasured;
 
-/// Difference to the first result, metres.
+/// Difference from the first result, metres.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub(crate) struct Difference {
-    /// Program that measured first; none where its document is gone.
+    /// Program that measured first; none if its document no longer exists.
     pub(crate) software: Option<String>,
     /// Largest gap under a template, now minus first.
     pub(crate) gap: Option<WithUncertainty>,
@@ -33,7 +33,7 @@ pub(crate) struct WithUncertainty {
 }
 
 impl Difference {
-    /// Compares a result with the first one; `document` is its `result.json`, which an unmeasured one has not.
+    /// Compares a result with the first one; `document` is its `result.json`, which an unmeasured stroke does not have.
     pub(crate) fn of(stroke: &Stroke, now: &Remeasured, document: &Path) -> Self {
         let first = stroke.document.as_deref().and_then(read);
         let figure = |measure: Measure| {

@@ -1,4 +1,5 @@
-//! Inputs of a measurement: everything that its result depends on, by SHA-256, so that a result that is there already is not made again.
+//! Inputs of a measurement: the SHA-256 of everything that its result depends on, so that an existing result is not
+//! computed again.
 
 use platen_engine::pipeline::Pipeline;
 use platen_plant::PlantFile;
@@ -50,7 +51,7 @@ impl Setup {
     /// # Errors
     /// The program's file cannot be read.
     pub(crate) fn of(plant: &PlantFile, pipeline: &Pipeline) -> std::io::Result<Self> {
-        // The Debug form of the options is the same for equal ones within one program, and the program is an input itself.
+        // Within one program the Debug form of equal options is equal, and the program is itself an input.
         let options =
             format!("{:?}", (&plant.frame, &plant.flattening, &plant.comparisons, plant.range_error));
         Ok(Self {

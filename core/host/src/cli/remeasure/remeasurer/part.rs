@@ -1,4 +1,4 @@
-//! Table of a shard: one row for each result, its columns the same in every shard.
+//! Table of a shard: one row for each result, with the same columns in every shard.
 
 use platen_history::{Columns, Stroke, Table};
 use platen_model::Measure;
@@ -6,7 +6,7 @@ use platen_model::Measure;
 use super::Remeasured;
 use super::comparison::{Difference, WithUncertainty};
 
-/// A stroke with its result, and the difference to the first one where it was asked for.
+/// Stroke with its result, and the difference from the first one if it was requested.
 #[derive(Debug)]
 pub(crate) struct Row {
     pub(crate) stroke: Stroke,
@@ -33,7 +33,7 @@ pub(crate) fn table(rows: &[Row], compared: bool) -> Table {
         .text("scan_sha256", |row| Some(row.now.inputs.scan.clone()))
         .text("verdict", |row| Some(row.now.verdict.as_str().to_owned()))
         .text("reason", |row| row.now.reason.clone());
-    // Times of the stroke, and the clock that gave them, are not there.
+    // Times of the stroke, and the clock that gave them, are left out.
     let times = [Measure::ScanTime, Measure::EvaluateTime, Measure::StrokeToResultTime, Measure::ClockError];
     for measure in Measure::ALL.iter().filter(|measure| !times.contains(measure)) {
         columns = columns.float(measure.name(), |row| row.now.figures.get(measure.name()).copied());
