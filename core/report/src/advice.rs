@@ -1,5 +1,6 @@
-//! Advice document of one stroke, `advice.json` beside its result: what the advisor was told, what it said, and what the strokes before
-//! made of its earlier advice. Metres and radians, as at the plugin boundary.
+//! Advice document of one stroke, `advice.json` beside its result, in metres and radians as at the plugin boundary.
+//!
+//! It contains the input of the advisor, the advice, and the outcome of the stroke compared with the advice before it.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the document.
 pub const ADVICE_SCHEMA: &str = "platen.advice-record/1";
-/// Its name in the folder of a stroke.
+/// File name in the folder of a stroke.
 pub const ADVICE_FILE: &str = "advice.json";
 
 /// Advice after one stroke.
@@ -19,30 +20,31 @@ pub struct AdviceRecord {
     pub schema: String,
     /// Row of the record.
     pub run_id: u32,
-    /// The stroke it follows.
+    /// The stroke that it follows.
     pub key: StrokeKey,
     /// It follows a scan of the blank.
     pub baseline: bool,
-    /// Where it was shown: `shadow` or `screen`.
+    /// Place where it was shown: `shadow` (not at all) or `screen`.
     pub show: String,
-    /// Plates that may teach each other.
+    /// Class of the plate: plates of one class share what is learned about the press.
     pub class: PlateClass,
-    /// What the advisor was told.
+    /// Input of the advisor.
     pub history: PlateHistory,
-    /// What it said; null when it failed.
+    /// Output of the advisor; null when it failed.
     pub advice: Option<Advice>,
-    /// Why it failed.
+    /// Reason why it failed.
     pub failed: Option<String>,
-    /// The stroke that it follows, against the advice before it; null without one, and where the stroke made no bend.
+    /// Comparison of the stroke that it follows with the advice before it; null without such advice, and where the
+    /// stroke made no bend.
     pub score: Option<Score>,
-    /// Why nothing was advised before that stroke; null where something was.
+    /// Reason why nothing was advised before that stroke; null where advice was given.
     #[serde(default)]
     pub unadvised: Option<CannotAdvise>,
-    /// From the result to the advice, milliseconds.
+    /// Time from the result to the advice, milliseconds.
     pub elapsed_ms: f64,
 }
 
-/// Kind of a plate, as far as strokes of one teach something about another.
+/// Class of a plate: strokes of one plate are evidence for another of the same class.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlateClass {
     /// Die set at the press.
@@ -51,12 +53,12 @@ pub struct PlateClass {
     pub thickness: f64,
     /// Grade of the steel.
     pub grade: Option<String>,
-    /// Target's kind and the side that it bends to.
+    /// Kind of the target, and the side to which it bends.
     pub target: String,
 }
 
 impl PlateClass {
-    /// Largest difference of thickness of like plates, metres.
+    /// Largest difference of thickness within a class, metres.
     const THICKNESS: f64 = 1e-3;
 
     /// Returns the class in words.
@@ -67,7 +69,7 @@ impl PlateClass {
         format!("{}, {:.0} mm{grade}{die}", self.target, 1e3 * self.thickness)
     }
 
-    /// Returns whether the two may teach each other.
+    /// Returns whether strokes of one of the two are evidence for the other.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
         (self.die, &self.grade, &self.target) == (other.die, &other.grade, &other.target)
@@ -75,40 +77,40 @@ impl PlateClass {
     }
 }
 
-/// A stroke against the advice before it.
+/// Comparison of a stroke with the advice before it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     /// The bend that it made.
     pub made: Bend,
     /// Distance of the bend from the advised line, metres.
     pub off_line: f64,
-    /// The advised angle.
+    /// Advised angle.
     pub advised_angle: f64,
-    /// Its 95 % interval of a stroke as advised; null in records of before this was kept.
+    /// Its 95 % interval if the stroke is made as advised; null in documents older than this field.
     #[serde(default)]
     pub advised_95: Option<[f64; 2]>,
-    /// Angle that was to be expected of the told depth at that place; null without a told depth.
+    /// Expected angle for the reported depth at that place; null without a reported depth.
     pub expected_angle: Option<f64>,
     /// Half width of its 95 % interval, radians.
     pub expected_to: Option<f64>,
-    /// Largest gap under the templates that was foretold (lower end, expected, upper end) of a stroke as advised, metres.
+    /// Predicted largest gap under the templates after a stroke as advised, metres: lower end, expected, upper end.
     pub foretold_gap: [f64; 3],
     /// Largest gap as measured, metres.
     pub gap: Option<f64>,
-    /// The stroke was pressed as advised: within 30 mm of where a bend for that line comes to lie, to a depth within three standard deviations of
-    /// the ram.
+    /// The stroke was pressed as advised: within 30 mm of where a bend for that line is expected, and to a depth within
+    /// three standard deviations of the ram.
     pub followed: bool,
 }
 
 impl Score {
-    /// Returns whether the angle lies in the interval that the told depth foretold.
+    /// Returns whether the angle lies in the interval that is predicted for the reported depth.
     #[must_use]
     pub fn angle_inside(&self) -> Option<bool> {
         let (expected, to) = self.expected_angle.zip(self.expected_to)?;
         Some((self.made.angle.abs() - expected).abs() <= to)
     }
 
-    /// Returns whether the gap lies in the foretold interval; `None` where the advice was not followed.
+    /// Returns whether the gap lies in the predicted interval; `None` if the advice was not followed.
     #[must_use]
     pub fn gap_inside(&self) -> Option<bool> {
         let [low, _, high] = self.foretold_gap;
@@ -120,7 +122,7 @@ impl AdviceRecord {
     /// Reads the advice beside a result document; `None` where there is none.
     ///
     /// # Errors
-    /// A sentence, when it is there and cannot be read.
+    /// The reason as a sentence, if the file exists but cannot be read.
     pub fn beside(document: &Path) -> Result<Option<Self>, String> {
         let path = path_beside(document);
         let text = match std::fs::read(&path) {
@@ -131,10 +133,10 @@ impl AdviceRecord {
         serde_json::from_slice(&text).map(Some).map_err(|error| format!("{}: {error}", path.display()))
     }
 
-    /// Writes it into the folder of its stroke.
+    /// Writes the document to the folder of its stroke.
     ///
     /// # Errors
-    /// A sentence with the path.
+    /// The reason as a sentence with the path.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, String> {
         let text = serde_json::to_vec_pretty(self).map_err(|error| error.to_string())?;
         let path = folder.join(ADVICE_FILE);
@@ -143,7 +145,7 @@ impl AdviceRecord {
     }
 }
 
-/// Returns an advice in words, one sentence each, what to do first.
+/// Returns an advice as sentences; the first states the next action.
 #[must_use]
 pub fn words(advice: &Advice) -> Vec<String> {
     let mut words = match &advice.step {

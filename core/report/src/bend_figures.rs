@@ -1,4 +1,5 @@
-//! Bends among the figures of a comparison: `bend.N.angle` with its place, `.direction`, `.length` and `.width`, as `curvature` gives them.
+//! Bend figures in the output of a comparison: `bend.N.angle` with its place, `.direction`, `.length` and `.width`, as
+//! from `curvature`.
 
 use platen_model::Figure;
 

@@ -1,7 +1,8 @@
-//! Export of the comparisons' fields on an even grid over the plate: CSV for spreadsheets, PLY and VTK for mesh viewers.
+//! Export of the comparisons' fields on a regular grid over the plate: CSV for spreadsheets, PLY and VTK for mesh
+//! viewers.
 //!
-//! Positions are metres on the scanned face in the scanner frame, (u, v) and fields in the units of their names. Nodes
-//! without data are empty cells in CSV and NaN in the meshes.
+//! Positions are on the scanned face in the scanner frame, in metres; (u, v) and fields have the units in their names.
+//! Nodes without data are empty cells in CSV and NaN in the meshes.
 
 mod vtk;
 
@@ -17,7 +18,7 @@ use platen_shape::Surface;
 /// Nodes along u and v, as in the fields of our comparisons.
 const NODES: [usize; 2] = [101, 101];
 
-/// Even grid over the plate, v outer, u inner, edges included, with the fields as columns.
+/// Regular grid over the plate, v outer, u inner, edges included, with the fields as columns.
 #[derive(Debug, Clone)]
 pub struct PlateTable {
     nodes: Vec<Node>,
@@ -56,10 +57,11 @@ impl PlateTable {
         }
     }
 
-    /// Writes CSV: u_mm, v_mm, x_m, y_m, z_m, seen, then a column for each component of a field; empty cells without data.
+    /// Writes CSV: u_mm, v_mm, x_m, y_m, z_m, seen, then a column for each component of a field; empty cells without
+    /// data.
     ///
     /// # Errors
-    /// The CSV writer's.
+    /// An error of the CSV writer.
     pub fn csv(&self) -> csv::Result<Vec<u8>> {
         let mut table = csv::Writer::from_writer(Vec::new());
         let names = self.columns.iter().map(|column| column.name.as_str());
@@ -76,11 +78,11 @@ impl PlateTable {
     }
 
     /// Writes a triangle mesh as binary little-endian PLY: positions in metres, every column as a scalar field in
-    /// CloudCompare's naming (`scalar_deviation_mm`), NaN without data. Triangles with unseen nodes are left out: a hole in
-    /// the data is a hole in the mesh.
+    /// CloudCompare's naming (`scalar_deviation_mm`), NaN without data. Triangles with unseen nodes are left out, so a
+    /// hole in the data is a hole in the mesh.
     ///
     /// # Errors
-    /// The PLY writer's, as text.
+    /// An error of the PLY writer, as text.
     pub fn ply(&self) -> Result<Vec<u8>, String> {
         let scalar = |name: &str, kind: ScalarType| PropertyDef::new(name.into(), PropertyType::Scalar(kind));
         let mut vertex = ElementDef::new("vertex".into());
@@ -147,7 +149,7 @@ impl PlateTable {
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Usual name of a face's corners in PLY.
+/// Common name of a face's corner indices in PLY.
 const FACE: &str = "vertex_indices";
 
 /// Returns one column for each component of a field, lengths in millimetres.
@@ -220,7 +222,7 @@ mod tests {
             (area(&table(|_| true)) - 3.0 * 2.5).abs() < 1e-9,
             "counter-clockwise triangles have positive area"
         );
-        // One unseen node inside takes the four squares round it.
+        // One unseen node inside removes the four squares round it.
         assert!((area(&table(|k| k != 50 * 101 + 50)) - (7.5 - 4.0 * 0.03 * 0.025)).abs() < 1e-9);
     }
 

@@ -1,4 +1,5 @@
-//! Strokes on record in the form of pictures and reports: labels, points of the strip, worst template, earlier documents.
+//! Conversion of recorded strokes for pictures and reports: labels, points of the strip, worst template, earlier
+//! documents.
 
 use std::path::Path;
 
@@ -11,8 +12,8 @@ use platen_shape::Blank;
 use crate::picture::StripPoint;
 use crate::result::{OutlineRecord, ResultRecord, TemplateRecord};
 
-/// Returns the strokes of a run's plate up to this one, oldest first; this one from its record, since the history may not have
-/// it yet.
+/// Returns the strokes of a run's plate up to this one, oldest first. This one is taken from its record, since the
+/// history may not contain it yet.
 ///
 /// # Errors
 /// The history cannot be read.
@@ -35,7 +36,7 @@ pub fn label(stroke: &Stroke) -> String {
     format!("{number}{again}{trial}")
 }
 
-/// Returns a stroke as a point of the strip, from its figures on record.
+/// Returns a stroke as a point of the strip, from its recorded figures.
 pub fn of_stroke(stroke: &Stroke) -> StripPoint {
     let figure = |name: &str| stroke.figures.get(name).copied();
     StripPoint {

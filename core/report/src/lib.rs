@@ -1,4 +1,5 @@
-//! Output of a measurement: documents, pictures, meshes, tables and the report of a plate. Overview: `core/report/README.md`.
+//! Output of a measurement: documents, pictures, meshes, tables and the report of a plate. Overview:
+//! `core/report/README.md`.
 //!
 //! | module | contents |
 //! |---|---|
@@ -6,7 +7,7 @@
 //! | `picture` | maps, sections and the strip of strokes as SVG; maps for a screen |
 //! | `field_export` | the fields of the comparisons as CSV, PLY and VTK |
 //! | `output_folder` | the files of one measurement, complete or absent |
-//! | `history_view` | strokes on record in the form of pictures and reports |
+//! | `history_view` | recorded strokes in the form for pictures and reports |
 //! | `plate_report` | the report of a plate: one HTML file |
 //! | `sequence` | bends of a plate in their order, for the comparison of crews |
 //!

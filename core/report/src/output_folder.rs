@@ -1,6 +1,6 @@
-//! Result folder of one measurement: its documents, written all or none, then tables, meshes and pictures.
+//! Result folder of one measurement: its documents, written completely or not at all, then tables, meshes and pictures.
 //!
-//! A folder and every single file appear under their name by one rename, so that a reader never finds half a file.
+//! A folder and every single file appear under their name by one rename, so that a reader never finds a partial file.
 
 use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
@@ -20,7 +20,7 @@ pub const SURFACE: &str = "surface.platen";
 /// Name of the raw scan, where it is kept.
 pub const SCAN: &str = "scan.e57";
 
-/// Fields whose colours are written as a picture of the plate alone, for the plate in 3D.
+/// Fields whose colours are written as a picture of the plate alone, for the 3D view.
 pub const TEXTURES: [&str; 2] = [CURVATURE_DEFICIT, "deviation"];
 
 /// Failure to write the files of a measurement.
@@ -43,10 +43,10 @@ pub enum FilesError {
 
 /// Writes `result.json`, `reference_lines.csv` and the surface, the reference of the next stroke, into a new folder.
 ///
-/// The folder is filled under a temporary name and renamed once, so that a reader finds it whole or not at all.
+/// The folder is filled under a temporary name and renamed once, so that a reader finds it complete or not at all.
 ///
 /// # Errors
-/// [`FilesError`]; then nothing is left behind.
+/// [`FilesError`]; then no file is left behind.
 pub fn write(folder: &Path, record: &ResultRecord, surface: &Surface) -> Result<Vec<PathBuf>, FilesError> {
     if folder.exists() {
         return Err(FilesError::Exists(folder.to_path_buf()));
@@ -59,7 +59,7 @@ pub fn write(folder: &Path, record: &ResultRecord, surface: &Surface) -> Result<
         Ok(files.iter().map(|file| folder.join(file)).collect())
     });
     if written.is_err() {
-        // A part that cannot be removed is recognised by its name.
+        // A partial folder that cannot be removed is recognised by its name.
         let _ = std::fs::remove_dir_all(&part);
     }
     written
@@ -82,7 +82,7 @@ fn failed(path: &Path) -> impl Fn(std::io::Error) -> FilesError + use<> {
     move |source| FilesError::Write { path: path.clone(), source }
 }
 
-/// Names the file of a failed encoder.
+/// Adds the file name to the error of an encoder.
 fn export<E: std::fmt::Display>(name: &'static str) -> impl Fn(E) -> FilesError {
     move |why| FilesError::Export(format!("{name}: {why}"))
 }
@@ -132,8 +132,8 @@ pub fn illustrate(
     Ok(files)
 }
 
-/// Writes the fields of the comparisons as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`) and as one
-/// map for each field of one component; `next` is framed on that of the missing curvature.
+/// Writes the fields of the comparisons as a table (`grid.csv`), on the plate's mesh (`plate.ply`, `plate.vtk`) and as
+/// one map for each field with one component; `next` is framed on the map of the missing curvature.
 ///
 /// # Errors
 /// [`FilesError`].
@@ -181,13 +181,13 @@ pub fn put(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, FilesEr
     Ok(path)
 }
 
-/// Replaces a file by one rename: a reader finds the old contents or the new ones, never half.
+/// Replaces a file by one rename: a reader finds the old content or the new one, never a part.
 ///
 /// # Errors
 /// [`FilesError::Write`].
 pub fn replace(path: &Path, content: &[u8]) -> Result<(), FilesError> {
     let write = || {
-        // Permissions of an ordinary new file: the umask applies.
+        // Permissions of an ordinary new file, so that the umask applies.
         let permissions = std::fs::Permissions::from_mode(0o666);
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut part =

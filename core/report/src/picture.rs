@@ -1,9 +1,9 @@
-//! Pictures of a stroke as SVG: maps of the plate, sections under templates, the strip of strokes so far; for the screen a map as a
-//! raster under an SVG of its words.
+//! Pictures of a stroke as SVG: maps of the plate, sections under templates, and the strip of the strokes so far.
 //!
-//! Legible at two metres. Scales of colours and heights follow from the plate file alone ([`PictureScale`]), never from the
-//! stroke, so that two strokes can be compared side by side. The colour map diverges from neutral gray, blue against orange,
-//! in steps of equal perceived difference; signed numbers stand beside it. Unseen areas are hatched.
+//! For the screen a map is a raster image with the text above it as SVG. Pictures are legible at a distance of two
+//! metres. The scales of colours and heights are determined by the plate file alone ([`PictureScale`]), never by the
+//! stroke, so that two strokes can be compared side by side. The colour map diverges from neutral gray, blue against
+//! orange, in steps of equal perceived difference; signed numbers stand beside it. Unseen areas are hatched.
 
 mod canvas;
 mod colour;

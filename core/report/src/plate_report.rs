@@ -1,8 +1,8 @@
 //! Report of one plate: one HTML file that prints on A4, with every stroke, its pictures and its uncertainties.
 //!
-//! Made from the documents on record and the pictures beside them, without scripts and links, so that the file alone can be
-//! sent and archived. "Not measured" and "cannot tell" are written out, never left blank. Every text given by a person or a
-//! press is escaped.
+//! It is made from the recorded documents and the pictures beside them, without scripts and links, so that the file
+//! alone can be sent and archived. "Not measured" and "cannot tell" are written out, never left blank. Every text that
+//! comes from a person or a press is escaped.
 
 use std::path::{Path, PathBuf};
 
@@ -35,7 +35,7 @@ pub enum ReportError {
 
 struct Entry<'a> {
     stroke: &'a Stroke,
-    /// Its document, or the reason why there is none.
+    /// Result document, or the reason why there is none.
     document: Result<ResultRecord, String>,
     point: StripPoint,
 }
@@ -104,21 +104,21 @@ impl<'a> Entry<'a> {
         });
         let mut point = history_view::of_stroke(stroke);
         if let Ok(record) = &document {
-            // The host writes the report before the history has the press's acknowledge.
+            // The host writes the report before the press's acknowledge is in the history.
             point = history_view::of_record(stroke, record);
         }
         Self { stroke, document, point }
     }
 
-    /// Returns the advice that followed the stroke, where it was shown, in words.
+    /// Returns the advice after the stroke as sentences, if it was shown.
     fn advice(&self) -> Option<Vec<String>> {
         let record = AdviceRecord::beside(self.stroke.document.as_deref()?).ok()??;
-        // The host writes the report before the advice: what is there may stem from an earlier host.
+        // The host writes the report before the advice, so an existing file may be from an earlier host.
         let shown = record.show != "shadow" && record.run_id == self.stroke.run_id;
         record.advice.filter(|_| shown).map(|advice| advice::words(&advice))
     }
 
-    /// Returns a picture drawn beside the document.
+    /// Returns a picture from the folder of the document.
     fn picture(&self, name: &str) -> Option<Markup> {
         let path = self
             .stroke
@@ -129,7 +129,7 @@ impl<'a> Entry<'a> {
         Some(PreEscaped(svg))
     }
 
-    /// Returns the map of the remaining deviation: of curvature where that was compared, else of height.
+    /// Returns the map of the remaining deviation: of curvature if it was compared, else of height.
     fn remaining(&self) -> Option<Markup> {
         self.picture("curvature_deficit").or_else(|| self.picture("deviation"))
     }
@@ -329,7 +329,7 @@ mod tests {
 
     use super::*;
 
-    /// A history of one plate with these strokes, none of them with a document.
+    /// Returns a history of one plate with these strokes, none of them with a document.
     fn archive(folder: &Path, verdicts: &[Option<Verdict>], name: &str) -> Archive {
         let path = folder.join("history.sqlite");
         let now = jiff::Timestamp::UNIX_EPOCH;

@@ -1,9 +1,9 @@
 //! Result document of one measurement, schema `platen.result/1`.
 //!
-//! Lengths that a person reads are millimetres, named `_mm`; positions are metres in the scanner frame, named `_m`; angles are
-//! degrees, named `_deg`; curvatures 1/m, named `_per_m`; times milliseconds. Grids are row-major, v outer, u inner. Unknown
-//! values are null, never 0. Uncertainties are expanded (95 %) unless named sigma. The program's own units are metres and
-//! radians.
+//! Lengths for people are in millimetres, named `_mm`; positions in metres in the scanner frame, named `_m`; angles in
+//! degrees, named `_deg`; curvatures in 1/m, named `_per_m`; times in milliseconds. Grids are row-major, v outer, u
+//! inner. Unknown values are null, never 0. Uncertainties are expanded (95 %) unless named sigma. Inside the program
+//! units are metres and radians.
 
 mod checks;
 mod clock;
@@ -66,7 +66,8 @@ pub struct ResultRecord {
     pub outline: Option<OutlineRecord>,
     /// Calibration of the scanner.
     pub calibration: CalibrationRecord,
-    /// Clock of the host; null without a host, where the system does not tell, and in documents older than it.
+    /// Clock of the host; null without a host, where the system does not report it, and in documents older than this
+    /// field.
     #[serde(default)]
     pub clock: Option<ClockRecord>,
     /// Scan.
@@ -76,7 +77,8 @@ pub struct ResultRecord {
     /// Expanded uncertainty (95 %) of each corner, all directions together; null in documents older than it.
     #[serde(default)]
     pub corners_uncertainty_mm: Option<[f64; 4]>,
-    /// Whether each corner was seen; false where it was extrapolated, or an edge that meets in it has another length than was cut.
+    /// Whether each corner was seen; false where it was extrapolated, or where the length of an adjacent edge differs
+    /// from the length that was cut.
     pub corners_seen: [bool; 4],
     /// Markers.
     pub markers: Vec<MarkerRecord>,
@@ -110,9 +112,10 @@ pub struct ResultRecord {
 pub struct CalibrationRecord {
     /// Correlated part of the level of detection, one sigma: from null pairs, else from the assumed range error.
     pub sigma_correlated_mm: f64,
-    /// Systematic uncertainty against a known artefact, one sigma; null when none was measured.
+    /// Systematic uncertainty against a known artefact, one sigma; null if none was measured.
     pub sigma_true_mm: Option<f64>,
-    /// Range error that stands in for a calibration, as a sentence; null with a calibration, and in documents older than it.
+    /// Range error used in place of a calibration, as a sentence; null with a calibration, and in documents older than
+    /// this field.
     #[serde(default)]
     pub assumption: Option<String>,
 }
@@ -130,7 +133,7 @@ pub struct ScanRecord {
     pub plate_points: usize,
     /// Maker, model, serial number.
     pub instrument: String,
-    /// Range error of the instrument's data sheet as the driver states it, one sigma; null where it does not.
+    /// Range error of the instrument's data sheet as stated by the driver, one sigma; null if it states none.
     #[serde(default)]
     pub range_error_mm: Option<f64>,
     /// Whether the scan is simulated.
@@ -180,10 +183,11 @@ pub struct QualityRecord {
     pub noise_mm: f64,
     /// Mean distance of neighbouring samples.
     pub lattice_step_mm: f64,
-    /// Root mean square membrane strain that the plate's double curvature explains.
+    /// Root mean square membrane strain that is explained by the plate's double curvature.
     #[serde(default)]
     pub membrane_strain: Option<f64>,
-    /// Largest distance of the chart's material points from an elastic membrane's; counted in the uncertainty of markers.
+    /// Largest distance between the chart's material points and those of an elastic membrane; included in the
+    /// uncertainty of markers.
     #[serde(default)]
     pub chart_misplaced_mm: Option<f64>,
 }
@@ -191,9 +195,9 @@ pub struct QualityRecord {
 /// Time of each stage, milliseconds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TimingsRecord {
-    /// From the start to the last column, with extraction in parallel.
+    /// Time from the start to the last column; extraction runs in parallel.
     pub acquire: f64,
-    /// From the last column to the plate's face.
+    /// Time from the last column to the plate's face.
     pub extract: f64,
     /// Boundary loop, corners, edges.
     pub outline: f64,
@@ -205,7 +209,7 @@ pub struct TimingsRecord {
     pub surface: f64,
     /// All comparisons.
     pub compare: f64,
-    /// From the last column to the verdict.
+    /// Time from the last column to the verdict.
     pub total: f64,
 }
 
@@ -216,9 +220,9 @@ pub struct Context<'a, E> {
     pub plate: &'a PlateFile,
     /// Task of the comparisons.
     pub task: &'a Task,
-    /// Range error that stands in for a calibration, as a sentence.
+    /// Range error used in place of a calibration, as a sentence.
     pub assumption: Option<&'a str>,
-    /// Calibrated range error of the scanner in places and lengths; none without a calibration.
+    /// Calibrated range error of the scanner in positions and lengths; none without a calibration.
     pub range_error: RangeError,
     /// Edges whose lengths are not explained.
     pub doubts: &'a [EdgeDoubt],
@@ -298,7 +302,7 @@ impl ResultRecord {
         }
     }
 
-    /// Adds the plugins that took part; one that was repeated is told.
+    /// Adds the plugins that took part, and a sentence for each plugin whose job was repeated.
     pub fn name_plugins(&mut self, plugins: Vec<PluginRecord>) {
         let repeated = plugins.iter().filter(|plugin| plugin.retried);
         self.says.extend(
@@ -330,8 +334,8 @@ fn sentences<E: Display>(reports: &[Result<Report, E>]) -> Vec<String> {
     says
 }
 
-/// Returns the edges whose lengths differ from those that were cut by more than is explained. Their intervals hold how well the edges were
-/// located, which is what is in doubt, and not the scanner's range error.
+/// Returns the edges whose lengths differ from the lengths that were cut by more than is explained. The intervals
+/// contain the uncertainty of locating the edges, which is in doubt here, and not the scanner's range error.
 #[must_use]
 pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
     let surface = &measured.measurement.surface;
@@ -340,7 +344,7 @@ pub fn doubts(measured: &Measured, plate: &PlateFile) -> Vec<EdgeDoubt> {
     edge_doubts(&ShapeChecks::new(&measured.outline, surface, RangeError::default()), surface, cut)
 }
 
-/// Says which lengths are those of a bevelled plate, `None` where its edges are square.
+/// Returns the sentence on the lengths of a bevelled plate, `None` if its edges are square.
 fn bevel_sentence(face_inset: f64) -> Option<String> {
     (face_inset > 0.0).then(|| {
         format!(
@@ -362,8 +366,8 @@ fn doubt_sentence(doubt: &EdgeDoubt) -> String {
     )
 }
 
-/// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the surface, along
-/// the beam from the scanner.
+/// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the
+/// surface, along the beam from the scanner.
 fn corner_uncertainties(measured: &Measured, range_error: RangeError) -> [f64; 4] {
     let surface = &measured.measurement.surface;
     let (w, h) = (surface.width(), surface.height());

@@ -1,4 +1,5 @@
-//! Bending sequence of a plate as figures that compare crews: order and place of bends, overshoot, re-hits, energy left.
+//! Bending sequence of a plate as figures for the comparison of crews: order and place of bends, overshoot, re-hits,
+//! energy left.
 //!
 //! | figure | definition |
 //! |---|---|
@@ -27,7 +28,7 @@ use crate::bend_figures::{BendFigures, bend_figures};
 use crate::picture::PictureScale;
 use crate::{history_view, output_folder};
 
-/// Failure to make a sequence.
+/// Failure to evaluate a sequence.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
     /// Unreadable history.
@@ -79,13 +80,13 @@ pub struct SequenceStroke {
     pub bends: Option<Vec<Bend>>,
     /// Elastic energy left to the target.
     pub energy_left_j: Option<f64>,
-    /// Energy left as a share of that of the first stroke on record.
+    /// Energy left as a share of that after the first recorded stroke.
     pub energy_left_share: Option<f64>,
     /// Share of the seen area bent beyond the target.
     pub beyond_share: Option<f64>,
 }
 
-/// Bend: a band that a stroke bent.
+/// Bend: the band that a stroke has bent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bend {
     /// Centre of the band.
@@ -127,7 +128,7 @@ pub struct Summary {
     pub overshoot_max_mm: Option<f64>,
     /// Mean feed.
     pub feed_mean_mm: Option<f64>,
-    /// Energy left after the last stroke, as a share of the first on record.
+    /// Energy left after the last stroke, as a share of that after the first recorded one.
     pub energy_left_share: Option<f64>,
     /// Number of strokes until the first pass.
     pub strokes_to_pass: Option<usize>,
@@ -138,8 +139,8 @@ pub struct Summary {
 }
 
 impl Sequence {
-    /// Evaluates the sequence of a plate on record. `curvature` runs the comparison of that name between the surfaces before
-    /// and after a stroke; `progress` receives the name of each stroke.
+    /// Evaluates the sequence of a recorded plate. `curvature` runs the comparison of that name between the surfaces
+    /// before and after a stroke; `progress` receives the name of each stroke.
     ///
     /// # Errors
     /// [`SequenceError`].
@@ -212,7 +213,7 @@ impl SequenceStroke {
     }
 }
 
-/// Returns the bends of a stroke, the largest first, each with its relation to those of earlier strokes.
+/// Returns the bends of a stroke, the largest first, each with its relation to the bends of earlier strokes.
 fn bends(figures: &[Figure], file: &PlateFile, earlier: &[SequenceStroke]) -> Vec<Bend> {
     let last = earlier.iter().rev().find_map(|stroke| stroke.bends.as_ref()?.first());
     let bend = |found: BendFigures| {
@@ -248,7 +249,7 @@ fn bent_back(file: &PlateFile, [u, v]: [f64; 2], direction: f64, angle: f64) -> 
     let target = target(file)?;
     let (sin, cos) = direction.sin_cos();
     let wanted = target.curvature(u, v).along([-sin, cos]);
-    // 1e-6 1/m: a radius of a thousand kilometres is straight.
+    // 1e-6 1/m: a radius of a thousand kilometres counts as straight.
     (wanted.abs() > 1e-6).then_some(wanted * angle < 0.0)
 }
 

@@ -1,20 +1,24 @@
-//! Figures of skill: how crews bend plates of one class, with the hardness of each plate taken out.
+//! Comparison of crews: figures of how they bend plates of one class, corrected for the hardness of each plate.
 //!
-//! Masuda et al. name the comparison of skilled persons with beginners as future work. Plates are comparable within a class alone: target,
-//! thickness, grade, die. A plate counts for a crew when all its strokes were that crew's and its advice (shadow suffices) told how many
-//! strokes are the least and how hard it was.
+//! Masuda et al. name the comparison of skilled persons with beginners as future work. Plates can only be compared
+//! within a class: target, thickness, grade, die. A plate counts for a crew if all its strokes were made by that crew
+//! and its advice states the least number of strokes and the hardness. Advice that was not shown (`shadow`) is
+//! sufficient.
 //!
 //! | figure of a plate | definition |
 //! |---|---|
 //! | excess | strokes to pass over the least number, the plan on the blank |
-//! | turn efficiency | net turn over the sum of the sizes of all bends |
+//! | turn efficiency | net bend angle over the sum of the sizes of all bend angles |
 //! | evenness | coefficient of variation of the angles, of the feeds |
 //! | idle hits | share of strokes that left no bend |
-//! | hardness | offset of the depth law that the strokes taught, millimetres |
+//! | hardness | offset of the depth law learned from the strokes, millimetres |
 //!
-//! The logarithm of the excess is fitted by a mean for each crew and one slope over the hardness, by least squares, so that a crew with a hard
-//! heat is not a bad crew. Crews are compared in pairs with 95 % intervals (Student), never ranked. Below [`LEAST_PLATES`] plates nothing
-//! is told of a crew. Plates of one heat are taken for independent.
+//! The logarithm of the excess is fitted by least squares, with a mean for each crew and one slope over the hardness,
+//! so that a crew with a hard heat of steel is not rated as a bad crew. Crews are compared in pairs with 95 % intervals
+//! (Student), never ranked.
+//!
+//! Limits: below [`LEAST_PLATES`] plates nothing is reported about a crew. Plates of one heat are assumed to be
+//! independent.
 
 use std::collections::BTreeMap;
 
@@ -41,7 +45,7 @@ pub struct PlateSkill {
     pub strokes: usize,
     /// Least number of strokes.
     pub least: u32,
-    /// Net turn over the sum of all.
+    /// Net bend angle over the sum of the sizes of all.
     pub turn_efficiency: Option<f64>,
     /// Coefficients of variation of angles and of feeds.
     pub unevenness: [Option<f64>; 2],
@@ -52,7 +56,7 @@ pub struct PlateSkill {
 }
 
 impl PlateSkill {
-    /// Strokes over the least number.
+    /// Returns the number of strokes over the least number.
     #[must_use]
     pub fn excess(&self) -> f64 {
         self.strokes as f64 / f64::from(self.least)
@@ -77,7 +81,7 @@ pub struct CrewSkill {
 pub struct CrewFigures {
     /// Geometric mean of the excess at the mean hardness of the class, with its 95 % interval.
     pub excess: [f64; 3],
-    /// Net turn over the sum of all.
+    /// Net bend angle over the sum of the sizes of all.
     pub turn_efficiency: Option<f64>,
     /// Coefficients of variation of angles and of feeds.
     pub unevenness: [Option<f64>; 2],
@@ -94,12 +98,12 @@ pub struct Difference {
     pub class: String,
     /// Codes.
     pub crews: [u16; 2],
-    /// Strokes of the first over those of the second at equal hardness, with its 95 % interval.
+    /// Strokes of the first crew over those of the second at equal hardness, with the 95 % interval.
     pub ratio: [f64; 3],
 }
 
 impl Difference {
-    /// Returns whether the interval leaves out 1.
+    /// Returns whether the interval does not contain 1.
     #[must_use]
     pub fn is_significant(&self) -> bool {
         !(self.ratio[0]..=self.ratio[2]).contains(&1.0)
@@ -113,12 +117,12 @@ pub struct Skill {
     pub crews: Vec<CrewSkill>,
     /// Pairs of crews with figures.
     pub differences: Vec<Difference>,
-    /// Finished plates without a crew, of several crews, or without advice.
+    /// Finished plates that were left out: without a crew, of several crews, or without advice.
     pub left_out: usize,
 }
 
 impl Skill {
-    /// Evaluates the finished plates on record.
+    /// Evaluates the finished plates of the record.
     ///
     /// # Errors
     /// The history cannot be read.
@@ -219,7 +223,7 @@ impl Fit {
             })
         };
         let (xy, xx) = centred().fold((0.0, 0.0), |(xy, xx), (y, q)| (xy + y * q, xx + q * q));
-        // Plates of one hardness say nothing of the slope, and need none.
+        // Plates of equal hardness do not determine the slope, and need none.
         let slope = if xx > 0.0 { xy / xx } else { 0.0 };
         let variance = centred().map(|(y, q)| (y - slope * q).powi(2)).sum::<f64>() / freedom;
         let hardness = means.iter().map(|(n, _, q)| n * q).sum::<f64>() / n as f64;
@@ -255,7 +259,7 @@ impl Fit {
 enum Finished {
     /// It has not passed.
     Not,
-    /// No figures can be told.
+    /// The figures cannot be determined.
     Unknown,
     Plate(PlateSkill),
 }
@@ -299,7 +303,7 @@ fn finished(archive: &Archive, plate: u32) -> Result<Finished, HistoryError> {
     }))
 }
 
-/// Returns the distances from each bend to the next across its line, metres.
+/// Returns the distances from each bend to the next one, across its line, metres.
 fn feeds(strokes: &[PressedStroke]) -> Vec<f64> {
     let bends: Vec<_> = strokes.iter().filter_map(|it| it.bends.first()).collect();
     let feed = |pair: &[&platen_model::Bend]| {
@@ -321,7 +325,8 @@ fn variation(values: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Plates of a crew of hands with 20 % scatter, on steel of this mean hardness; each 0.1 mm of hardness costs 5 % more strokes.
+    /// Returns plates of a crew whose work scatters by 20 %, on steel of this mean hardness; each 0.1 mm of hardness
+    /// costs 5 % more strokes.
     fn plates(random: &mut fastrand::Rng, crew: u16, hardness_mm: f64, skill: f64) -> Vec<PlateSkill> {
         let mut normal =
             || (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (std::f64::consts::TAU * random.f64()).cos();
@@ -353,7 +358,8 @@ mod tests {
         skill.differences[0].is_significant()
     }
 
-    /// Found: 5 of 100 equal crews, 98 of 100 of which one needs 20 % more strokes.
+    /// Found: 5 of 100 pairs of equal crews differ significantly, and 98 of 100 pairs of which one needs 20 % more
+    /// strokes.
     #[test]
     fn a_crew_with_a_hard_heat_is_no_bad_crew() {
         let equal = (0..100).filter(|seed| significant(*seed, 0.5, 0.0)).count();

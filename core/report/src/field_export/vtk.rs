@@ -1,7 +1,7 @@
-//! Legacy VTK file of the plate's mesh with its fields, which ParaView and other viewers read.
+//! Legacy VTK file of the plate's mesh with its fields, for ParaView and other viewers.
 //!
 //! Source: The VTK User's Guide, "VTK File Formats", "Simple Legacy Formats": a text head before each array, arrays
-//! big-endian. Binary, because VTK's text reader stops at NaN, the value of nodes without data.
+//! big-endian. The binary form is used because VTK's text reader stops at NaN, the value of nodes without data.
 
 use platen_model::units::mm;
 
@@ -10,8 +10,8 @@ use super::PlateTable;
 const TRIANGLE: u32 = 5;
 
 impl PlateTable {
-    /// Writes a triangle mesh as binary legacy VTK: positions in metres, fields with the unit in their name, NaN without
-    /// data. Triangles as in [`ply`](Self::ply).
+    /// Writes a triangle mesh as binary legacy VTK: positions in metres, fields with the unit in their name, NaN
+    /// without data. Triangles as in [`ply`](Self::ply).
     pub fn vtk(&self) -> Vec<u8> {
         let triangles = self.triangles();
         let mut file = File::default();
@@ -52,7 +52,7 @@ impl File {
     }
 
     fn scalars(&mut self, name: &str, values: impl Iterator<Item = Option<f64>>) {
-        // A name ends at the first blank.
+        // A name ends at the first white space.
         let name = name.replace(char::is_whitespace, "_");
         self.head(&format!("SCALARS {name} float 1\nLOOKUP_TABLE default\n"));
         self.array(values.map(|value| value.map_or(f32::NAN, |value| value as f32).to_be_bytes()));

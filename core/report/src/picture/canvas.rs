@@ -18,16 +18,16 @@ pub(super) struct Canvas<'a> {
     pub(super) width: f64,
 }
 
-/// Pixels of the drawing library to one of the picture: the library has whole pixels only.
+/// Pixels of the drawing library for one pixel of the picture: the library has whole pixels only.
 const FINE: f64 = 8.0;
 
 #[derive(Clone, Copy)]
 pub(super) struct Text {
-    /// Height of its letters with their room, pixels.
+    /// Height of the letters including line spacing, pixels.
     pub(super) size: f64,
     pub(super) colour: RGBColor,
     pub(super) bold: bool,
-    /// Part of the text at its position.
+    /// Horizontal anchor of the text at its position.
     pub(super) across: HPos,
     pub(super) upright: VPos,
 }
@@ -54,7 +54,7 @@ impl Text {
     }
 }
 
-/// Returns the SVG of the shapes drawn by `paint` on paper.
+/// Returns the SVG of the shapes drawn by `paint` on a paper-coloured background.
 pub(super) fn draw(
     size: (u32, u32),
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
@@ -65,7 +65,7 @@ pub(super) fn draw(
     })
 }
 
-/// Returns the SVG of the shapes drawn by `paint` on nothing.
+/// Returns the SVG of the shapes drawn by `paint` on a transparent background.
 pub(super) fn overlay(
     size: (u32, u32),
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
@@ -91,7 +91,7 @@ fn pixel((x, y): At) -> (i32, i32) {
     ((x * FINE).round() as i32, (y * FINE).round() as i32)
 }
 
-/// Converts widths and radii.
+/// Converts widths and radii to pixels of the drawing library.
 fn wide(pixels: u32) -> u32 {
     pixels * FINE as u32
 }
@@ -109,7 +109,7 @@ impl Canvas<'_> {
     }
 
     pub(super) fn frame(&self, from: At, to: At, colour: RGBColor, width: u32) -> Result<(), PictureError> {
-        // As a line: the library draws the outline of a rectangle one pixel wide, whatever its style.
+        // Drawn as a line: the library draws the outline of a rectangle one pixel wide, whatever its style.
         self.line(&[from, (to.0, from.1), to, (from.0, to.1), from], colour, width)
     }
 
@@ -159,7 +159,7 @@ impl Canvas<'_> {
         self.text(&caption.title(language), (24.0, 34.0), Text::new(38.0).bold())?;
         self.text(title, (24.0, 78.0), Text::new(24.0))?;
         let words = words::verdict(caption.verdict).of(language).to_uppercase();
-        // Widths in a bold sans serif: a capital letter about 0.72 of its height, a Japanese one all of it.
+        // Widths in a bold sans serif: a capital letter about 0.72 of its height, a Japanese character the full height.
         let letters = words.chars().map(|c| if c.is_ascii() { 0.72 } else { 1.0 });
         let chip = 34.0 * letters.sum::<f64>() + 40.0;
         let right = self.width - 24.0;

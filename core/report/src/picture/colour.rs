@@ -20,13 +20,14 @@ pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
 
 /// Lightness and chroma along a branch: gray, most vivid, darkest.
 const PATH: [[f64; 2]; 3] = [[0.89, 0.0], [0.68, 0.115], [0.42, 0.125]];
-/// Hues of the negative and the positive branch, degrees: blue and orange, distinct in every common colour blindness.
+/// Hues of the negative and the positive branch, degrees: blue and orange, distinct in every common form of colour
+/// blindness.
 const HUES: [f64; 2] = [255.0, 45.0];
 
 /// Returns the colour of a position from -1 to 1: blue through neutral gray to orange.
 ///
-/// Equal steps in position are equal distances in OKLab; both branches pass the same lightness and chroma, so that neither
-/// looks stronger.
+/// Equal steps in position are equal distances in OKLab. Both branches have the same lightness and chroma, so that
+/// neither looks stronger.
 pub(super) fn diverging(position: f64) -> RGBColor {
     let length = |from: [f64; 2], to: [f64; 2]| (to[0] - from[0]).hypot(to[1] - from[1]);
     let (first, second) = (length(PATH[0], PATH[1]), length(PATH[1], PATH[2]));
@@ -51,7 +52,7 @@ fn srgb([lightness, a, b]: [f64; 3]) -> RGBColor {
         -1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s,
         -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
     ];
-    // The transfer curve of sRGB, IEC 61966-2-1.
+    // Transfer function of sRGB, IEC 61966-2-1.
     let [r, g, b] = linear.map(|c| c.clamp(0.0, 1.0)).map(|c| match c <= 0.003_130_8 {
         true => 12.92 * c,
         false => 1.055 * c.powf(1.0 / 2.4) - 0.055,
@@ -65,7 +66,7 @@ pub(super) fn text_on(position: f64) -> RGBColor {
     if position.abs() > 0.45 { PAPER } else { INK }
 }
 
-/// Returns the colour behind a verdict's words, which never stands without them.
+/// Returns the background colour of a verdict; it is never shown without the words.
 pub(super) fn verdict(verdict: Verdict) -> RGBColor {
     match verdict {
         Verdict::Pass => RGBColor(22, 110, 90),
@@ -79,7 +80,7 @@ pub(super) fn verdict(verdict: Verdict) -> RGBColor {
 mod tests {
     use super::*;
 
-    /// Back to OKLab, written separately.
+    /// Converts back to OKLab, written independently.
     fn oklab(RGBColor(r, g, b): RGBColor) -> [f64; 3] {
         let [r, g, b] = [r, g, b]
             .map(|c| f64::from(c) / 255.0)

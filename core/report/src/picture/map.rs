@@ -11,12 +11,13 @@ use super::{Caption, PictureError, PictureScale, View};
 use crate::result::{Next, NextPlace, PlateRecord};
 pub(super) use layout::{Layout, Look, SQUARE};
 
-/// Where to press next, on the map of the missing curvature.
+/// Mark of the next action, on the map of the missing curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark<'a> {
-    /// Place of the next hit: framed.
+    /// Place of the next hit, drawn as a frame.
     Place(&'a NextPlace),
-    /// Advised bend line: its ends (u, v), and how far from it the bend may come to lie, millimetres: outlined.
+    /// Advised bend line: its ends (u, v), and the largest expected distance of the bend from it, millimetres, drawn as
+    /// an outline.
     Line([[f64; 2]; 2], Option<f64>),
 }
 
@@ -52,7 +53,7 @@ pub fn map(
     })
 }
 
-/// Draws everything that lies on the colours or beside them.
+/// Draws everything that lies over the colours or beside them.
 pub(super) fn words(
     layout: &Layout<'_>,
     field: &Field,
@@ -101,7 +102,7 @@ mod tests {
         map(field, &plate, &caption, &picture_scale, next).unwrap()
     }
 
-    /// The part of the picture that is the legend's numbers.
+    /// Returns the part of the picture that contains the legend's numbers.
     fn legend(svg: &str) -> Vec<&str> {
         svg.lines().filter(|line| line.contains('+') || line.contains('\u{2212}')).collect()
     }

@@ -1,7 +1,7 @@
 //! Scales of colours and heights, fixed for a plate by its plate file.
 //!
-//! Gaps have a ladder of 1, 2, 5, 10, 20 and 50 times the limit, at equal steps of colour or height. Curvatures are shown as
-//! the gap that they open under a template of chord c: g = delta kappa c^2 / 8.
+//! Gaps are shown on a ladder of 1, 2, 5, 10, 20 and 50 times the limit, at equal steps of colour or height. Curvatures
+//! are shown as the gap that they open under a template of chord c: g = delta kappa c^2 / 8.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,15 +13,15 @@ use super::words;
 use super::{Units, View};
 use crate::result::CURVATURE_DEFICIT;
 
-/// Limit and chord of a template where the plate file has none, millimetres: the trade's 3 mm on 2 m.
+/// Limit and chord of a template where the plate file has none, millimetres: 3 mm on 2 m, usual in the trade.
 const USUAL: [f64; 2] = [3.0, 2000.0];
 
-/// Steps of the ladder in limits: fine near the limit, coarse towards the unbent plate.
+/// Steps of the ladder as multiples of the limit: fine near the limit, coarse towards the unbent plate.
 const LADDER: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 
 const EVEN: usize = 4;
 
-/// Parameters of the scales of a plate's pictures. They follow from its plate file alone, so that no stroke changes them.
+/// Parameters of the scales of a plate's pictures. They depend on its plate file alone, so that no stroke changes them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PictureScale {
     /// Smallest limit of the plate's templates, millimetres.
@@ -56,7 +56,7 @@ impl PictureScale {
         per_m(self.limit_mm, self.chord_mm)
     }
 
-    /// Returns the place of a gap on the ladder, 0 for none to 1 for the largest that is told apart.
+    /// Returns the position of a gap on the ladder, from 0 for none to 1 for the largest that is distinguished.
     pub fn share(&self, gap_mm: f64) -> f64 {
         self.gaps().position(gap_mm.abs())
     }
@@ -127,7 +127,7 @@ fn curvature_words(name: &str) -> Option<Texts> {
 pub(super) enum Unit {
     /// Millimetres, shown in the unit of lengths of the view.
     Length,
-    /// Another one, as it is shown.
+    /// Another unit, as it is shown.
     Other(&'static str),
 }
 
@@ -144,7 +144,7 @@ pub(super) struct Scale {
     pub(super) inverted: bool,
     /// Names of the negative and the positive side.
     pub(super) words: Option<[Texts; 2]>,
-    /// Whether it is the same for every stroke of the plate.
+    /// Whether the scale is the same for every stroke of the plate.
     pub(super) locked: bool,
 }
 
@@ -188,7 +188,7 @@ impl Scale {
         if self.unit == Unit::Length {
             return units.signed(value);
         }
-        // Three digits of the scale's end.
+        // Three digits at the end of the scale.
         let last = self.anchors.last().copied().unwrap_or(1.0);
         let decimals = (2.0 - last.log10().floor()).max(0.0) as usize;
         let text = format!("{value:+.decimals$}").replace('-', "\u{2212}");
@@ -197,7 +197,7 @@ impl Scale {
     }
 }
 
-/// Returns the least of 1, 2 and 5 times a power of ten that is not below `value`.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `value`.
 pub(super) fn nice_ceiling(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0, 10.0]

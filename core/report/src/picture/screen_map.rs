@@ -1,5 +1,8 @@
-//! Map for a screen: the colours as a palette PNG, one pixel a square, under an SVG of words and numbers. Colours, scale and marks are
-//! those of the map in the files; letters are larger, and the plate is seen as the operator sees it.
+//! Map for a screen: the colours as a palette PNG with one pixel for each square, and an SVG of words and numbers over
+//! it.
+//!
+//! Colours, scale and marks are those of the map in the files. The letters are larger, and the plate is drawn as the
+//! operator sees it.
 
 use platen_model::Field;
 
@@ -12,18 +15,17 @@ use crate::result::PlateRecord;
 const LOOK: Look =
     Look { left: 112.0, top: 104.0, below: 136.0, letters: 1.35, press_line: 74.0, title_line: 114.0 };
 
-/// Two images of one shape: the PNG is shown as wide as the SVG, its pixels unsmoothed, and the SVG over it.
+/// Two images of equal proportions: the PNG is shown as wide as the SVG, without smoothing, and the SVG lies over it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScreenMap {
     /// Colours, white around the plate.
     pub png: Vec<u8>,
-    /// Words, numbers, marks and hatching, on nothing.
+    /// Words, numbers, marks and hatching on a transparent background.
     pub svg: String,
 }
 
-/// Draws one field over the plate, with the scale of the plate's pictures. The map of the missing curvature frames the place of the
-/// next hit,
-/// or draws the advised bend line.
+/// Draws one field over the plate, with the scale of the plate's pictures. On the map of the missing curvature it
+/// frames the place of the next hit or draws the advised bend line.
 ///
 /// # Errors
 /// An encoder fails.
@@ -76,7 +78,7 @@ mod tests {
         PlateRecord { width_mm: 3000.0, height_mm: 2000.0, press_side, ..PlateRecord::default() }
     }
 
-    /// Missing curvature by place in shares of the sides; `None` where unseen, unchanged where 0.
+    /// Returns a field of missing curvature by place in shares of the sides; `None` where unseen, unchanged where 0.
     fn field(missing: impl Fn(f64, f64) -> Option<f64>) -> Field {
         let share = |k: usize| k as f64 / (SIDE - 1) as f64;
         let nodes: Vec<_> = (0..SIDE * SIDE).map(|k| missing(share(k % SIDE), share(k / SIDE))).collect();
@@ -95,7 +97,7 @@ mod tests {
         }
     }
 
-    /// Every shade of the scale from left to right, gray in the middle, an unseen corner.
+    /// Returns a field with every shade of the scale from left to right, gray in the middle, and an unseen corner.
     fn rainbow() -> Field {
         field(|u, v| match u - 0.5 {
             _ if u > 0.8 && v > 0.8 => None,
@@ -108,7 +110,7 @@ mod tests {
         screen_map(field, &plate(press_side), view, None).unwrap()
     }
 
-    /// Colours of a PNG, row by row from above, with its width.
+    /// Returns the colours of a PNG, row by row from above, with its width.
     fn decoded(png: &[u8]) -> (usize, Vec<String>) {
         let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
         let palette = reader.info().palette.clone().unwrap();
@@ -122,7 +124,7 @@ mod tests {
         (frame.width as usize, pixels.iter().map(colour).collect())
     }
 
-    /// Filled rectangles of an SVG: extent along x and y, pixels, and colour.
+    /// Returns the filled rectangles of an SVG: extent along x and y, pixels, and colour.
     fn rectangles(svg: &str) -> Vec<([[f64; 2]; 2], String)> {
         let value = |line: &str, name: &str| {
             let text = line.split_once(&format!(" {name}=\"")).unwrap().1;
@@ -136,7 +138,7 @@ mod tests {
         svg.lines().filter(|line| line.starts_with("<rect")).map(of).collect()
     }
 
-    /// A line along v at u 1.5 m, to 20 mm and to 200 mm: the dashes lie so far to both sides.
+    /// A line along v at u 1.5 m, with intervals of 20 mm and 200 mm: the dashes lie at these distances on both sides.
     #[test]
     fn the_advised_line_lies_within_the_interval_of_its_place() {
         let field = rainbow();
@@ -150,7 +152,7 @@ mod tests {
         let others = dashes(None);
         let [narrow, wide] = [20.0, 200.0].map(|to| dashes(Some(to)));
         println!("{others} {narrow} {wide}");
-        // Both sides all along, and the ends the longer the wider.
+        // Both sides along the whole line, and longer ends for a wider interval.
         assert!(narrow > others + 20 && wide > narrow, "{others} {narrow} {wide}");
     }
 
@@ -200,7 +202,7 @@ mod tests {
     fn the_press_is_below_whatever_its_side() {
         // A strong patch in the corner u = W, v = 0.
         let field = field(|u, v| Some(if u > 0.9 && v < 0.1 { 140.0 } else { 4.0 } * ONE_MM));
-        // Right and below as drawn; turned by quarters clockwise with the edge v = 0, u = W, v = H, u = 0 below.
+        // Right and below as drawn; turned clockwise by quarter turns with the edge v = 0, u = W, v = H, u = 0 below.
         for (side, at) in
             [([0, -1], [0.95, 0.95]), ([1, 0], [0.05, 0.95]), ([0, 1], [0.05, 0.05]), ([-1, 0], [0.95, 0.05])]
         {

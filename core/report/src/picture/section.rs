@@ -21,7 +21,8 @@ const GAP: [f64; 2] = [470.0, 660.0];
 const TEMPLATE: f64 = 44.0;
 const PLATE: f64 = 20.0;
 
-/// Draws the section of the plate under a template. The sentence of the comparison keeps its language and millimetres.
+/// Draws the section of the plate under a template. The sentence of the comparison stays in its language and in
+/// millimetres.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -95,7 +96,7 @@ impl Layout<'_> {
         (share * (self.template.gap_mm.len().max(1) - 1) as f64).round() as usize
     }
 
-    /// Returns the colour of the gap: that of the required bend in the maps.
+    /// Returns the colour of the gap, the same as that of the missing bend in the maps.
     fn open(&self) -> RGBColor {
         colour::diverging(0.5 * f64::from(self.template.sense))
     }
@@ -168,7 +169,7 @@ impl Layout<'_> {
         let words = format!("{number} {}", units.symbol());
         let look = Text::new(30.0).bold();
         let above = height - 32.0;
-        // Clear of the limit's line, and above the gap's own, which falls away from here to either side.
+        // Placed clear of the line of the limit, and above the gap's own curve, which falls to either side of here.
         let limit = y(template.limit_mm);
         let above = if (above - limit).abs() > 22.0 { above } else { limit - 30.0 };
         let above = if above > GAP[0] - 20.0 { above } else { height + 34.0 };

@@ -1,4 +1,4 @@
-//! Rasterised field: few rectangles of few colours or a palette PNG, and hatching where unseen.
+//! Rasterised field: few rectangles of few colours or a palette PNG, with hatching where unseen.
 
 use std::collections::BTreeMap;
 
@@ -13,9 +13,9 @@ use super::scale::Scale;
 
 /// Number of shades from one anchor of the scale to the next.
 const PER_STEP: i32 = 4;
-/// Distance of the hatching's lines, squares.
+/// Distance of the hatching lines, squares.
 const HATCH: usize = 4;
-/// Overlap of neighbouring rectangles, so that no seam shows, pixels.
+/// Overlap of neighbouring rectangles that hides the seams, pixels.
 pub(super) const OVERLAP: f64 = 0.5;
 
 /// Returns the number of shades on each side of zero.
@@ -28,7 +28,7 @@ pub(super) fn colour_of(shade: i32, n: i32) -> RGBColor {
     colour::diverging(f64::from(shade) / f64::from(n))
 }
 
-/// Returns the shade of a position, rounded away from zero: only zero is neutral.
+/// Returns the shade of a position, rounded away from zero, so that only zero is neutral.
 pub(super) fn shade_of(position: f64, n: i32) -> i32 {
     let size = (position.abs() * f64::from(n)).ceil().min(f64::from(n)) as i32;
     if position < 0.0 { -size } else { size }
@@ -46,8 +46,8 @@ pub(super) struct Shades {
 type Run = (usize, usize, Option<i32>);
 
 impl Shades {
-    /// Rasterises a field of one component into `n_x` times `n_y` squares. `on_plate` converts shares from the left and from below to
-    /// shares of the plate's sides u and v.
+    /// Rasterises a field with one component into `n_x` times `n_y` squares. `on_plate` converts shares from the left
+    /// and from below to shares of the plate's sides u and v.
     pub(super) fn of(
         field: &Field,
         scale: &Scale,
@@ -68,7 +68,7 @@ impl Shades {
         Self { n_x, n_y, shade, n_shades }
     }
 
-    /// Draws between the upper left and the lower right corner.
+    /// Draws the shades between the upper left and the lower right corner.
     pub(super) fn paint(
         &self,
         canvas: &Canvas<'_>,
@@ -101,9 +101,10 @@ impl Shades {
         Ok(())
     }
 
-    /// Encodes one pixel a square as a palette PNG of `size` pixels, white around the field, whose first square is at `corner`.
+    /// Encodes one pixel for each square as a palette PNG of `size` pixels, white around the field, whose first square
+    /// is at `corner`.
     pub(super) fn png(&self, size: [usize; 2], corner: [usize; 2]) -> Result<Vec<u8>, png::EncodingError> {
-        // Paper, then the shades from the most negative.
+        // Paper first, then the shades from the most negative.
         let colours = (-self.n_shades..=self.n_shades).map(|shade| colour_of(shade, self.n_shades));
         let palette: Vec<u8> =
             std::iter::once(PAPER).chain(colours).flat_map(|RGBColor(r, g, b)| [r, g, b]).collect();

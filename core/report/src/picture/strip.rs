@@ -27,7 +27,7 @@ pub struct StripPoint {
     pub verdict: Verdict,
 }
 
-/// Draws the strip of the strokes so far, oldest first; labels are drawn as they are given.
+/// Draws the strip of the strokes so far, oldest first; labels are drawn as given.
 ///
 /// # Errors
 /// The drawing library fails.
@@ -39,7 +39,7 @@ pub fn strip(
 ) -> Result<String, PictureError> {
     let scale = picture_scale.gaps();
     let y = |mm: f64| BOTTOM - scale.position(mm.max(0.0)) * (BOTTOM - TOP);
-    // Few strokes keep their distance and do not fill the width.
+    // A strip of few strokes keeps its spacing and does not fill the width.
     let step = (RIGHT - LEFT) / points.len().max(12) as f64;
     let x = |k: usize| LEFT + (k as f64 + 0.5) * step;
     draw(SIZE, |canvas| {
@@ -55,7 +55,7 @@ pub fn strip(
         }
         for (k, point) in points.iter().enumerate() {
             draw_point(canvas, point, x(k), &y)?;
-            // Labels stay apart however many strokes there are.
+            // Labels do not overlap, however many strokes there are.
             let every = (34.0 / step).ceil() as usize;
             if (points.len() - 1 - k).is_multiple_of(every) {
                 canvas.text(&point.label, (x(k), BOTTOM + 24.0), Text::new(22.0).centred())?;

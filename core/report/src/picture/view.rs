@@ -1,5 +1,6 @@
-//! How a person sees figures and pictures on a screen: language, unit of lengths, orientation of the plate. Files and registers stay
-//! in millimetres and as drawn.
+//! View settings of figures and pictures on a screen: language, unit of lengths, orientation of the plate.
+//!
+//! Files and registers are always in millimetres and in the orientation of the drawing.
 
 use platen_model::Language;
 
@@ -32,14 +33,15 @@ pub enum Units {
 /// Orientation of the plate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turn {
-    /// Turned by quarter turns, never mirrored, so that the edge that faces the press is below; as drawn where it is unknown.
+    /// Turned by quarter turns, never mirrored, so that the edge that faces the press is below; as drawn where it is
+    /// unknown.
     #[default]
     Press,
     /// As drawn: u to the right, v up.
     Drawing,
 }
 
-/// Plate as it is seen in a view.
+/// Plate as seen in a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenPlate {
     /// Quarter turns, clockwise from the drawing.
@@ -51,7 +53,8 @@ pub struct SeenPlate {
 }
 
 impl Turn {
-    /// Returns a plate as it is seen: extent along u and v, and the edge that faces the press as a direction in (u, v).
+    /// Returns the plate as seen in the view, from its extent along u and v and the direction in (u, v) of the edge
+    /// that faces the press.
     pub fn of(self, size_mm: [f64; 2], press_side: Option<[i8; 2]>) -> SeenPlate {
         let press = press_side.filter(|_| self == Self::Press);
         let quarters = match press {
@@ -149,8 +152,8 @@ impl Units {
         }
     }
 
-    /// Formats a length with its uncertainty, both given in millimetres, without the symbol. The uncertainty is rounded up and
-    /// never 0.
+    /// Formats a length with its uncertainty, both given in millimetres, without the symbol. The uncertainty is rounded
+    /// up and never 0.
     pub fn with_uncertainty(self, mm: f64, uncertainty_mm: Option<f64>) -> String {
         let decimals = self.decimals();
         let steps = 10_f64.powi(decimals as i32);
@@ -207,7 +210,7 @@ mod tests {
             let edge = [0, 1].map(|i| 0.5 * [3000.0, 2000.0][i] * (1.0 + f64::from(side[i])));
             let [x, y] = seen.place_mm(edge);
             assert_eq!([2.0 * x, y], [seen.extent_mm()[0], 0.0], "{side:?}: the middle of the edge is below");
-            // A quarter turn counter-clockwise from the way along u is the way along v.
+            // The direction of v is the direction of u turned by a quarter turn counter-clockwise.
             let [o, u, v] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|at| seen.place_mm(at));
             let way = |to: [f64; 2]| [to[0] - o[0], to[1] - o[1]];
             assert_eq!(way(v), [-way(u)[1], way(u)[0]], "{side:?}");

@@ -16,7 +16,7 @@ pub struct ShapeChecksRecord {
     pub diagonal_difference_mm: CheckRecord,
     /// Inner angles in the plate's surface, corners (0,0), (W,0), (W,H), (0,H).
     pub angles_deg: [CheckRecord; 4],
-    /// Twist along u and along v: turn of the far edge against the near one, clockwise positive.
+    /// Twist along u and along v: rotation of the far edge relative to the near one, clockwise positive.
     pub twist_deg: [CheckRecord; 2],
 }
 
@@ -38,7 +38,7 @@ pub struct CheckRecord {
     pub value: f64,
     /// Expanded uncertainty (95 %).
     pub uncertainty: f64,
-    /// False when it rests on a corner that was extrapolated.
+    /// False if it depends on a corner that was extrapolated.
     pub seen: bool,
 }
 

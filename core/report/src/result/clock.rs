@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct ClockRecord {
     /// Whether a time server disciplines it.
     pub synchronised: bool,
-    /// Largest error, as the kernel estimates it; null while it is not synchronised.
+    /// Largest error, estimated by the kernel; null while the clock is not synchronised.
     pub error_bound_ms: Option<f64>,
 }
 

@@ -1,8 +1,9 @@
-//! Fields of comparisons, found by name.
+//! Search for a field of the comparisons by name.
 
 use platen_model::{Field, Report};
 
-/// Returns a field of so many components: that of the plugin `owner`, whose name it is, else the first of any comparison.
+/// Returns the field of this name and number of components: that of the plugin `owner`, to which the name belongs, else
+/// the first of any comparison.
 pub(super) fn find_field<'a>(
     reports: &[&'a Report],
     owner: &str,

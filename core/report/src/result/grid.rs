@@ -8,7 +8,7 @@ use platen_model::{Field, NodeState, Report};
 use platen_shape::evaluate::{self, GRID};
 use platen_shape::measure::Measurement;
 
-/// Even grid over the plate; null where unseen.
+/// Regular grid over the plate; null where unseen.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct GridRecord {
     /// Nodes along u.
@@ -21,12 +21,12 @@ pub struct GridRecord {
     pub kappa_v_per_m: Vec<Option<f64>>,
     /// Twist.
     pub kappa_uv_per_m: Vec<Option<f64>>,
-    /// On the scanned face, scanner frame.
+    /// Position on the scanned face, scanner frame.
     pub position_m: Vec<[f64; 3]>,
-    /// Displacement since the previous stroke, where there is one.
+    /// Displacement since the previous stroke, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement_mm: Option<Vec<Option<[f64; 3]>>>,
-    /// Measured minus target along the target's normal, where there is a target.
+    /// Measured minus target along the target's normal, if there is a target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deviation_mm: Option<Vec<Option<f64>>>,
     /// Whether the displacement is below the level of detection.
@@ -57,7 +57,8 @@ impl GridRecord {
     }
 }
 
-/// Samples a field at the nodes of the grid by its nearest nodes, which coincide where the grids divide evenly.
+/// Samples a field at the nodes of the grid by its nearest nodes; they coincide where one grid divides the other
+/// evenly.
 fn nodes<T>(field: &Field, value: impl Fn(&[f64], NodeState) -> T) -> Vec<Option<T>> {
     let nearest = |k: usize, n: usize, along: usize| (k * (along - 1) + (n - 1) / 2) / (n - 1);
     let at = |i_u: usize, i_v: usize| {

@@ -1,4 +1,4 @@
-//! Reference lines of the result document and the templates on them.
+//! Reference lines of the result document, and the templates on them.
 
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +56,8 @@ pub struct TemplateRecord {
     pub chord_mm: f64,
     /// Gaps at equal steps from the template's first end to its last.
     pub gap_mm: Vec<f64>,
-    /// Height of the face at these steps over the straight line between the template's ends on it, towards the scanner.
+    /// Height of the face at these steps above the chord between the template's end points on the face, towards the
+    /// scanner.
     pub height_mm: Vec<f64>,
     /// Whether the plate was seen at these steps.
     pub seen: Vec<bool>,
@@ -130,7 +131,7 @@ fn places(finding: &TemplateFinding, line: &platen_model::ReferenceLine, chord: 
     (0..finding.gap.len()).map(|k| on_line(at(k))).collect()
 }
 
-/// Returns the heights of the face over the straight line from the first place to the last, millimetres.
+/// Returns the heights of the face above the straight line from the first point to the last, millimetres.
 fn heights(surface: &Surface, places: &[[f64; 2]]) -> Vec<f64> {
     let [Some(first), Some(last), Some(middle)] =
         [places.first(), places.last(), places.get(places.len() / 2)]

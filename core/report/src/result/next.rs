@@ -1,18 +1,20 @@
 //! Place of the next hit: the place where a template shows the largest gap that is still to be bent.
 //!
-//! The gap in the middle of a template of chord c that is held at both ends is the missing curvature dk in its section,
+//! A template of chord c is held at both ends. The gap in its middle is the missing curvature dk in its section,
 //! weighted by the influence line of a simply supported beam:
 //!
 //! ```text
 //! g(p) = c^2 / 8 * integral of w(x - p) dk(x) dx,    w(x) = (1 - |x| / (c / 2)) / (c / 2)  for |x| < c / 2
 //! ```
 //!
-//! The template is the plate file's shortest, along the direction in which the target bends; across it the mean has the same
-//! weights over the same length, or over the plate where that is shorter. Curvature below the level of detection counts as nothing,
-//! and so does the area beyond the plate, so that a narrow band gives its own middle wherever it lies. Unseen area takes the mean of
-//! the seen area beside it, which must have half of the weight; area of uncertain curvature counts as unseen (`trusted` of `curvature`).
+//! - The template is the shortest of the plate file. It lies along the direction in which the target bends. Across that
+//!   direction the mean has the same weights over the same length, or over the plate where it is shorter.
+//! - Curvature below the level of detection counts as zero, and so does the area beyond the plate. A narrow band
+//!   therefore gives its own middle, wherever it lies.
+//! - Unseen area takes the mean of the seen area beside it, which must have at least half of the weight. Area of
+//!   uncertain curvature counts as unseen (`trusted` of `curvature`).
 //!
-//! The figure is a place: neither the force nor the depth of a stroke follows from it.
+//! Limits: the result is only a place. Neither the force nor the depth of a stroke can be derived from it.
 
 use super::fields::find_field;
 use serde::{Deserialize, Serialize};
@@ -43,11 +45,13 @@ pub enum Next {
 pub struct NextPlace {
     /// Its middle (u, v).
     pub at_mm: [f64; 2],
-    /// Extent of the missing curvature around it along u and v: that of an even band of the same second moment, on the plate.
+    /// Extent of the missing curvature around it along u and v: that of a uniform band with the same second moment, on
+    /// the plate.
     pub extent_mm: [f64; 2],
     /// Gap that the missing curvature makes under the template.
     pub gap_mm: f64,
-    /// Its expanded uncertainty (95 %): that of the template's own gap; null where the template was not laid.
+    /// Its expanded uncertainty (95 %), equal to that of the template's own gap; null if the template was not laid
+    /// there.
     pub uncertainty_mm: Option<f64>,
     /// Limit of the template.
     pub limit_mm: f64,
@@ -67,18 +71,19 @@ pub enum NoNext {
     BentTooFar,
     /// No target, no template, or no comparison with the curvature of the target.
     NoTarget,
-    /// Nothing stands out where the curvature is known, and in a part of the plate less than half of it is: not seen, or too uncertain,
-    /// as everywhere with the range error that is assumed of an uncalibrated scanner.
+    /// No gap exceeds the limit where the curvature is known, but in a part of the plate less than half of it is known:
+    /// it was not seen or is too uncertain. With the range error that is assumed for an uncalibrated scanner, this is
+    /// the case everywhere.
     NotEnoughSeen,
 }
 
 /// Nodes from one candidate for the place to the next, along u and v.
 const STRIDE: usize = 2;
-/// Gaps that differ by less than this share are equal; then the place nearest to the middle of the plate is taken.
+/// Gaps that differ by less than this share count as equal; then the place nearest to the middle of the plate is taken.
 const EQUAL: f64 = 1e-3;
 
 impl Next {
-    /// Returns the place, where there is one.
+    /// Returns the place, if there is one.
     #[must_use]
     pub fn place(&self) -> Option<&NextPlace> {
         match self {
@@ -133,14 +138,14 @@ fn find(reports: &[&Report], plate: &PlateFile) -> Result<NextPlace, NoNext> {
     let target = plate.target.as_ref().ok_or(NoNext::NoTarget)?;
     let target = TargetSurface::of_plate(target, &plate.plate).map_err(|_| NoNext::NoTarget)?;
     let size = [plate.plate.width, plate.plate.height];
-    // Along u where no direction is special.
+    // Along u where the target has no preferred direction.
     let along = target.bending(0.5 * size[0], 0.5 * size[1]).unwrap_or([1.0, 0.0]);
     let laid = reports.iter().flat_map(|report| &report.findings.templates);
     let uncertainty = laid.filter(|t| t.name == template.name).map(|t| t.uncertainty).max_by(f64::total_cmp);
     Gaps::new(field, size, along, template.chord).next(template, uncertainty)
 }
 
-/// Gaps that a field of missing curvature makes under a template laid anywhere on the plate.
+/// Gaps caused by a field of missing curvature under a template laid anywhere on the plate.
 struct Gaps<'a> {
     field: &'a Field,
     /// Distance of the nodes along u and v, metres.
@@ -156,7 +161,7 @@ struct Weights {
     reach: [usize; 2],
     /// v outer, u inner.
     values: Vec<f64>,
-    /// Sum of the weights of a place whose surroundings lie on the plate.
+    /// Sum of the weights for a place whose surroundings lie entirely on the plate.
     whole: f64,
 }
 
@@ -195,7 +200,8 @@ impl<'a> Gaps<'a> {
         Self { field, step, size, weights: Weights::new(step, size, along, chord), chord }
     }
 
-    /// Returns the place of the largest gap, unless it is bent too far there, or within limit and uncertainty.
+    /// Returns the place of the largest gap, unless the plate is bent too far there or the gap is within limit and
+    /// uncertainty.
     fn next(&self, template: &Template, uncertainty: Option<f64>) -> Result<NextPlace, NoNext> {
         let (mut more, mut too_far): (Vec<Around>, f64) = (Vec::new(), 0.0);
         let mut all_seen = true;
@@ -205,7 +211,7 @@ impl<'a> Gaps<'a> {
                 continue;
             };
             too_far = too_far.max(-around.gap);
-            // A place is one that lacks curvature itself.
+            // Only a node that itself lacks curvature can be the place.
             if self.field.state[node] == NodeState::Seen && self.field.values[node] > 0.0 {
                 more.push(around);
             }
@@ -236,7 +242,7 @@ impl<'a> Gaps<'a> {
         (0..n_v).step_by(STRIDE).flat_map(move |row| (0..n_u).step_by(STRIDE).map(move |i| row * n_u + i))
     }
 
-    /// Returns the gap in the middle of the template at a node; `None` where less than half of its surroundings were seen.
+    /// Returns the gap in the middle of the template at a node; `None` if less than half of its surroundings were seen.
     fn around(&self, node: usize) -> Option<Around> {
         let (mut plate, mut seen, mut sum) = (0.0, 0.0, 0.0);
         for (weight, other) in self.surroundings(node) {
@@ -255,7 +261,8 @@ impl<'a> Gaps<'a> {
         (2.0 * seen >= plate && seen > 0.0).then(|| Around { node, at: self.at(node), gap })
     }
 
-    /// Returns the extents along u and v of an even band with the second moments of the missing curvature around a place.
+    /// Returns the extents along u and v of a uniform band with the second moments of the missing curvature around a
+    /// place.
     fn extent(&self, around: &Around) -> [f64; 2] {
         let (mut sum, mut moments) = (0.0, [0.0; 2]);
         for (weight, other) in self.surroundings(around.node) {

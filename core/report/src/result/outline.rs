@@ -1,4 +1,4 @@
-//! Outline to which the plate's (u, v) refer.
+//! Outline to which the coordinates (u, v) of the plate refer.
 
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,7 @@ impl OutlineRecord {
         }
     }
 
-    /// Returns the blank, if its outline is from a scan, equal to the recorded one to the last bit.
+    /// Returns the blank, if its outline is from a scan; it equals the recorded one to the last bit.
     pub fn blank(&self) -> Option<Blank> {
         let blank = Blank {
             corners: self.corners_mm.map(|corner| corner.map(metres)),

@@ -22,8 +22,8 @@ pub struct PlateRecord {
     pub target: Option<String>,
     /// Parameters of the scales of its pictures.
     pub scale: PictureScale,
-    /// Edge that faces the press, as a direction in (u, v): `[0, -1]` is the edge v = 0. Null where the plant file does not
-    /// place the press, or places it under the plate.
+    /// Edge that faces the press, as a direction in (u, v): `[0, -1]` is the edge v = 0. Null where the plant file does
+    /// not place the press, or places it under the plate.
     pub press_side: Option<[i8; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! Plugins behind a measurement.
+//! Plugins that took part in a measurement.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +15,6 @@ pub struct PluginRecord {
     pub sha256: String,
     /// Whether it ran in a process of its own.
     pub isolated: bool,
-    /// Whether it failed, and this is the result of a second time in a fresh process.
+    /// Whether the first attempt failed and this is the result of a second one in a new process.
     pub retried: bool,
 }

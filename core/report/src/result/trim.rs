@@ -1,4 +1,4 @@
-//! Trim lines of the result document: the formed plate is marked along them for its last cut.
+//! Trim lines of the result document: the lines along which the formed plate is marked for its last cut.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Layout of a map: the plate's rectangle as it is seen, its axes and the edge that faces the press.
+//! Layout of a map: the plate's rectangle in the view, its axes and the edge that faces the press.
 
 use platen_model::{Field, NodeState};
 
@@ -12,9 +12,10 @@ use crate::result::PlateRecord;
 /// Width of the picture and of the plate in it, pixels; a tall plate is drawn narrower.
 const WIDTH: f64 = 1200.0;
 pub(super) const PLATE: [f64; 2] = [808.0, 760.0];
-/// Least height of the plate for the legend beside it, pixels, for letters of size 1.
+/// Smallest height of the plate for the legend beside it, pixels, for letters of size 1.
 pub(super) const LEAST_HEIGHT: f64 = 420.0;
-/// Side of the squares of which the map consists, pixels; the lengths above and those of a [`Look`] are multiples of it.
+/// Side of the squares of which the map consists, pixels; the lengths above and those of a [`Look`] are multiples of
+/// it.
 pub(in crate::picture) const SQUARE: f64 = 4.0;
 
 /// Distances and sizes of a map, pixels.
@@ -86,7 +87,7 @@ impl<'a> Layout<'a> {
         self.squares.map(|n| n as f64 * SQUARE)
     }
 
-    /// Returns the pixel of a place in shares of the plate as it is seen, from the left and from below.
+    /// Returns the pixel of a place given as shares of the plate in the view, from the left and from below.
     fn pixel(&self, [x, y]: [f64; 2]) -> At {
         let ((left, _), (_, bottom)) = self.corners();
         let [wide, high] = self.extent();
@@ -99,7 +100,7 @@ impl<'a> Layout<'a> {
         self.pixel([x / w, y / h])
     }
 
-    /// Converts shares of the plate as it is seen to shares of its sides u and v.
+    /// Converts shares of the plate in the view to shares of its sides u and v.
     pub(super) fn on_plate(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [w, h] = self.seen.extent_mm();
         let [u, v] = self.seen.at_mm([x * w, y * h]);
@@ -139,7 +140,7 @@ impl<'a> Layout<'a> {
         self.press(canvas)
     }
 
-    /// Draws the mark of the corner (0, 0); where that is not below on the left, the legend names it.
+    /// Draws the mark of the corner (0, 0); if it is not at the lower left, the legend explains it.
     fn corner(&self, canvas: &Canvas<'_>) -> Result<(), PictureError> {
         let ((x, y), (from, to)) = (self.at(0.0, 0.0), self.corners());
         let side = 34.0 * self.look.letters;
@@ -152,7 +153,7 @@ impl<'a> Layout<'a> {
         canvas.text("(0, 0)", (x - 14.0, below), self.text().bold().right())
     }
 
-    /// Returns whether the corner (0, 0) is another one than that below on the left.
+    /// Returns whether the corner (0, 0) is not at the lower left.
     pub(super) fn is_turned(&self) -> bool {
         self.seen.place_mm([0.0, 0.0]) != [0.0, 0.0]
     }

@@ -1,4 +1,4 @@
-//! Marks on a map: means of the field on parts of the plate, place of the next hit.
+//! Marks on a map: means of the field over parts of the plate, and the place of the next hit.
 
 use platen_model::{Field, NodeState};
 
@@ -33,7 +33,7 @@ pub(super) fn part_means(
     Ok(())
 }
 
-/// Marks where to press next on the map of the missing curvature.
+/// Marks the next action on the map of the missing curvature.
 pub(super) fn next(
     mark: Option<Mark<'_>>,
     field: &Field,
@@ -49,7 +49,7 @@ pub(super) fn next(
                 canvas.line(&line, PAPER, 12)?;
                 return canvas.line(&line, INK, 6);
             };
-            // Within its interval: a narrower line, else it would lie over the outline.
+            // With an interval the line is narrower, otherwise it would cover the outline.
             outline(ends, to, layout, canvas)?;
             canvas.line(&line, INK, 3)
         }
@@ -74,7 +74,7 @@ fn outline(
     [(a, b), (b, c), (c, d), (d, a)].into_iter().try_for_each(|(from, to)| canvas.dashed(from, to, INK, 2))
 }
 
-/// Frames the place of the next hit, and names it inside the frame, away from the means.
+/// Draws a frame at the place of the next hit and its name inside the frame, away from the means.
 fn frame(
     place: &NextPlace,
     field: &Field,
@@ -84,12 +84,12 @@ fn frame(
     let ([u, v], [w, h]) = (place.at_mm, place.extent_mm.map(|mm| 0.5 * mm));
     let (a, b) = (layout.at(u - w, v - h), layout.at(u + w, v + h));
     let (from, to) = ((a.0.min(b.0), a.1.min(b.1)), (a.0.max(b.0), a.1.max(b.1)));
-    // Paper around ink: visible on the darkest shades.
+    // Paper colour around the ink makes it visible on the darkest shades.
     canvas.frame(from, to, PAPER, 8)?;
     canvas.frame(from, to, INK, 4)?;
     let ((left, _), (_, bottom)) = layout.corners();
     let [wide, high] = layout.extent();
-    // Rows of means as they are seen.
+    // Rows of means in the view.
     let u_is_up = layout.at(0.0, 0.0).1 != layout.at(layout.plate.width_mm, 0.0).1;
     let row_height = high / PARTS[usize::from(!u_is_up)] as f64;
     let to_a_mean = |y: f64| (((bottom - y) / row_height).fract() - 0.5).abs();
@@ -111,7 +111,8 @@ fn shade_at(field: &Field, scale: &Scale, [u, v]: [f64; 2]) -> Option<f64> {
     }
 }
 
-/// Returns the mean over the seen nodes of a part of the plate; `None` when fewer than half were seen, or most are unchanged.
+/// Returns the mean over the seen nodes of a part of the plate; `None` if fewer than half were seen, or most are
+/// unchanged.
 fn mean(field: &Field, i: usize, k: usize) -> Option<f64> {
     let [n_u, n_v] = field.nodes;
     let range = |part: usize, parts: usize, n: usize| part * n / parts..(part + 1) * n / parts;

@@ -1,4 +1,5 @@
-//! Place of the next hit on fields in closed form: a cylinder of radius 9 m with flat bands, under a template of 3 mm on 2 m.
+//! Tests of the place of the next hit on closed-form fields: a cylinder of radius 9 m with flat bands, and a template
+//! of 3 mm on 2 m.
 
 use platen_model::{Findings, Seat, TemplateFinding};
 
@@ -6,7 +7,7 @@ use super::*;
 
 const SIDE: usize = 101;
 const SIZE: [f64; 2] = [3.0, 2.5];
-/// Curvature that a flat place lacks, 1/m.
+/// Curvature that is missing in a flat band, 1/m.
 const FLAT: f64 = 1.0 / 9.0;
 /// Curvature that opens 1 mm under the template, 1/m.
 const ONE_MM: f64 = 8.0 * 1e-3 / 4.0;
@@ -22,7 +23,7 @@ fn plate(axis_deg: f64) -> PlateFile {
     PlateFile::parse("plate.toml", &text).unwrap()
 }
 
-/// Missing curvature by place; `None` where unseen, unchanged where 0.
+/// Returns a report on the missing curvature by place; `None` where unseen, unchanged where 0.
 fn report(missing: impl Fn(f64, f64) -> Option<f64>) -> Report {
     let at = |k: usize, i: usize| SIZE[i] * k as f64 / (SIDE - 1) as f64;
     let nodes: Vec<_> = (0..SIDE * SIDE).map(|k| missing(at(k % SIDE, 0), at(k / SIDE, 1))).collect();
