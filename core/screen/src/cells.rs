@@ -1,5 +1,7 @@
-//! The parts of a page that change. A page renders them into its HTML, so that the first paint says the truth without script; every
-//! later event carries the same cells as JSON, and the script puts them into the elements of the same names.
+//! Changing elements of a page, which are updated while the page is open.
+//!
+//! A page renders them into its HTML, so that the first paint is correct without a script. Every later event contains
+//! the same cells as JSON, and the script writes them to the elements with the same ids.
 
 use std::collections::BTreeMap;
 

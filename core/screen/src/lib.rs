@@ -1,17 +1,17 @@
-//! Browser pages of a running host, over HTTP/1.1: the operator's screen, the strokes of a plate, two strokes compared, the
-//! engineer's page, the plate in 3D. Overview: `core/screen/README.md`.
+//! Browser pages of a running host, over HTTP/1.1: operator's screen, strokes of a plate, comparison of two strokes,
+//! engineer's page, plate in 3D. Overview: `core/screen/README.md`.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `snapshot` | the state of press, plate, stroke and result: `platen.screen/1` |
 //! | `source` | the trait through which pages read; the host implements it |
-//! | `view` | language, units, turn and theme of a page, from its address |
+//! | `view` | language, units, orientation and theme of a page, from its address |
 //! | `words` | texts of the pages in both languages |
-//! | `cells` | the parts of a page that change, rendered once for the first paint and for every later event |
+//! | `cells` | the changing elements of a page, rendered once for the first paint and again for every later event |
 //! | `page` | the pages |
 //! | `server` | listener, access, headers, the event stream |
 //!
-//! Pages read and never write: the server answers GET and HEAD alone. It knows no press, no plugin and no database.
+//! The pages only read: the server answers GET and HEAD alone. This crate has no access to press, plugins or database.
 
 mod cells;
 mod page;
@@ -33,5 +33,5 @@ pub use source::{
 };
 pub use view::{Theme, View};
 
-/// Age of the press cycle from which on measuring has stopped (rule R2).
+/// Age of the press cycle above which measuring counts as stopped (rule R2).
 const CYCLE_LIMIT: Duration = Duration::from_secs(3);

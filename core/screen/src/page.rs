@@ -1,4 +1,4 @@
-//! The pages. Each is rendered whole on the server; [`live`] returns the cells that a page keeps up to date.
+//! Pages, each rendered completely on the server; [`live`] returns the cells that a page keeps up to date.
 
 mod compare;
 mod engineer;
@@ -32,7 +32,7 @@ pub(crate) enum LivePage {
 }
 
 impl LivePage {
-    /// Returns its name in the address of its events.
+    /// Returns the page's name in the address of its events.
     fn name(self) -> &'static str {
         match self {
             Self::Operator => "operator",
@@ -55,7 +55,7 @@ impl LivePage {
     }
 }
 
-/// Returns a document. A live one carries the address of its events, and the words for their absence.
+/// Returns a document. A live page contains the address of its events, and the words that are shown when they stop.
 fn document(view: View, title: &str, class: &str, live: Option<(LivePage, &str)>, body: Markup) -> Markup {
     let text = |texts: Texts| texts.of(view.language);
     let theme = if view.theme == Theme::Dark { "dark" } else { "light" };
@@ -113,13 +113,13 @@ fn class(verdict: Verdict, sense: i8) -> &'static str {
     }
 }
 
-/// Returns a text of a person, a press or a plugin fit for a page: without control characters and marks that turn the direction of
-/// writing, and not longer than 64 characters.
+/// Returns a text from a person, a press or a plugin in a form that is safe to show: without control characters and
+/// marks that change the writing direction, and not longer than 64 characters.
 pub(crate) fn clean(text: &str) -> String {
     clean_to(64, text)
 }
 
-/// As [`clean`], for a sentence of a plugin: not longer than 240 characters.
+/// Returns a sentence of a plugin, cleaned as by [`clean`] and not longer than 240 characters.
 pub(crate) fn clean_sentence(text: &str) -> String {
     clean_to(240, text)
 }

@@ -1,5 +1,6 @@
-//! The server: a listener with limits, a thread and runtime of its own at a lower priority, so that the press side is never behind
-//! it. It answers GET and HEAD alone.
+//! HTTP server of the pages: a listener with limits, on a thread and runtime of its own with a lower priority.
+//!
+//! The press side therefore never waits for it. It answers GET and HEAD alone.
 
 mod access;
 pub(crate) mod assets;
@@ -24,7 +25,7 @@ const NICE: i32 = 10;
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the message of a variant names its fields")]
 pub enum ServerError {
-    /// The address is taken, or not of this computer.
+    /// The address is in use, or does not belong to this computer.
     #[error(
         "[screen]: {listen} cannot be opened: {source}; is another host running, or the address not of this computer?"
     )]
@@ -45,7 +46,7 @@ impl Listener {
     /// Opens an address.
     ///
     /// # Errors
-    /// It is taken, or not of this computer.
+    /// The address is in use, or does not belong to this computer.
     pub fn open(listen: SocketAddr) -> Result<Self, ServerError> {
         let open = || {
             let listener = std::net::TcpListener::bind(listen)?;
@@ -84,7 +85,7 @@ impl Server {
         let (stop, stopped) = oneshot::channel::<()>();
         let router = routes::router(source, access.at(address));
         let serve = move || {
-            // Without the right to change it, the pages have the priority of the rest.
+            // Without the permission to lower it, the pages keep the priority of the host.
             let _ = rustix::process::nice(NICE);
             runtime.block_on(async {
                 let listener = match TcpListener::from_std(listener) {

@@ -1,7 +1,8 @@
-//! State of press, plate, stroke and result at one moment: `platen.screen/1`, as events and as `/api/v1/state`.
+//! Snapshot of press, plate, stroke and result at one moment: document `platen.screen/1`, sent as events and as
+//! `/api/v1/state`.
 //!
-//! A snapshot is whole: a page that has missed ten shows the truth with the eleventh. What is not known is null. `result` is the
-//! result of the plate and stroke in hand or null: it never is one of an earlier stroke.
+//! Every snapshot is complete: a page that has missed ten snapshots is correct after the eleventh. Unknown values are
+//! null. `result` is the result of the present plate and stroke, or null; it is never the result of an earlier stroke.
 
 mod advice;
 
@@ -19,7 +20,7 @@ pub const SCHEMA: &str = "platen.screen/1";
 pub struct Snapshot {
     /// [`SCHEMA`].
     pub schema: &'static str,
-    /// Another one after every start of the host.
+    /// Identifier of this start of the host; every start has another one.
     pub boot: String,
     /// Count of snapshots since the start.
     pub seq: u64,
@@ -39,7 +40,7 @@ pub struct Snapshot {
     pub result: Option<ResultPart>,
     /// The newest strokes of this plate with the one in hand, oldest first.
     pub strip: Vec<StripPart>,
-    /// Alarms that stand now, the most urgent first.
+    /// Active alarms, the most urgent first.
     pub alarms: Vec<ShownAlarm>,
 }
 
@@ -63,7 +64,7 @@ pub struct PressPart {
     pub name: String,
     /// Press and host are synchronised.
     pub in_step: bool,
-    /// Its heartbeat moves; true where it has none.
+    /// Its heartbeat changes; true if the press has no heartbeat.
     pub alive: bool,
     /// The next stroke will be measured.
     pub ready: bool,
@@ -82,7 +83,7 @@ pub struct ScannerPart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScannerState {
-    /// Not yet asked.
+    /// Not yet queried.
     Unknown,
     /// In reach.
     Ready,
@@ -104,7 +105,7 @@ pub struct RecordPart {
 /// Plate in hand.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlatePart {
-    /// Its name: of the plate file, else of the press; null before the first measurement where the press names none.
+    /// Its name from the plate file, else from the press; null before the first measurement if the press gives no name.
     pub id: Option<String>,
     /// Number of the part at the press.
     pub part: Option<u32>,
@@ -123,15 +124,15 @@ pub struct StrokePart {
     pub run: Option<u32>,
     /// Its number at the press.
     pub number: u16,
-    /// 0 for the first measurement of it.
+    /// 0 for its first measurement.
     pub attempt: u16,
-    /// A scan of the blank.
+    /// The stroke is a scan of the blank.
     pub baseline: bool,
     /// Its stage.
     pub stage: Stage,
     /// Start of its scan, milliseconds since 1970.
     pub since_ms: Option<i64>,
-    /// Share of its scan that is done, percent, while it is scanned and where the driver says.
+    /// Share of its scan that is done, percent; while it is scanned, and if the driver reports it.
     pub scanned_percent: Option<u8>,
 }
 
@@ -139,13 +140,13 @@ pub struct StrokePart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
-    /// Accepted; waits for a clear view.
+    /// Accepted; waiting for a clear view.
     Accepted,
     /// Being scanned.
     Scanning,
     /// Being measured.
     Measuring,
-    /// Given up, or its result is on its way.
+    /// Given up, or its result is about to be written.
     Ending,
     /// Its result is in the registers.
     Done,
@@ -164,11 +165,12 @@ pub struct ResultPart {
     pub why: Option<Texts>,
     /// Template with the largest gap per limit.
     pub worst: Option<Worst>,
-    /// Place of the next hit, or why there is none; null in documents older than it, and where nothing was measured.
+    /// Place of the next hit, or the reason why there is none; null in documents older than this field, and where
+    /// nothing was measured.
     pub next: Option<Next>,
-    /// An earlier stroke bent the plate at this place; false while that is not known.
+    /// An earlier stroke bent the plate at this place; false while that is unknown.
     pub again: bool,
-    /// Advice for the next stroke; null where the plant file shows none, and until it is there.
+    /// Advice for the next stroke; null if the plant file shows none, and until it is ready.
     pub advice: Option<AdvicePart>,
     /// Names of the fields that can be shown as maps.
     pub fields: Vec<String>,
@@ -200,27 +202,27 @@ pub struct StripPart {
     pub gap_mm: Option<f64>,
 }
 
-/// An alarm that stands.
+/// Active alarm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShownAlarm {
     /// Number.
     pub code: Code,
     /// Severity.
     pub severity: Severity,
-    /// Who must act.
+    /// Person who must act.
     pub audience: Audience,
-    /// Time since when it stands, milliseconds since 1970.
+    /// Start of the alarm, milliseconds since 1970.
     pub since_ms: i64,
     /// Fault.
     pub text: Texts,
     /// Remedy.
     pub remedy: Texts,
-    /// How often it was raised since the start of the host.
+    /// Number of times that it was raised since the start of the host.
     pub count: u64,
 }
 
 impl ShownAlarm {
-    /// Returns an alarm of the table.
+    /// Returns an alarm with the texts of the alarm table.
     #[must_use]
     pub fn new(code: Code, since_ms: i64, count: u64) -> Self {
         let alarm = code.alarm();

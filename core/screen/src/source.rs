@@ -1,4 +1,4 @@
-//! Source of the pages: a trait that the host implements over its press side, its record and its files.
+//! Data source of the pages: a trait that the host implements with its press side, its record and its files.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use tokio::sync::watch;
 
 use crate::{CYCLE_LIMIT, PressPart, Snapshot};
 
-/// Files of a stroke that may be read; sections of its templates (`section-NAME.svg`) beside them.
+/// Files of a stroke that may be read, besides the sections of its templates (`section-NAME.svg`).
 pub const FILES: [&str; 11] = [
     "result.json",
     "reference_lines.csv",
@@ -29,20 +29,20 @@ pub const FILES: [&str; 11] = [
 /// Failure to read for a page.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// There is no such plate, stroke, field or file.
+    /// The plate, stroke, field or file does not exist.
     #[error("{0}")]
     NotFound(String),
-    /// It is there and cannot be read.
+    /// It exists but cannot be read.
     #[error("{0}")]
     Unreadable(String),
 }
 
-/// Source of everything that the pages show. Calls that read the record or files may block.
+/// Data source of the pages. Calls that read the record or files may block.
 pub trait Source: Send + Sync + 'static {
     /// Returns the present snapshot, and every later one.
     fn snapshots(&self) -> watch::Receiver<Arc<Snapshot>>;
 
-    /// Returns the time since the press cycle has last reported: it grows while the cycle stands.
+    /// Returns the time since the last report of the press cycle: it grows while the cycle is stopped.
     fn cycle_age(&self) -> Duration;
 
     /// Returns the newest plates on record, newest first.
@@ -75,14 +75,14 @@ pub trait Source: Send + Sync + 'static {
     /// No such stroke or field.
     fn field(&self, run: u32, name: &str) -> Result<Arc<Field>, SourceError>;
 
-    /// Returns the scanned face of a stroke on an even grid, v outer, u inner: nodes of a side, and of each node x, y, z, metres,
-    /// scanner frame, and 1 where it was seen, else 0.
+    /// Returns the scanned face of a stroke on an even grid, v outer, u inner: nodes of a side, and of each node x, y,
+    /// z, metres, scanner frame, and 1 where it was seen, else 0.
     ///
     /// # Errors
     /// No such stroke, or it was not measured.
     fn mesh(&self, run: u32) -> Result<(usize, Vec<[f32; 4]>), SourceError>;
 
-    /// Returns a file of a stroke's folder; the server asks for names of a fixed list only.
+    /// Returns a file of a stroke's folder; the server requests only names of a fixed list.
     ///
     /// # Errors
     /// No such stroke or file.
@@ -101,7 +101,8 @@ pub trait Source: Send + Sync + 'static {
     fn metrics(&self) -> String;
 }
 
-/// Returns the present snapshot; while the press cycle stands, without the result, which may be that of an earlier stroke (rule R2).
+/// Returns the present snapshot. While the press cycle is stopped it has no result, since the result may be that of an
+/// earlier stroke (rule R2).
 pub(crate) fn present(source: &dyn Source) -> Arc<Snapshot> {
     let snapshot = source.snapshots().borrow().clone();
     if source.cycle_age() <= CYCLE_LIMIT {
@@ -114,11 +115,11 @@ pub(crate) fn present(source: &dyn Source) -> Arc<Snapshot> {
 /// Sign of life.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Beat {
-    /// As in the snapshot.
+    /// Value of the snapshot.
     pub boot: String,
-    /// Of the newest snapshot.
+    /// Number of the newest snapshot.
     pub seq: u64,
-    /// Time since the press cycle has last reported.
+    /// Time since the last report of the press cycle.
     pub cycle_age_ms: u64,
 }
 
@@ -156,7 +157,7 @@ pub struct StrokeRow {
     pub reason: Option<String>,
     /// Largest gap under a template, and its expanded uncertainty (95 %).
     pub gap_mm: Option<f64>,
-    /// See `gap_mm`.
+    /// Uncertainty of `gap_mm`.
     pub uncertainty_mm: Option<f64>,
     /// -1 under-bent, 0 within the limit, 1 bent too far.
     pub sense: i8,
@@ -175,7 +176,7 @@ pub struct Engineer {
     pub plugins: Vec<PluginRow>,
     /// Alarms since the start, by number: code, text, count.
     pub alarms: Vec<(u16, String, u64)>,
-    /// Named figures of link, scanner, calibration, disk and record, in their order.
+    /// Named figures of link, scanner, calibration, disk and record, in display order.
     pub figures: Vec<(String, String)>,
     /// Files in force: path and SHA-256 or CRC.
     pub files: Vec<(String, String)>,
@@ -190,18 +191,18 @@ pub struct RegisterRow {
     pub words: u16,
     /// Name of the field.
     pub name: String,
-    /// Value in words.
+    /// Value as text.
     pub value: String,
 }
 
-/// One stroke of the timeline: milliseconds from the trigger.
+/// One stroke of the timeline; times in milliseconds from the trigger.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TimelineRow {
     /// Stroke.
     pub stroke: String,
     /// Verdict.
     pub verdict: Verdict,
-    /// To the scan's end, to the result, to the acknowledgement.
+    /// Times to the end of the scan, to the result, to the acknowledgement.
     pub steps_ms: [Option<f64>; 3],
 }
 

@@ -1,10 +1,11 @@
-//! How a page is shown, from the query of its address: `/?lang=ja&units=in&turn=drawing&theme=dark`. Nothing is kept in the browser.
+//! View settings of a page, from the query of its address: `/?lang=ja&units=in&turn=drawing&theme=dark`. The browser
+//! stores nothing.
 
 use platen_model::Language;
 use platen_report::picture::{self, Turn, Units};
 use serde::Deserialize;
 
-/// View of a page. What an address does not name, or names wrongly, has its default.
+/// View of a page. A parameter that is missing or wrong in the address has its default value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct View {
     /// Language of texts.
@@ -17,7 +18,7 @@ pub struct View {
     pub theme: Theme,
 }
 
-/// Colours around the pictures; a map has the same ones in both.
+/// Colours around the pictures; the colours of a map are the same in both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Theme {
     /// Dark on light gray.
@@ -27,7 +28,7 @@ pub enum Theme {
     Dark,
 }
 
-/// The query of an address, as far as the view needs it.
+/// Query of an address, as far as the view needs it.
 #[derive(Debug, Default, Deserialize)]
 pub(crate) struct ViewQuery {
     lang: Option<String>,
@@ -70,7 +71,7 @@ impl View {
         link
     }
 
-    /// Returns the part of it that pictures need.
+    /// Returns the settings that pictures need.
     pub(crate) fn picture(self) -> picture::View {
         picture::View { language: self.language, units: self.units, turn: self.turn }
     }

@@ -1,4 +1,5 @@
-//! The pages over real sockets, from a source without press and record: methods, headers, access, limits, texts of others, events.
+//! Tests of the pages over real sockets, with a source without press and record: methods, headers, access, limits,
+//! foreign texts, events.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -21,7 +22,7 @@ const EVIL: &str = "<script>alert(1)</script>\"><img onerror=alert(2)>";
 
 struct Stand {
     snapshots: watch::Sender<Arc<Snapshot>>,
-    /// Answered while the cycle age is this, milliseconds.
+    /// Cycle age that is answered, milliseconds.
     cycle_age: AtomicU64,
     asked: Mutex<Vec<String>>,
 }
@@ -180,7 +181,7 @@ impl Site {
         BufReader::new(stream)
     }
 
-    /// Status, head and body of an answer.
+    /// Returns status, head and body of an answer.
     fn ask(&self, method: &str, path: &str, more: &str) -> (u16, String, String) {
         let mut text = Vec::new();
         self.open(method, path, &format!("Connection: close\r\n{more}")).read_to_end(&mut text).unwrap();
@@ -294,7 +295,7 @@ fn out_of_step_with_the_press_nothing_is_good() {
     assert!(page.contains("NO CONNECTION") && !page.contains(">DONE<"));
 }
 
-/// Next event of a stream: its name and data.
+/// Returns the next event of a stream: its name and data.
 fn event(stream: &mut BufReader<TcpStream>) -> (String, serde_json::Value) {
     let (mut name, mut line) = (String::new(), String::new());
     loop {
@@ -325,7 +326,7 @@ fn the_stream_starts_whole_follows_changes_and_beats() {
     site.stand.cycle_age.store(2500, Ordering::Relaxed);
     let beat = event_named(&mut stream, "beat");
     assert_eq!(beat["boot"], "boot-1");
-    // The first beat may have been under way.
+    // The first beat may have been sent before.
     let aged = (0..3).any(|_| event_named(&mut stream, "beat")["cycle_age_ms"] == 2500);
     assert!(aged);
     site.stand.snapshots.send_replace(Arc::new(snapshot(None)));
@@ -414,7 +415,7 @@ fn readers_that_never_read_and_heads_without_end_cost_the_others_nothing() {
         site.stand.snapshots.send_replace(Arc::new(Snapshot { seq, ..snapshot(None) }));
     }
     assert_eq!(site.get("/").0, 200);
-    // The head without end is answered or closed after its time.
+    // An incomplete head is answered or the connection closed after its time.
     let mut rest = Vec::new();
     endless.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
     let _ = endless.read_to_end(&mut rest);
@@ -502,7 +503,7 @@ fn advice_is_a_line_a_depth_and_what_comes_of_it() {
     show(cannot);
     assert!(site.get("/").2.contains("No advice: what is missing lies nearer to an edge"));
     assert!(site.get("/?lang=ja").2.contains("助言なし: 端部"));
-    // The stroke before it had no advice in time.
+    // The stroke before it was made before its advice was ready.
     assert!(site.get("/").2.contains(">Last stroke: made before the advice was ready<"));
     assert!(site.get("/?lang=ja").2.contains(">直前: 助言の準備前に押されました<"));
 }

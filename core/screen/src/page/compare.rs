@@ -1,4 +1,5 @@
-//! `/compare?a=RUN&b=RUN`: two strokes on the same scale: maps side by side, sections over each other, and their figures with their difference.
+//! Page `/compare?a=RUN&b=RUN`: two strokes on the same scale, with maps side by side, sections over each other, and
+//! their figures with the difference.
 
 use maud::{Markup, html};
 use platen_model::Texts;
@@ -14,7 +15,7 @@ struct Row {
     values: [Option<(f64, f64)>; 2],
 }
 
-/// Returns the page; without two strokes it says how to choose them.
+/// Returns the page; without two strokes it explains how to choose them.
 pub(crate) fn page(strokes: Option<[(u32, &ResultRecord); 2]>, view: View) -> Markup {
     let text = |texts: Texts| texts.of(view.language);
     let body = html! {
@@ -76,7 +77,7 @@ fn difference(values: [Option<(f64, f64)>; 2], view: View) -> String {
     view.with_uncertainty(b - a, u)
 }
 
-/// Returns the name of the map that shows what is still to bend: of curvature where that was compared, else of height.
+/// Returns the name of the map of the missing bend: of curvature if it was compared, else of height.
 pub(super) fn map(record: &ResultRecord) -> &'static str {
     let is_curvature = |comparison: &serde_json::Value| comparison["plugin"] == "curvature";
     if record.comparisons.iter().any(is_curvature) { CURVATURE_DEFICIT } else { "deviation" }

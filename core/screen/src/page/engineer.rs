@@ -1,4 +1,4 @@
-//! `/engineer`: registers, timeline, link, scanner, plugins, alarms and files, renewed every second.
+//! Page `/engineer`: registers, timeline, link, scanner, plugins, alarms and files, updated every second.
 
 use maud::{Markup, html};
 use platen_model::Texts;
@@ -61,7 +61,7 @@ pub(crate) fn page(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Mark
     document(view, text(words::ENGINEER), "page", Some((LivePage::Engineer, &snapshot.boot)), body)
 }
 
-/// Rows for alarms: more kinds than these have not been raised together.
+/// Number of rows for alarms: more kinds than these have not been raised together.
 const ALARMS: usize = 12;
 
 /// Returns the cells of the page.
@@ -100,7 +100,7 @@ pub(super) fn cells(snapshot: &Snapshot, engineer: &Engineer, view: View) -> Cel
     cells
 }
 
-/// Returns a path whole: it may be longer than a name.
+/// Returns a path in full: it may be longer than a name.
 fn clean_path(path: &str) -> String {
     path.split('/').map(clean).collect::<Vec<_>>().join("/")
 }

@@ -1,4 +1,5 @@
-//! `/`: the operator's page, read from two metres: verdict, place of the next hit, gap against its limit, states, one alarm.
+//! Page `/` for the operator, legible from two metres: verdict, place of the next hit, gap against its limit, states,
+//! one alarm.
 
 mod advice;
 
@@ -17,7 +18,7 @@ const STRIP: usize = 16;
 const STRIP_SIZE: [f64; 2] = [640.0, 100.0];
 /// Size of the drawing of the gap against its limit.
 const BAR_SIZE: [f64; 2] = [600.0, 48.0];
-/// Fields that a map is shown of, the first that there is.
+/// Fields for the map, in order of preference.
 const FIELDS: [&str; 2] = ["curvature_deficit", "deviation"];
 
 /// Returns the page.
@@ -77,7 +78,7 @@ pub(super) fn cells(snapshot: &Snapshot, view: View) -> Cells {
     cells
 }
 
-/// Band: verdict of the stroke in hand, else what goes on.
+/// Fills the band: the verdict of the present stroke, or else the current activity.
 fn band(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let text = |texts: Texts| texts.of(view.language);
     let stage = snapshot.stroke.as_ref().map(|stroke| stroke.stage).filter(|stage| *stage != Stage::Done);
@@ -109,7 +110,7 @@ fn sense(result: &ResultPart) -> i8 {
     result.worst.as_ref().map_or(0, |worst| worst.sense)
 }
 
-/// Map, and the place of the next hit.
+/// Fills the map and the place of the next hit.
 fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let text = |texts: Texts| texts.of(view.language).to_owned();
     let result = snapshot.result.as_ref();
@@ -119,7 +120,7 @@ fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
         let (result, field) = (result?, field?);
         Some(view.link(&format!("/strokes/{}/{field}.{ending}", result.run)))
     };
-    // Another address once the advice is there: its line lies on the map.
+    // Another address once the advice is there, since its line is drawn on the map.
     let advised = result.is_some_and(|result| result.advice.is_some());
     for (id, ending) in [("map", "png"), ("overlay", if advised { "svg?advised" } else { "svg" })] {
         cells.set(id, "src", picture(ending));
@@ -139,13 +140,13 @@ fn place(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     }
 }
 
-/// Worst gap against its limit.
+/// Fills the worst gap against its limit.
 fn gap(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let worst = snapshot.result.as_ref().and_then(|result| result.worst.as_ref());
     let text = |texts: Texts| texts.of(view.language);
     let gap =
         worst.map(|worst| view.with_uncertainty(worst.gap_mm, worst.uncertainty_mm)).unwrap_or_default();
-    // The figure is large, its uncertainty and unit beside it are not.
+    // The figure is large; its uncertainty and unit beside it are small.
     let (gap, more) = gap.split_once(' ').unwrap_or_default();
     cells.text("gap-title", worst.map_or("", |_| text(words::GAP)));
     cells.text("gap", gap);
@@ -171,7 +172,7 @@ fn gap(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     }
 }
 
-/// Strip of the strokes of this plate: gap against the limit.
+/// Fills the strip of the strokes of this plate: gap against the limit.
 fn strip(cells: &mut Cells, snapshot: &Snapshot) {
     let [wide, high] = STRIP_SIZE;
     let worst = snapshot.result.as_ref().and_then(|result| result.worst.as_ref());
@@ -195,7 +196,7 @@ fn strip(cells: &mut Cells, snapshot: &Snapshot) {
     cells.bar("strip-limit", bar, "bar-limit");
 }
 
-/// Stroke and plate, three states in words, at most one alarm.
+/// Fills stroke and plate, three states in words, and at most one alarm.
 fn states(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let text = |texts: Texts| texts.of(view.language);
     let stroke = snapshot.stroke.as_ref().map(|stroke| {

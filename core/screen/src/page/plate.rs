@@ -1,4 +1,4 @@
-//! `/plate?run=RUN`: the plate in 3D with the colours of its map; where the browser has no WebGL, the map.
+//! Page `/plate?run=RUN`: the plate in 3D with the colours of its map; a browser without WebGL shows the map.
 
 use maud::{Markup, html};
 use platen_model::Texts;

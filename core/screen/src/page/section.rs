@@ -1,4 +1,5 @@
-//! Sections of two strokes under one template, over each other: height of the face over the straight line between the template's ends.
+//! Sections of two strokes under one template, drawn over each other: height of the face above the chord between the
+//! template's ends.
 
 use maud::{Markup, html};
 use platen_report::result::TemplateRecord;

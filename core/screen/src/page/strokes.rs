@@ -1,4 +1,5 @@
-//! `/strokes`: the plates on record; `/strokes?plate=N`: the strokes of one plate, as pictures, table and files.
+//! Pages `/strokes` (the recorded plates) and `/strokes?plate=N` (the strokes of one plate, as pictures, table and
+//! files).
 
 use maud::{Markup, html};
 use platen_model::Texts;

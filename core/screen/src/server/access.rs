@@ -1,8 +1,8 @@
-//! Access to the pages: the name by which they are asked for, the site that asks, and the token.
+//! Access control of the pages: the host name of a request, the site that it comes from, and the token.
 //!
-//! A page of another site must not read them through a browser of the plant (DNS rebinding, cross-site requests): the `Host` must be one
-//! of our own names, and `Sec-Fetch-Site` must not be another site. Off loopback a token is required: once as `?token=`, which is answered
-//! by a cookie, or as `Authorization: Bearer`.
+//! A page of another site must not read the pages through a browser of the plant (DNS rebinding, cross-site requests).
+//! Therefore `Host` must be one of our own names, and `Sec-Fetch-Site` must not be another site. Off loopback a token
+//! is required. It is given once as `?token=`, which is answered by a cookie, or as `Authorization: Bearer`.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -16,12 +16,12 @@ use subtle::ConstantTimeEq as _;
 
 /// Name of the cookie with the token.
 pub(super) const COOKIE: &str = "platen_token";
-/// Wrong tokens of one address within [`WINDOW`], after which it is refused.
+/// Number of wrong tokens from one address within [`WINDOW`] after which it is refused.
 const WRONG: usize = 5;
 const WINDOW: Duration = Duration::from_secs(60);
-/// Addresses whose wrong tokens are counted at once.
+/// Largest number of addresses for which wrong tokens are counted.
 const COUNTED: usize = 1024;
-/// Least length of a token, characters.
+/// Smallest length of a token, characters.
 const LEAST: usize = 32;
 
 /// Failure to read a token.
@@ -76,7 +76,7 @@ impl Token {
 pub struct Access {
     /// Token, where one is required.
     pub token: Option<Token>,
-    /// Names by which browsers reach the host, beside loopback and its address.
+    /// Host names by which browsers reach the host, besides loopback and its address.
     pub names: Vec<String>,
 }
 
@@ -87,18 +87,18 @@ impl Access {
     }
 }
 
-/// Answer of the gate.
+/// Decision on a request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Passage {
-    /// Let in.
+    /// Access granted.
     Open,
-    /// Let in by the token in the address: it is replaced by a cookie.
+    /// Access granted by the token in the address, which is replaced by a cookie.
     Cookie(String),
-    /// Refused, and why.
+    /// Access refused, with the reason.
     Closed(StatusCode, &'static str),
 }
 
-/// Decides about every request.
+/// Access check for every request.
 #[derive(Debug)]
 pub(super) struct Gate {
     access: Access,
@@ -107,7 +107,8 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Decides about a request: its headers, the token in its address, and whether it asks for data rather than for a page.
+    /// Decides on a request from its headers, the token in its address, and whether it is for data rather than for a
+    /// page.
     pub(super) fn passage(
         &self,
         peer: IpAddr,
@@ -146,8 +147,8 @@ impl Gate {
         }
     }
 
-    /// Returns whether a `Host` is this server: loopback or its address with its port, or one of the names, for which a proxy in
-    /// front may have another port.
+    /// Returns whether `Host` is this server: loopback or its address with its port, or one of the names. For a name
+    /// any port is accepted, since a proxy in front may use another one.
     fn is_own(&self, host: &str) -> bool {
         let (name, port) = match host.rsplit_once(':') {
             Some((name, port)) if port.chars().all(|c| c.is_ascii_digit()) => (name, port.parse().ok()),
@@ -157,7 +158,7 @@ impl Gate {
         if self.access.names.iter().any(|own| own.eq_ignore_ascii_case(name)) {
             return true;
         }
-        // A rebound name is never an address: on all addresses, any of them is ours.
+        // A rebound name is never an address: when listening on all addresses, any of them is ours.
         let own = self.address.ip();
         let is_address =
             name.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback() || ip == own || own.is_unspecified());

@@ -1,4 +1,5 @@
-//! Style and scripts, embedded, compressed once, under addresses that change with their content, so that browsers keep them for a year.
+//! Style and scripts of the pages: embedded, compressed once, with addresses that change with the content so that
+//! browsers keep them for a year.
 
 use std::io::Write as _;
 use std::sync::LazyLock;
@@ -32,7 +33,7 @@ impl Asset {
         let mut sum = Crc::new();
         sum.update(text.as_bytes());
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-        // A vector takes everything.
+        // Writing to a vector cannot fail.
         let _ = encoder.write_all(text.as_bytes());
         let packed = encoder.finish().unwrap_or_default();
         Self { name, kind, text, address: format!("/assets/{:08x}/{name}", sum.sum()), packed }

@@ -1,5 +1,8 @@
-//! Connections: at most 64, at most 16 of one address; 5 s for the head of a request of at most 16 kB; a reader that takes nothing for
-//! 10 s is dropped.
+//! Connection limits of the server, which bound the load by its readers.
+//!
+//! - at most 64 connections, and at most 16 from one address
+//! - 5 s for the head of a request, of at most 16 kB
+//! - a reader that accepts no data for 10 s is disconnected
 
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
@@ -13,16 +16,17 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_io_timeout::TimeoutStream;
 
-/// Most connections, and most of one address other than loopback, where a proxy may stand for many.
+/// Largest number of connections, and of connections from one address other than loopback, where a proxy may act for
+/// many readers.
 const CONNECTIONS: usize = 64;
 const CONNECTIONS_OF_ONE: usize = 16;
 /// Longest time for the head of a request.
 const HEAD_TIME: Duration = Duration::from_secs(5);
 /// Largest head of a request, bytes.
 const HEAD_SIZE: usize = 16 * 1024;
-/// Longest time for which a reader takes nothing of what is written to it.
+/// Longest time for which a reader may accept no data.
 const STALLED: Duration = Duration::from_secs(10);
-/// Pause after a failure to accept: the system has no file descriptors.
+/// Pause after a failure to accept a connection because the system has no file descriptors.
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// Address of the reader of a request.
@@ -40,7 +44,7 @@ struct Slot {
 }
 
 impl Open {
-    /// Takes a slot, if there is one.
+    /// Takes a slot, if one is free.
     fn slot(&self, ip: IpAddr) -> Option<Slot> {
         let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let of_one = open.get(&ip).copied().unwrap_or(0);
@@ -86,7 +90,7 @@ pub(super) async fn accept(listener: TcpListener, router: Router) {
 }
 
 async fn serve(stream: TcpStream, peer: SocketAddr, router: Router) {
-    // An event is one small write; without this it may be late by the peer's delayed acknowledgement, and no more.
+    // An event is one small write; without this option it could only be late by the peer's delayed acknowledgement.
     let _ = stream.set_nodelay(true);
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(STALLED));

@@ -1,4 +1,4 @@
-//! Addresses of the pages and their data. GET and HEAD alone: the router answers 405 to any other method.
+//! Addresses of the pages and their data, for GET and HEAD alone: the router answers 405 to any other method.
 
 use std::sync::Arc;
 
@@ -22,12 +22,13 @@ use crate::source::present;
 use crate::view::{View, ViewQuery};
 use crate::{CYCLE_LIMIT, FILES, Source, SourceError};
 
-/// Queries of the record at once.
+/// Largest number of concurrent queries of the record.
 pub(super) const RECORD_QUERIES: usize = 2;
-/// Content security policy of a page: it shows what this server gave it. Its one form asks for another page of this server.
+/// Content security policy of a page: it may load only content of this server. Its single form requests another page of
+/// this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
                       base-uri 'none'; form-action 'self'; frame-ancestors 'none'; require-trusted-types-for 'script'";
-/// A report is one file with its own style and pictures in it.
+/// Policy of a report, which is one file with its own style and pictures.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; \
                              frame-ancestors 'none'";
 /// A finished stroke never changes.
@@ -69,7 +70,7 @@ pub(super) fn router(source: Arc<dyn Source>, gate: Gate) -> Router {
         .with_state(site)
 }
 
-/// Lets a request in or refuses it, and sets the headers of every answer.
+/// Grants or refuses a request, and sets the headers of every answer.
 async fn guard(
     State(gate): State<Arc<Gate>>,
     Extension(Peer(peer)): Extension<Peer>,
@@ -106,13 +107,13 @@ async fn guard(
     response
 }
 
-/// Answers a token in the address by a cookie and the address without it.
+/// Answers a token in the address with a cookie and a redirect to the address without it.
 fn with_cookie(uri: &Uri, token: &str) -> Response {
     let parts = uri.query().unwrap_or_default().split('&');
     let query =
         parts.filter(|part| !part.is_empty() && !part.starts_with("token=")).collect::<Vec<_>>().join("&");
     let between = if query.is_empty() { "" } else { "?" };
-    // A path that starts with two slashes would name another host.
+    // A path that starts with two slashes would denote another host.
     let place = format!("/{}{between}{query}", uri.path().trim_start_matches('/'));
     let cookie = format!("{COOKIE}={token}; Path=/; Max-Age=7776000; HttpOnly; SameSite=Strict");
     (StatusCode::SEE_OTHER, [(header::LOCATION, place), (header::SET_COOKIE, cookie)]).into_response()
@@ -129,7 +130,7 @@ impl IntoResponse for SourceError {
 }
 
 impl Site {
-    /// Runs a query of the record or of files on a thread that may block; not more than two at once.
+    /// Runs a query of the record or of files on a thread that may block; at most two run at once.
     async fn ask<T: Send + 'static>(
         &self,
         query: impl FnOnce(&dyn Source) -> Result<T, SourceError> + Send + 'static,
@@ -175,7 +176,7 @@ async fn engineer(State(site): State<Site>, Query(view): Query<ViewQuery>) -> Re
     html(page::engineer(&snapshot, &site.source.engineer(), view.into()))
 }
 
-/// Plate and strokes in the query of an address.
+/// Plate and strokes selected in the query of an address.
 #[derive(Deserialize)]
 struct Chosen {
     plate: Option<u32>,
@@ -234,7 +235,7 @@ async fn report(State(site): State<Site>, Path(plate): Path<u32>) -> Response {
     report.map_or_else(IntoResponse::into_response, |text| (head, text).into_response())
 }
 
-/// Map of a field, `curvature_deficit.png`, and its words, `curvature_deficit.svg`; the mesh, `mesh.bin`.
+/// Returns the map of a field, `curvature_deficit.png`, and its words, `curvature_deficit.svg`; the mesh, `mesh.bin`.
 async fn stroke_picture(
     State(site): State<Site>,
     Path((run, name)): Path<(u32, String)>,
@@ -332,7 +333,7 @@ async fn api_engineer(State(site): State<Site>) -> Response {
     json(Ok(site.source.engineer()))
 }
 
-/// State, figures and metrics in one file, for whoever helps.
+/// Returns state, figures and metrics in one file, for support.
 async fn api_diagnosis(State(site): State<Site>) -> Response {
     let snapshot = present(&*site.source);
     json(Ok(serde_json::json!({
@@ -345,7 +346,7 @@ async fn metrics(State(site): State<Site>) -> Response {
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], site.source.metrics()).into_response()
 }
 
-/// 200 while the press cycle runs, else 503.
+/// Returns 200 while the press cycle runs, else 503.
 async fn health(State(site): State<Site>) -> Response {
     let age = site.source.cycle_age();
     let status = if age > CYCLE_LIMIT { StatusCode::SERVICE_UNAVAILABLE } else { StatusCode::OK };

@@ -1,5 +1,6 @@
-//! The event stream: whole states on change, and beats with the age of the press cycle. A slow reader misses states and never gets an
-//! old one.
+//! Event stream of a page: complete states when they change, and beats with the age of the press cycle.
+//!
+//! A slow reader misses states but never receives an outdated one.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -17,9 +18,9 @@ use crate::{Beat, Snapshot, Source, View};
 
 /// Period of beats.
 const BEAT: Duration = Duration::from_millis(500);
-/// Least time between two states.
+/// Shortest time between two states.
 const APART: Duration = Duration::from_millis(100);
-/// Beats from one renewal of the engineer's page to the next.
+/// Beats from one update of the engineer's page to the next.
 const RENEWAL: u64 = 2;
 
 /// Content of the states of a stream.
@@ -61,7 +62,7 @@ impl Reader {
     async fn next(&mut self) -> Option<Event> {
         let due = async {
             let changed = self.snapshots.changed().await;
-            // A beat may come first: the change stays noted.
+            // A beat may be sent first: the change stays marked.
             self.snapshots.mark_changed();
             sleep_until(self.next_state).await;
             changed

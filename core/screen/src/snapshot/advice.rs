@@ -1,4 +1,4 @@
-//! Advice for the next stroke, as the pages show it: millimetres and sentences of what an advisor said.
+//! Advice for the next stroke in the form for the pages: lengths in millimetres, and the sentences of the advisor.
 
 use platen_model::units::mm;
 use platen_model::{Advice, CannotAdvise, NextBend, Sentence, Step, Texts};
@@ -8,31 +8,31 @@ use serde::Serialize;
 /// Advice for the next stroke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdvicePart {
-    /// What to do.
+    /// Next action.
     pub step: AdvisedStep,
     /// The bend of `bend` and `turn_over`.
     pub bend: Option<AdvisedBend>,
-    /// Why there is none.
+    /// Reason why there is none.
     pub why: Option<Texts>,
-    /// Fewest strokes that are left, and a number that is seldom exceeded.
+    /// Smallest number of strokes left, and a number that is seldom exceeded.
     pub strokes_left: Option<[u32; 2]>,
     /// Sentences of the advisor, most important first.
     pub says: Vec<Sentence>,
-    /// What came of the advice before; null without one.
+    /// Outcome of the advice before; null without one.
     pub last: Option<LastAdvice>,
 }
 
-/// The last stroke against the advice before it.
+/// Comparison of the last stroke with the advice before it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum LastAdvice {
     /// An angle was advised.
     Made {
-        /// The advised angle.
+        /// Advised angle.
         advised_deg: f64,
         /// Its 95 % interval.
         advised_95_deg: Option<[f64; 2]>,
-        /// The angle that the stroke made.
+        /// Angle that the stroke made.
         made_deg: f64,
     },
     /// The stroke was made before the advice was ready.
@@ -40,14 +40,15 @@ pub enum LastAdvice {
 }
 
 impl LastAdvice {
-    /// Returns what came of the advice before the stroke that this one follows.
+    /// Returns the outcome of the advice before the stroke of this record.
     #[must_use]
     pub fn of(record: &AdviceRecord) -> Option<Self> {
         if record.unadvised == Some(CannotAdvise::TooLate) {
             return Some(Self::TooLate);
         }
         let score = record.score?;
-        // The angle of a bend is positive towards the scanner, an advised one the way the target bends.
+        // The angle of a bend is positive towards the scanner, an advised angle in the direction in which the target
+        // bends.
         Some(Self::Made {
             advised_deg: score.advised_angle.to_degrees(),
             advised_95_deg: score.advised_95.map(|it| it.map(f64::to_degrees)),
@@ -64,9 +65,9 @@ pub enum AdvisedStep {
     Bend,
     /// Turn the plate over and bend it back along a line.
     TurnOver,
-    /// Bend at the place of the result; how much cannot be told.
+    /// Bend at the place of the result; the amount cannot be determined.
     Place,
-    /// Enough.
+    /// Finished.
     Done,
     /// No advice.
     Cannot,
@@ -79,9 +80,9 @@ pub struct AdvisedBend {
     pub line_mm: [[f64; 2]; 2],
     /// Angle that should remain.
     pub angle_deg: f64,
-    /// Half width of the interval of the bend's place about the line; null where none can be told.
+    /// Half width of the interval of the bend's position about the line; null if it cannot be determined.
     pub place_95_mm: Option<f64>,
-    /// Depth of the ram; null where none can be told.
+    /// Depth of the ram; null if it cannot be determined.
     pub depth_mm: Option<f64>,
     /// Depth beyond which the plate could no longer be finished from one side.
     pub depth_not_beyond_mm: Option<f64>,

@@ -1,4 +1,5 @@
-//! Advice on the operator's page: the line along which to press in place of the place of the next hit, the depth, what comes of it.
+//! Advice on the operator's page: the line to press along (instead of the place of the next hit), the depth, and the
+//! expected outcome.
 
 use platen_model::{Texts, fill};
 use platen_report::picture::SeenPlate;
@@ -8,10 +9,10 @@ use crate::page::clean_sentence;
 use crate::view::View;
 use crate::{AdvicePart, AdvisedBend, AdvisedStep, LastAdvice, Snapshot, words};
 
-/// A line whose ends lie within this is said by one number, millimetres.
+/// A line whose ends differ by less than this is shown by one number, millimetres.
 const STRAIGHT: f64 = 5.0;
 
-/// Fills the cells of the advice, over those of the next place.
+/// Fills the cells of the advice, replacing the cells of the next place.
 pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     let advice = snapshot.result.as_ref().and_then(|result| result.advice.as_ref());
     let text = |texts: Texts| texts.of(view.language);
@@ -42,7 +43,7 @@ pub(super) fn cells(cells: &mut Cells, snapshot: &Snapshot, view: View) {
     cells.text("near-words", if bend.depth_mm.is_some() { text(words::DEPTH) } else { "" });
 }
 
-/// Returns the last stroke's advised angle beside the one that it made.
+/// Returns the last stroke's advised angle beside the angle that it made.
 fn before(last: LastAdvice, view: View) -> String {
     let text = |texts: Texts| texts.of(view.language);
     let number = |deg: f64| format!("{deg:.1}");
@@ -58,8 +59,8 @@ fn before(last: LastAdvice, view: View) -> String {
     }
 }
 
-/// Returns the edge from which a line is measured, and the distances of its ends, the nearer to the operator (or to the left) first,
-/// millimetres.
+/// Returns the edge from which a line is measured, and the distances of its ends in millimetres; the end nearer to the
+/// operator (or to the left) is first.
 fn distances(bend: &AdvisedBend, seen: SeenPlate) -> (Texts, [f64; 2]) {
     let [[x1, y1], [x2, y2]] = bend.line_mm.map(|end| seen.place_mm(end));
     if (x1 - x2).abs() <= (y1 - y2).abs() {
@@ -70,7 +71,8 @@ fn distances(bend: &AdvisedBend, seen: SeenPlate) -> (Texts, [f64; 2]) {
     }
 }
 
-/// Returns the largest depth, what comes of the stroke, the number of strokes left, or why there is no advice.
+/// Returns the largest depth, the expected outcome of the stroke and the number of strokes left, or the reason why
+/// there is no advice.
 fn sentence(advice: &AdvicePart, view: View) -> String {
     let text = |texts: Texts| texts.of(view.language);
     let most = advice.bend.and_then(|bend| bend.depth_mm.and(bend.depth_not_beyond_mm));
