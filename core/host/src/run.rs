@@ -5,7 +5,7 @@
 //! | press side ([`platen_press::run_press`]) | link, handshake, registers |
 //! | `measurement_worker` | scans and measures one stroke at a time, on a thread of its own |
 //! | dispatcher (this module) | passes messages between the two, stops both |
-//! | `journal` | steps of a stroke in the history, written before the press is informed |
+//! | `journal` | steps of a stroke in the history; a commitment to the press is recorded before it is made |
 //! | `previous_scans`, `region` | the previous stroke and the baseline, from the history; the window of the next scan |
 //! | `scan_retention` | raw scans beside their results, for as long as the plant file allows |
 //! | `scan_store` | copies of kept scans in a store, by the rule of the plant file |

@@ -1,4 +1,5 @@
-//! Table of alarms: the only source of code, text and remedy for registers, log, `status` and the list of the HMI.
+//! Alarm table: the only source of code, text and remedy for the registers, the log, `status` and the alarm list of the
+//! HMI.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,18 +31,18 @@ impl Severity {
 pub enum Audience {
     /// The person at the press: shown on the operator's screen.
     Operator,
-    /// Whoever looks after the installation: shown on the engineer's page alone.
+    /// The person who maintains the installation: shown on the engineer's page alone.
     Engineer,
 }
 
-/// A row of the table.
+/// Row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Alarm {
     /// Number.
     pub code: Code,
     /// Severity.
     pub severity: Severity,
-    /// Who must act.
+    /// Person who must act.
     pub audience: Audience,
     /// Fault.
     pub texts: Texts,
@@ -61,7 +62,7 @@ impl Alarm {
     }
 }
 
-/// The codes and the table from one list.
+/// Generates the codes and the table from one list.
 macro_rules! alarms {
     ($($code:ident = $number:literal $severity:ident $audience:ident $text_en:literal $remedy_en:literal $text_ja:literal $remedy_ja:literal)*) => {
         /// Number of an alarm: 1xx link and strokes, 2xx scanner, 3xx evaluation, 4xx storage, 5xx configuration.
@@ -70,10 +71,10 @@ macro_rules! alarms {
         pub enum Code { $(#[doc = $text_en] $code = $number,)* }
 
         impl Code {
-            /// All of them, by number.
+            /// All codes, by number.
             pub const ALL: &'static [Self] = &[$(Self::$code,)*];
 
-            /// Returns its row of the table.
+            /// Returns the code's row of the table.
             pub fn alarm(self) -> &'static Alarm {
                 match self {
                     $(Self::$code => &Alarm {

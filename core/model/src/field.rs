@@ -1,6 +1,6 @@
-//! Fields over the plate.
+//! Fields over the plate: values on a regular grid, the output of comparisons.
 
-/// A field on an even grid over the whole plate, v outer, u inner.
+/// Field on a regular grid over the whole plate, v outer, u inner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     /// Name, e.g. `displacement`.
@@ -21,24 +21,24 @@ pub struct Field {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum NodeState {
-    /// The plate was not seen here.
+    /// Not seen.
     Unseen = 0,
-    /// A value.
+    /// Seen, with a value.
     Seen = 1,
-    /// A value below the level of detection.
+    /// Seen, with a value below the level of detection.
     Unchanged = 2,
 }
 
 impl From<bool> for NodeState {
-    /// Returns the state of a node that was seen, or was not.
+    /// Returns the state of a node that was seen (true) or not (false).
     fn from(seen: bool) -> Self {
         if seen { Self::Seen } else { Self::Unseen }
     }
 }
 
 impl Field {
-    /// Returns one component at a share of the plate's sides (0 to 1): interpolated bilinearly between the seen nodes, with
-    /// the state of the nearest one.
+    /// Returns one component at a position given as shares of the plate's sides (0 to 1): interpolated bilinearly
+    /// between the seen nodes, with the state of the nearest one.
     #[must_use]
     pub fn sample(&self, u: f64, v: f64, component: usize) -> (NodeState, f64) {
         let [n_u, n_v] = self.nodes;

@@ -1,10 +1,10 @@
-//! The figures of a measurement.
+//! Figures of a measurement: a value for each [`Measure`], in one unit system.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The measures from one list: variant, name and meaning.
+/// Generates the measures from one list: variant, name and meaning.
 macro_rules! measures {
     ($($variant:ident $name:literal $meaning:literal)*) => {
         /// A figure of a measurement, in the units inside: metres, radians, seconds, shares of one.
@@ -57,12 +57,12 @@ impl Measure {
     }
 }
 
-/// The figures of a measurement, in metres, radians, seconds and shares of one. A figure that is absent was not
-/// measured and goes out as its register's invalid value, never as 0.
+/// Figures of a measurement, in metres, radians, seconds and shares of one. An absent figure was not measured; its
+/// register holds the invalid value, never 0.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
-    /// By measure.
+    /// Values by measure.
     pub values: BTreeMap<Measure, f64>,
-    /// At the configured stations, in their order.
+    /// Values at the configured stations, in their order.
     pub stations: Vec<Option<f64>>,
 }

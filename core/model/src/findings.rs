@@ -1,4 +1,5 @@
-//! The output of a comparison: figures, judgement and sentences cross the plugin boundary as JSON (`platen.findings/1`).
+//! Output of a comparison: figures, judgement and sentences, which cross the plugin boundary as JSON
+//! (`platen.findings/1`).
 
 use serde::{Deserialize, Serialize};
 

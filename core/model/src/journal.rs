@@ -1,7 +1,7 @@
-//! The journal's records: the steps of a stroke that survive a power cut.
+//! Records of the journal: the steps of a stroke that must survive a power cut.
 //!
-//! Each promise to the press is journalled before it is made: no stroke is echoed as accepted before
-//! [`Record::Accepted`] is on the disk, no result is published before [`Record::Finished`] is.
+//! A commitment to the press is written to the disk before it is made. No stroke is echoed as accepted before
+//! [`Record::Accepted`] is on the disk, and no result is published before [`Record::Finished`] is.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Publication, StrokeData, StrokeKey};
 
-/// A step of a stroke that must survive a power cut.
+/// Step of a stroke that must survive a power cut.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Record {
-    /// The stroke is going to be echoed as accepted, then scanned.
+    /// The stroke will be echoed as accepted, then scanned.
     Accepted {
         /// Its identity.
         key: StrokeKey,
@@ -21,10 +21,10 @@ pub enum Record {
         /// Data of the press about it.
         data: Box<StrokeData>,
     },
-    /// The scan is taken.
+    /// The scan is complete.
     #[allow(missing_docs, reason = "the stroke")]
     Scanned { key: StrokeKey },
-    /// The result is going to be published.
+    /// The result will be published.
     Finished(Box<Publication>),
     /// The stroke is closed.
     #[allow(missing_docs, reason = "the stroke and its acknowledgement")]
@@ -51,7 +51,7 @@ impl Record {
     }
 }
 
-/// Stages of a stroke, in their order.
+/// Stage of a stroke, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
@@ -59,7 +59,7 @@ pub enum Stage {
     Accepted,
     /// Scanned, not judged.
     Scanned,
-    /// Judged; the press may not have the result.
+    /// Judged; the press may not have received the result.
     Finished,
     /// Closed.
     Acked,
@@ -73,12 +73,12 @@ pub enum Acknowledgement {
     Explicit,
     /// The press continued with the next stroke while the result was in the registers.
     NextStroke,
-    /// The press gave no sign that it has read the result: it continued or restarted before the result was in the registers, or its next
-    /// trigger rose before that.
+    /// The press gave no sign of having read the result: it continued or restarted before the result was in the
+    /// registers, or its next trigger rose before that.
     Never,
 }
 
-/// The last stroke in the journal.
+/// Last stroke in the journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     /// Its identity.
@@ -102,9 +102,10 @@ pub struct Recalled {
     pub result_seq: u16,
     /// Run id of the last stroke, 0 before the first.
     pub run_id: u32,
-    /// The last stroke accepted.
+    /// Last accepted stroke.
     pub last: Option<Entry>,
-    /// Highest attempt per stroke number in the session of [`last`](Self::last): the strokes not to scan again.
+    /// Highest attempt for each stroke number in the session of [`last`](Self::last): these strokes are not scanned
+    /// again.
     pub attempts: BTreeMap<u16, u16>,
 }
 

@@ -1,4 +1,4 @@
-//! Texts for people in each language.
+//! Texts for people, in each language.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ pub enum Language {
     Ja,
 }
 
-/// A text in each language.
+/// Text in each language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Texts {
     /// English.
@@ -44,7 +44,7 @@ pub struct Sentence {
 }
 
 impl Sentence {
-    /// Fills a text, its places in their order.
+    /// Creates a sentence from a text; `values` replace its placeholders in order.
     #[must_use]
     pub fn new(texts: Texts, values: &[&str]) -> Self {
         Self { en: fill(texts.en, values), ja: fill(texts.ja, values) }
@@ -60,7 +60,7 @@ impl Sentence {
     }
 }
 
-/// Fills the places `{}` of a text in their order.
+/// Replaces the placeholders `{}` of a text in order.
 #[must_use]
 pub fn fill(text: &str, values: &[&str]) -> String {
     let mut parts = text.split("{}");

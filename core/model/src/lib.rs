@@ -1,8 +1,8 @@
-//! The vocabulary of the workspace: one type for each idea that more than one room uses.
+//! Shared data model of the workspace: one type for each concept that is used by more than one crate.
 //!
 //! | module | types |
 //! |---|---|
-//! | `plate` | [`Plate`], [`Marker`], [`ReferenceLine`], [`Support`], [`Station`]: the plate as ordered and the places on it |
+//! | `plate` | [`Plate`], [`Marker`], [`ReferenceLine`], [`Support`], [`Station`]: the plate as ordered and the points on it |
 //! | `target` | [`Target`] and its shapes: the shape that the plate is bent toward |
 //! | `template` | [`Template`], [`Centre`], [`Seat`]: a template laid on a reference line |
 //! | `stroke` | [`StrokeKey`], [`StrokeData`]: identity of a stroke, and the press's data about it |
@@ -14,8 +14,8 @@
 //! | `alarm` | [`Code`]: numbers, texts and remedies of the alarms |
 //! | `language` | [`Language`], [`Texts`], [`Sentence`]: texts for people in each language |
 //!
-//! Lengths in metres, angles in radians, places as (u, v) on the original rectangle. [`units`] converts to the units of
-//! people. Plain data with serde: no I/O, no clock.
+//! Lengths are in metres, angles in radians, and points are (u, v) on the original rectangle. [`units`] converts to the
+//! units shown to people. The types are plain data with serde: no I/O, no clock.
 
 mod advice;
 mod alarm;

@@ -1,4 +1,4 @@
-//! The plate as ordered, and the places on it that are reported.
+//! Plate as ordered, with the points and lines on it that are reported.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub struct Plate {
     pub root_face: f64,
 }
 
-/// A place whose position is reported.
+/// Point whose position is reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
     /// Name.
@@ -30,12 +30,12 @@ pub struct Marker {
     pub at: [f64; 2],
 }
 
-/// A line along which the formed plate is cut, on the original rectangle.
+/// Line on the original rectangle along which the formed plate is cut.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrimLine {
     /// Name.
     pub name: String,
-    /// Points, metres; straight on the rectangle between them.
+    /// Points, metres; on the rectangle the line is straight between them.
     pub points: Vec<[f64; 2]>,
 }
 

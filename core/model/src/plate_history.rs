@@ -1,4 +1,5 @@
-//! The history of a plate: what an advisor reads beside the surfaces. It crosses the plugin boundary as JSON (`platen.record/1`).
+//! History of a plate: the input of an advisor besides the surfaces; it crosses the plugin boundary as JSON
+//! (`platen.record/1`).
 
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ pub struct PlateHistory {
     pub tells_depth: bool,
 }
 
-/// Records of before this was asked come from presses that tell it.
+/// Returns the default: records older than this field are from presses that report the depth.
 fn told() -> bool {
     true
 }

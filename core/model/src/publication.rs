@@ -1,18 +1,19 @@
-//! The result of a stroke as it goes to the press.
+//! Result of a stroke in the form that is sent to the press.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Code, Figures, StrokeKey, Timestamp, Verdict};
 
-/// Judgement of a stroke for the press. In documents `"pass"`, `"cannot_tell"`, `"fail"` or `{"not_measured": code}`.
+/// Judgement of a stroke for the press. In documents it is `"pass"`, `"cannot_tell"`, `"fail"` or `{"not_measured":
+/// code}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Judgement {
-    /// The verdict of a measurement.
+    /// Verdict of a measurement.
     Measured(Verdict),
-    /// No measurement, for this reason.
+    /// No measurement, with the reason.
     NotMeasured {
-        /// The reason.
+        /// Reason.
         not_measured: Code,
     },
 }
@@ -36,7 +37,7 @@ pub struct Measurement {
     pub figures: Figures,
     /// Time of the scan.
     pub scanned_at: Option<Timestamp>,
-    /// A warning that does not invalidate the result.
+    /// Warning that does not invalidate the result.
     pub warning: Option<Code>,
 }
 
@@ -71,7 +72,7 @@ impl Measurement {
     }
 }
 
-/// Result as it stands in the registers: written once, and written again word for word after a restart.
+/// Result as in the registers: written once, and written again word for word after a restart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Publication {
     /// Its stroke.
@@ -80,7 +81,7 @@ pub struct Publication {
     pub run_id: u32,
     /// Count of published results; the commit word.
     pub seq: u16,
-    /// Recipe that the plate was judged by.
+    /// Recipe by which the plate was judged.
     pub recipe_id: Option<u16>,
     /// The result.
     pub measurement: Measurement,

@@ -1,4 +1,4 @@
-//! Identity of a stroke, and the data that the press gives about it.
+//! Identity of a stroke, and the data that the press reports about it.
 
 use std::fmt;
 
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 /// Identity of a measurement. Each is scanned at most once.
 ///
-/// A stroke number recurs after a full turn of the press's counter in the same session; the `run_id` of a
-/// [`Publication`](crate::Publication) never does.
+/// A stroke number recurs in the same session after the press's counter has wrapped; the `run_id` of a
+/// [`Publication`](crate::Publication) never recurs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct StrokeKey {
     /// Plant number of the press.
     pub press: u16,
-    /// Session: a number that the press changes when it restarts or the part changes; 0 without one.
+    /// Session: a number that the press changes when it restarts or the part changes; 0 if it has none.
     pub session: u16,
     /// Number of the stroke.
     pub stroke: u16,
@@ -27,8 +27,8 @@ impl fmt::Display for StrokeKey {
     }
 }
 
-/// Data of the press about a stroke. `None`: not in this press's registers, not plausible, or 0 where 0 stands for
-/// "none" (thickness, force, ram, die).
+/// Data of the press about a stroke. `None` means: not in this press's registers, not plausible, or 0 where 0 stands
+/// for "none" (thickness, force, ram, die).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StrokeData {
     /// Number of the target shape.
@@ -62,13 +62,13 @@ pub struct StrokeData {
     /// Code of the crew, where the plant file has `[crews]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crew: Option<u16>,
-    /// A scan of the plate before its first stroke.
+    /// The scan is the one before the plate's first stroke.
     pub baseline: bool,
-    /// A trial: measured and recorded as one.
+    /// The stroke is a trial: it is measured, and recorded as a trial.
     pub dry_run: bool,
 }
 
-/// A time in UTC as seconds and milliseconds, which fit registers.
+/// Time in UTC as seconds and milliseconds, which fit registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Timestamp {
     /// Seconds since 1970-01-01.

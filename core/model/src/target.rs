@@ -1,4 +1,4 @@
-//! The target: the shape that the plate is bent toward.
+//! Target of a plate: the shape toward which it is bent.
 
 use serde::{Deserialize, Serialize};
 
@@ -53,8 +53,8 @@ pub enum TargetShape {
     },
 }
 
-/// Largest change of a cone's radius of normal curvature along its straight line, relative to its length: the tangent of the angle between
-/// line and axis. A roof of slope 1 : 20 is no longer told from flat.
+/// Largest change of a cone's radius of normal curvature along its straight line, relative to its length. It equals the
+/// tangent of the angle between line and axis. A roof of slope 1 : 20 is no longer distinguished from a flat one.
 pub const FLATTEST_CONE: f64 = 20.0;
 
 /// Surface that a radius refers to.

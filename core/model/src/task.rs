@@ -1,4 +1,4 @@
-//! The input of a comparison beside the surfaces: it crosses the plugin boundary as JSON (`platen.task/1`).
+//! Task of a comparison: its input besides the surfaces, which crosses the plugin boundary as JSON (`platen.task/1`).
 
 use serde::{Deserialize, Serialize};
 

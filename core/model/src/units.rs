@@ -1,4 +1,4 @@
-//! Conversion from the units inside to those of people: the only place where a length becomes millimetres.
+//! Conversion between the internal units and those shown to people: the only place where a length becomes millimetres.
 
 /// Converts metres to millimetres.
 #[must_use]
@@ -12,13 +12,13 @@ pub fn mm_pair(place: [f64; 2]) -> [f64; 2] {
     place.map(mm)
 }
 
-/// Converts millimetres, as a person gave them, to metres.
+/// Converts millimetres, as given by a person, to metres.
 #[must_use]
 pub fn metres(mm: f64) -> f64 {
     mm / 1000.0
 }
 
-/// Returns how values in a unit of a comparison's findings are printed: the ending of their name, and their factor.
+/// Returns how values in a unit of a comparison's findings are printed: the suffix of their name, and their factor.
 #[must_use]
 pub fn readable(unit: &str) -> (&'static str, f64) {
     match unit {

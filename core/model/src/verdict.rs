@@ -1,4 +1,4 @@
-//! The judgement of a plate.
+//! Verdict on a plate, ordered from good to bad.
 
 use serde::{Deserialize, Serialize};
 
@@ -33,13 +33,13 @@ impl Verdict {
         }
     }
 
-    /// Returns the verdict of this name.
+    /// Returns the verdict with this name.
     #[must_use]
     pub fn from_text(text: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|verdict| verdict.as_str() == text)
     }
 
-    /// Returns the words for people: the name with spaces.
+    /// Returns the verdict as readable text: the name with spaces.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
