@@ -1,7 +1,7 @@
 //! Errors of a measurement against the true shape of a simulated plate.
 //!
-//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`,
-//! `platen-sim scanner --truth`). Nothing of the measurement enters it, and it never enters a measurement.
+//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`, `platen-sim
+//! scanner --truth`). It does not depend on the measurement, and the measurement does not read it.
 
 use std::path::Path;
 
@@ -11,11 +11,11 @@ use platen_shape::{Surface, Vec3};
 
 use serde::Deserialize;
 
-/// Width of the strip along the edges whose surface errors are counted apart, metres.
+/// Width of the strip along the edges whose surface errors are counted separately, metres.
 pub const EDGE_STRIP: f64 = 0.1;
 /// Width of the strip along the edges whose curvature errors are not counted, metres.
 pub const CURVATURE_STRIP: f64 = 0.15;
-/// Newton steps of the projection of a point onto the face, from a start within millimetres.
+/// Newton steps of the projection of a point onto the face, from a start point within millimetres.
 const FOOT_STEPS: usize = 3;
 
 /// True shape of a plate; metres, scanner frame.
@@ -23,11 +23,12 @@ const FOOT_STEPS: usize = 3;
 pub struct Truth {
     /// Corners (0,0), (W,0), (W,H), (0,H) of the scanned face.
     pub corners_m: [[f64; 3]; 4],
-    /// Edges v = 0, u = W, v = H, u = 0 of the scanned face, counter-clockwise; on a bevelled plate inside of the rectangle.
+    /// Edges v = 0, u = W, v = H, u = 0 of the scanned face, counter-clockwise; on a bevelled plate they lie inside the
+    /// rectangle.
     pub edges: [Vec<[f64; 3]>; 4],
     /// Markers on the scanned face.
     pub markers: Vec<TrueMarker>,
-    /// Positions and curvatures at a few hundred places.
+    /// Positions and curvatures at a few hundred points.
     pub grid: TrueGrid,
     /// Positions, at most 50 mm apart.
     pub face: TrueFace,
@@ -44,12 +45,12 @@ pub struct TrueMarker {
     pub position_m: [f64; 3],
 }
 
-/// Even grid over the plate, edges included, v outer, u inner.
+/// Regular grid over the plate, edges included, v outer, u inner.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueGrid {
-    /// Places along u.
+    /// Points along u.
     pub nu: usize,
-    /// Places along v.
+    /// Points along v.
     pub nv: usize,
     /// On the scanned face.
     pub position_m: Vec<[f64; 3]>,
@@ -59,12 +60,12 @@ pub struct TrueGrid {
     pub kappa_v_per_m: Vec<f64>,
 }
 
-/// Even grid as [`TrueGrid`], positions only.
+/// Regular grid like [`TrueGrid`], positions only.
 #[derive(Debug, Clone, Deserialize)]
 pub struct TrueFace {
-    /// Places along u.
+    /// Points along u.
     pub nu: usize,
-    /// Places along v.
+    /// Points along v.
     pub nv: usize,
     /// On the scanned face.
     pub position_m: Vec<[f64; 3]>,
@@ -77,7 +78,7 @@ pub enum TruthError {
     /// Unreadable file.
     #[error("{path}: {source}; the simulated scanner writes it when its option truth_file is set")]
     Read { path: String, source: std::io::Error },
-    /// File that is no truth document.
+    /// File that is not a truth document.
     #[error(
         "{path}: not the truth of a scan: {what}; rebuild the simulated driver together with this program"
     )]
@@ -113,16 +114,16 @@ pub struct Accuracy {
     pub markers_mean: f64,
     /// Largest distance of a marker.
     pub markers_worst: f64,
-    /// Root mean square distance of the true face from the measured one along its normal, beyond [`EDGE_STRIP`].
+    /// Root mean square distance of the true face from the measured one along its normal, outside of [`EDGE_STRIP`].
     pub surface_inside: f64,
-    /// The same within it.
+    /// The same inside of [`EDGE_STRIP`].
     pub surface_edge: f64,
-    /// Sides along u of the cells of a lattice drawn on the plate (21 x 21 places): measured minus true, root mean square
-    /// about zero, so that a bias counts.
+    /// Sides along u of the cells of a lattice drawn on the plate (21 x 21 points): measured minus true, root mean
+    /// square about zero, so that a bias is included.
     pub side_u: f64,
     /// Sides along v.
     pub side_v: f64,
-    /// Angles of these cells.
+    /// Angles of the same cells.
     pub angle: f64,
     /// Curvatures along u and v, root mean square, without [`CURVATURE_STRIP`].
     pub curvature: f64,
@@ -159,13 +160,13 @@ impl Accuracy {
     }
 }
 
-/// Returns the root mean square, 0 for no values.
+/// Returns the root mean square; 0 without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (n, sum) = values.into_iter().fold((0_usize, 0.0), |(n, sum), x| (n + 1, sum + x * x));
     (sum / n.max(1) as f64).sqrt()
 }
 
-/// Returns (u, v) of the k-th node of an even grid over the plate.
+/// Returns (u, v) of the k-th node of a regular grid over the plate.
 fn place(surface: &Surface, k: usize, [nu, nv]: [usize; 2]) -> [f64; 2] {
     [
         surface.width() * (k % nu) as f64 / (nu - 1) as f64,
@@ -188,8 +189,8 @@ fn heights(surface: &Surface, truth: &TrueFace) -> (Vec<f64>, Vec<f64>) {
     (inside, edge)
 }
 
-/// Returns the height of a point over the measured face at its orthogonal projection: the point's own (u, v) contains the
-/// error of the flattening.
+/// Returns the height of a point over the measured face at its orthogonal projection. The point's own (u, v) is not
+/// used, since it contains the error of the flattening.
 fn height(surface: &Surface, [mut u, mut v]: [f64; 2], point: Vec3) -> f64 {
     for _ in 0..FOOT_STEPS {
         let at = surface.derivatives(u, v);

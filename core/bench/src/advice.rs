@@ -1,9 +1,13 @@
-//! Study of the advice: plates of a hidden steel, bent to their target by the advice and by four shop strategies.
+//! Study of the advice: simulated plates of unknown steel are bent to their target by the advice and by four strategies
+//! of a shop.
 //!
-//! The steel is the simulator's fibre model, of which the advice knows nothing ([`hidden_plate`]); press, die and operator err as in a
-//! shop. Plates are bent until every board passes with the uncertainty of its gap, or until 60 strokes. A plate counts as too far when a
-//! gap of the true plate exceeded the limit on a plate more hollow than the template, once on the way. One dimension: the same along a
-//! bend line everywhere, no weight of the plate, no tilt of the ram.
+//! The steel is the simulator's fibre model, and the advice has no access to it ([`hidden_plate`]). Press, die and
+//! operator have the errors of a shop. A plate is bent until the gap under every template (board) plus its uncertainty
+//! is within the limit, or until 60 strokes. A plate counts as bent too far if, once on the way, a gap of the true
+//! plate exceeded the limit where the plate is more hollow than the template.
+//!
+//! Limits: the model has one dimension. The bend is the same everywhere along a bend line; the weight of the plate and
+//! the tilt of the ram are left out.
 
 #[cfg(test)]
 mod crews;
@@ -24,10 +28,10 @@ use crate::seeds::shared;
 use hidden_plate::{Order, Shop};
 use strategies::{Advised, DepthTable, Outcome, Strategy};
 
-/// Plates that teach the press before those that count.
+/// Number of plates from which the press is learned, before the plates that count.
 const TAUGHT: u64 = 10;
 
-/// A row of the study: plates of one order, a shop, a strategy.
+/// Row of the study: plates of one order, a shop, a strategy.
 struct Row {
     order: Order,
     shop: Shop,
@@ -51,15 +55,15 @@ struct Figures {
     unfinished: usize,
     gap_end_mean_mm: f64,
     gap_end_max_mm: f64,
-    /// Shares of made angles and of gaps inside the stated 95 % intervals; `None` without advice.
+    /// Shares of measured angles and of gaps inside the stated 95 % intervals; `None` without advice.
     angle_inside: Option<f64>,
     gap_inside: Option<f64>,
     /// Share of the strokes for which nothing was advised.
     not_advised: Option<f64>,
-    /// Plates on which the advice said that the press is too coarse.
+    /// Plates on which the advice stated that the press is too coarse.
     said_too_coarse: Option<usize>,
-    /// Plates on which the first stroke came out so far off that the advice asked for a look at plate and die, and share of the third strokes
-    /// inside their interval.
+    /// Plates on which the first stroke deviated so much that the advice requested a check of plate and die, and share
+    /// of the third strokes inside their interval.
     said_look: Option<usize>,
     third_inside: Option<f64>,
     advise_ms: Option<f64>,
@@ -108,7 +112,7 @@ pub(super) fn study(arguments: &BenchArguments, json: bool) -> Result<Json, CliE
     Ok(json!(all))
 }
 
-/// Bends the plates of a row. The first teach the press, where the strategy learns.
+/// Bends the plates of a row. The press is learned from the first plates, if the strategy learns.
 fn figures(row: &Row, table: &DepthTable, seed: u64, threads: usize) -> Result<Figures, CliError> {
     let Row { order, shop, strategy, plates } = row;
     let seed = seed.wrapping_mul(1_000_003);

@@ -1,4 +1,4 @@
-//! `platen bench`: accuracy, time and memory of the method on simulated scans, and the tables of Masuda et al.
+//! Command `platen bench`: accuracy, time and memory of the method on simulated scans, and the tables of Masuda et al.
 
 use std::process::ExitCode;
 

@@ -6,7 +6,8 @@ use crate::accuracy::Accuracy;
 
 use serde_json::{Map, Value as Json, json};
 
-/// Figure of errors of type `E`: name in documents, head in tables, value in the unit of the name, digits after the point.
+/// Figure of errors of type `E`: name in documents, head in tables, value in the unit of the name, digits after the
+/// point.
 pub(super) type Figure<E> = (&'static str, &'static str, fn(&E) -> f64, usize);
 
 pub(super) const OF_MEASUREMENT: [Figure<Accuracy>; 9] = [

@@ -1,4 +1,5 @@
-//! The program `platen-bench`, which `platen bench` and `platen press soak` start: off the path of a plant's computer.
+//! Benchmark program `platen-bench`, started by `platen bench` and `platen press soak`; it is not needed on a plant's
+//! computer.
 //!
 //! | module | contents |
 //! |---|---|
@@ -6,7 +7,7 @@
 //! | `tables` | tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", beside this machine's figures |
 //! | `seeds`, `strokes` | accuracy over many seeds: plates of every shape, strokes, templates |
 //! | `random` | accuracy over random scenes, coverage of the stated intervals |
-//! | `advice` | plates of a hidden steel bent by the advice and by shop strategies |
+//! | `advice` | simulated plates of unknown steel, bent by the advice and by strategies of a shop |
 //! | `scale` | time and memory from 1.6 to 44 million cells |
 //! | `soak` | strokes against a simulated press on a faulty line |
 //! | `accuracy` | the difference of a measurement from the known truth |

@@ -5,7 +5,8 @@ use std::time::Duration;
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
-/// Returns the processor time of this process so far, all threads together; other load of the machine hardly enters it.
+/// Returns the processor time of this process so far, summed over all threads; other load of the machine has little
+/// effect on it.
 pub(super) fn cpu_time() -> Duration {
     time_of(ClockId::ProcessCPUTime)
 }
@@ -21,14 +22,15 @@ fn time_of(clock: ClockId) -> Duration {
     Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or(0))
 }
 
-/// Returns the peak resident memory of this process so far, in units of 2^20 bytes; `None` where the system does not report it.
+/// Returns the peak resident memory of this process so far, in units of 2^20 bytes; `None` where the system does not
+/// report it.
 pub(super) fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().trim_end_matches(" kB").parse::<f64>().ok()? / 1024.0)
 }
 
-/// Machine that the figures are of.
+/// Machine on which the figures were measured.
 #[derive(Debug, Serialize)]
 pub(super) struct Machine {
     /// Model of the processor.

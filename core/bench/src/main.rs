@@ -1,4 +1,4 @@
-//! The program `platen-bench`.
+//! Program `platen-bench`.
 
 fn main() -> std::process::ExitCode {
     platen_bench::main()

@@ -1,15 +1,27 @@
-//! Random scenes of known truth: errors, coverage of the stated 95 % intervals, and gross errors with what the program said.
+//! Accuracy over random scenes of known truth: errors, coverage of the stated 95 % intervals, and gross errors with the
+//! program's output.
 //!
-//! A scene follows from its seed alone ([`RandomScene::of`]): a plate of 2 to 5 x 1.5 to 4 m, 25 to 50 mm thick, of any shape of the
-//! simulator, concave or convex, at any heading, 6 to 11 m away (horizontally, its middle), the scanner 3 to 5 m above it, steps of 0.03 to 0.055 degrees, range
-//! noise of 0.3 to 1.5 mm at 10 m on mill scale, the plate's reflectivity 0.1 to 0.6, a person or a chain in a third of the scenes each, a
-//! cyclic range error of up to 0.3 mm in a third.
-//! The truth is the simulator's; lengths and angles of the true outline follow the definitions of
-//! [`ShapeChecks`], so that a figure is compared with the same figure.
+//! A scene depends on its seed alone ([`RandomScene::of`]). The properties are drawn from these ranges:
 //!
-//! Families ([`Family`]) share these scenes: square edges and normal range errors; edges with a double-V bevel of 20 to 40 degrees, in half
-//! of the scenes with a root face of up to 6 mm; a share of wide range errors; a table that shows in one to two rows beyond the far edges;
-//! a person before the nearest corner; a beam with power beyond its 1/e^2 width. Several scans of each scene tell a bias from scatter ([`repeated`]).
+//! - plate: 2 to 5 x 1.5 to 4 m, 25 to 50 mm thick, any shape of the simulator, concave or convex, at any heading
+//! - position: the plate's middle 6 to 11 m away horizontally, the scanner 3 to 5 m above it
+//! - scan: steps of 0.03 to 0.055 degrees, range noise of 0.3 to 1.5 mm at 10 m on mill scale, reflectivity of the
+//!   plate 0.1 to 0.6
+//! - disturbances: a person, or a chain, each in a third of the scenes; a cyclic range error of up to 0.3 mm in a third
+//!
+//! The truth is that of the simulator. Lengths and angles of the true outline follow the definitions of
+//! [`ShapeChecks`], so that each figure is compared with the same figure.
+//!
+//! Families ([`Family`]) share these scenes and differ in one property:
+//!
+//! - square edges and normal range errors
+//! - edges with a double-V bevel of 20 to 40 degrees, in half of the scenes with a root face of up to 6 mm
+//! - a share of wide range errors
+//! - a table that is visible in one to two rows beyond the far edges
+//! - a person before the nearest corner
+//! - a beam with power beyond its 1/e^2 width
+//!
+//! Several scans of each scene separate bias from scatter ([`repeated`]).
 
 mod laid_template;
 mod plate_scene;
@@ -39,18 +51,18 @@ use stated::{Errors, KINDS, Kind, Stated};
 
 use serde_json::{Value as Json, json};
 
-/// Figures of corners beyond this are far off, metres.
+/// Errors of corners above this are far off, metres.
 const FAR: f64 = 1e-3;
 
-/// One scene, measured.
+/// Measurement of one scene.
 struct Outcome {
     seed: u64,
-    /// Number of the scan of this scene, from 0; people read it from 1.
+    /// Number of the scan of this scene, from 0; it is shown to people from 1.
     scan: u64,
     scene: String,
     /// Amplitude of the cyclic range error, millimetres.
     cyclic_mm: f64,
-    /// Widest distance of samples across an edge, metres.
+    /// Largest distance of samples across an edge, metres.
     spacing: f64,
     result: Result<Errors, String>,
 }
@@ -105,7 +117,7 @@ pub(super) fn random(
     }))
 }
 
-/// Returns the figures of each scene over its scans; none of a scene that was measured once.
+/// Returns the figures of each scene over its scans; none for a scene that was measured once.
 fn over_scans(outcomes: &[Outcome]) -> Vec<(u64, Vec<Repeated>)> {
     let of_scene = |scans: &[Outcome]| {
         let measured: Vec<&[Stated]> =
@@ -127,7 +139,7 @@ fn errors(
     let seen = stages::see(shot).map_err(refused)?;
     let measurement = stages::shape(shot, &seen, flattening).map_err(refused)?;
     let surface = &measurement.surface;
-    // Without a calibration the instrument's own figure.
+    // Without a calibration the instrument's own figure is used.
     let own = || ScannerError::known(RangeError::new(shot.header.range_error_m.unwrap_or(0.0)), surface);
     let scanner = calibration.map_or_else(own, |of| ScannerError::calibrated(of, surface));
     let mut errors =
@@ -142,7 +154,8 @@ struct Summary {
     n: usize,
     /// Median, 95th percentile and largest absolute error, in the unit of the name.
     quantiles: [f64; 3],
-    /// Share of errors inside their 95 % interval: of all scenes, of those without and with a cyclic range error.
+    /// Share of errors inside their 95 % interval: for all scenes, for those without and those with a cyclic range
+    /// error.
     coverage: [f64; 3],
     /// Root mean square of error over standard deviation.
     ratio: f64,
@@ -193,10 +206,11 @@ impl Summary {
     }
 }
 
-/// Figures of corners that are far off and outside of their 95 % interval.
+/// Corner figures that are far off and outside of their 95 % interval.
 struct FarCorners {
     found: usize,
-    /// As many as there would be if all errors were normally distributed with the stated standard deviations: a twentieth of all figures is outside.
+    /// Expected number if all errors were normally distributed with the stated standard deviations: a twentieth of all
+    /// figures is outside.
     expected: f64,
 }
 

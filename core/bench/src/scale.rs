@@ -1,7 +1,7 @@
-//! Time and memory of one measurement, from the scan of the tables to a full dome, columns streamed.
+//! Time and memory of one measurement with streamed columns, from the scan of the tables to a full dome.
 //!
-//! Each lattice is measured in a process of its own. Its peak memory is that of one measurement and of the ray caster in
-//! the same process.
+//! Each lattice is measured in a process of its own. Its peak memory is that of one measurement and of the ray caster
+//! in the same process.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -53,11 +53,11 @@ struct Row {
     rows: u32,
     columns: u32,
     plate_points: usize,
-    /// Extraction while columns arrive.
+    /// Time of extraction while columns arrive.
     columns_ms: f64,
-    /// From the last column to the plate's face.
+    /// Time from the last column to the plate's face.
     extract_ms: f64,
-    /// From the plate's face to S(u, v).
+    /// Time from the plate's face to S(u, v).
     measure_ms: f64,
     /// Size of all cells uncompressed.
     raw_lattice_mb: f64,
@@ -135,7 +135,7 @@ fn here(
     }
     scan.finish()?;
     drop(scan);
-    // Its memory is not that of measuring.
+    // The scanner's memory does not belong to the measurement.
     drop(scanner);
     let start = machine::cpu_time();
     let patch = extractor.finish().map_err(|e| failed(&e))?;

@@ -1,8 +1,8 @@
-//! Simulated scans with known truth, through the library of the driver `simulated`.
+//! Simulated scans with known truth, acquired through the library of the driver `simulated`.
 //!
-//! Scan and truth come from one call of the driver: the columns over the plugin boundary, the truth through the file of its
-//! option `truth_file`. Every seed has errors of its own and shifts and turns the plate, so that the lattice meets its edges
-//! differently each time.
+//! Scan and truth come from one call of the driver: the columns over the plugin boundary, the truth through the file of
+//! its option `truth_file`. Every seed has errors of its own and shifts and turns the plate, so that its edges lie
+//! differently on the lattice each time.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -23,7 +23,7 @@ use crate::accuracy::Truth;
 pub(super) const SCAN_LIMIT: Duration = Duration::from_secs(3600);
 /// Angle between cells of the scans of `accuracy`, degrees: 6 mm at 7 m.
 const STEP_DEG: f64 = 0.05;
-/// Margin round their plates, degrees: enough to show the edges.
+/// Margin scanned round the plates, degrees: wide enough for the edges.
 const MARGIN_DEG: f64 = 2.0;
 /// Largest shift of the plate from seed to seed, metres: many lattice steps.
 const SHIFT: f64 = 0.05;
@@ -41,8 +41,8 @@ pub(super) struct Scene {
     pub(super) shape: String,
     /// Centre of the mid-surface in the scanner frame, millimetres.
     pub(super) centre_mm: [f64; 3],
-    /// Distance of the face's edge inside the mid-surface's edge, and height of the root face between the flanks of the bevel,
-    /// millimetres; 0 for square edges.
+    /// Distance of the face's edge inside the mid-surface's edge, and height of the root face between the flanks of the
+    /// bevel, millimetres; 0 for square edges.
     pub(super) bevel_mm: [f64; 2],
     /// Direction of u, counter-clockwise from the line of sight, degrees.
     pub(super) yaw_deg: f64,
@@ -105,7 +105,7 @@ impl Scene {
         }
     }
 
-    /// Returns the simulator's description of the plate in its pose for this seed.
+    /// Returns the simulator's description of the plate in the pose of this seed.
     fn description(&self, seed: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut swing = |reach: f64| reach * (2.0 * random.f64() - 1.0);

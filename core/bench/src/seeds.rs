@@ -1,6 +1,6 @@
 //! Accuracy over many simulated scans: each scene with several seeds, measured with each flattening.
 //!
-//! Threads share the cases; the results do not depend on their number.
+//! The cases are distributed to threads; the results do not depend on the number of threads.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,7 +19,7 @@ use crate::strokes::{self, OF_STROKE, StrokeErrors};
 
 use serde_json::{Value as Json, json};
 
-/// Returns plates of a shop, 7 m away, scanned face concave.
+/// Returns plates of a shop, 7 m away, with the scanned face concave.
 pub(super) fn scenes() -> Vec<Scene> {
     let scene = |name: &str, size_mm: [f64; 3], yaw_deg: f64, shape: &str| Scene {
         name: name.into(),
@@ -136,7 +136,8 @@ fn pairs(
     Ok(rows.map(|(noise_mm, errors)| PairRow { noise_mm: *noise_mm, errors: errors.to_vec() }).collect())
 }
 
-/// Runs `work` for every case on several threads, each with tools of its own; returns the results in the order of the cases.
+/// Runs `work` for every case on several threads, each with its own tools; returns the results in the order of the
+/// cases.
 pub(super) fn shared<C: Sync, T, R: Send>(
     cases: &[C],
     threads: usize,

@@ -1,8 +1,8 @@
-//! `platen press soak`: the host's press side against a simulated press on a faulty line, stroke after stroke.
+//! Command `platen press soak`: the host's press side against a simulated press on a faulty line, for many strokes.
 //!
-//! The press is `platen-sim` in a process of its own, which counts strokes, results and writes. A stand-in answers for scanner
-//! and evaluation: the figures of every result identify its stroke, so that a result under another stroke's number is
-//! detected.
+//! The press is `platen-sim` in a process of its own, which counts strokes, results and writes. A substitute answers
+//! for scanner and evaluation. The figures of every result identify its stroke, so that a result under another stroke's
+//! number is detected.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -25,15 +25,16 @@ use tokio::sync::mpsc;
 
 /// Strokes on one plate; the next part follows in a new session.
 const PER_PART: u64 = 50;
-/// Interval of reading the press's counts.
+/// Interval between reads of the press's counts.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Time without a result after which the run has failed: far more than a stroke takes on the worst of these lines.
+/// Time without a result after which the run has failed: far longer than a stroke takes on the worst of these lines.
 const STANDSTILL: Duration = Duration::from_secs(60);
 /// Shortest and longest delay of a late answer; the silence of the host on a serial line must be longer.
 const LATE_MS: [u64; 2] = [150, 350];
-/// Heartbeat limit of the press: a faulty serial line may interrupt the host's heartbeat for longer than a real press allows.
+/// Heartbeat limit of the press: a faulty serial line may interrupt the host's heartbeat for longer than a real press
+/// allows.
 const HOST_MS: u64 = 10_000;
-/// Limit of writes, out of the way: strokes come as fast as the line carries them.
+/// Limit of writes, set high enough to have no effect: strokes follow as fast as the line allows.
 const WRITES_PER_S: u32 = 1000;
 
 /// Counts of the press.
@@ -65,10 +66,10 @@ struct Outcome {
     counts: Counts,
     /// Number of results with another stroke's figures.
     wrong_figures: u64,
-    /// Number of scans ordered, and of those for a stroke that had been scanned before.
+    /// Number of scans ordered, and of those that were ordered for a stroke scanned before.
     scans: u64,
     scanned_twice: u64,
-    /// Times on the press's clock from the trigger to the echo of the stroke's number.
+    /// Times from the trigger to the echo of the stroke's number, on the press's clock.
     trigger_to_busy: Durations,
     elapsed: Duration,
     stopped: bool,
@@ -97,7 +98,7 @@ impl Outcome {
     }
 }
 
-/// Runs the strokes; exit code 0 when nothing was wrong, doubled or lost.
+/// Runs the strokes; exit code 0 if no result was wrong, doubled or lost.
 pub(crate) fn run(common: &Common, arguments: &SoakArguments) -> Result<ExitCode, CliError> {
     press::report(common, soak_strokes(common, arguments))
 }

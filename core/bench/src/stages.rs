@@ -1,4 +1,4 @@
-//! Measurement of a scan in memory, each stage timed in processor time.
+//! Timed measurement of a scan in memory: the processor time of each stage.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use platen_shape::outline::{Outline, outline};
 use crate::machine::cpu_time;
 use crate::scene::Shot;
 
-/// Time limit of flattening one mesh, far beyond a press's, for slow plugins and large meshes.
+/// Time limit of flattening one mesh, far longer than that of a press, for slow plugins and large meshes.
 const FLATTENING_LIMIT: Duration = Duration::from_secs(120);
 
 /// Processor time of each stage.
@@ -81,7 +81,7 @@ pub(super) fn run(shot: &Shot, flattening: &mut Flattening) -> Result<Run, NotMe
     Ok(Run { seen, measurement, stages })
 }
 
-/// Returns the median; of an even number of times, the smaller of the two in the middle.
+/// Returns the median; for an even number of times, the smaller of the two in the middle.
 pub(super) fn median(mut times: Vec<Duration>) -> Duration {
     times.sort_unstable();
     times.get(times.len().saturating_sub(1) / 2).copied().unwrap_or_default()
@@ -92,8 +92,8 @@ pub(super) fn ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// Loads the flattening plugins of these names with their default options, in threads of this process: their time and memory are part of
-/// its own.
+/// Loads the flattening plugins with these names and their default options in threads of this process, so that its time
+/// and memory include theirs.
 pub(crate) fn flattenings(catalogue: &Catalogue, names: &[String]) -> Result<Vec<Flattening>, CliError> {
     let catalogue = &catalogue.clone().isolated(Isolation::InProcess);
     let load = |name: &String| {

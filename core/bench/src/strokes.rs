@@ -1,7 +1,8 @@
 //! Errors of the comparisons `displacement`, `curvature` and `template` on pairs of simulated scans.
 //!
-//! A plate with two bend bands is scanned, receives a third band, is scanned, and is scanned again unchanged: a stroke and a
-//! null pair. Between scans it is shifted and turned, as on a press.
+//! A plate with two bend bands is scanned. It receives a third band and is scanned again, then scanned once more
+//! unchanged. The first pair is a stroke, the second a null pair. Between scans the plate is shifted and turned, as on
+//! a press.
 
 use std::path::Path;
 use std::time::Duration;
@@ -93,7 +94,8 @@ impl Tools {
     }
 }
 
-/// Scans a plate before and after a stroke and once more, and a rolled plate, and returns the errors of the comparisons.
+/// Scans a plate before and after a stroke and once more, and a rolled plate, and returns the errors of the
+/// comparisons.
 pub(super) fn errors(
     catalogue: &Catalogue,
     folder: &Path,
@@ -112,7 +114,7 @@ pub(super) fn errors(
             bevel_mm: [0.0; 2],
             yaw_deg: 10.0,
         };
-        // Four scans a seed, none with the errors of another.
+        // Four scans for each seed, with different errors.
         let setting = Setting::of_accuracy(noise_mm, seed.wrapping_mul(4).wrapping_add(number));
         let shot = scene.scan(catalogue, folder, setting, &[])?;
         let run = stages::run(&shot, &mut tools.flattening).map_err(|e| failed(&e))?;
@@ -189,8 +191,8 @@ fn task() -> Task {
     }
 }
 
-/// Returns the true gap: a template of the target face's radius touches the flatter plate with its middle, and its ends stand
-/// off by the difference of the sagittas.
+/// Returns the true gap: a template with the radius of the target face touches the flatter plate with its middle, and
+/// the gap at its ends is the difference of the sagittas.
 fn true_gap() -> f64 {
     let half_thickness = metres(0.5 * SIZE_MM[2]);
     let sagitta = |radius: f64| radius - (radius * radius - 0.25 * CHORD * CHORD).sqrt();
@@ -198,7 +200,7 @@ fn true_gap() -> f64 {
 }
 
 /// Returns the root mean square errors of a displacement field at the true grid, along the normal and as a vector. The
-/// plate's own motion is no part of them: the true grid before is moved rigidly onto the places before of the field.
+/// rigid motion of the plate is excluded: the true grid before is moved rigidly onto the positions before of the field.
 fn displacement(field: &Field, now: &Surface, truth: [&Truth; 2]) -> [f64; 2] {
     let [before, after] = truth.map(|truth| &truth.grid);
     let [n_u, n_v] = field.nodes;

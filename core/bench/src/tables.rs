@@ -1,7 +1,8 @@
-//! Tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", on a
-//! simulated scan of the same size.
+//! Benchmark tables: tables 1 to 4 of Masuda et al., "Point-based shape monitoring of plate bending for large-scale
+//! storage tanks", on a simulated scan of the same size.
 //!
-//! The published times are of one Intel i7 at 3.07 GHz; those beside them are processor time of this machine.
+//! The published times were measured on an Intel i7 at 3.07 GHz; the times beside them are processor time of this
+//! machine.
 
 use std::path::Path;
 use std::time::Duration;
@@ -41,14 +42,14 @@ const PAPER_FLATTENING: [(usize, [f64; 2]); 5] = [
 /// ABF and harmonic map: standard deviation of d_u and d_v in millimetres and of the angle in degrees.
 const PAPER_CELLS: [(&str, [f64; 3]); 2] =
     [("paper, abf", [0.8, 0.4, 0.14]), ("paper, harmonic", [0.8, 0.4, 0.15])];
-/// Nine markers, mean error, millimetres.
+/// Mean error of nine markers, millimetres.
 const PAPER_MARKERS_MM: f64 = 1.0;
 
 /// Meshes above this size are flattened at most three times.
 const LARGE_MESH: usize = 20_000;
 
-/// Returns the plate: 11 square metres, rolled with its straight lines oblique to its edges; the published pitch gives the
-/// published number of points on it.
+/// Returns the plate: 11 square metres, rolled with its straight lines oblique to its edges. The published pitch gives
+/// the published number of points on it.
 pub(super) fn scene() -> Scene {
     Scene {
         name: "rolled".into(),

@@ -1,4 +1,5 @@
-//! Crews of identical hands on the hidden steel, one of them with hard heats: their figures must not tell them apart.
+//! Test of the crew comparison: two crews with identical skill, one of them with hard heats of steel, must not differ
+//! significantly.
 #![allow(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 use platen_report::skill::{PlateSkill, Skill};
@@ -6,13 +7,13 @@ use platen_report::skill::{PlateSkill, Skill};
 use super::hidden_plate::{Order, Shop};
 use super::strategies::{self, DepthTable, Strategy};
 
-/// Plates of a crew in a trial, and trials.
+/// Plates of a crew in a trial, and number of trials.
 const PLATES: u64 = 20;
 const TRIALS: u64 = 20;
-/// Yield strength of the hard heats, relative to the other crew's.
+/// Yield strength of the hard heats, relative to that of the other crew.
 const HARD: f64 = 1.1;
 
-/// Plates of one crew, bent by hand on steel of this yield strength.
+/// Returns the plates of one crew, bent by hand on steel of this yield strength.
 fn crew(code: u16, seeds: std::ops::Range<u64>, yields: f64, table: &DepthTable) -> Vec<PlateSkill> {
     let (order, shop) = (Order::cylinder(3.0, 9.0), Shop::with_steel(yields));
     let plate = |seed| {
@@ -32,7 +33,8 @@ fn crew(code: u16, seeds: std::ops::Range<u64>, yields: f64, table: &DepthTable)
     seeds.map(plate).collect()
 }
 
-/// Found: 2 of 100 pairs told apart, hardness of the crews 0.41 and 0.61 mm; here 20 pairs, as 100 take minutes.
+/// Found: 2 of 100 pairs differ significantly, hardness of the crews 0.41 and 0.61 mm. Here 20 pairs are tested, as 100
+/// take minutes.
 #[test]
 fn identical_hands_are_not_told_apart_by_their_steel() {
     let table = DepthTable::new();
@@ -51,6 +53,6 @@ fn identical_hands_are_not_told_apart_by_their_steel() {
         told_apart += usize::from(skill.differences[0].is_significant());
     }
     println!("{told_apart} of {TRIALS} pairs told apart; hardness {hardness:.2?} mm");
-    // 1 is expected; of 20 pairs more than 3 are told apart in one of 60 runs.
+    // 1 is expected; of 20 pairs more than 3 differ significantly in one of 60 runs.
     assert!(told_apart <= 3, "{told_apart}");
 }

@@ -1,4 +1,4 @@
-//! Plates, presses and scans of the study: what the advice is not told.
+//! Plates, presses and scans of the study, with the properties that are hidden from the advice.
 
 use fastrand::Rng;
 use nalgebra::DVector;
@@ -13,7 +13,7 @@ use platen_sim_plate::{FibreSteel, FibreStrip, Press};
 /// Thickness, metres, and mean yield strength, pascals, as ordered.
 pub(super) const THICKNESS: f64 = 0.036;
 pub(super) const YIELD: f64 = 440e6;
-/// Die opening as marked, metres.
+/// Nominal die opening, metres.
 pub(super) const OPENING: f64 = 0.36;
 /// Uncertainty of a gap, metres.
 pub(super) const UNCERTAINTY: f64 = 0.2e-3;
@@ -22,7 +22,7 @@ const SPAN: f64 = 0.1;
 const COEFFICIENT: f64 = 0.02e-3;
 /// Standard deviations of a measured bend: angle, radians, and place, metres.
 const BEND: [f64; 2] = [0.3e-3, 3e-3];
-/// A smaller change is not told from none, radians.
+/// Smallest change that is distinguished from none, radians.
 const LEAST: f64 = 2.5e-3;
 
 /// A plate as ordered.
@@ -31,7 +31,7 @@ pub(super) struct Order {
     pub(super) name: String,
     pub(super) task: Task,
     pub(super) lines: BendLines,
-    /// The first half of the plate comes bent to the target.
+    /// The first half of the plate is delivered bent to the target.
     half_bent: bool,
 }
 
@@ -41,12 +41,12 @@ pub(super) struct Shop {
     pub(super) name: String,
     /// Standard deviation of the ram about the wanted depth, metres.
     ram: f64,
-    /// Standard deviation of the place of a bend, and offset of the die from its mark, metres.
+    /// Standard deviation of the position of a bend, and offset of the die from its mark, metres.
     place: f64,
     pub(super) off_mark: f64,
-    /// Share of the strokes that stop short.
+    /// Share of the strokes that stop before their depth.
     short: f64,
-    /// Plates are thicker than told by this, metres.
+    /// Plates are thicker than stated by this, metres.
     thicker: f64,
     /// Yield strength of the steel, relative to that of the plate file.
     yields: f64,
@@ -77,7 +77,7 @@ impl Shop {
         Self { yields, ..Self::of("usual") }
     }
 
-    /// Returns presses that are worse in one respect each.
+    /// Returns presses that are each worse in one respect.
     pub(super) fn worse() -> Vec<Self> {
         vec![
             Self { ram: 0.3e-3, ..Self::of("ram repeats to 0.3 mm") },
@@ -88,7 +88,8 @@ impl Shop {
         ]
     }
 
-    /// Returns shops whose plate files are wrong. They have no like plates, which would teach what the file does not tell.
+    /// Returns shops whose plate files are wrong. They have no earlier plates of the same class, from which the true
+    /// values would be learned.
     pub(super) fn wrong_files() -> Vec<Self> {
         vec![
             Self { yields: 1.25, ..Self::of("steel 25 % stronger than told") },
@@ -99,7 +100,7 @@ impl Shop {
 }
 
 impl Order {
-    /// A cylinder of this radius on a plate `width` long across the bends, metres.
+    /// Returns a cylinder of this radius on a plate of length `width` across the bends, metres.
     pub(super) fn cylinder(width: f64, radius: f64) -> Self {
         let axis = 90.0_f64.to_radians();
         Self::new(
@@ -110,7 +111,7 @@ impl Order {
         )
     }
 
-    /// The other orders of the study.
+    /// Returns the other orders of the study.
     pub(super) fn others() -> Vec<Self> {
         let axis = |deg: f64| deg.to_radians();
         vec![
@@ -146,7 +147,7 @@ impl Order {
     fn new(name: &str, [width, height]: [f64; 2], shape: TargetShape, half_bent: bool) -> Self {
         let along_u = matches!(shape, TargetShape::Cylinder { axis, .. } | TargetShape::Cone { axis, .. } if axis.sin().abs() > 0.5);
         let parallel = matches!(shape, TargetShape::Cylinder { axis, .. } if axis.sin().abs() > 0.99 || axis.cos().abs() > 0.99);
-        // Where all boards would show the same, one is enough.
+        // Where all templates would show the same gap, one is enough.
         let shares: &[f64] = if parallel { &[0.5] } else { &[0.08, 0.5, 0.92] };
         let line = |(k, share): (usize, &f64)| {
             let (from, to) = if along_u {
@@ -197,12 +198,12 @@ impl Order {
         self.target().map_or(0.0, |target| target.curvature(middle[0], middle[1]).strongest().abs())
     }
 
-    /// Returns the curvature across the lines that the target has at the middle of line x, 1/m.
+    /// Returns the curvature across the lines of the target at the middle of line x, 1/m.
     fn half(&self, x: f64) -> f64 {
         if self.half_bent && x < 0.5 * self.lines.length() { self.curvature() } else { 0.0 }
     }
 
-    /// Lays the boards on a plate with this curvature across the lines in the middle of the plate, 1/m.
+    /// Lays the templates on a plate with this curvature across the lines in the middle of the plate, 1/m.
     pub(super) fn boards(&self, curvature: &dyn Fn(f64) -> f64) -> Vec<Board> {
         let Some(target) = self.target() else { return Vec::new() };
         let in_the_middle = self.curvature();
@@ -214,7 +215,8 @@ impl Order {
                 let [c, s] = self.lines.direction(x);
                 let crossing = along[1] * c - along[0] * s;
                 let goal = target.curvature(u, v);
-                // A bend along a generator keeps its angle, so that its curvature falls with the distance from the apex.
+                // A bend along a generator has the same angle along its length, so its curvature decreases with the
+                // distance from the apex.
                 let fanned = goal.strongest() / in_the_middle;
                 crossing * crossing * curvature(x) * fanned - goal.along(along)
             };
@@ -224,7 +226,7 @@ impl Order {
     }
 }
 
-/// A plate on the press.
+/// Plate on the press.
 pub(super) struct HiddenPlate<'a> {
     order: &'a Order,
     shop: &'a Shop,
@@ -233,12 +235,12 @@ pub(super) struct HiddenPlate<'a> {
     random: Rng,
 }
 
-/// One stroke as it came out.
+/// Outcome of one stroke.
 pub(super) struct Pressed {
     pub(super) told: f64,
-    /// Angle that stayed, radians.
+    /// Angle that remained, radians.
     pub(super) angle: f64,
-    /// Coordinate and angle of the bend as the scans show it.
+    /// Coordinate and angle of the bend as measured by the scans.
     pub(super) seen: Option<[f64; 2]>,
 }
 
@@ -247,7 +249,8 @@ impl<'a> HiddenPlate<'a> {
         let mut random = Rng::with_seed(seed ^ 0x6869_6464_656e);
         let yields = shop.yields * YIELD * (1.0 + 0.1 * normal(&mut random));
         let thickness = THICKNESS + shop.thicker + 0.4e-3 * normal(&mut random);
-        // Within the plate: two waves of 2 to 6 m length and random phase, of the given standard deviation together.
+        // Variation within the plate: two waves of 2 to 6 m length and random phase, with the given standard deviation
+        // together.
         let mut wave = |sigma: f64| {
             let waves: Vec<[f64; 2]> = (0..2)
                 .map(|k| {
@@ -266,12 +269,12 @@ impl<'a> HiddenPlate<'a> {
         Self { order, shop, strip, press, random }
     }
 
-    /// Returns the press of every shop: its die 3 % narrow, its zero 0.2 mm off, its frame soft.
+    /// Returns the press of every shop: its die is 3 % narrow, its zero 0.2 mm off, its frame elastic.
     pub(super) fn press_of_shop() -> Press {
         Press { opening: 0.97 * OPENING, compliance: 0.2e-9, zero: 0.2e-3, nominal_thickness: THICKNESS }
     }
 
-    /// Presses at x for a depth, metres, as well as the shop can.
+    /// Presses at x to a depth, metres, with the errors of the shop.
     pub(super) fn press(&mut self, x: f64, depth: f64, backwards: bool) -> Pressed {
         let random = &mut self.random;
         let place = x + self.shop.off_mark + self.shop.place * normal(random);
@@ -283,17 +286,18 @@ impl<'a> HiddenPlate<'a> {
         Pressed { told, angle, seen: (seen[1].abs() > LEAST).then_some(seen) }
     }
 
-    /// Returns the sag of the plate in the die at x, as an operator sees it under his ruler, metres.
+    /// Returns the sag of the plate in the die at x, as an operator measures it under a ruler, metres.
     pub(super) fn sag(&self, x: f64) -> f64 {
         let step = self.strip.step();
         let arm = |k: usize| (0.5 * OPENING - ((k as f64 + 0.5) * step - x).abs()).max(0.0);
         self.strip.curvature().enumerate().map(|(k, curvature)| 0.5 * curvature * step * arm(k)).sum()
     }
 
-    /// Returns the boards on the plate as it is.
+    /// Returns the templates on the plate in its present state.
     pub(super) fn boards(&self) -> Vec<Board> {
         let (step, curvature) = (self.strip.step(), self.strip.curvature().collect::<Vec<_>>());
-        // Linear between the sections: the boards' integration then keeps the angle of a bend, which steps would change by 2 %.
+        // Linear between the sections: integration under the templates then keeps the angle of a bend, which steps
+        // would change by 2 %.
         let at = |x: f64| {
             let place = (x / step - 0.5).clamp(0.0, (curvature.len() - 1) as f64);
             let k = (place as usize).min(curvature.len() - 2);
@@ -303,12 +307,12 @@ impl<'a> HiddenPlate<'a> {
         self.order.boards(&at)
     }
 
-    /// Scans the plate: the curvature across the lines as a spline shows it, 1/m.
+    /// Scans the plate: returns the curvature across the lines as measured by a spline, 1/m.
     pub(super) fn scan(&mut self) -> Scan {
         let step = self.strip.step();
         let length = self.order.lines.length();
         let knots = UniformKnots::new(0.0, length, (length / SPAN).round() as usize);
-        // A prior that no plate feels.
+        // A prior too weak to change the fit.
         let mut fit = CurveFit::with_prior(knots, Roughness::Curvature, 1e6, length);
         let (mut height, mut slope) = (0.0, 0.0);
         for (k, curvature) in self.strip.curvature().enumerate() {
@@ -348,8 +352,8 @@ pub(super) fn normal(random: &mut Rng) -> f64 {
 mod tests {
     use super::*;
 
-    /// The gap of the scanned plate is that of the plate, to the scanner's error: of small gaps, since a board on a far too flat plate may
-    /// come to rest in either of two seats. Found: 0.08 mm.
+    /// The gap of the scanned plate equals that of the plate within the scanner's error. Gaps must be small, since a
+    /// template on a much too flat plate can come to rest in either of two seats. Found: 0.08 mm.
     #[test]
     fn a_scan_shows_the_gap() {
         for order in [Order::cylinder(3.0, 9.0)].into_iter().chain(Order::others()) {

@@ -1,12 +1,14 @@
-//! Strain of the face under a bend: the rule of the advice beside the fibre model.
+//! Test of the strain rule: the strain of the face under a bend by the rule of the advice, compared with the fibre
+//! model.
 
 use platen_advice::strain::face_strain;
 use platen_sim_plate::{FibreSteel, FibreStrip};
 
 use super::hidden_plate::{HiddenPlate, THICKNESS, YIELD};
 
-/// Fibres under a punch without width have a cusp that no plate has, as a load spreads within the thickness. Found: 0.77 % as the mean over a
-/// thickness, 1.00 % by the rule, 1.57 % in the cusp at 20 mrad; 1.22, 1.55, 2.32 % at 31; 1.71, 2.15, 3.04 % at 43; 3.83, 5.00, 5.47 % at 100.
+/// Fibres under a punch without width have a strain peak that no plate has, since a load spreads within the thickness.
+/// Found: 0.77 % as the mean over a thickness, 1.00 % by the rule, 1.57 % in the peak at 20 mrad; 1.22, 1.55, 2.32 % at
+/// 31; 1.71, 2.15, 3.04 % at 43; 3.83, 5.00, 5.47 % at 100.
 #[test]
 fn the_rule_for_the_strain_of_a_face_lies_between_the_fibres_mean_and_their_cusp() {
     let steel = FibreSteel { yield_strength: YIELD, thickness: THICKNESS };

@@ -1,7 +1,8 @@
-//! Ways to bend a plate: the advice, with or without its parts, and four of a shop.
+//! Bending strategies of the study: the advice, complete or with parts removed, and four strategies of a shop.
 //!
-//! A shop sees the same gaps and the same map of missing curvature, has a depth table that is exact for the mean steel, sees the sag of the
-//! plate in the die, presses deeper where nothing happened, and turns a plate over where it is bent too far.
+//! A shop sees the same gaps and the same map of missing curvature. It has a depth table that is exact for the mean
+//! steel, and sees the sag of the plate in the die. It presses deeper where a stroke had no effect, and turns a plate
+//! over where it is bent too far.
 
 use std::time::{Duration, Instant};
 
@@ -16,10 +17,10 @@ use platen_sim_plate::{FibreSteel, FibreStrip};
 
 use super::hidden_plate::{HiddenPlate, OPENING, Order, Pressed, Scan, Shop, THICKNESS, UNCERTAINTY, YIELD};
 
-/// Strokes after which a plate is given up.
+/// Number of strokes after which a plate is given up.
 pub(super) const GIVEN_UP: usize = 60;
 
-/// A way to bend a plate.
+/// Strategy for bending a plate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Strategy {
     /// Two passes of 60 and 85 %, then half of the closing angle beside the largest gap.
@@ -37,17 +38,17 @@ pub(super) enum Strategy {
 /// Advice without some of its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Advised {
-    /// Largest bend, as the feed at which the target has it, metres.
+    /// Largest bend, given as the feed at which the target has it, metres.
     pub(super) feed: f64,
-    /// Starts from like plates.
+    /// Starts from earlier plates of the same class.
     pub(super) like: bool,
     /// Learns from strokes.
     pub(super) learns: bool,
-    /// The press tells its depth.
+    /// The press reports its depth.
     pub(super) depth: bool,
-    /// Guards against bending too far.
+    /// Limits a bend so that the plate is not bent too far.
     pub(super) guard: bool,
-    /// Plans anew after each stroke.
+    /// Plans again after each stroke.
     pub(super) replans: bool,
 }
 
@@ -83,7 +84,7 @@ impl Strategy {
         [Self::TwoPassesGap, Self::TwoPassesMap, Self::OnePassMap, Self::ByHand]
     }
 
-    /// Returns the advice without each of its parts.
+    /// Returns variants of the advice, each without one of its parts.
     pub(super) fn parts() -> Vec<Self> {
         let whole = Advised::default();
         let without = [
@@ -98,7 +99,7 @@ impl Strategy {
     }
 }
 
-/// One plate, bent.
+/// Outcome for one plate.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outcome {
     pub(super) strokes: usize,
@@ -107,7 +108,8 @@ pub(super) struct Outcome {
     pub(super) finished: bool,
     /// True gap at the end, metres.
     pub(super) gap: f64,
-    /// Advised strokes that came out inside their intervals, of all: angle, gap, angle of the third stroke.
+    /// Advised strokes with an outcome inside their intervals, and all advised strokes: angle, gap, angle of the third
+    /// stroke.
     pub(super) inside: [(usize, usize); 3],
     pub(super) not_advised: usize,
     pub(super) said_too_coarse: bool,
@@ -117,7 +119,7 @@ pub(super) struct Outcome {
     pub(super) advise: Duration,
 }
 
-/// Depths of a shop: angle and depth on a flat plate of the mean steel.
+/// Depth table of a shop: angle and depth on a flat plate of the mean steel.
 pub(super) struct DepthTable(Vec<[f64; 2]>);
 
 impl DepthTable {
@@ -167,16 +169,16 @@ pub(super) fn bend(
     job.outcome
 }
 
-/// A plate under work.
+/// Plate in progress.
 struct Job<'a> {
     order: &'a Order,
     shop: &'a Shop,
     plate: HiddenPlate<'a>,
     table: &'a DepthTable,
     outcome: Outcome,
-    /// Strokes as the record has them.
+    /// Strokes in the form of the record.
     strokes: Vec<PressedStroke>,
-    /// Depth that the operator adds to his table, metres.
+    /// Depth that the operator adds to the table, metres.
     correction: f64,
 }
 
@@ -192,12 +194,13 @@ impl Job<'_> {
         pressed
     }
 
-    /// Presses for an angle by the table; the operator corrects his depth when `corrects`, else only after a stroke that did nothing.
+    /// Presses for an angle by the table. The operator corrects the depth after each stroke if `corrects`, else only
+    /// after a stroke without effect.
     fn by_table(&mut self, x: f64, angle: f64, corrects: bool) {
         let backwards = angle < 0.0;
         let sag = if backwards { -self.plate.sag(x) } else { self.plate.sag(x) };
         let depth = self.table.depth(angle.abs()) + sag + self.correction;
-        // A shop knows where its die is.
+        // The offset of the die is known in a shop.
         let pressed = self.stroke(x - self.shop.off_mark, depth, backwards);
         if corrects && !backwards {
             let off = (angle - pressed.angle).clamp(-0.02, 0.02);
@@ -207,7 +210,7 @@ impl Job<'_> {
         }
     }
 
-    /// Bends the plate by a shop's strategy; what its strokes teach is learned in shadow, from a flat blank.
+    /// Bends the plate by a shop's strategy. The press is learned from its strokes in shadow mode, from a flat blank.
     fn by_shop(&mut self, strategy: Strategy) {
         self.by_habit(strategy);
         let scan = self.plate.scan();
@@ -261,7 +264,7 @@ impl Job<'_> {
         }
     }
 
-    /// Returns the place that lacks most curvature over half a metre.
+    /// Returns the place where most curvature is missing, averaged over half a metre.
     fn place_of_map(&self, scan: &Scan) -> f64 {
         let length = self.order.lines.length();
         let n = ((length - 0.4) / 0.05) as usize;
@@ -293,7 +296,7 @@ impl Job<'_> {
                 Step::Bend(next) => (next, false),
                 Step::TurnOver(next) => (next, true),
                 Step::Place { .. } | Step::Cannot { .. } => {
-                    // The operator helps himself.
+                    // Without advice the operator presses at the worst place of the map.
                     self.outcome.not_advised += 1;
                     let x = self.place_of_map(&scan);
                     let gap = worst(&situation.boards).0;
@@ -319,7 +322,7 @@ impl Job<'_> {
                 }
             }
             let depth_wanted = depth.filter(|_| advised.depth).unwrap_or_else(|| {
-                // By eye: the table, corrected by hand.
+                // Depth by the table, corrected by hand.
                 self.table.depth(angle.abs()) + self.plate.sag(x) + self.correction
             });
             let pressed = self.stroke(x, depth_wanted, backwards);
@@ -327,7 +330,7 @@ impl Job<'_> {
                 self.correction += 0.7 * (angle - pressed.angle).clamp(-0.02, 0.02) * 0.25 * OPENING;
             }
             let wanted = WantedBend { at: middle, angle, depth: depth.filter(|_| advised.depth) };
-            // A stroke that stopped short says nothing of an interval given the wanted depth.
+            // A stroke that stopped before its depth does not test an interval that is given for the wanted depth.
             let short = pressed.told < depth_wanted - 0.5e-3;
             if !backwards && !short && advised.replans {
                 let [angles, gaps, third] = &mut self.outcome.inside;
@@ -346,7 +349,8 @@ impl Job<'_> {
         }
     }
 
-    /// Returns the history of the plate so far, with its boards as they are now, on a press that tells its depth or does not.
+    /// Returns the history of the plate so far, with the present state of its templates, on a press that reports its
+    /// depth or does not.
     fn history(&self, boards: &[Board], tells_depth: bool) -> PlateHistory {
         let depth = |stroke: &PressedStroke| stroke.depth.filter(|_| tells_depth);
         PlateHistory {
@@ -365,7 +369,7 @@ impl Job<'_> {
         }
     }
 
-    /// Returns a stroke as the record has it, pressed without advice.
+    /// Returns a stroke pressed without advice, in the form of the record.
     fn on_record(&self, pressed: &Pressed) -> PressedStroke {
         let bend = |[x, angle]: [f64; 2]| {
             let x = x.clamp(0.0, self.order.lines.length());
@@ -386,7 +390,7 @@ impl Job<'_> {
     }
 }
 
-/// Returns the choices of a shop that bends by this advice.
+/// Returns the settings of a shop that bends by this advice.
 pub(super) fn settings(order: &Order, advised: &Advised) -> Settings {
     Settings {
         largest: (order.curvature() * advised.feed).min(3.0_f64.to_radians()),
@@ -398,19 +402,19 @@ pub(super) fn settings(order: &Order, advised: &Advised) -> Settings {
     }
 }
 
-/// Returns the plate as a scan shows it.
+/// Returns the plate as measured by a scan.
 fn situation(order: &Order, scan: &Scan, blank: Vec<f64>) -> Situation {
     Situation { lines: order.lines, boards: order.boards(&|x| scan.curvature(x)), side: 1.0, blank }
 }
 
-/// Returns the largest gap and its board.
+/// Returns the largest gap and its template.
 fn worst(boards: &[Board]) -> (Gap, usize) {
     let each = boards.iter().enumerate().map(|(k, board)| (board.worst(board.height()), k));
     let worst = each.reduce(|a, b| if b.0.gap > a.0.gap { b } else { a });
     worst.unwrap_or((Gap { gap: 0.0, hollow: false, place: 0 }, 0))
 }
 
-/// Returns the finding of a board as the comparison `template` gives it.
+/// Returns the finding of a template in the form of the comparison `template`.
 fn finding(board: &Board) -> TemplateFinding {
     let gap = board.worst(board.height());
     let passes = gap.gap + UNCERTAINTY <= board.limit;

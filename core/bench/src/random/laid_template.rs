@@ -1,4 +1,5 @@
-//! Errors of template gaps and stations: the comparison `template` on the measured plate against the same on the true one.
+//! Errors of template gaps and stations: the comparison `template` on the measured plate against the same comparison on
+//! the true plate.
 
 use std::time::Duration;
 
@@ -23,13 +24,13 @@ use crate::scene::Shot;
 const LIMIT: Duration = Duration::from_secs(60);
 /// Chord of a template as a share of its line.
 const CHORD: f64 = 0.6;
-/// Places of the stations in shares of the sides.
+/// Positions of the stations as shares of the sides.
 const STATIONS: [[f64; 2]; 5] = [[0.5, 0.5], [0.2, 0.3], [0.8, 0.3], [0.8, 0.7], [0.2, 0.7]];
-/// Standard deviation of a true place, metres, and its weight, 1/m^2.
+/// Standard deviation of a true point, metres, and its weight, 1/m^2.
 const KNOWN_TO: f64 = 1e-6;
 const WEIGHT: f64 = 1.0 / (KNOWN_TO * KNOWN_TO);
-/// Penalty of the third derivatives of the true surface, m^3, relative to that weight: nothing, but determines the spline between
-/// the outermost places.
+/// Penalty of the third derivatives of the true surface, m^3, relative to that weight: negligible, but it determines
+/// the spline between the outermost points.
 const PENALTY: f64 = 1e-9 * WEIGHT;
 
 /// Loads the comparison, without its search over the whole plate.
@@ -38,11 +39,11 @@ pub(super) fn load(catalogue: &Catalogue) -> Result<Comparison, CliError> {
     Ok(Comparison::create(&library, &values, LIMIT)?)
 }
 
-/// Returns the errors of the gaps under two templates, along u and along v, and of the stations. Counted is what both
-/// plates have, and a gap whose contacts were seen.
+/// Returns the errors of the gaps under two templates, along u and along v, and of the stations. A figure is counted if
+/// both plates have it; a gap is counted if its contacts were seen.
 ///
 /// # Errors
-/// A plate without a seat for its target; a truth that determines no surface.
+/// A plate without a seat for its target; a truth that does not determine a surface.
 pub(super) fn errors(
     comparison: &Comparison,
     scene: &RandomScene,
@@ -125,7 +126,7 @@ fn task(spec: &PlateSpec, target: Target, scanner: &ScannerError) -> Task {
     }
 }
 
-/// Interpolates the true places of the face, at most 50 mm apart, and returns the mid-surface below it.
+/// Interpolates the true points of the face, at most 50 mm apart, and returns the mid-surface below it.
 fn true_surface(face: &TrueFace, spec: &PlateSpec) -> Result<Surface, String> {
     let PlateSpec { width, height, thickness, .. } = *spec;
     let at = |k: usize| {
@@ -156,7 +157,7 @@ fn true_surface(face: &TrueFace, spec: &PlateSpec) -> Result<Surface, String> {
 mod tests {
     use super::*;
 
-    /// A cylinder of radius R: positions, normals and curvature of the mid-surface come back from its face.
+    /// A cylinder of radius R: positions, normals and curvature of the mid-surface are recovered from its face.
     #[test]
     fn the_true_surface_is_that_of_the_face() {
         let (radius, thickness, [nu, nv]) = (5.0, 0.04, [61, 51]);

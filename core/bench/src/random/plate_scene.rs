@@ -1,4 +1,4 @@
-//! A random scene: plate, pose, scanner and its errors, drawn from a seed.
+//! Random scene: plate, pose, scanner and its errors, drawn from a seed.
 
 use std::path::Path;
 
@@ -13,7 +13,8 @@ use platen_shape::Vec3;
 use crate::accuracy::Truth;
 use crate::scene::{Scene, Setting, Shot};
 
-/// Height of the plate's middle under the simulator's scanner, millimetres: far enough above the floor for every shape.
+/// Height of the plate's middle under the simulator's scanner, millimetres: high enough above the floor for every
+/// shape.
 const PLATE_MM: f64 = -3200.0;
 /// Reflectivities of the plate: dark mill scale to primer; the walls of the simulator have 0.8, its floor 0.3.
 const REFLECTIVITY: [f64; 2] = [0.1, 0.6];
@@ -24,7 +25,8 @@ const TARGET_SHARES: [f64; 2] = [0.95, 1.05];
 /// Radius of the target of a plate with bend bands, metres: the mean of its curvature between them.
 const BANDS_RADIUS: f64 = 15.0;
 
-/// Largest movement of the plate along x and y, millimetres, and largest turn, degrees, between repeated scans: another place on the lattice, the same incidence.
+/// Largest movement of the plate along x and y, millimetres, and largest turn, degrees, between repeated scans: the
+/// position on the lattice changes, the incidence does not.
 const MOVED_MM: f64 = 30.0;
 const TURNED_DEG: f64 = 0.5;
 
@@ -40,24 +42,25 @@ pub(super) struct Given {
 /// A scene of a family.
 pub(super) struct RandomScene {
     pub(super) scene: Scene,
-    /// Shape that the plate is bent towards: its own, with other radii.
+    /// Shape toward which the plate is bent: its own, with other radii.
     pub(super) target: Target,
     /// Share of wide range errors and their factor.
     tails: [f64; 2],
-    /// Angle by which the table shows beyond the far edges, degrees; 0: a wide table.
+    /// Angle by which the table is visible beyond the far edges, degrees; 0: a wide table.
     strip_deg: f64,
     /// Whether the beam has power beyond its 1/e^2 width.
     wings: bool,
     pub(super) setting: Setting,
     reflectivity: f64,
-    /// Height of the scanner over that of the simulator's shop, metres.
+    /// Height of the scanner above that of the simulator's shop, metres.
     scanner_m: f64,
     pub(super) cyclic_mm: f64,
     hidden_by: &'static str,
 }
 
 impl RandomScene {
-    /// Draws the scene of a seed. The same seed gives the same scene in every family but for edges, errors and what hides the plate.
+    /// Draws the scene of a seed. The same seed gives the same scene in every family, except for edges, errors and
+    /// hidden parts.
     pub(super) fn of(family: Family, given: Given, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed ^ 0x7363_656e_6573);
         let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
@@ -66,8 +69,8 @@ impl RandomScene {
         let scanner_m = between(3.0, 5.0) + 0.001 * PLATE_MM;
         let yaw_deg = between(-180.0, 180.0).round();
         let (step_deg, noise_mm) = (between(0.03, 0.055), between(0.3, 1.5));
-        // Doubly curved plates no more so than those of a tank: beyond, their edges are strained by more than a plate of
-        // another size would be off.
+        // Double curvature is limited to that of tank plates: beyond it the strain of the edges exceeds the difference
+        // by which a plate of another size is recognised.
         let longer = 0.001 * size_mm[0].max(size_mm[1]);
         let (radius, cross) = (between(5.0, 20.0), longer * between(3.8, 8.0));
         let axis = between(0.0, 180.0).round();
@@ -144,7 +147,7 @@ impl RandomScene {
         let hidden_by = if family == Family::Hidden { "person at corner" } else { hidden_by };
         let scene = Scene { name: name.into(), size_mm, shape, centre_mm, bevel_mm, yaw_deg };
         let [dark, bright] = REFLECTIVITY;
-        // From a generator of its own, so that scenes are those of versions that did not draw it.
+        // From a separate generator, so that scenes equal those of versions that did not draw this value.
         let drawn = dark * (bright / dark).powf(Rng::with_seed(!seed).f64());
         let reflectivity = given.reflectivity.unwrap_or(drawn);
         let wings = family == Family::Wings;
@@ -162,7 +165,8 @@ impl RandomScene {
         }
     }
 
-    /// Returns the scene as its repeated scan of a number sees it, 0 itself: with other noise, the plate moved by up to [`MOVED_MM`] and turned by up to [`TURNED_DEG`].
+    /// Returns the scene for repeated scan `number`, 0 being the scene itself: with other noise, the plate moved by up
+    /// to [`MOVED_MM`] and turned by up to [`TURNED_DEG`].
     pub(super) fn repeated(mut self, number: u64) -> Self {
         if number > 0 {
             self.setting.seed ^= number << 32;
@@ -190,7 +194,7 @@ impl RandomScene {
         self.scene.scan(catalogue, folder, self.setting, &more)
     }
 
-    /// Describes the scene in a line.
+    /// Describes the scene in one line.
     pub(super) fn words(&self) -> String {
         let [w, h, t] = self.scene.size_mm;
         let [x, ..] = self.scene.centre_mm;
@@ -223,7 +227,8 @@ fn bevel(random: &mut Rng, thickness: f64) -> [f64; 2] {
     [(10.0 * inset).round() / 10.0, root]
 }
 
-/// Returns the widest distance of neighbouring samples across an edge, metres: `step` is the angle between beams, radians.
+/// Returns the largest distance of neighbouring samples across an edge, metres: `step` is the angle between beams,
+/// radians.
 pub(super) fn widest_spacing(truth: &Truth, step: f64) -> f64 {
     let (nu, nv) = (truth.face.nu, truth.face.nv);
     let middle = Vec3::from(truth.face.position_m[nv / 2 * nu + nu / 2]);
@@ -234,7 +239,7 @@ pub(super) fn widest_spacing(truth: &Truth, step: f64) -> f64 {
     truth.edges.iter().map(across).fold(0.0, f64::max) * step
 }
 
-/// Returns the distance on the plate, across an edge at `at`, per angle between beams.
+/// Returns the distance on the plate across an edge at `at` per angle between beams.
 fn spacing(at: Vec3, along: Vec3, middle: Vec3) -> f64 {
     let along = along.normalize();
     let inwards = middle - at;
@@ -279,7 +284,8 @@ mod tests {
         assert!(turned != 0.0 && turned.abs() <= TURNED_DEG, "{turned}");
     }
 
-    /// Straight down on a plane, samples lie as far apart as the range times the angle; at 60 degrees across the edge twice as far.
+    /// Straight down on a plane, the distance of samples is the range times the angle; at 60 degrees across the edge it
+    /// is twice that.
     #[test]
     fn spacing_grows_with_the_incidence_across_the_edge() {
         let down = spacing(Vec3::new(0.0, 0.0, -5.0), Vec3::y(), Vec3::new(-1.0, 0.0, -5.0));

@@ -1,19 +1,22 @@
 //! Bias and scatter of figures over repeated scans of one scene (trueness and precision of ISO 5725-1).
 //!
-//! A stated standard deviation covers both: what noise scatters, and what an edge, its contrast and its place on the lattice leave in every scan. Errors on random
-//! scenes do not tell them apart. Over scans of one scene with other noise and the plate moved a little the mean error is the bias, its deviations are the scatter.
+//! A stated standard deviation covers two kinds of error: the scatter due to noise, and the error that an edge, its
+//! contrast and its position on the lattice cause in every scan. Errors over random scenes do not separate the two.
+//! Here one scene is scanned several times with other noise and the plate moved a little: the mean error is the bias,
+//! and the deviations from it are the scatter.
 //!
-//! In: the figures of each scan; out: [`Repeated`]. A figure is known by its kind and its number among those of its kind.
+//! In: the figures of each scan; out: [`Repeated`]. A figure is identified by its kind and its number among the figures
+//! of that kind.
 
 use serde_json::{Value as Json, json};
 
 use super::stated::{Kind, Stated};
 use crate::accuracy::rms;
 
-/// A figure over the scans of one scene, metres or radians.
+/// Figure over the scans of one scene, metres or radians.
 pub(super) struct Repeated {
     pub(super) kind: Kind,
-    /// Number of scans that gave it.
+    /// Number of scans that have it.
     pub(super) n: usize,
     /// Mean error.
     pub(super) bias: f64,
@@ -44,7 +47,7 @@ impl Repeated {
         Self { kind, n, bias, scatter, sigma: rms(figure.iter().map(|s| s.sigma)) }
     }
 
-    /// Returns it in the unit of its kind.
+    /// Returns the figure in the unit of its kind.
     pub(super) fn document(&self) -> Json {
         let (name, unit) = self.kind.name_and_unit();
         json!({
@@ -54,7 +57,8 @@ impl Repeated {
     }
 }
 
-/// Returns the row of a kind: number of figures, bias and its largest amount, scatter, stated standard deviation (root mean squares).
+/// Returns the row of a kind: number of figures, bias and its largest amount, scatter, stated standard deviation (root
+/// mean squares).
 pub(super) fn row(kind: Kind, figures: &[&Repeated]) -> Vec<String> {
     let (name, unit) = kind.name_and_unit();
     let over =

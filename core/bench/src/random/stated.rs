@@ -1,4 +1,4 @@
-//! Errors of one measurement with their stated standard deviations.
+//! Stated errors: the errors of one measurement together with their stated standard deviations.
 
 use platen_model::units::{metres, mm};
 use platen_shape::evaluate::{self, Place};
@@ -20,7 +20,7 @@ pub(super) struct Stated {
 }
 
 impl Stated {
-    /// Returns error and stated interval in the unit of the kind.
+    /// Returns the error and its stated interval in the unit of the kind.
     pub(super) fn document(&self) -> Json {
         let (name, unit) = self.kind.name_and_unit();
         json!({ "of": name, "error": unit(self.error), "uncertainty": unit(EXPANDED * self.sigma) })
@@ -96,7 +96,7 @@ const GROSS_CORNER: f64 = 2e-3;
 const GROSS_MARKER: f64 = 1e-3;
 
 impl Errors {
-    /// Compares places and dimension checks with the truth.
+    /// Compares positions and dimension checks with the truth.
     pub(super) fn of(
         measurement: &Measurement,
         outline: &Outline,
@@ -158,20 +158,21 @@ impl Errors {
         Self { stated, corner, marker, corners_seen: corners_seen(outline, &doubts) }
     }
 
-    /// Returns true when a corner or a marker is farther off than is acceptable.
+    /// Returns whether a corner or a marker is farther off than is acceptable.
     pub(super) fn is_gross(&self) -> bool {
         self.corner > GROSS_CORNER || self.marker > GROSS_MARKER
     }
 }
 
-/// Returns the standard deviations of a corner along u and v: the outline's are along the leaving edge and the arriving one.
+/// Returns the standard deviations of a corner along u and v; the outline states them along the leaving and the
+/// arriving edge.
 fn corner_sigma(corner: &Corner, [u, v]: [f64; 2]) -> [f64; 2] {
     let [leaving, arriving] = corner.sigma;
     // u runs along the edge that leaves the corners (0, 0) and (W, H).
     if (u > 0.0) == (v > 0.0) { [leaving, arriving] } else { [arriving, leaving] }
 }
 
-/// Returns the true outline; the smoothed face of the measured one stands in for the true one, which no figure uses.
+/// Returns the true outline; the smoothed face of the measured outline replaces the true one, since no figure uses it.
 fn true_outline(outline: &Outline, truth: &Truth) -> Outline {
     let edges = truth.edges.each_ref().map(|edge| {
         let points: Vec<Vec3> = edge.iter().map(|p| Vec3::from(*p)).collect();
