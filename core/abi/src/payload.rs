@@ -1,7 +1,7 @@
 //! Payload of a frame: a header, then arrays at the offsets given in the header.
 //!
-//! All arrays lie in the same buffer, aligned to 8 bytes, little endian. Buffers are not trusted: [`read`] and [`slice()`]
-//! check sizes, offsets and alignment before any access.
+//! All arrays lie in the same buffer, aligned to 8 bytes, little endian. Buffers are not trusted: [`read`] and
+//! [`slice()`] check sizes, offsets and alignment before any access.
 
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
@@ -203,7 +203,8 @@ header! {
         mask_u: u32,
         /// Mask cells along v.
         mask_v: u32,
-        /// Share of the covariance that is noise of the scan; the rest is smoothing bias. 0: unknown, taken as all of it.
+        /// Share of the covariance that is noise of the scan; the rest is smoothing bias. 0: unknown, taken as all of
+        /// it.
         noise_share: f32,
         /// Thickness of the plate.
         thickness: f64,
@@ -214,7 +215,8 @@ header! {
         /// f64, 3 a control point, v outer, u inner.
         control: Span,
         /// f64: Cholesky factor of the control values' precision, for each row of the net across its longer axis the
-        /// blocks that couple it to itself and to the three rows before, each square over the shorter axis, column-major.
+        /// blocks that couple it to itself and to the three rows before, each square over the shorter axis,
+        /// column-major.
         precision_factor: Span,
         /// f64, 49 a control point: covariances with those up to three away, 7 x 7, v outer, u inner.
         covariance: Span,
@@ -313,7 +315,7 @@ impl std::fmt::Display for Malformed {
 
 impl std::error::Error for Malformed {}
 
-/// Reads the header at the start of a buffer; members that an older writer did not know are zero.
+/// Reads the header at the start of a buffer; members that an older writer does not have are zero.
 ///
 /// # Errors
 /// [`Malformed::Header`] when it is incomplete.

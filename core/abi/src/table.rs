@@ -263,8 +263,8 @@ pub struct Host {
     pub progress: unsafe extern "C" fn(*const Host, u64, f64, *const c_char),
     /// Returns non-zero when the job was cancelled or its deadline has passed.
     pub cancelled: unsafe extern "C" fn(*const Host, u64) -> c_int,
-    /// Allocates a buffer for one frame of a job, aligned to 8 bytes, its contents undefined. Waits until the host has taken
-    /// earlier frames, at most until the job is cancelled or its deadline has passed.
+    /// Allocates a buffer for one frame of a job, aligned to 8 bytes, its contents undefined. Waits until the host has
+    /// taken earlier frames, at most until the job is cancelled or its deadline has passed.
     pub buffer_alloc: unsafe extern "C" fn(*const Host, u64, u64, *mut Buffer) -> Status,
     /// Frees a buffer that will not be emitted.
     pub buffer_free: unsafe extern "C" fn(*const Host, *mut Buffer),
@@ -327,26 +327,26 @@ pub struct Entry {
     >,
 }
 
-/// A struct of a plugin that the host reads as far as both sides know it.
+/// Struct of a plugin, of which the host reads the members that both sides have.
 ///
 /// # Safety
 /// Implementors are `repr(C)`, begin with `struct_size: u32`, and all zeros is a valid value.
 pub unsafe trait Table: Copy {
     /// Name in the header, for messages.
     const NAME: &'static str;
-    /// Size up to and with the last member that no plugin can do without.
+    /// Size up to and including the last member that every plugin must have.
     const LEAST: usize;
 
-    /// Reads the struct; members that the plugin's version did not have are zero.
+    /// Reads the struct; members that the plugin's version does not have are zero.
     ///
     /// # Errors
     /// Its size, when it is less than [`LEAST`](Self::LEAST).
     ///
     /// # Safety
-    /// `at` points to a struct as long as its `struct_size` says.
+    /// `at` points to a struct as long as its `struct_size`.
     unsafe fn read(at: *const Self) -> Result<Self, u32> {
         let mut table = std::mem::MaybeUninit::<Self>::zeroed();
-        // SAFETY: the struct is at least as long as it says, and zeros fill the rest.
+        // SAFETY: the struct is at least as long as its struct_size, and zeros fill the rest.
         unsafe {
             let stated = at.cast::<u32>().read();
             if (stated as usize) < Self::LEAST {
