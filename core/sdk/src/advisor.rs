@@ -1,4 +1,4 @@
-//! Advisor plugins: trait, inputs, frames of the boundary.
+//! Advisor plugins: the trait, its inputs, and the frames of the boundary.
 
 use std::ffi::{CStr, c_char};
 
@@ -11,7 +11,8 @@ use crate::exchange::Payload;
 use crate::shim::{Input, Plugin, describe, refused};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 
-/// Plugin that advises the next stroke of a plate. It runs after the result has gone to the press; its failure costs the advice alone.
+/// Plugin that advises the next stroke of a plate. It runs after the result has been sent to the press; if it fails,
+/// only the advice is lost.
 pub trait Advisor: Send + Sized + 'static {
     /// Description of the plugin.
     const INFO: Info;
@@ -24,11 +25,11 @@ pub trait Advisor: Send + Sized + 'static {
     /// When the options contradict each other.
     fn new(options: Self::Options) -> Result<Self>;
 
-    /// Returns the advice after the last stroke of the history. Deterministic: equal inputs give equal advice, to the last bit. A reason
-    /// for giving none is an advice too ([`Step::Cannot`](platen_model::Step::Cannot)).
+    /// Returns the advice after the last stroke of the history. Deterministic: equal inputs give equal advice, to the
+    /// last bit. A reason for giving none is also an advice ([`Step::Cannot`](platen_model::Step::Cannot)).
     ///
     /// # Errors
-    /// When the inputs make no sense, or the job was cancelled.
+    /// The inputs are inconsistent, or the job was cancelled.
     fn advise(&mut self, job: &Job<'_>, inputs: &AdvisorInputs) -> Result<Advice>;
 }
 

@@ -1,4 +1,4 @@
-//! Comparison plugins: trait, inputs, frames of the boundary.
+//! Comparison plugins: the trait, its inputs, and the frames of the boundary.
 
 use std::ffi::{CStr, c_char};
 
@@ -48,7 +48,7 @@ impl Inputs {
     /// Returns the earlier surface by name, `before` or `baseline`; `None` when there is no such scan.
     ///
     /// # Errors
-    /// [`ErrorKind::BadData`] when it is of another plate: scans of one plate have equal size, from the plate file.
+    /// [`ErrorKind::BadData`] if it belongs to another plate: scans of one plate have equal size, from the plate file.
     pub fn earlier(&self, against: &str) -> Result<Option<&Surface>> {
         const SAME_SIZE: f64 = 1e-6;
         let earlier = if against == "before" { &self.before } else { &self.baseline };

@@ -1,4 +1,4 @@
-//! Devices that a driver finds in reach.
+//! Devices that a scanner driver finds in reach.
 
 use std::ffi::c_char;
 
@@ -7,7 +7,7 @@ use platen_abi as abi;
 /// A device in reach of a driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Device {
-    /// Option by which a plant file names it, such as `address`.
+    /// Option that identifies it in a plant file, such as `address`.
     pub option: String,
     /// Value of that option.
     pub value: String,
@@ -22,7 +22,7 @@ impl Device {
         crate::shim::copy_text(&mut out.about, &self.about);
     }
 
-    /// Returns the device that a plugin wrote; what is no UTF-8 in it is replaced.
+    /// Converts the device that a plugin wrote; invalid UTF-8 in it is replaced.
     #[must_use]
     pub fn from_raw(raw: &abi::Device) -> Self {
         let text = |text: &[c_char]| {

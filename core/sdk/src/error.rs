@@ -39,7 +39,7 @@ pub enum ErrorKind {
     Internal = status::INTERNAL,
 }
 
-/// Error: one sentence on what happened, and one on what to do.
+/// Error: one sentence on the failure, and one on the remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Error {
     pub(crate) kind: ErrorKind,
@@ -54,7 +54,7 @@ impl Error {
         Self { kind, message: message.into(), hint: String::new(), flags: 0 }
     }
 
-    /// Adds the hint: what to do, in one sentence.
+    /// Adds the hint: the remedy in one sentence.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = hint.into();

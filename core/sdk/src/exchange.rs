@@ -1,12 +1,13 @@
-//! Payloads of the plugin boundary, written and read in one place.
+//! Encoder and decoder of the payloads that cross the plugin boundary.
 //!
-//! Each value that crosses the boundary has one format of `platen.h`, and one implementation of [`Payload`] here. The SDK writes into buffers of the host, the host into an [`AlignedBuffer`]; a file of a surface
-//! (`surface.platen`) has the same bytes.
+//! Each value that crosses the boundary has one format of `platen.h`, and one implementation of [`Payload`] here. The
+//! SDK writes into buffers of the host, the host into an [`AlignedBuffer`]. A file of a surface (`surface.platen`) has
+//! the same bytes.
 //!
 //! | module | values | format |
 //! |---|---|---|
-//! | `scan` | scan header, column, end of a scan, window | `platen.scan/1`, `.column/1`, `.scan_end/1`, `.window/1` |
-//! | `mesh` | mid-surface mesh, chart | `platen.mesh/1`, `.chart/1` |
+//! | `scan` | scan header, column, end of a scan, window | `platen.scan/1`, `.column/2`, `.scan-end/1`, `.window/1` |
+//! | `mesh` | mid-surface mesh, chart | `platen.mesh/2`, `.chart/1` |
 //! | `surface` | S(u, v) with covariance and mask | `platen.surface/1` |
 //! | `findings` | task, findings, history, advice (JSON), field | `platen.task/1`, `.findings/1`, `.record/1`, `.advice/1`, `.grid/1` |
 
@@ -52,15 +53,15 @@ impl From<Malformed> for DecodeError {
     }
 }
 
-/// A value that crosses the boundary as a payload.
+/// Value that crosses the boundary as a payload.
 pub trait Payload: Sized {
     /// Name of the format.
     const FORMAT: &'static CStr;
 
-    /// Writes the value into a buffer of as many bytes as `allocate` is asked for.
+    /// Writes the value into a buffer from `allocate`, which is called with the number of bytes.
     ///
     /// # Errors
-    /// Those of `allocate`.
+    /// The errors of `allocate`.
     fn encode<B: AsMut<[u8]>, E>(&self, allocate: impl FnOnce(usize) -> Result<B, E>) -> Result<B, E>;
 
     /// Writes the value into a buffer of its own.
@@ -120,7 +121,7 @@ pub struct AlignedBuffer {
 }
 
 impl AlignedBuffer {
-    /// Allocates.
+    /// Allocates the buffer.
     #[must_use]
     pub fn new(bytes: usize) -> Self {
         Self { words: vec![0; bytes.div_ceil(8)], bytes }

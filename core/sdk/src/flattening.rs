@@ -1,4 +1,4 @@
-//! Flattening plugins: trait, frames of the boundary.
+//! Flattening plugins: the trait, and the frames of the boundary.
 
 use std::ffi::c_char;
 
@@ -9,7 +9,7 @@ use crate::exchange::Payload;
 use crate::shim::{Input, Plugin, describe, refused};
 use crate::{Error, ErrorKind, Info, Job, Options, Result, Values};
 
-/// Plugin that assigns each vertex of the mid-surface mesh its place (u, v) on the original plate.
+/// Plugin that assigns to each vertex of the mid-surface mesh its position (u, v) on the original plate.
 pub trait Flattening: Send + Sized + 'static {
     /// Description of the plugin.
     const INFO: Info;

@@ -107,11 +107,12 @@ mod tests {
     #[test]
     fn components_are_connected_by_sides_and_do_not_wrap_round() {
         let mut label = vec![0_i8; PlateGrid::NODES];
-        // A row's last node and the next row's first are no neighbours; diagonal nodes are none either.
+        // The last node of a row and the first of the next row are not neighbours; diagonal nodes are not neighbours
+        // either.
         for node in [100, 101, 5 * 101 + 5, 6 * 101 + 6] {
             label[node] = 1;
         }
-        // Two senses side by side are two patches.
+        // Two adjacent areas of different sign are two patches.
         (label[2000], label[2001], label[2002]) = (1, 1, -1);
         let patches = PlateGrid::connected_components(&label);
         assert_eq!(patches, [vec![100], vec![101], vec![510], vec![612], vec![2000, 2001], vec![2002]]);

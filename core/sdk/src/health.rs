@@ -3,7 +3,7 @@
 use platen_abi as abi;
 use platen_abi::health_flag;
 
-/// State of an instrument; `None` where it is not known.
+/// State of an instrument; `None` where it is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Health {
     /// Temperature inside, degrees Celsius.
@@ -34,7 +34,7 @@ impl Health {
         }
     }
 
-    /// Returns the state that a plugin wrote.
+    /// Converts the state that a plugin wrote.
     #[must_use]
     pub fn from_raw(raw: &abi::Health) -> Self {
         let known = |value: f64| value.is_finite().then_some(value);

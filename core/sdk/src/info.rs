@@ -15,8 +15,8 @@ pub struct Info {
 }
 
 impl Info {
-    /// Makes a description: `id` as in plant files, display name, one or two sentences, version. Vendor and licence are those of
-    /// platen unless set by [`by`](Self::by).
+    /// Creates a description: `id` as in plant files, display name, one or two sentences, version. Vendor and licence
+    /// are those of platen unless they are set by [`by`](Self::by).
     pub const fn new(
         id: &'static CStr,
         name: &'static CStr,

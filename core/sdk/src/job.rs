@@ -67,8 +67,8 @@ impl<'a> Job<'a> {
         unsafe { (self.host.progress)(self.host, self.raw.job_id, fraction, phase.as_ptr()) };
     }
 
-    /// Registers `wake`, which is called from another thread when the job is cancelled, until the guard is dropped. Typically
-    /// it closes a socket, so that a blocking read returns. It must return at once.
+    /// Registers `wake`, which is called from another thread when the job is cancelled, until the guard is dropped.
+    /// Typically it closes a socket, so that a blocking read returns. It must return at once.
     #[must_use]
     pub fn on_cancel(&self, wake: impl Fn() + Send + 'static) -> CancelGuard<'a> {
         *self.waker.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(wake));
@@ -142,7 +142,8 @@ struct OwnedBuffer<'a> {
 
 impl AsMut<[u8]> for OwnedBuffer<'_> {
     fn as_mut(&mut self) -> &mut [u8] {
-        // SAFETY: the host gave at least `bytes` bytes of memory that was written before, which are ours until emitted or freed.
+        // SAFETY: the host gave at least `bytes` bytes of memory that was written before, which are ours until emitted
+        // or freed.
         unsafe { std::slice::from_raw_parts_mut(self.raw.data.cast(), self.bytes) }
     }
 }

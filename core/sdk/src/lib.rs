@@ -1,6 +1,6 @@
 //! SDK for plugins in Rust: safe traits over the C boundary of `platen-abi`.
 //!
-//! A plugin is a crate of type `cdylib` that implements one of three traits and exports the implementation with
+//! A plugin is a crate of type `cdylib` that implements one of four traits and exports the implementation with
 //! [`export!`]:
 //!
 //! | kind | trait | input | output |
@@ -8,6 +8,7 @@
 //! | scanner | [`Scanner`] | trigger, window | lattice, column by column |
 //! | flattening | `Flattening` (feature `flattening`) | mid-surface mesh | (u, v) of each vertex |
 //! | comparison | `Comparison` (feature `comparison`) | surfaces, task | figures, verdicts, sentences, fields |
+//! | advisor | `Advisor` (feature `comparison`) | surfaces, history of the plate | advice for the next stroke |
 //!
 //! # Example
 //!
@@ -49,21 +50,21 @@
 //!
 //! # Options
 //!
-//! [`options!`] declares each option once; validation, `platen plugins describe` and the typed value follow
-//! from the declaration. A field of type `Option<T>` is optional; any other field without a default is required. The host
+//! [`options!`] declares each option once; validation, `platen plugins describe` and the typed value are derived from
+//! the declaration. A field of type `Option<T>` is optional; any other field without a default is required. The host
 //! checks the plant file before the plugin is created.
 //!
 //! # Errors, panics, log
 //!
-//! An [`Error`] consists of a kind, a sentence (where and what) and a hint (what to do). Panics are caught in the exported
-//! functions and become errors of kind [`ErrorKind::Internal`]; the crate must be built with `panic = "unwind"`. Events of
-//! `tracing` are forwarded to the host's log with the id of the job.
+//! An [`Error`] consists of a kind, a sentence (place and failure) and a hint (remedy). Panics are caught in the
+//! exported functions and become errors of kind [`ErrorKind::Internal`]; the crate must be built with `panic =
+//! "unwind"`. Events of `tracing` are forwarded to the host's log with the id of the job.
 //!
 //! # Threads and time
 //!
 //! All methods of one plugin instance are called one at a time, from the same thread. A job has a deadline and can be
-//! cancelled at any time: call [`Job::check`] at least every 50 ms of work, or register [`Job::on_cancel`] around a blocking
-//! call.
+//! cancelled at any time: call [`Job::check`] at least every 50 ms of work, or register [`Job::on_cancel`] around a
+//! blocking call.
 #![allow(unsafe_code, reason = "this crate is the plugin's side of the boundary")]
 
 mod device;

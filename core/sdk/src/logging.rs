@@ -1,5 +1,6 @@
-//! Forwards the plugin's `tracing` events to the host. A library has its own `tracing` globals and cannot use the host's
-//! subscriber.
+//! Forwarding of the plugin's `tracing` events to the host.
+//!
+//! A library has its own `tracing` globals and cannot use the host's subscriber.
 
 use std::cell::Cell;
 use std::ffi::CString;
@@ -30,7 +31,7 @@ unsafe impl Sync for ToHost {}
 
 /// Installs the host as the subscriber of this library's `tracing` events.
 pub(crate) fn install(host: &'static abi::Host) {
-    // A second `init` in the same process finds the first subscriber in place, which serves as well.
+    // A second `init` in the same process finds the first subscriber installed, which serves equally.
     let _ = tracing::subscriber::set_global_default(ToHost(host));
 }
 

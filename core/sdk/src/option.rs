@@ -1,4 +1,4 @@
-//! Options: one declaration gives validation, `describe`, schema and typed values.
+//! Options of a plugin: one declaration gives validation, `describe`, schema and typed values.
 
 use std::ffi::{CStr, c_char};
 use std::path::PathBuf;
@@ -9,14 +9,14 @@ use platen_abi::{OptionDecl, Value, option_flag, option_type};
 pub trait Options: Sized {
     /// Table of declarations, read by the host.
     const TABLE: &'static [OptionDecl];
-    /// Makes the struct from the values that the host checked.
+    /// Creates the struct from the values that the host checked.
     ///
     /// # Errors
-    /// When a value is missing: a fault of the host.
+    /// A value is missing, which is a fault of the host.
     fn from_values(values: &Values<'_>) -> crate::Result<Self>;
 }
 
-/// No options.
+/// A plugin without options.
 impl Options for () {
     const TABLE: &'static [OptionDecl] = &[];
     fn from_values(_: &Values<'_>) -> crate::Result<Self> {
@@ -131,7 +131,7 @@ const fn pointer(text: Option<&'static str>) -> *const c_char {
     }
 }
 
-/// Returns a bound and its flag; 0 without one.
+/// Returns a bound and its flag; 0 without a bound.
 const fn bound(bound: Option<f64>, flag: u32) -> (f64, u32) {
     match bound {
         Some(bound) => (bound, flag),

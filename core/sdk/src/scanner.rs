@@ -1,4 +1,4 @@
-//! Scanner plugins: trait, and the sink of a scan.
+//! Scanner plugins: the trait, and the sink of a scan.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ pub trait Scanner: Send + Sized + 'static {
     /// Connects to the device; may block.
     ///
     /// # Errors
-    /// When the device does not answer, with what to do about it.
+    /// The device does not answer; the error contains the remedy.
     fn open(&mut self) -> Result<()> {
         Ok(())
     }
@@ -33,20 +33,22 @@ pub trait Scanner: Send + Sized + 'static {
         None
     }
 
-    /// Returns what is known of the instrument after `open` or a scan, without asking it for longer than 100 ms.
+    /// Returns the known state of the instrument after `open` or a scan; a request to the instrument must not take
+    /// longer than 100 ms.
     fn health(&mut self) -> Option<Health> {
         None
     }
 
-    /// Looks for devices for at most 3 s, without `open`; the options tell where.
+    /// Searches for devices for at most 3 s, without `open`; the options determine where.
     ///
     /// # Errors
-    /// When the driver cannot look for any, or nothing can be asked.
+    /// The driver cannot search for devices, or the place to search cannot be reached.
     fn discover(&mut self) -> Result<Vec<Device>> {
         Err(Error::new(ErrorKind::Unsupported, "this driver cannot look for devices"))
     }
 
-    /// Scans: calls [`ScanSink::begin`] once, [`ScanSink::column`] for the columns in any order, [`ScanSink::end`] once.
+    /// Scans: calls [`ScanSink::begin`] once, [`ScanSink::column`] for the columns in any order, [`ScanSink::end`]
+    /// once.
     ///
     /// # Errors
     /// When the scan is not complete.
@@ -56,7 +58,7 @@ pub trait Scanner: Send + Sized + 'static {
     fn close(&mut self) {}
 }
 
-/// Receiver of a scan and its job: [`ScanSink`], or a test's.
+/// Receiver of a scan and its job: a [`ScanSink`], or that of a test.
 pub trait ScanReceiver {
     /// As [`Job::check`].
     fn check(&self) -> Result<()>;
@@ -103,7 +105,8 @@ pub struct ScanSink<'a> {
 }
 
 impl ScanSink<'_> {
-    /// Returns the requested part of the field of view; `None` requests all of it. A driver without such a feature sends all.
+    /// Returns the requested part of the field of view; `None` requests all of it. A driver that cannot restrict a scan
+    /// sends all of it.
     pub fn window(&self) -> Option<&Window> {
         self.window.as_ref()
     }

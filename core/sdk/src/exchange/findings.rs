@@ -1,4 +1,5 @@
-//! The task of a comparison, its findings and its fields; the plate's history for an advisor, and its advice.
+//! Documents of comparisons and advisors: a comparison's task, findings and fields; an advisor's history of the plate,
+//! and its advice.
 
 use std::ffi::CStr;
 
@@ -10,7 +11,7 @@ use super::{Arrays, DecodeError, Payload};
 /// Largest field accepted: 4 million numbers.
 const MAX_FIELD: usize = 1 << 22;
 
-/// Implements [`Payload`] as JSON without a header. These documents are plain data, which always have a JSON form.
+/// Implements [`Payload`] as JSON without a header. These documents are plain data and always have a JSON form.
 macro_rules! json {
     ($($document:ty = $format:expr;)*) => { $(
         impl Payload for $document {

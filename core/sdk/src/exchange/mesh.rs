@@ -1,4 +1,4 @@
-//! The mid-surface mesh, and the chart that a flattening returns.
+//! Mid-surface mesh, and the chart that a flattening returns.
 
 use std::ffi::CStr;
 

@@ -1,4 +1,4 @@
-//! Scans: header, columns, end, and the window that is asked for.
+//! Scans: header, columns, end, and the requested window.
 
 use std::ffi::CStr;
 
@@ -153,7 +153,7 @@ impl Payload for ScanEnd {
     }
 }
 
-/// Returns the window as it crosses the boundary, also as an argument of `estimate`.
+/// Returns the window in the form of the boundary, also for the argument of `estimate`.
 #[must_use]
 pub fn to_raw_window(window: &Window) -> payload::Window {
     payload::Window {
@@ -166,7 +166,7 @@ pub fn to_raw_window(window: &Window) -> payload::Window {
     }
 }
 
-/// Returns the window of such an argument.
+/// Returns the window from such an argument.
 #[must_use]
 pub fn from_raw_window(window: &payload::Window) -> Window {
     Window {
@@ -211,7 +211,7 @@ mod tests {
             notes: vec!["rows reversed".into(), "units: mm".into()],
         };
         assert_eq!(ScanHeader::decode(header.to_buffer().as_ref()), Ok(header.clone()));
-        // A driver built before the range error was appended.
+        // Written by a driver that was built before the range error was appended.
         let mut older = header.to_buffer();
         older.as_mut()[..4].copy_from_slice(&96_u32.to_le_bytes());
         older.as_mut()[4] &= !2;

@@ -1,4 +1,4 @@
-//! The surface S(u, v) with its covariance and its mask.
+//! Surface S(u, v) with its covariance and its mask.
 
 use std::ffi::CStr;
 
