@@ -1,4 +1,5 @@
-//! Answers of a plugin to the reference inputs, and their digest: two answers are equal to the last bit or not.
+//! Answers of a plugin to the reference inputs, and their digest, which is equal only for answers that agree to the
+//! last bit.
 
 use std::time::Duration;
 
@@ -13,12 +14,12 @@ use crate::Verdict;
 use crate::reference;
 use crate::subject::{Subject, failed};
 
-/// Why there is no answer.
+/// Reason why there is no answer.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", match .0 { Verdict::Failed(why) | Verdict::LeftOut(why) | Verdict::Warned(why) => why, Verdict::Passed => "" })]
 pub(crate) struct NoAnswer(pub(crate) Verdict);
 
-/// A fresh instance of any kind.
+/// New instance of any kind.
 pub(crate) enum Any {
     Flattening(Flattening),
     Comparison(Comparison),
@@ -57,13 +58,13 @@ impl Any {
     }
 }
 
-/// Returns a digest of all answers of a fresh instance.
+/// Returns a digest of all answers of a new instance.
 pub(crate) fn digest(subject: &Subject) -> Result<String, NoAnswer> {
     let limit = subject.settings.limit;
     Any::of(subject, limit).and_then(|mut any| any.answer(limit)).map_err(NoAnswer)
 }
 
-/// Returns what a fresh instance shows after it has answered.
+/// Returns the result of `look` at a new instance after it has answered.
 pub(crate) fn after<T>(subject: &Subject, look: impl Fn(&Instance) -> T) -> Result<T, Verdict> {
     let limit = subject.settings.limit;
     let mut any = Any::of(subject, limit)?;
@@ -94,7 +95,7 @@ pub(crate) fn of_flattening(flattening: &mut Flattening) -> Result<String, Verdi
     Ok(hex(sha))
 }
 
-/// Inputs of a comparison, by name: before, baseline, target, how much is seen.
+/// Inputs of a comparison, by name: before, baseline, target, share of the plate that is seen.
 pub(crate) const SITUATIONS: [(&str, bool, bool, bool, f64); 5] = [
     ("a plate, the stroke before and its blank", true, true, true, 1.0),
     ("no stroke before", false, true, true, 1.0),
@@ -131,7 +132,7 @@ pub(crate) fn of_comparison(comparison: &Comparison) -> Result<String, Verdict> 
     Ok(hex(sha))
 }
 
-/// Situations of an advisor, by name: radius of the plate, metres; how much is seen; strokes so far.
+/// Inputs of an advisor, by name: radius of the plate, metres; share of the plate that is seen; strokes so far.
 const ADVISED: [(&str, f64, f64, usize); 4] = [
     ("a flat plate", 1e4, 1.0, 0),
     ("a plate half way, after three strokes", 9.0, 1.0, 3),

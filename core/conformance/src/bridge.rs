@@ -1,8 +1,9 @@
-//! Conformance tests of a scan bridge over TCP, behind `platen bridge check`: the scan bridge protocol 1.0
-//! (`drivers/faro-stream/PROTOCOL.md`), written from that document alone.
+//! Conformance tests of a scan bridge over TCP, for `platen bridge check`. They test the scan bridge protocol 1.0 and
+//! are written from its document alone (`drivers/faro-stream/PROTOCOL.md`).
 //!
-//! The kit is a driver of its own. Each test opens its connections anew; those that scan use the settings given, and the scanner
-//! turns. A test that the bridge's answers leave no room for (no scan was under way any more) is left out and says so.
+//! The tests act as a driver of their own. Each test opens new connections. Tests that scan use the given settings, and
+//! the scanner turns. A test that the answers of the bridge make impossible (for example, the scan has already ended)
+//! is left out and gives the reason.
 
 mod client;
 mod hello;
@@ -18,7 +19,7 @@ use serde_json::Value as Json;
 use crate::{Outcome, Verdict};
 use scans::Recorded;
 
-/// Bridge under test: its address, members of Start, limits, and the scan that several tests look at.
+/// Bridge under test: its address, members of Start, limits, and the scan that several tests use.
 #[derive(Debug)]
 pub struct BridgeSubject {
     address: SocketAddr,
@@ -26,9 +27,9 @@ pub struct BridgeSubject {
     settings: Json,
     /// Longest time of a scan.
     limit: Duration,
-    /// Makes names of jobs that no earlier run has used.
+    /// Prefix of job names that no earlier run has used.
     run: String,
-    /// The scan that several tests look at, made once.
+    /// Scan that several tests use, made once.
     scan: OnceCell<Result<Recorded, String>>,
 }
 
@@ -59,7 +60,7 @@ impl Test {
     }
 }
 
-/// Runs the tests whose names contain `only`, and tells of each. Without an answer to Hello the others are left out.
+/// Runs the tests whose names contain `only`, and reports each. Without an answer to Hello the others are left out.
 pub fn run_bridge(
     subject: &BridgeSubject,
     only: Option<&str>,

@@ -1,4 +1,4 @@
-//! Outcomes as JUnit's XML, which CI systems read.
+//! Outcomes of tests as JUnit's XML, which CI systems read.
 
 use maud::{PreEscaped, html};
 

@@ -1,14 +1,17 @@
-//! Conformance tests of a plugin library, behind `platen plugins check`: the contract of the boundary, one test after another, each in a
-//! worker process of its own. [`run_bridge`] has those of a scan bridge over TCP, behind `platen bridge check`.
+//! Conformance tests of a plugin library, for `platen plugins check`: tests of the boundary's contract, each in a
+//! worker process of its own.
+//!
+//! [`run_bridge`] runs the tests of a scan bridge over TCP, for `platen bridge check`.
 //!
 //! | level | contents |
 //! |---|---|
-//! | 0 | the file, of which nothing runs |
+//! | 0 | the file, without running any of its code |
 //! | 1 | loading and description |
-//! | 2 | the contract: options, reference inputs, equal answers, sense |
+//! | 2 | the contract: options, reference inputs, equal answers, plausible answers |
 //! | 3 | abuse: deadlines, cancellation, hard inputs, leaks |
 //!
-//! A test that needs what is not there (options without a default, a device) is left out and says so: it proves nothing.
+//! A test whose prerequisites are missing (options without a default, a device) is left out with the reason. It proves
+//! nothing.
 
 mod answer;
 mod bridge;
@@ -32,24 +35,24 @@ pub const LEVELS: u8 = 3;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The plugin keeps this part of the contract.
+    /// The plugin complies with this part of the contract.
     Passed,
-    /// It does, but somebody will be sorry: the reason.
+    /// It complies, but in a way that may cause trouble: the reason.
     Warned(String),
-    /// It does not: what it did.
+    /// It does not comply: its behaviour.
     Failed(String),
-    /// Not tested: what is missing.
+    /// Not tested: the missing prerequisite.
     LeftOut(String),
 }
 
-/// A test that was run.
+/// Test that was run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Outcome {
-    /// Name, by which `--only` finds it.
+    /// Name, as for `--only`.
     pub test: &'static str,
     /// Level.
     pub level: u8,
-    /// What the contract demands.
+    /// Requirement of the contract.
     pub demands: &'static str,
     /// Result.
     pub verdict: Verdict,
@@ -80,10 +83,10 @@ impl Test {
     }
 }
 
-/// Names of the tests without which those of level 2 and 3 after them prove nothing.
+/// Names of the tests without which the later tests of levels 2 and 3 prove nothing.
 const GATES: [&str; 4] = ["load.loads", "options.default", "answer.given", "answer.same"];
 
-/// Runs the tests up to a level whose names contain `only`, and tells of each.
+/// Runs the tests up to a level whose names contain `only`, and reports each.
 pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMut(&Outcome)) -> Vec<Outcome> {
     let (mut outcomes, mut shut): (Vec<Outcome>, Option<&str>) = (Vec::new(), None);
     let wanted = tests::ALL.iter().copied().flatten().filter(|test| test.level <= level);
@@ -95,7 +98,7 @@ pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMu
         };
         let passed = matches!(outcome.verdict, Verdict::Passed | Verdict::Warned(_));
         let left_out = matches!(outcome.verdict, Verdict::LeftOut(_));
-        // No two scans of a device are the same, which proves nothing against its driver.
+        // No two scans of a device are equal, which is not a fault of its driver.
         if GATES.contains(&test.name) && !passed && !(left_out && test.name == "answer.same") {
             shut = shut.or(Some(test.name));
         }
@@ -108,7 +111,7 @@ pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMu
 /// Returns a digest of the plugin's answers to the reference inputs, hexadecimal: equal in both isolations.
 ///
 /// # Errors
-/// The answer of the plugin in place of a digest: its error, in words.
+/// The plugin's error as a sentence, if it gave no answer.
 pub fn digest(subject: &Subject) -> Result<String, String> {
     answer::digest(subject).map_err(|error| error.to_string())
 }

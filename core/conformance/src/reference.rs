@@ -1,4 +1,4 @@
-//! Reference inputs of closed form: meshes with known charts, surfaces, the task of a plate.
+//! Reference inputs in closed form: meshes with known charts, surfaces, the task of a plate.
 
 use platen_model::{
     Bend, Centre, Die, Facing, PlateHistory, PressedStroke, RadiusOf, ReferenceLine, Seat, Steel, Target,
@@ -12,7 +12,7 @@ use platen_shape::{Surface, Vec3};
 pub(crate) const SIZE: [f64; 2] = [3.0, 2.0];
 const THICKNESS: f64 = 0.036;
 
-/// Meshes of plates that were bent without stretching, with their names.
+/// Returns meshes of plates that were bent without stretching, with their names.
 pub(crate) fn meshes() -> [(&'static str, ClosedForm); 3] {
     let flat = |[u, v]: [f64; 2]| [u, v, 0.0];
     let half = |[u, v]: [f64; 2]| {
@@ -26,7 +26,7 @@ pub(crate) fn meshes() -> [(&'static str, ClosedForm); 3] {
     ]
 }
 
-/// Meshes at the edge of what a scan can give, with their names.
+/// Returns meshes at the limits of a scan, with their names.
 pub(crate) fn hard_meshes() -> [(&'static str, ClosedForm); 3] {
     let flat = |[u, v]: [f64; 2]| [u, v, 0.0];
     let dome = |[u, v]: [f64; 2]| [u, v, -0.1 * ((u - 1.5).powi(2) + (v - 1.0).powi(2))];
@@ -37,7 +37,8 @@ pub(crate) fn hard_meshes() -> [(&'static str, ClosedForm); 3] {
     ]
 }
 
-/// A plate's mid-surface rolled to a radius, metres, seen up to a share of u; `None` never: enough points determine it.
+/// Returns a plate's mid-surface rolled to a radius in metres and seen up to a share of u. It is never `None`: there
+/// are enough points to determine it.
 pub(crate) fn surface(radius: f64, seen: f64) -> Option<Surface> {
     let mut fit = SplineFit::new(UniformKnots::new(0.0, SIZE[0], 30), UniformKnots::new(0.0, SIZE[1], 20));
     for k in 0..150 * 100 {
@@ -57,7 +58,7 @@ pub(crate) fn surface(radius: f64, seen: f64) -> Option<Surface> {
     Some(Surface::new(fit.solve([0.0, 0.0, 1.0]).ok()?, THICKNESS, mask))
 }
 
-/// The task of that plate, with or without a target.
+/// Returns the task of that plate, with or without a target.
 pub(crate) fn task(target: bool) -> Task {
     let shape = TargetShape::Cylinder { radius: 6.0, axis: std::f64::consts::FRAC_PI_2 };
     let target = target.then_some(Target { shape, radius_of: RadiusOf::Mid, scanned_face: Facing::Inside });
@@ -77,7 +78,7 @@ pub(crate) fn task(target: bool) -> Task {
     }
 }
 
-/// The history of that plate after so many strokes from its left edge, with one template along u.
+/// Returns the history of that plate after this number of strokes from its left edge, with one template along u.
 pub(crate) fn history(strokes: usize) -> PlateHistory {
     let line = ReferenceLine { name: "L".into(), from: [0.0, 1.0], to: [SIZE[0], 1.0] };
     let template = Template {

@@ -1,4 +1,4 @@
-//! The plugin under test: its library, its options, fresh instances of it.
+//! Plugin under test: its library, its options, new instances of it.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -14,19 +14,19 @@ use crate::Verdict;
 /// Deadline of a scanner to connect.
 const OPEN_LIMIT: Duration = Duration::from_secs(60);
 
-/// A plugin under test.
+/// Plugin under test.
 #[derive(Debug)]
 pub struct Subject {
     pub(crate) path: PathBuf,
     pub(crate) catalogue: Catalogue,
-    /// The plugin, or why its library cannot be used.
+    /// The plugin, or the reason why its library cannot be used.
     pub(crate) library: Result<Library, PluginError>,
-    /// Its options, or what is missing.
+    /// Its options, or the missing ones.
     pub(crate) values: Result<Vec<OptionValue>, String>,
     pub(crate) settings: Settings,
 }
 
-/// How a plugin is tested.
+/// Settings of the tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// Seed of random options.
@@ -46,12 +46,12 @@ pub enum SubjectError {
         /// Its plugins.
         names: Vec<String>,
     },
-    /// The library has not this one.
+    /// The library does not contain the requested plugin.
     #[error("{} holds no plugin {wanted}, but {}", .path.display(), .names.join(", "))]
     None {
         /// The library.
         path: PathBuf,
-        /// What was asked for.
+        /// Requested name.
         wanted: String,
         /// Its plugins.
         names: Vec<String>,
@@ -59,10 +59,10 @@ pub enum SubjectError {
 }
 
 impl Subject {
-    /// Opens a library; `plugin` names one of several in it, `options` are those of a plant file.
+    /// Opens a library; `plugin` selects one of several in it, `options` are those of a plant file.
     ///
     /// # Errors
-    /// The plugin is not named, or not there. A library that cannot be used is a subject: its tests fail.
+    /// The plugin is not selected or does not exist. A library that cannot be used is still a subject: its tests fail.
     pub fn open(
         catalogue: &Catalogue,
         path: &Path,
@@ -118,7 +118,7 @@ impl Subject {
         self.values.as_deref().map_err(|why| Verdict::LeftOut(format!("give options by --plant: {why}")))
     }
 
-    /// Returns a fresh instance with these values.
+    /// Returns a new instance with these values.
     pub(crate) fn instance(&self, values: &[OptionValue]) -> Result<Instance, PluginError> {
         let library = self.library.as_ref().map_err(Clone::clone)?;
         Instance::create(library, library.descriptor().kind, values)
@@ -143,7 +143,7 @@ impl Subject {
         Advisor::create(self.library()?, self.values()?, limit).map_err(refused)
     }
 
-    /// Returns a connected scanner, with so much memory.
+    /// Returns a connected scanner.
     pub(crate) fn scanner(&self) -> Result<Scanner, Verdict> {
         let scanner = Scanner::create(self.library()?, self.values()?).map_err(refused)?;
         match scanner.instance().open(OPEN_LIMIT) {
@@ -153,14 +153,14 @@ impl Subject {
         }
     }
 
-    /// Returns the same with less memory, bytes.
+    /// Returns the library with this memory limit, bytes.
     pub(crate) fn limited(&self, memory: u64) -> Result<Library, Verdict> {
         let limits = Limits { memory, ..Limits::default() };
         Ok(self.library()?.clone().with(WorkerSettings { limits, ..WorkerSettings::default() }))
     }
 }
 
-/// A failure of the plugin.
+/// Returns a failure of the plugin.
 pub(crate) fn failed(what: impl std::fmt::Display) -> Verdict {
     Verdict::Failed(what.to_string())
 }

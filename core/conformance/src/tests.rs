@@ -1,4 +1,4 @@
-//! The tests, by level.
+//! Tests of a plugin library, by level.
 
 mod abuse;
 mod contract;
@@ -12,13 +12,13 @@ use crate::Test;
 /// All tests, in the order in which they are run.
 pub(crate) const ALL: [&[Test]; 4] = [file::TESTS, load::TESTS, contract::TESTS, abuse::TESTS];
 
-/// Returns whether a test concerns plugins of a kind.
+/// Returns whether a test applies to plugins of a kind.
 pub(crate) fn concerns(test: &str, kind: Kind) -> bool {
     match test {
         "sense.lengths" => kind == Kind::Flattening,
         "sense.figures" => kind == Kind::Comparison,
         "cancel.kept" => kind == Kind::Scanner,
-        // One device, one driver, and no two scans are the same.
+        // There is one device for one driver, and no two scans are equal.
         "answer.again" | "answer.beside" | "input.hard" | "memory.little" => kind != Kind::Scanner,
         _ => true,
     }

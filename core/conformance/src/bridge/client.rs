@@ -1,4 +1,5 @@
-//! One connection to a bridge: frames out and in (sections 1 and 2 of the protocol). Whatever the bridge sends is checked on the way.
+//! Client connection to a bridge: sends and receives frames (sections 1 and 2 of the protocol). Every received frame is
+//! checked.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -23,23 +24,24 @@ pub(super) const SCAN_BEGIN: u16 = 0x8010;
 pub(super) const COLUMN: u16 = 0x8011;
 pub(super) const SCAN_END: u16 = 0x8012;
 
-/// Name of the client: the same in each run, so that the lease of an earlier one is no hindrance.
+/// Name of the client: the same in each run, so that the lease of an earlier run does not prevent a connection.
 pub(super) const CLIENT: &str = "platen bridge check";
-/// Bit of a type that a receiver must know.
+/// Bit of a frame type that a receiver must support.
 const CRITICAL: u16 = 0x8000;
 const HEADER: usize = 32;
 const LARGEST: usize = 1 << 20;
-/// Time for an answer that needs no scanner. The protocol sets none; the driver closes after 4 s without a frame.
+/// Time for an answer that needs no scanner. The protocol sets none; the driver closes the connection after 4 s without
+/// a frame.
 pub(super) const ANSWER: Duration = Duration::from_secs(4);
 /// Time within which a bridge closes a connection that it must close.
 const CLOSING: Duration = Duration::from_secs(4);
 
-/// Makes a failure of a sentence.
+/// Returns a failure with this sentence.
 pub(super) fn fault<T>(what: impl Into<String>) -> Result<T, Verdict> {
     Err(Verdict::Failed(what.into()))
 }
 
-/// A frame as it came, its payload sound.
+/// Received frame with a correct checksum.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     pub(super) kind: u16,
@@ -49,7 +51,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Parses a payload of JSON.
+    /// Parses a JSON payload.
     pub(super) fn json(&self) -> Result<Json, Verdict> {
         match serde_json::from_slice(&self.payload) {
             Ok(object @ Json::Object(_)) => Ok(object),
@@ -98,13 +100,13 @@ pub(super) struct Client {
     sent: u64,
     received: u64,
     spoke: Instant,
-    /// Times between two Status frames, and since the last, from Capabilities on.
+    /// Time of the last Status frame, and the longest time between two, both from Capabilities on.
     status: Option<Instant>,
     pub(super) longest_silence: Duration,
 }
 
 impl Client {
-    /// Connects, and says nothing.
+    /// Connects without sending anything.
     pub(super) fn connect(subject: &BridgeSubject) -> Result<Self, Verdict> {
         let stream = TcpStream::connect_timeout(&subject.address, ANSWER);
         let stream = stream.or_else(|why| fault(format!("no connection: {why}")))?;
@@ -141,7 +143,7 @@ impl Client {
         self.send_raw(&bytes)
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     pub(super) fn send_raw(&mut self, bytes: &[u8]) -> Result<(), Verdict> {
         self.spoke = Instant::now();
         let _ = self.stream.set_write_timeout(Some(ANSWER));
@@ -153,7 +155,8 @@ impl Client {
         self.sent
     }
 
-    /// Returns the next frame but Status; `None` when nothing comes in time or the bridge closed the connection. Sends heartbeats.
+    /// Returns the next frame other than Status; `None` if none arrives in time or the bridge closed the connection.
+    /// Sends heartbeats.
     pub(super) fn next(&mut self, limit: Duration) -> Result<Option<Frame>, Verdict> {
         let until = Instant::now() + limit;
         loop {
@@ -161,7 +164,7 @@ impl Client {
             match frame.kind {
                 STATUS => {}
                 kind if kind & CRITICAL != 0 => return Ok(Some(frame)),
-                // Of a later version: to be skipped.
+                // Frame of a later version, to be skipped.
                 _ => continue,
             }
             let status = frame.json()?;
@@ -203,7 +206,7 @@ impl Client {
         }
     }
 
-    /// Checks that the bridge closes the connection; what it sends before does not count.
+    /// Checks that the bridge closes the connection; frames that it sends before are ignored.
     pub(super) fn expect_close(mut self) -> Result<(), Verdict> {
         let until = Instant::now() + CLOSING;
         let mut bytes = [0; 4096];
@@ -254,7 +257,7 @@ impl Client {
         Ok(Some(Frame { kind, scan: word(24), payload, crc }))
     }
 
-    /// Fills a buffer, with heartbeats meanwhile; false when not a byte came.
+    /// Fills a buffer and sends heartbeats meanwhile; returns false if no byte arrived.
     fn fill(&mut self, buffer: &mut [u8], until: Instant) -> Result<bool, Verdict> {
         let mut held = 0;
         while held < buffer.len() {

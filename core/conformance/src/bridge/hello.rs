@@ -1,4 +1,4 @@
-//! Sections 1 to 4 of the protocol, without a scan: Hello, lease, Configure, Status.
+//! Tests of sections 1 to 4 of the protocol that need no scan: Hello, lease, Configure, Status.
 
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -130,7 +130,7 @@ fn rate(subject: &BridgeSubject) -> Result<(), Verdict> {
     silence(&mut Client::controller(subject)?)
 }
 
-/// Checks that Status comes in time for 3 s; half a second is granted to the network.
+/// Checks for 3 s that Status arrives in time; half a second is allowed for the network.
 fn silence(client: &mut Client) -> Result<(), Verdict> {
     let start = Instant::now();
     while start.elapsed() < Duration::from_secs(3) {
@@ -158,7 +158,7 @@ fn discovered(subject: &BridgeSubject) -> Result<(), Verdict> {
     let ask = |answer: &mut [u8]| {
         let socket = UdpSocket::bind(here)?;
         socket.set_read_timeout(Some(Duration::from_secs(1)))?;
-        // Not one of the protocol: to be ignored.
+        // Not a datagram of the protocol: to be ignored.
         socket.send_to(b"hello?", subject.address)?;
         socket.send_to(&encode(HELLO, 0, 0, hello.to_string().as_bytes()), subject.address)?;
         socket.recv_from(answer)
@@ -191,7 +191,7 @@ fn impossible(subject: &BridgeSubject) -> Result<(), Verdict> {
     settings["divisor"] = json!(3_000_000);
     client.send(CONFIGURE, 0, &settings)?;
     client.expect_error("config")?;
-    // A query: the connection stays.
+    // A query; the connection is kept.
     client.send(CONFIGURE, 0, &subject.settings)?;
     match client.next(ANSWER)? {
         Some(frame) if frame.kind == CONFIGURED => Ok(()),

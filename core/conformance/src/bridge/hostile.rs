@@ -1,4 +1,4 @@
-//! Frames that a bridge must not trust (section 1 of the protocol).
+//! Tests with invalid frames, which a bridge must reject (section 1 of the protocol).
 
 use super::client::{ABORT, ANSWER, CONFIGURE, CONFIGURED, Client, encode, seal};
 use super::{BridgeSubject, Test};
@@ -45,7 +45,7 @@ fn critical(subject: &BridgeSubject) -> Result<(), Verdict> {
     client.expect_close()
 }
 
-/// Sends a Configure that was spoilt after Hello.
+/// Sends a damaged Configure after Hello.
 fn spoilt(subject: &BridgeSubject, spoil: fn(&mut [u8])) -> Result<(), Verdict> {
     let mut client = Client::controller(subject)?;
     let mut frame = encode(CONFIGURE, 0, client.sequence(), subject.settings.to_string().as_bytes());

@@ -1,4 +1,4 @@
-//! Sections 4 to 7 of the protocol: scans, their columns, Resume, Abort.
+//! Tests of sections 4 to 7 of the protocol: scans, their columns, Resume, Abort.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -31,7 +31,7 @@ pub(super) const TESTS: &[Test] = &[
     Test::new("abort.unknown", "Abort of a job that is not running is ignored", abort_unknown),
 ];
 
-/// A scan as it was sent.
+/// Scan as received.
 #[derive(Debug, Clone)]
 pub(super) struct Recorded {
     job: String,
@@ -54,7 +54,8 @@ fn start(subject: &BridgeSubject, job: &str) -> Json {
     start
 }
 
-/// Receives a scan from its ScanBegin to its ScanEnd; `until` ends it earlier, by the number of columns that came.
+/// Receives a scan from its ScanBegin to its ScanEnd; `until` ends it earlier, depending on the number of received
+/// columns.
 fn receive(
     client: &mut Client,
     subject: &BridgeSubject,
@@ -112,7 +113,7 @@ impl Recorded {
     }
 }
 
-/// Returns the scan that several tests look at; they are left out without it.
+/// Returns the scan that several tests use; they are left out without it.
 fn recorded(subject: &BridgeSubject) -> Result<&Recorded, Verdict> {
     made(subject).map_err(|why| Verdict::LeftOut(format!("there is no scan: {why}")))
 }
@@ -237,7 +238,7 @@ fn status(subject: &BridgeSubject) -> Result<(), Verdict> {
     }
 }
 
-/// Checks that a scan was sent again as it was.
+/// Checks that a repeated scan equals the first.
 fn same(first: &Recorded, second: &Recorded) -> Result<(), Verdict> {
     if second.number != first.number {
         return fault(format!("scan {} came for scan {}", second.number, first.number));
@@ -265,7 +266,7 @@ fn again(subject: &BridgeSubject) -> Result<(), Verdict> {
     same(first, &second)
 }
 
-/// Asks for runs of columns of the recorded scan on a new connection.
+/// Requests runs of columns of the recorded scan on a new connection.
 fn resumed(subject: &BridgeSubject, first: &Recorded, missing: &Json) -> Result<Recorded, Verdict> {
     let mut client = Client::controller(subject)?;
     client.send(RESUME, first.number, &json!({"job": first.job, "missing": missing}))?;
@@ -333,7 +334,7 @@ fn other(subject: &BridgeSubject) -> Result<(), Verdict> {
     while let Some(frame) = client.next(subject.limit)? {
         match frame.kind {
             SCAN_BEGIN if frame.json()?["job"] == *job => number = Some(frame.scan),
-            // The first was over before the second was read.
+            // The first had ended before the second was read.
             SCAN_BEGIN => {
                 return Err(Verdict::LeftOut(
                     "a scan is over too soon here to be under way at another Start".into(),

@@ -1,4 +1,4 @@
-//! Level 3: deadlines, cancellation, hard inputs, leaks.
+//! Tests of level 3: deadlines, cancellation, hard inputs, leaks.
 
 use std::time::{Duration, Instant};
 
@@ -10,11 +10,11 @@ use crate::reference;
 use crate::subject::{Subject, failed};
 use crate::{Test, Verdict};
 
-/// Jobs after which memory must not have grown.
+/// Number of jobs after which memory must not have grown.
 const JOBS: usize = 12;
-/// Growth of private memory that is no leak, bytes.
+/// Growth of private memory that does not count as a leak, bytes.
 const GROWTH: u64 = 16 << 20;
-/// Memory in which a plate must be measured, bytes.
+/// Memory limit within which a plate must be measured, bytes.
 const LITTLE: u64 = 512 << 20;
 
 pub(super) const TESTS: &[Test] = &[
@@ -51,7 +51,7 @@ fn usual(subject: &Subject) -> Result<Duration, Verdict> {
 }
 
 fn deadline(subject: &Subject) -> Result<(), Verdict> {
-    // The references are three or five inputs: a fifth of the time is within the first job.
+    // There are three or five reference inputs: a fifth of the time ends within the first job.
     let one = usual(subject)? / 5;
     for share in [0.0, 0.1, 0.5, 0.9] {
         let limit = one.mul_f64(share).max(Duration::from_millis(1));
@@ -166,7 +166,7 @@ fn files(subject: &Subject) -> Result<(), Verdict> {
     Ok(())
 }
 
-/// Returns a figure of the worker after the first answers and after [`JOBS`] of them.
+/// Returns a figure of the worker after the first answers and again after [`JOBS`] answers.
 fn after_jobs(
     subject: &Subject,
     figure: fn(&platen_engine::plugin::WorkerState) -> Option<u64>,
@@ -180,7 +180,7 @@ fn after_jobs(
         let state = any.instance().worker_state();
         state.as_ref().and_then(figure).ok_or_else(|| Verdict::LeftOut("not in a process of its own".into()))
     };
-    // What is kept from the first time, such as a pool of threads, is no leak.
+    // Memory that is kept after the first job, such as a thread pool, is not a leak.
     for _ in 0..2 {
         any.answer(subject.settings.limit).map_err(unanswered)?;
     }

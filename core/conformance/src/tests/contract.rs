@@ -1,4 +1,4 @@
-//! Level 2: options, reference inputs, equal answers, sense.
+//! Tests of level 2: options, reference inputs, equal answers, plausible answers.
 
 use platen_engine::plugin::{Kind, PluginError};
 use platen_plant::{OptionDecl, OptionType, OptionValue, Value};
@@ -8,9 +8,9 @@ use crate::reference;
 use crate::subject::{Subject, failed};
 use crate::{Test, Verdict};
 
-/// Random sets of options.
+/// Number of random option sets.
 const RANDOM_SETS: usize = 20;
-/// A plate that was bent without stretching keeps its places this well, metres.
+/// Accuracy of the positions (u, v) on a plate that was bent without stretching, metres.
 const EXACT: f64 = 1e-5;
 
 pub(super) const TESTS: &[Test] = &[
@@ -85,7 +85,7 @@ fn by_default(subject: &Subject) -> Result<(), Verdict> {
     subject.instance(subject.values()?).map(drop).map_err(failed)
 }
 
-/// Creates the plugin with these values, which it may refuse.
+/// Creates the plugin with these values; it may refuse them.
 fn may_refuse(subject: &Subject, values: &[OptionValue]) -> Result<(), Verdict> {
     match subject.instance(values) {
         Ok(_) => Ok(()),
@@ -106,7 +106,7 @@ fn with(values: &[OptionValue], name: &str, value: Value) -> Vec<OptionValue> {
     values
 }
 
-/// Returns values at the edges of what an option allows.
+/// Returns values at the limits of an option.
 fn edges(option: &OptionDecl) -> Vec<Value> {
     let ends = || [option.min, option.max].into_iter().flatten();
     match option.kind {

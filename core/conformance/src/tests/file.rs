@@ -1,4 +1,4 @@
-//! Level 0: the file, of which nothing runs.
+//! Tests of level 0: the file, without running any of its code.
 
 use platen_engine::plugin::exported_symbols;
 

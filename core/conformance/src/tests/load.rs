@@ -1,4 +1,4 @@
-//! Level 1: loading and description.
+//! Tests of level 1: loading and description.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use platen_engine::plugin::{Library, LoadFacts};
 use crate::subject::{Subject, failed};
 use crate::{Test, Verdict};
 
-/// Slower than this, lists of plugins are tiresome.
+/// Slower than this, listing the plugins takes too long.
 const SLOW: Duration = Duration::from_millis(100);
 
 pub(super) const TESTS: &[Test] = &[
