@@ -1,4 +1,4 @@
-//! Queries of a history.
+//! Read access to a history: queries of its strokes and plates.
 
 use std::path::{Path, PathBuf};
 
@@ -32,8 +32,8 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Returns the query. It has the given conditions alone: SQLite finds no index for one that may be empty, and would read the whole
-    /// record for the strokes of one plate.
+    /// Returns the query. It contains only the given conditions: SQLite finds no index for a condition that may be
+    /// empty, and would read the whole record for the strokes of one plate.
     fn sql(&self) -> String {
         let conditions = [
             (self.plate.is_some(), "s.plate = :plate"),
@@ -131,8 +131,8 @@ impl Archive {
         Ok(self.query(&sql, [press])?.pop())
     }
 
-    /// Returns the stroke to compare a run with: the last one measured on the same physical plate, without trials and other
-    /// attempts of the same stroke. A baseline counts: it is the state before the first stroke.
+    /// Returns the stroke to compare a run with: the last one measured on the same physical plate, without trials and
+    /// other attempts of the same stroke. A baseline counts: it is the state before the first stroke.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
@@ -145,7 +145,8 @@ impl Archive {
         Ok(self.query(&sql, (this.plate, run_id, this.key.session, this.key.stroke))?.pop())
     }
 
-    /// Returns the scan of the blank that a run's (u, v) refer to: the last baseline measured on the same physical plate.
+    /// Returns the scan of the blank that a run's (u, v) refer to: the last baseline measured on the same physical
+    /// plate.
     ///
     /// # Errors
     /// [`Error::NoSuchRun`], [`Error::Storage`], [`Error::Damaged`].
@@ -283,7 +284,7 @@ fn wrong(column: usize, why: String) -> rusqlite::Error {
 mod tests {
     use super::*;
 
-    /// The advice asks for the strokes of hundreds of plates after each stroke.
+    /// The advice queries the strokes of hundreds of plates after each stroke.
     #[test]
     fn strokes_of_a_plate_are_found_by_an_index() {
         let folder = tempfile::tempdir().unwrap();

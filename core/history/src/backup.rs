@@ -1,7 +1,8 @@
 //! Backup of a record while its host runs, and its restoration.
 //!
-//! The copy is one read transaction (`VACUUM INTO`): SQLite's backup in steps starts again with each commit of the writer and would never
-//! end beside a busy press. A copy of the database file without its write-ahead log loses strokes.
+//! The copy is one read transaction (`VACUUM INTO`). SQLite's incremental backup restarts with each commit of the
+//! writer and would never end while a busy press is served. A copy of the database file without its write-ahead log
+//! loses strokes.
 
 use std::path::Path;
 
@@ -27,15 +28,16 @@ impl Archive {
     }
 }
 
-/// Makes a restored database a record of its own: documents lie where `document` says, and each press gets another owner number. Run ids
-/// after the backup come again with other content; with the old number, whoever takes up strokes by it would take them for known ones. Sequence numbers of results move on by a quarter turn.
-/// Returns the old and the new numbers.
+/// Makes a restored database a separate record: documents lie where `document` returns, and each press gets another
+/// owner number. Run ids after the backup are used again with other content. With the old owner number, a program that
+/// identifies strokes by both would take them for known ones. The sequence numbers of results advance by a quarter of
+/// their range. Returns the old and the new owner numbers.
 ///
 /// # Errors
 /// [`Error::Foreign`], [`Error::Storage`].
 pub fn adopt(path: &Path, document: impl Fn(u32) -> String) -> Result<Vec<[u16; 2]>, Error> {
     let storage = Error::storage(path);
-    // Opened as a reader first: a file that is none of ours is refused before anything is written.
+    // Opened for reading first: a file that is not a history is refused before anything is written.
     let archive = Archive::open(path)?;
     let runs: Vec<u32> = {
         let mut query = archive
@@ -59,8 +61,8 @@ pub fn adopt(path: &Path, document: impl Fn(u32) -> String) -> Result<Vec<[u16; 
         query.query_map([], |row| row.get(0))?.collect()
     };
     let old = owners(&transaction).map_err(&storage)?;
-    // Another number for certain: the old one moved on by 1 to 65534 places of 65535.
-    // The press may have seen results after the backup: theirs are the sequence numbers that it would take for known.
+    // The owner number certainly changes: the old one is advanced by 1 to 65534 of 65535 positions. The press may have
+    // seen results after the backup, and would take their sequence numbers for known ones.
     let draw = "UPDATE journal SET owner = (owner - 1 + 1 + abs(random() % 65534)) % 65535 + 1, \
                 result_seq = (result_seq + 16384) % 65536";
     transaction.execute(draw, []).map_err(&storage)?;

@@ -1,4 +1,4 @@
-//! Changes of the record in the order of their commits, for programs that pass it on. Format 1.1 on.
+//! Change log of the record, in the order of its commits, for programs that forward it. It exists from format 1.1 on.
 
 use rusqlite::Row;
 
@@ -7,17 +7,17 @@ use crate::{Archive, Error};
 /// A change of the record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Change {
-    /// Number, rising with the commits; never given twice.
+    /// Number, increasing with the commits; never used twice.
     pub n: u64,
-    /// Owner number of the record when it was made; of a stroke, when the stroke was accepted.
+    /// Owner number of the record at the time of the change; for a stroke, at its acceptance.
     pub owner: u16,
-    /// The stroke; none of a plate's end.
+    /// The stroke; none for the end of a plate.
     pub run_id: Option<u32>,
     /// Its plate.
     pub plate: Option<u32>,
-    /// The event; none of a stroke or a plate.
+    /// The event; none for a stroke or a plate.
     pub event: Option<u32>,
-    /// What changed.
+    /// Kind of the change.
     pub kind: ChangeKind,
     /// Its time, RFC 3339 in UTC.
     pub at: String,
@@ -28,13 +28,13 @@ pub struct Change {
 pub enum ChangeKind {
     /// A stroke was accepted.
     Accepted,
-    /// It has a result.
+    /// The stroke has a result.
     Finished,
-    /// The press has acknowledged it, or never will.
+    /// The press has acknowledged the stroke, or never will.
     Acked,
     /// A plate has ended.
     Plate,
-    /// An event was noted.
+    /// An event was recorded.
     Event,
     /// A kind of a later minor format.
     Later,
@@ -49,24 +49,25 @@ impl ChangeKind {
         ("event", Self::Event),
     ];
 
-    /// Returns the name; none of [`Later`](Self::Later).
+    /// Returns the name; none for [`Later`](Self::Later).
     #[must_use]
     pub fn name(self) -> Option<&'static str> {
         Self::NAMES.iter().find(|(_, kind)| *kind == self).map(|(name, _)| *name)
     }
 }
 
-/// Owner number that a record had, and from which change on.
+/// Owner number of the record, and the change from which it applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Owner {
-    /// The number.
+    /// Owner number.
     pub owner: u16,
-    /// Changes after this number are its own.
+    /// It applies to changes after this number.
     pub after_change: u64,
 }
 
 impl Archive {
-    /// Returns up to `most` changes after number `after`, oldest first; none of a record of format 1.0, which a host extends at its start.
+    /// Returns up to `most` changes after number `after`, oldest first; none for a record of format 1.0, which a host
+    /// extends at its start.
     ///
     /// # Errors
     /// [`Error::Storage`].
@@ -108,7 +109,8 @@ impl Archive {
         last.map_err(Error::storage(self.path()))
     }
 
-    /// Returns the owner numbers that the record has had, oldest first: the last one is in force. None of a record of format 1.0.
+    /// Returns the owner numbers of the record, oldest first; the last one applies now. None for a record of format
+    /// 1.0.
     ///
     /// # Errors
     /// [`Error::Storage`].
@@ -121,7 +123,7 @@ impl Archive {
             .map_err(Error::storage(self.path()))
     }
 
-    /// Whether the record has format 1.1 or later.
+    /// Returns whether the record has format 1.1 or later.
     fn has_changes(&self) -> Result<bool, Error> {
         let sql = "SELECT count(*) > 0 FROM sqlite_schema WHERE name = 'change'";
         self.connection().query_row(sql, [], |row| row.get(0)).map_err(Error::storage(self.path()))

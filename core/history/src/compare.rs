@@ -1,4 +1,4 @@
-//! Figures of two strokes side by side.
+//! Comparison of two strokes: their figures side by side.
 
 use std::collections::BTreeSet;
 

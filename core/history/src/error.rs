@@ -24,7 +24,7 @@ pub enum Error {
     /// The file is not a history, or has the format of a newer program.
     #[error("{}: {why}", path.display())]
     Foreign { path: PathBuf, why: String },
-    /// A step does not follow from those on record: a fault of the caller. Nothing was changed.
+    /// A step does not follow from the recorded steps: a fault of the caller. Nothing was changed.
     #[error("{key}: {why}")]
     Contradiction { key: StrokeKey, why: String },
     /// No record has this number.

@@ -1,4 +1,4 @@
-//! Events beside the strokes: alarms, jumps of the clock.
+//! Events recorded besides the strokes: alarms, jumps of the clock.
 
 use jiff::Timestamp;
 
@@ -6,23 +6,23 @@ use crate::archive::{self, text};
 use crate::history::History;
 use crate::{Archive, Error};
 
-/// An event on record.
+/// Recorded event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Event {
-    /// Number, rising.
+    /// Number, increasing.
     pub event: u32,
     /// Its time.
     pub at: Timestamp,
     /// Kind: `alarm`, `clock`.
     pub kind: String,
-    /// The stroke it belongs to.
+    /// Stroke to which it belongs.
     pub run_id: Option<u32>,
     /// Sentence for people.
     pub text: String,
 }
 
 impl History {
-    /// Notes an event.
+    /// Records an event.
     ///
     /// # Errors
     /// [`Error::Storage`].

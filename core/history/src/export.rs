@@ -1,5 +1,6 @@
-//! Export of strokes as a table: one row each, with a column for every figure of any stroke and for every value of the press (`press.`
-//! and its name).
+//! Export of strokes as a table, with one row for each stroke.
+//!
+//! It has a column for every figure of any stroke and for every value of the press (`press.` and its name).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +10,7 @@ use crate::Stroke;
 use crate::table::{Columns, Table};
 
 impl Table {
-    /// Makes the table of `strokes`, in their order.
+    /// Creates the table of `strokes`, in their order.
     pub fn of_strokes(strokes: &[Stroke]) -> Self {
         let rows: Vec<Row<'_>> = strokes.iter().map(Row::of).collect();
         let columns = Columns::of(&rows)
@@ -37,7 +38,7 @@ impl Table {
     }
 }
 
-/// A stroke with the data of the press, parsed.
+/// Stroke with the parsed data of the press.
 struct Row<'a> {
     stroke: &'a Stroke,
     press: BTreeMap<String, Value>,

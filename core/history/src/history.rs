@@ -1,4 +1,4 @@
-//! Writer of a history: each step of a stroke is on the disk before the method returns.
+//! Writer of a history; each step of a stroke is on the disk before the method returns.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,8 +10,8 @@ use crate::archive::{self, Archive, text};
 use crate::lock::Lock;
 use crate::{Error, StrokeKey, Verdict, schema};
 
-/// Half the range of the press's stroke counter, which wraps at 65535: the same key within as many runs is the same stroke,
-/// beyond it a new one.
+/// Half the range of the press's stroke counter, which wraps at 65535. The same key within this number of runs is the
+/// same stroke, beyond it a new one.
 pub(crate) const RECENT_RUNS: u32 = 32_768;
 
 /// Writer of a history, for the strokes of one press. Its methods block until the record is on the disk.
@@ -84,11 +84,12 @@ impl History {
         &self.archive
     }
 
-    /// Records the acceptance of a stroke, before it is echoed to the press and scanned. The same again changes nothing.
+    /// Records the acceptance of a stroke, before it is echoed to the press and scanned. The same again changes
+    /// nothing.
     ///
     /// # Errors
-    /// [`Error::Contradiction`] when the run id belongs to another stroke, or the stroke is on record under another run id:
-    /// a stroke is measured at most once. [`Error::Storage`].
+    /// [`Error::Contradiction`] when the run id belongs to another stroke, or the stroke is recorded under another run
+    /// id: a stroke is measured at most once. [`Error::Storage`].
     pub fn accept(&mut self, stroke: &Accepted, now: Timestamp) -> Result<(), Error> {
         self.own(stroke.key)?;
         let contradiction = |why: String| Err(Error::Contradiction { key: stroke.key, why });
@@ -260,8 +261,8 @@ fn newest(connection: &Connection, key: StrokeKey) -> rusqlite::Result<Option<u3
     connection.query_row(sql, (key.press, key.session, key.stroke, key.attempt), |row| row.get(0))
 }
 
-/// Returns the physical plate of a stroke, inserting it if it is new: the plate of the part number, else the one that has not
-/// ended.
+/// Returns the physical plate of a stroke, inserting it if it is new: the plate with the part number, else the one that
+/// has not ended.
 fn plate(connection: &Connection, stroke: &Accepted, now: Timestamp) -> rusqlite::Result<u32> {
     let part_id = stroke.part_id.filter(|part_id| *part_id != 0);
     let sql = "SELECT plate FROM plate WHERE press = ?1 AND part_id IS ?2 AND (?2 IS NOT NULL OR ended IS NULL) \

@@ -1,4 +1,4 @@
-//! Journal of the press side: records to rows and back.
+//! Journal of the press side: conversion of its records to rows of the database and back.
 
 use std::collections::BTreeMap;
 
@@ -41,7 +41,7 @@ impl History {
     /// Records one step of a stroke. The same step again changes nothing.
     ///
     /// # Errors
-    /// [`Error::Contradiction`] when the step does not follow from those on record; [`Error::Storage`].
+    /// [`Error::Contradiction`] when the step does not follow from the recorded steps; [`Error::Storage`].
     pub fn record(&mut self, record: &Record, now: Timestamp) -> Result<(), Error> {
         match record {
             Record::Accepted { key, run_id, data } => self.accept(&accepted(*key, *run_id, data), now),

@@ -1,4 +1,4 @@
-//! Lists of run ids, as another program selects them: a column `run_id` in a file of CSV or Parquet.
+//! List of run ids selected by another program: a column `run_id` in a CSV or Parquet file.
 
 use std::fs::File;
 use std::path::Path;
@@ -8,13 +8,13 @@ use parquet::record::Field;
 
 use crate::Error;
 
-/// Column that is read; all others are left alone.
+/// Column that is read; all others are ignored.
 const COLUMN: &str = "run_id";
 
-/// Returns the run ids of a file, in its order: Parquet where its name ends so, else CSV with a head.
+/// Returns the run ids of a file in its order. The file is Parquet if its name ends so, else CSV with a head.
 ///
 /// # Errors
-/// [`Error::Unreachable`]; [`Error::Foreign`] without the column, or with a cell that is no run id.
+/// [`Error::Unreachable`]; [`Error::Foreign`] without the column, or with a cell that is not a run id.
 pub fn run_ids(path: &Path) -> Result<Vec<u32>, Error> {
     let file = File::open(path).map_err(|source| Error::Unreachable { path: path.to_owned(), source })?;
     let read = if path.extension().is_some_and(|end| end == "parquet") { of_parquet } else { of_csv };

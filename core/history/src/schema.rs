@@ -1,4 +1,4 @@
-//! Opening of the database: created when new, refused when it is anything else.
+//! Opening of the database: a new one is created, a foreign file is refused.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,17 +9,17 @@ use crate::Error;
 
 /// Marks a SQLite file as a history of platen: "pltn".
 const APPLICATION_ID: i32 = 0x706c_746e;
-/// Format of the first release, which counted otherwise.
+/// Format of the first release, which had another numbering.
 const FIRST: i32 = 1;
 /// Format that this program writes: 100 x major + minor.
 const VERSION: i32 = 101;
-/// Steps from one minor format to the next; an empty database gets all of them.
+/// Steps from one minor format to the next; an empty database receives all of them.
 const STEPS: [&str; 2] = [include_str!("schema.sql"), include_str!("schema-1.1.sql")];
 
 /// Longest wait for a reader's checkpoint; in write-ahead mode the writer itself never waits.
 const BUSY: Duration = Duration::from_secs(5);
 
-/// Opens the database for writing and creates it when it is new. The caller holds the lock.
+/// Opens the database for writing, and creates it if it is new. The caller holds the lock.
 pub(crate) fn open_writer(path: &Path) -> Result<Connection, Error> {
     let storage = Error::storage(path);
     let mut connection = Connection::open(path).map_err(&storage)?;
@@ -37,7 +37,8 @@ pub(crate) fn open_writer(path: &Path) -> Result<Connection, Error> {
     Ok(connection)
 }
 
-/// Opens the database for reading, beside a writer or not. A transaction that died with its process is rolled back first.
+/// Opens the database for reading, with or without a writer. An unfinished transaction of a dead process is rolled back
+/// first.
 pub(crate) fn open_reader(path: &Path) -> Result<Connection, Error> {
     std::fs::metadata(path).map_err(|source| Error::Unreachable { path: path.to_owned(), source })?;
     match read_only(path) {
@@ -57,20 +58,21 @@ fn read_only(path: &Path) -> Result<Connection, Error> {
     Ok(connection)
 }
 
-/// Whether a rollback journal lies beside the database, which a connection for reading alone may not apply.
+/// Returns whether a rollback journal lies beside the database; a read-only connection may not apply it.
 fn needs_rollback(error: &rusqlite::Error) -> bool {
     error.sqlite_error().is_some_and(|error| error.extended_code == rusqlite::ffi::SQLITE_READONLY_ROLLBACK)
 }
 
-/// Applies the rollback journal: SQLite does so before the first read of a connection that may write, unless a living process holds it.
+/// Applies the rollback journal. SQLite does so before the first read of a connection that may write, unless a living
+/// process holds it.
 fn roll_back(path: &Path) -> rusqlite::Result<()> {
     let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
     connection.busy_timeout(BUSY)?;
     connection.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(()))
 }
 
-/// Creates all tables and both marks in one transaction: a process that dies here leaves an empty file, which the next one
-/// fills.
+/// Creates all tables and both marks in one transaction. A process that dies here leaves an empty file, which the next
+/// one fills.
 fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
     for step in STEPS {
@@ -81,8 +83,8 @@ fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     transaction.commit()
 }
 
-/// Extends an older minor format: a checked copy beside the database first, then one transaction. A process that dies here leaves the
-/// older format, and the next one begins anew. Rows and columns that are there stay as they are.
+/// Extends an older minor format: first a checked copy beside the database, then one transaction. If the process dies
+/// here, the older format remains and the next process starts again. Existing rows and columns are not changed.
 fn extend(connection: &mut Connection, path: &Path, from: i32) -> Result<(), Error> {
     let storage = Error::storage(path);
     let copy = copy_path(path, from);
@@ -102,7 +104,8 @@ fn copy_path(path: &Path, format: i32) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Copies a database by one read transaction, beside a writer or not, and checks the copy. A half copy never has the name.
+/// Copies a database in one read transaction, with or without a writer, and checks the copy. An incomplete copy never
+/// has the final name.
 pub(crate) fn copy_checked(connection: &Connection, path: &Path, copy: &Path) -> Result<(), Error> {
     let storage = Error::storage(copy);
     let mut part = copy.as_os_str().to_owned();
@@ -130,7 +133,7 @@ pub(crate) fn damage(connection: &Connection) -> rusqlite::Result<Option<String>
     Ok((found != "ok").then_some(found))
 }
 
-/// Returns a format in words: 1.1.
+/// Returns a format as text: 1.1.
 pub(crate) fn words(format: i32) -> String {
     format!("{}.{}", format / 100, format % 100)
 }
@@ -140,7 +143,8 @@ fn is_empty(connection: &Connection, path: &Path) -> Result<bool, Error> {
     connection.query_row(tables, [], |row| row.get(0)).map_err(|source| refuse(path, source))
 }
 
-/// Returns the format of a history. One of the same major number can be read and written: later minor ones only add.
+/// Returns the format of a history. Any format of the same major number can be read and written, since later minor ones
+/// only add to it.
 fn check(connection: &Connection, path: &Path) -> Result<i32, Error> {
     let pragma = |name: &str| -> Result<i32, Error> {
         connection.pragma_query_value(None, name, |row| row.get(0)).map_err(|source| refuse(path, source))

@@ -1,4 +1,4 @@
-//! Records of strokes and plates.
+//! Records of strokes and plates, as read from the database.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

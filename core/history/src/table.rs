@@ -1,4 +1,4 @@
-//! Tables of records, written as CSV and as Parquet from the same columns.
+//! Table of records, which can be written as CSV and as Parquet with the same columns.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use parquet::schema::types::{Type, TypePtr};
 use crate::Error;
 use crate::archive::text;
 
-/// Table with named columns, one row each record. A missing value is an empty cell, never 0.
+/// Table with named columns and one row for each record. A missing value is an empty cell, never 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     columns: Vec<(String, Column)>,
@@ -111,7 +111,8 @@ impl Table {
         Ok(csv.flush()?)
     }
 
-    /// Writes Parquet, uncompressed: one row group; times are UTC in milliseconds, numbers doubles, every cell may be null.
+    /// Writes Parquet, uncompressed: one row group; times are UTC in milliseconds, numbers doubles, every cell may be
+    /// null.
     ///
     /// # Errors
     /// [`Error::Parquet`].
@@ -177,7 +178,7 @@ impl Column {
         rows: &mut SerializedRowGroupWriter<'_, W>,
     ) -> parquet::errors::Result<()> {
         match self {
-            // A value above half the range keeps its bits: the column is declared as unsigned.
+            // A value above half the range keeps its bit pattern: the column is declared as unsigned.
             Self::Unsigned(cells) => put::<Int32Type, _, _>(rows, cells, |value| *value as i32),
             Self::Boolean(cells) => put::<BoolType, _, _>(rows, cells, |value| *value),
             Self::Text(cells) => {

@@ -1,4 +1,4 @@
-//! Recording, queries and export; refusal of steps that do not follow.
+//! Tests of recording, queries and export, and of the refusal of steps that do not follow.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
@@ -14,7 +14,7 @@ use platen_model::{Stage, StrokeKey, Verdict};
 
 const PRESS: u16 = 3;
 
-/// History in a temporary folder, with a clock that advances a second per step.
+/// History in a temporary folder, with a clock that advances by a second in each step.
 struct Fixture {
     folder: tempfile::TempDir,
     history: Option<History>,
@@ -397,7 +397,7 @@ fn cells_are_quoted_only_where_rfc_4180_requires_it() {
     }
 }
 
-/// The rows of a Parquet file as its own reader shows them.
+/// Returns the rows of a Parquet file as its own reader shows them.
 fn rows(file: Vec<u8>) -> Vec<String> {
     use parquet::file::reader::{FileReader as _, SerializedFileReader};
     let mut disk = tempfile::tempfile().unwrap();
@@ -495,7 +495,7 @@ fn a_row_changed_by_hand_is_named() {
     assert!(error.contains("run 1: ") && error.contains("unknown verdict \"good\""), "{error}");
 }
 
-/// A record of the first release: it is read as it is, a host extends it with a copy before, and no stroke is passed over.
+/// A record of the first release is read unchanged, a host extends it after making a copy, and no stroke is missed.
 #[test]
 fn a_record_of_format_1_0_is_read_and_extended() {
     let folder = tempfile::tempdir().unwrap();
@@ -552,7 +552,7 @@ fn each_step_is_a_change_and_a_repeated_one_none() {
         events.iter().map(|it| Some(it.event)).collect::<Vec<_>>(),
         [changes[3].event, changes[4].event]
     );
-    // A stroke that is not on record is not named.
+    // A stroke that is not recorded is not referred to.
     assert_eq!((events[0].run_id, events[1].run_id), (Some(run_id), None));
     assert_eq!(
         (events[1].kind.as_str(), events[1].text.as_str(), events[1].at),
@@ -576,7 +576,7 @@ fn a_restored_copy_has_the_same_strokes_and_another_owner() {
     assert_eq!(after[0], Stroke { document: None, ..before[0].clone() });
     let restored = Archive::open(&copy).unwrap();
     assert_eq!(restored.damage().unwrap(), None);
-    // Changes from before the copy keep the number under which they were made; those after it get the new one.
+    // Changes before the copy keep the number under which they were made; those after it get the new one.
     drop(restored);
     let mut goes_on = History::open(&copy, PRESS, Timestamp::UNIX_EPOCH).unwrap();
     goes_on.note("alarm", None, "after", Timestamp::UNIX_EPOCH).unwrap();

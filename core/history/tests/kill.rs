@@ -1,7 +1,8 @@
-//! `kill -9` at every point of a stroke: no stroke is scanned twice, lost unreported, or published with two results.
+//! Crash test: `kill -9` at every point of a stroke. No stroke may be scanned twice, lost without a report, or
+//! published with two results.
 //!
-//! The test acts as the press. The host is the same test binary as a child process, connected by pipes, and is killed: at each
-//! named point while it is paused there, then at random moments.
+//! The test acts as the press. The host is the same test binary as a child process, connected by pipes. It is killed at
+//! each named point while it is paused there, then at random moments.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
@@ -19,7 +20,7 @@ const SESSION: u16 = 5;
 const CHILD: &str = "PLATEN_HISTORY_CHILD";
 const STOP: &str = "PLATEN_HISTORY_STOP";
 
-/// Points at which the child pauses when [`STOP`] names them: around every step of stroke 2.
+/// Points at which the child pauses if [`STOP`] contains them: around every step of stroke 2.
 const POINTS: [&str; 10] = [
     "before accept",
     "after accept",
@@ -65,7 +66,7 @@ impl Host {
     }
 
     fn order(&mut self, order: &str) {
-        // A child that died no longer reads; the end of its reports shows it.
+        // A child that has died no longer reads; the end of its reports shows it.
         let _ = writeln!(self.orders, "{order}");
     }
 
@@ -80,7 +81,7 @@ impl Host {
         lines.filter_map(|line| Some(line.trim_end().strip_prefix("host: ")?.to_owned()))
     }
 
-    /// Kills the child; returns what it had reported before and nobody had read.
+    /// Kills the child; returns the reports that were not read before.
     fn kill(mut self) -> Vec<String> {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -132,7 +133,7 @@ impl Witness {
     }
 }
 
-/// Runs `strokes` strokes; `fatal` returns after each report whether to kill the host.
+/// Runs `strokes` strokes; `fatal` is called after each report and returns whether to kill the host.
 fn press(database: &Path, strokes: u16, stop: &str, mut fatal: impl FnMut(&str) -> bool) -> (Witness, u32) {
     let mut witness = Witness::default();
     let mut deaths = 0;
@@ -194,13 +195,13 @@ fn killed_at_random_moments() {
     };
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("history.sqlite");
-    // The report is read, the child runs on: the kill lands wherever it has come to, often inside a commit.
+    // The report is read while the child runs on: the kill occurs at its present point, often inside a commit.
     let (witness, deaths) = press(&database, 60, "", |_| random(12) == 0);
     assert!(deaths >= 20, "only {deaths} kills");
     witness.judge(60, &database);
 }
 
-/// The child: a host with a scanner that only counts. Does nothing unless it was started by the tests above.
+/// Child process: a host with a scanner that only counts. Does nothing unless it was started by the tests above.
 #[test]
 fn the_host_that_is_killed() {
     let Some(database) = std::env::var_os(CHILD) else { return };
@@ -241,7 +242,7 @@ fn the_host_that_is_killed() {
     }
 }
 
-/// At the start: a stroke that was accepted and has no result is reported as interrupted, never scanned again.
+/// At the start, an accepted stroke without a result is reported as interrupted and never scanned again.
 fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
     let unfinished = |last: &&Entry| last.stage < Stage::Finished;
     if let Some(last) = recalled.last.as_ref().filter(unfinished) {
@@ -251,7 +252,7 @@ fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
     }
 }
 
-/// The press still holds the trigger of a stroke that is on record: what is on record is published again.
+/// The press still holds the trigger of a recorded stroke: its recorded result is published again.
 fn again(history: &History, key: StrokeKey) {
     let last = history.archive().last(PRESS).unwrap().unwrap();
     assert_eq!(last.key, key);
