@@ -1,19 +1,21 @@
-//! Writer of the advice registers. They are written beside the handshake, never in its place: a refused write is logged and given up, and
-//! measuring goes on.
+//! Writer of the advice registers at the press, independent of the handshake.
+//!
+//! A refused write is logged and not repeated, and measuring continues.
 
 use platen_plant::press::{AdviceBlock, Mode, Press};
 
 use crate::codec::STATE;
 use crate::{AdviceImage, Client, Link, LinkError, StrokeKey};
 
-/// Desired and known content of the advice registers of one press; without `[advice] show = "screen_and_registers"` it does nothing.
+/// Desired and known content of the advice registers of one press; without `[advice] show = "screen_and_registers"` it
+/// does nothing.
 #[derive(Debug)]
 pub(crate) struct AdviceWriter {
     block: Option<AdviceBlock>,
     wanted: AdviceImage,
-    /// Content of the registers; `None` after a connection, when they may contain anything.
+    /// Content of the registers; `None` after a new connection, when their content is unknown.
     known: Option<AdviceImage>,
-    /// The last published stroke, until the next trigger.
+    /// Last published stroke, until the next trigger.
     published: Option<StrokeKey>,
     /// Advice that waits until its stroke has been published.
     offered: Option<(StrokeKey, AdviceImage)>,
@@ -36,13 +38,13 @@ impl AdviceWriter {
         }
     }
 
-    /// Takes the advice after a stroke. One that comes after the next trigger is worth nothing.
+    /// Accepts the advice after a stroke. Advice that arrives after the next trigger is dropped.
     pub(crate) fn offer(&mut self, stroke: StrokeKey, advice: AdviceImage) {
         self.offered = Some((stroke, advice));
         self.set();
     }
 
-    /// Notes that the result of a stroke is valid in the registers.
+    /// Records that the result of a stroke is valid in the registers.
     pub(crate) fn publish(&mut self, stroke: StrokeKey) {
         self.published = Some(stroke);
         self.set();
@@ -51,27 +53,28 @@ impl AdviceWriter {
     /// Sets the advice after the published stroke.
     fn set(&mut self) {
         if let Some((_, advice)) = self.offered.take_if(|(stroke, _)| self.published == Some(*stroke)) {
-            // 0 is the number of registers without advice.
+            // 0 is the sequence number of registers without advice.
             self.seq = self.seq.checked_add(1).unwrap_or(1);
             self.wanted = advice;
             self.wanted.0[0] = self.seq;
         }
     }
 
-    /// Withdraws the advice: the next stroke has been made, or it may no longer hold.
+    /// Withdraws the advice: the next stroke has been made, or the advice may no longer be valid.
     pub(crate) fn withdraw(&mut self) {
         self.published = None;
         self.wanted = AdviceImage::NONE;
         self.wanted.0[0] = self.seq;
     }
 
-    /// Marks the registers as unknown: there is a new connection.
+    /// Marks the content of the registers as unknown after a new connection.
     pub(crate) fn forget(&mut self) {
         self.known = None;
         self.refused = false;
     }
 
-    /// Writes the differences: of advice that is withdrawn the state alone, of new advice everything and then its sequence number.
+    /// Writes the differences. For advice that is withdrawn only the state is written; for new advice everything, and
+    /// its sequence number last.
     ///
     /// # Errors
     /// An error that ended the connection.

@@ -1,4 +1,4 @@
-//! Codec between registers and typed images according to the register map; pure functions.
+//! Codec between registers and typed images, according to the register map; pure functions.
 
 mod advice_image;
 mod host_image;

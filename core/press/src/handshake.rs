@@ -1,12 +1,12 @@
 //! Handshake with the press: a pure state machine (Mealy machine).
 //!
-//! [`Handshake::step`] maps state, one event and the time to the next state and a list of effects. It has no socket, clock,
-//! journal or scanner, so that any order of events can be tested in virtual time.
+//! [`Handshake::step`] maps state, one event and the time to the next state and a list of effects. It has no socket,
+//! clock, journal or scanner, so that any order of events can be tested in virtual time.
 //!
-//! The state has two orthogonal regions: the link to the press ([`LinkState`]) and the active stroke ([`Work`]). A lost link
-//! does not stop a scan; its result waits for the reconnection. One step runs in this order:
+//! The state has two orthogonal regions: the link to the press ([`LinkState`]) and the active stroke ([`Work`]). A lost
+//! link does not stop a scan; its result waits for the reconnection. One step runs in this order:
 //!
-//! 1. [`machine`] notes the event ([`messages`]): it changes observations only.
+//! 1. [`machine`] stores the event ([`messages`]): it changes observations only.
 //! 2. [`transitions`] takes transitions in order of urgency until none is due. [`link_region`] and [`work_region`]
 //!    contain their actions, [`acceptance`] the conditions under which a stroke is accepted, blocked or missed.
 //!    For a press without stroke numbers, [`trigger_edges`] counts the strokes.

@@ -1,8 +1,9 @@
 //! Register map, Modbus link and handshake with the controller of a press.
 //!
-//! [`run_press`] is the entry: one task polls the press over a [`Link`], decodes its registers ([`PressImage`]), steps the pure
-//! state machine [`Handshake`], passes its [`Command`]s to the host and writes the wanted registers ([`HostImage`]) until
-//! they are echoed. Invariants, table of transitions, timing parameters and register map are in the README of this crate.
+//! [`run_press`] is the entry: one task polls the press over a [`Link`], decodes its registers ([`PressImage`]), steps
+//! the pure state machine [`Handshake`], passes its [`Command`]s to the host and writes the wanted registers
+//! ([`HostImage`]) until they are echoed. Invariants, table of transitions, timing parameters and register map are in
+//! the README of this crate.
 
 mod advice_block;
 mod codec;

@@ -3,14 +3,15 @@
 //! | module | contents |
 //! |---|---|
 //! | `client` | the only user of a [`Link`]: time limits, check of quantity and echo, allow-list, counters |
-//! | `press_link` | the link that the plant file describes |
+//! | `press_link` | the link as described in the plant file |
 //! | `modbus` | host as Modbus client over TCP, RTU or RTU over TCP (tokio-modbus) |
 //! | `server` | host as Modbus TCP server |
 //! | `tcp`, `rtu` | sockets and serial ports with the options that a press needs |
 //! | `error` | errors, and the consequence of each exception code |
 //!
 //! [`Link`] transfers one request and one answer. The client drops the connection at any error or timeout: after a late
-//! answer a Modbus TCP connection would assign every answer to the wrong request, and an RTU line would do so undetected.
+//! answer a Modbus TCP connection would assign every answer to the wrong request, and an RTU line would do so
+//! undetected.
 
 mod client;
 mod error;

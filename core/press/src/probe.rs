@@ -1,4 +1,4 @@
-//! Search for word order and address of a 32-bit number: every interpretation of the registers round an address.
+//! Search for word order and address of a 32-bit number: every interpretation of the registers around an address.
 
 use platen_plant::press::{RegisterType, WordOrder};
 
@@ -20,7 +20,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Whether it equals the expected number to the precision of the smaller of both types (24 bits).
+    /// Returns whether it equals the expected number to the precision of the smaller of both types (24 bits).
     pub fn is(&self, expected: f64) -> bool {
         (self.number - expected).abs() <= expected.abs().max(f64::MIN_POSITIVE) * f64::from(f32::EPSILON)
     }

@@ -1,8 +1,9 @@
 //! Reconciliation of the host's registers: drives them to their target values. Every write can be repeated safely.
 //!
-//! The desired words are compared with the known actual words (echoed or read back); differences are written until they are
-//! echoed. Order: data with the old commit word, the commit word, the status; a result is therefore complete before it is
-//! valid. A result is withdrawn by its status first, also when the next result is present after a loss of the link.
+//! The desired words are compared with the known actual words (echoed or read back); differences are written until they
+//! are echoed. Order: data with the old commit word, the commit word, the status; a result is therefore complete before
+//! it is valid. A result is withdrawn by its status first, also when the next result is present after a loss of the
+//! link.
 
 use std::time::Duration;
 
@@ -24,7 +25,7 @@ enum Turn {
     Status,
 }
 
-/// The block of the host: desired and known actual words.
+/// Host's block: desired and known actual words.
 #[derive(Debug)]
 pub(crate) struct Reconciler {
     map: RegisterMap,
@@ -74,7 +75,7 @@ impl Reconciler {
         self.known = None;
     }
 
-    /// Whether actual and desired words differ, or a beat is due.
+    /// Returns whether actual and desired words differ, or a beat is due.
     pub(crate) fn is_due(&self, image: &HostImage) -> bool {
         Instant::now() >= self.next_beat || !self.says(&image.encode(&self.map, self.heartbeat))
     }
@@ -107,8 +108,8 @@ impl Reconciler {
         Witness { owner: found_owner, heartbeat: found_beat, mine }
     }
 
-    /// Writes the differences. Returns true when the actual words equal `image`; false when the limit of writes per second
-    /// defers the rest.
+    /// Writes the differences. Returns true when the actual words equal `image`; false when the limit of writes per
+    /// second defers the rest.
     pub(crate) async fn write<L: Link>(
         &mut self,
         client: &mut Client<L>,
@@ -146,7 +147,8 @@ impl Reconciler {
         Ok(done)
     }
 
-    /// Writes the registers of the error code and of the status, where they differ, one by one and the status last. A refused one does not
+    /// Writes the registers of the error code and of the status where they differ, one by one and the status last. A
+    /// refused write does not prevent the others.
     /// keep back the others.
     ///
     /// # Errors
@@ -176,7 +178,8 @@ impl Reconciler {
         refusal
     }
 
-    /// Whether the valid result in the registers is this one: by its sequence number there, else by the last one made valid.
+    /// Returns whether the valid result in the registers is this one: by its sequence number there, else by the last
+    /// one made valid.
     fn shows_this(&self, known: &[u16], wanted: &[u16], image: &HostImage) -> bool {
         match self.map.output(Output::ResultSeq).and_then(|field| field.place.offset()) {
             Some(offset) => known.get(usize::from(offset)) == wanted.get(usize::from(offset)),
@@ -184,7 +187,7 @@ impl Reconciler {
         }
     }
 
-    /// Whether the actual words of the writable registers equal these.
+    /// Returns whether the actual words of the writable registers equal these.
     fn says(&self, wanted: &[u16]) -> bool {
         let same = |known: &Vec<u16>| {
             let mut registers = self.spans.iter().cloned().flatten().filter(|&i| self.turns[i] != Turn::Idle);

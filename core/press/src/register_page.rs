@@ -1,4 +1,4 @@
-//! The register map in force for the programmer of the press: Markdown, CSV, JSON, and the reference program.
+//! Register map in force as a page for the programmer of the press: Markdown, CSV, JSON, and the reference program.
 
 mod alarms;
 mod rules;

@@ -1,8 +1,9 @@
-//! Replay of a recording of both blocks to the handshake: strokes taken now against strokes taken by the recorded host.
+//! Replay of a recording of both blocks to the handshake: strokes accepted now against strokes accepted by the recorded
+//! host.
 //!
-//! A recording contains the blocks as they changed for a reader of the registers. The handshake receives the press's block
-//! at the recorded times; the recorded host stands in for the scanner, with results at their recorded times (at once in a
-//! recording without a host). A fault in the field becomes a test case, with or without this host in it.
+//! A recording contains the changes of the blocks as read. The handshake receives the press's block at the recorded
+//! times. The recorded host replaces the scanner: its results follow at their recorded times, or at once in a recording
+//! without a host. A fault in the field thus becomes a test case, with or without this host in the recording.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -56,7 +57,7 @@ pub struct Replayed {
 }
 
 impl Replayed {
-    /// Whether the handshake accepts the strokes of the recorded host; true without one.
+    /// Returns whether the handshake accepts the strokes of the recorded host; true without one.
     pub fn agrees(&self) -> bool {
         self.recorded.is_empty() || self.recorded == self.accepted
     }
@@ -175,7 +176,8 @@ fn host_blocks(samples: &[Sample]) -> impl Iterator<Item = &Sample> {
     samples.iter().filter(|sample| sample.side == Side::Host)
 }
 
-/// Returns the strokes in the order in which the recorded host echoed them; the one at the start is over.
+/// Returns the strokes in the order in which the recorded host echoed them; a stroke echoed at the start is already
+/// finished.
 fn recorded_strokes(map: &RegisterMap, samples: &[Sample]) -> Vec<(u16, u16)> {
     let echo = |sample: &Sample| {
         let session = number(map, Output::SessionEcho, &sample.words).unwrap_or(0);

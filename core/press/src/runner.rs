@@ -1,8 +1,8 @@
 //! I/O task of the press side: connects link, registers, journal and host with the pure handshake.
 //!
-//! One task polls the press, feeds the handshake and executes its effects (`cycle`). The host takes part through two channels:
-//! it receives [`Order`]s and sends [`Answer`]s. The journal is written on a thread of its own (`journal`); the modes `off` and
-//! `listen` write nothing (`read_only`); `metrics` counts strokes and durations.
+//! One task polls the press, feeds the handshake and executes its effects (`cycle`). The host takes part through two
+//! channels: it receives [`Order`]s and sends [`Answer`]s. The journal is written on a thread of its own (`journal`);
+//! the modes `off` and `listen` write nothing (`read_only`); `metrics` counts strokes and durations.
 
 mod cycle;
 mod journal;
@@ -134,7 +134,7 @@ pub enum RunError<E: std::error::Error + 'static> {
 
 /// Serves one press until the host sends [`Answer::Stop`] or drops its end; then makes the registers safe.
 ///
-/// Errors of `link` are no errors of this function: it reconnects without end.
+/// Errors of `link` are not errors of this function: it reconnects without end.
 ///
 /// # Errors
 /// [`RunError`], when the journal cannot be read at the start.

@@ -1,4 +1,4 @@
-//! Advice for a display at the press: 24 registers of their own, which no motion program reads.
+//! Advice registers for a display at the press: 24 registers apart from the handshake, which no motion program reads.
 //!
 //! | offset | content | type |
 //! |---|---|---|
@@ -13,10 +13,10 @@
 //! | 15, 16 | strokes left: fewest, seldom exceeded | u16 |
 //! | 17 | feed from the last bend | i16, 1 mm |
 //! | 18, 19 | depth, not beyond | i16, 0.01 mm |
-//! | 20, 21 | like plates, strokes of this plate that taught it | u16 |
+//! | 20, 21 | earlier plates of the same class, strokes of this plate used for learning | u16 |
 //! | 22, 23 | 0 | |
 //!
-//! A value that is not known is 0x8000 (i16) or 0xFFFF (u16); so are depths unless `depth_on_panel` is true.
+//! An unknown value is 0x8000 (i16) or 0xFFFF (u16). Depths are always unknown unless `depth_on_panel` is true.
 
 use platen_model::units::mm;
 use platen_model::{Advice, NextBend, Step};
@@ -48,7 +48,8 @@ impl AdviceImage {
     /// Registers without advice.
     pub const NONE: Self = Self([0; ADVICE_REGISTERS as usize]);
 
-    /// Encodes the advice that follows a stroke. `last` is the middle (u, v) of the last bend, metres; `depth` shows the depths.
+    /// Encodes the advice that follows a stroke. `last` is the middle (u, v) of the last bend, metres; `depth` shows
+    /// the depths.
     #[must_use]
     pub fn new(advice: &Advice, stroke: u16, simulated: bool, last: Option<[f64; 2]>, depth: bool) -> Self {
         let mut words = [0; ADVICE_REGISTERS as usize];
@@ -106,7 +107,7 @@ fn write_bend(words: &mut [u16], bend: &NextBend, last: Option<[f64; 2]>, depth:
         *word = count(100.0 * mm(gap));
     }
     if let Some(last) = last {
-        // Across the line: positive towards larger u, and larger v on a line along u.
+        // Distance across the line: positive towards larger u, and towards larger v for a line along u.
         let (sin, cos) = bend.direction.sin_cos();
         let way = [0.5 * (u1 + u2) - last[0], 0.5 * (v1 + v2) - last[1]];
         words[17] = whole(mm(sin * way[0] - cos * way[1]));
@@ -117,14 +118,14 @@ fn write_bend(words: &mut [u16], bend: &NextBend, last: Option<[f64; 2]>, depth:
     }
 }
 
-/// Returns a rounded number as a signed register; one that does not fit is unknown.
+/// Returns a rounded number as a signed register; a number out of range becomes unknown.
 fn whole(value: f64) -> u16 {
     let value = value.round();
     let fits = value > f64::from(i16::MIN) && value <= f64::from(i16::MAX);
     (if fits { value as i16 } else { UNKNOWN }) as u16
 }
 
-/// Returns a rounded number as an unsigned register; one that does not fit is unknown.
+/// Returns a rounded number as an unsigned register; a number out of range becomes unknown.
 fn count(value: f64) -> u16 {
     let value = value.round();
     if (0.0..f64::from(UNKNOWN_COUNT)).contains(&value) { value as u16 } else { UNKNOWN_COUNT }

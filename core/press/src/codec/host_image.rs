@@ -152,7 +152,7 @@ fn put_words(block: &mut [u16], offset: u16, words: &[u16]) {
     }
 }
 
-/// Whether a figure is larger than its field can hold.
+/// Returns whether a figure is larger than its field can hold.
 pub fn saturates(map: &RegisterMap, figures: &Figures) -> bool {
     map.outputs.iter().any(|(&output, field)| {
         let cut = |index| words::number_bits(field, figure(figures, output, field, index)).1;
@@ -169,9 +169,9 @@ fn figure(figures: &Figures, output: Output, field: &RegisterField, index: usize
     }
 }
 
-/// Returns the CRC-16/MODBUS over the block's fields, high byte first, in the order of their registers, except those that change
-/// with every beat or step (map version, heartbeat, status, host state) and the closing words (tail, the CRC itself).
-/// In the built-in map these are the registers 3-51 and 55-61.
+/// Returns the CRC-16/MODBUS over the block's fields, high byte first, in the order of their registers. Left out are
+/// the fields that change with every beat or step (map version, heartbeat, status, host state) and the closing words
+/// (tail, the CRC itself). In the built-in map the CRC covers the registers 3-51 and 55-61.
 fn checksum(map: &RegisterMap, block: &[u16]) -> u16 {
     let mut covered = vec![false; block.len()];
     for (&output, field) in &map.outputs {
@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(words[53..64], [7, 11, 409, 0xFFFF, 0x8000, 0x8000, 2, 0xFFFF, 0, 0, 0]);
     }
 
-    /// Bit by bit, as a PLC programmer would write it: polynomial 0xA001, start 0xFFFF.
+    /// Computes it bit by bit, as a PLC programmer would write it: polynomial 0xA001, start 0xFFFF.
     #[test]
     fn the_crc_is_that_of_the_page() {
         let words = image().encode(&RegisterMap::pph1(), 99);

@@ -163,8 +163,8 @@ impl Reader<'_> {
 }
 
 impl PressImage {
-    /// Decodes the registers of press `press_id`; `words` are the read block or its first part, in which case later fields
-    /// are absent.
+    /// Decodes the registers of press `press_id`; `words` are the read block or its first part, in which case later
+    /// fields are absent.
     ///
     /// A press without an `enable` or `clear_to_scan` always gives both. One that counts no strokes and has no `ack`
     /// acknowledges by dropping its trigger.

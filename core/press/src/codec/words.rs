@@ -1,4 +1,4 @@
-//! Numbers and texts in 16-bit registers.
+//! Conversion of numbers and texts to and from 16-bit registers.
 
 use platen_plant::press::{RegisterField, RegisterType, WordOrder};
 

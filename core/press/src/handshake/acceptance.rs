@@ -30,8 +30,8 @@ impl Handshake {
         self.work == Work::WaitAck && self.config.policy.no_ack == NoAck::Hold
     }
 
-    /// Returns whether the trigger rose while the last stroke was being measured, so that it says nothing about the result: the
-    /// press cannot have read that.
+    /// Returns whether the trigger rose while the last stroke was being measured. Such a trigger is no acknowledgement
+    /// of the result, which the press cannot have read.
     pub(super) fn trigger_is_early(&self) -> bool {
         let here = self.press.as_ref().map(|press| (press.session_id, press.stroke_id));
         here == self.counted && self.last.is_some_and(|last| here != Some((last.session, last.stroke)))
@@ -78,8 +78,8 @@ impl Handshake {
         Transition::StrokeMissed
     }
 
-    /// Returns the steps of the stroke counter since the last accounted stroke, and whether it went back; `None` in another
-    /// session or without a counter.
+    /// Returns the steps of the stroke counter since the last accounted stroke, and whether it went back; `None` in
+    /// another session or without a counter.
     pub(super) fn steps_to(&self, (session, stroke): (u16, u16)) -> Option<(u32, bool)> {
         let counter = self.config.counter?;
         let (_, before) = self.counted.filter(|&(counted_session, _)| counted_session == session)?;

@@ -142,8 +142,8 @@ impl Handshake {
         Transition::StrokeResumed
     }
 
-    /// Becomes idle and sets the baseline of the stroke counter. Strokes missed in the same session are counted with the
-    /// next stroke.
+    /// Becomes idle and sets the baseline of the stroke counter. Strokes missed in the same session are counted with
+    /// the next stroke.
     pub(super) fn become_idle(&mut self, now: Duration) -> Transition {
         self.work = Work::Idle;
         if let Some(press) = self.press.as_ref().filter(|press| !press.trigger) {

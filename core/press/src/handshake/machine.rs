@@ -1,8 +1,8 @@
 //! State of the handshake and the step.
 //!
-//! An event is an observation: [`Handshake::step`] stores it, takes the transitions that are due and returns the effects in
-//! the order in which they must be carried out. Deadlines are compared with the time of the step, so the caller
-//! steps with [`Event::Tick`] while nothing else happens.
+//! An event is an observation: [`Handshake::step`] stores it, takes the transitions that are due and returns the
+//! effects in the order in which they must be carried out. Deadlines are compared with the time of the step, so the
+//! caller steps with [`Event::Tick`] while nothing else happens.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -214,7 +214,7 @@ impl Handshake {
         }
     }
 
-    /// Notes an event, takes every transition that is due and returns the effects. `now` is monotonic.
+    /// Stores an event, takes every transition that is due and returns the effects. `now` is monotonic.
     pub fn step(&mut self, event: Event, now: Duration) -> Vec<Effect> {
         self.note(event, now);
         while let Some(transition) = self.advance(now) {

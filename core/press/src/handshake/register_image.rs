@@ -1,7 +1,7 @@
 //! Wanted registers of the host as a function of the state.
 //!
-//! Derived after every step. Until the acceptance of a stroke is journalled, the registers about the stroke keep
-//! their former values: an echo is a promise.
+//! The registers are derived after every step. Until the acceptance of a stroke is journalled, the registers about the
+//! stroke keep their former values, because an echo commits the host to the stroke.
 
 use std::time::Duration;
 
@@ -94,8 +94,8 @@ impl Handshake {
         }
     }
 
-    /// Returns whether the next stroke will be detected. Without stroke numbers, ready waits until the debounced trigger is
-    /// low: a press that raises it again between two reads would bend a plate without a measurement.
+    /// Returns whether the next stroke will be detected. Without stroke numbers, ready waits until the debounced
+    /// trigger is low: a press that raises it again between two reads would bend a plate without a measurement.
     fn sees_the_next_stroke(&self) -> bool {
         self.trigger_edges.as_ref().is_none_or(EdgeCounter::armed)
     }

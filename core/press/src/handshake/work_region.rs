@@ -1,7 +1,7 @@
 //! Actions of the work region: the active stroke from its acceptance to the acknowledgement.
 //!
 //! In order: accept, start the scan, begin the evaluation, conclude, publish, acknowledge; give up from accepted or
-//! scanning. Each promise to the press waits for its record in the journal.
+//! scanning. A commitment to the press is made only after its record is in the journal.
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ impl Handshake {
         };
         self.run_id = self.run_id.wrapping_add(1);
         self.last = Some(key);
-        // An acknowledge that stands now is that of an earlier result.
+        // An acknowledge that is up now belongs to an earlier result.
         self.ack_was_low = !press.ack;
         self.asked = press.attempt;
         self.counted = Some((key.session, key.stroke));
@@ -66,7 +66,7 @@ impl Handshake {
         self.work = Work::Accepted;
     }
 
-    /// Forgets attempts of the previous turn of the stroke counter, whose numbers come again.
+    /// Deletes attempts from the previous round of the stroke counter, whose numbers are used again.
     pub(super) fn forget_old_lap(&mut self, stroke: u16) {
         if let Some(counter) = self.config.counter {
             let half = u32::from(counter.wrap) / 2;

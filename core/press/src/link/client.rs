@@ -1,4 +1,4 @@
-//! The client of a link: time limits, checks of the answers, the allow-list of writes, and counters.
+//! Client of a link: time limits, checks of the answers, the allow-list of writes, and counters.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -76,7 +76,7 @@ impl<L: Link> Client<L> {
         &self.counts
     }
 
-    /// Whether a connection exists that no error has invalidated.
+    /// Returns whether a connection exists that no error has invalidated.
     pub fn connected(&self) -> bool {
         self.connected
     }
@@ -125,10 +125,10 @@ impl<L: Link> Client<L> {
         }
     }
 
-    /// Writes holding registers (function 16): the only function of this program that does.
+    /// Writes holding registers (function 16); no other function of this program does so.
     ///
-    /// Returns when the press has echoed address and quantity. After an error other than a refusal or an exception it is
-    /// unknown whether the write was executed: every write must be idempotent.
+    /// Returns when the press has echoed address and quantity. After an error other than a refusal or an exception it
+    /// is unknown whether the write was executed: every write must be idempotent.
     ///
     /// # Errors
     /// [`LinkError::Refused`] outside the allow-list and in modes that never write; else as for [`read`](Self::read).
@@ -161,7 +161,7 @@ impl<L: Link> Client<L> {
 
     /// Transfers one request and its answer within the time limit. Any other outcome drops the connection.
     async fn exchange(&mut self, request: &Request) -> Result<Response, LinkError> {
-        // A moment that has passed is not slept for: the timer would wait for its next whole millisecond.
+        // A time in the past is skipped: the timer would wait for its next whole millisecond.
         if let Some(moment) = self.not_before.filter(|&moment| moment > Instant::now()) {
             sleep_until(moment).await;
         }

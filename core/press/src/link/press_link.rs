@@ -1,4 +1,4 @@
-//! The link that the plant file describes: client or server.
+//! Link in the role that the plant file specifies: client or server.
 
 use platen_plant::press::{Press, Role, Transport};
 
@@ -14,8 +14,8 @@ pub enum PressLink {
 }
 
 impl PressLink {
-    /// Returns the link of the plant file, not connected yet. The server role exists for Modbus TCP only, as the check of the
-    /// plant file ensures.
+    /// Returns the link of the plant file, not connected yet. The server role exists for Modbus TCP only, as the check
+    /// of the plant file ensures.
     pub fn new(press: &Press) -> Self {
         match (press.role, &press.link.transport) {
             (Role::Server, Transport::Tcp(socket)) => Self::Served(ServerLink::new(press, socket)),

@@ -1,8 +1,8 @@
-//! Host as Modbus TCP server, for presses with client function blocks only: the press writes its block here and reads the
-//! host's.
+//! Modbus TCP server in the host, for presses with client function blocks only: the press writes its block here and
+//! reads the host's block.
 //!
-//! It implements [`Link`]: a read of the press returns the block that the press wrote last. A press without a request for
-//! a while counts as not connected.
+//! It implements [`Link`]: a read of the press returns the block that the press wrote last. A press that has sent no
+//! request for a time counts as not connected.
 
 use std::future::{Ready, ready};
 use std::net::{IpAddr, SocketAddr};
@@ -132,7 +132,7 @@ impl Link for ServerLink {
                     Response::Written { start: *start, count }
                 })
             }
-            // A client cannot be asked.
+            // A client has no identification that could be read.
             Request::Identify => return Ok(Response::Exception(ExceptionCode::IllegalFunction.into())),
         };
         Ok(response.unwrap_or(Response::Exception(ExceptionCode::IllegalDataAddress.into())))

@@ -1,4 +1,4 @@
-//! The table of alarms as CSV, for the alarm list of a press's HMI.
+//! Alarm table as CSV, for the alarm list of a press's HMI.
 
 use platen_model::{Code, Language};
 

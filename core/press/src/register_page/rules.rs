@@ -1,4 +1,4 @@
-//! The texts beside the tables: connection, notation of the tables, and rules for the program of the press.
+//! Texts of the register page besides its tables: connection, notation, and rules for the program of the press.
 
 use platen_plant::press::{Input, Mode, Output, Parity, Press, RegisterType, Role, Transport};
 

@@ -1,5 +1,6 @@
-//! The cycle of the press side: poll, step of the handshake, reconciliation of the registers, execution of effects; pauses
-//! between connections grow exponentially with jitter.
+//! Cycle of the press side: poll, step of the handshake, reconciliation of the registers, execution of effects.
+//!
+//! The pauses between connections grow exponentially with jitter.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
@@ -60,7 +61,7 @@ pub(super) struct Clock {
     polled: Instant,
     triggered: Instant,
     busy_untold: bool,
-    /// Time since when a result waits for the press.
+    /// Time since which a result has waited for the press.
     result_since: Option<Instant>,
     next_status: Instant,
 }
@@ -158,7 +159,7 @@ impl<L: Link> Runner<L> {
         Ok(())
     }
 
-    /// Reads the press: only its fast part while nothing happens on a slow line, else the whole block.
+    /// Reads the press: only its fast part while a slow line is idle, else the whole block.
     async fn poll(&mut self) -> Result<(), LinkError> {
         let block = self.press.map.read;
         let online = self.handshake.state().link == LinkState::Online;
@@ -250,8 +251,8 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// Withdraws ready and gives the reason after a fault, register by register: a controller that refuses an address or a value
-    /// elsewhere may take these.
+    /// Withdraws ready and writes the reason after a fault, register by register: a controller that refuses another
+    /// address or value may accept these.
     async fn withdraw_ready(&mut self) {
         let image = self.handshake.image().clone();
         if let Err(error) = self.registers.withdraw(&mut self.client, &image).await {
@@ -311,8 +312,8 @@ impl<L: Link> Runner<L> {
         self.back_off();
     }
 
-    /// Returns the pause before the next connection: exponential back-off from zero after a connection that worked, with a
-    /// jitter of a quarter, so that two hosts that lost the same press do not reconnect at the same time.
+    /// Returns the pause before the next connection: exponential back-off from zero after a connection that worked,
+    /// with a jitter of a quarter, so that two hosts that lost the same press do not reconnect at the same time.
     fn back_off(&mut self) {
         let (least, most) = (self.press.link.backoff_min, self.press.link.backoff_max);
         let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
@@ -329,8 +330,8 @@ impl<L: Link> Runner<L> {
         tick.min(self.clock.next_poll)
     }
 
-    /// Waits for the next event: an answer of the host, a completion of the journal, or a timer. Changes of the registers are
-    /// written at once.
+    /// Waits for the next event: an answer of the host, a completion of the journal, or a timer. Changes of the
+    /// registers are written at once.
     async fn wait(&mut self, until: Instant) {
         tokio::select! {
             biased;
@@ -400,7 +401,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// A host that has dropped its end stops the handshake by that.
+    /// If the host has dropped its end of the channel, that alone stops the handshake.
     fn order(&self, order: Order) {
         let _ = self.side.orders.send(order);
     }

@@ -1,4 +1,4 @@
-//! The journal on a thread of its own: a slow disk must not stop the heartbeat.
+//! Journal on a thread of its own, so that a slow disk does not stop the heartbeat.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Counters and durations of the strokes since the start.
+//! Metrics of the strokes since the start: counters and durations.
 
 use std::time::Duration;
 
@@ -52,7 +52,7 @@ pub struct Metrics {
     pub ack_timeouts: u64,
     /// Torn reads of the press's block.
     pub torn_reads: u64,
-    /// Read-backs of the host's own block that found it changed by the press.
+    /// Read-backs in which the press had changed the host's own block.
     pub rewrites: u64,
     /// From the poll that saw the trigger to the echo of busy.
     pub trigger_to_busy: Durations,

@@ -1,4 +1,4 @@
-//! The modes that write nothing: `off` and `listen`.
+//! Modes that write nothing: `off` and `listen`.
 
 use std::time::Duration;
 
@@ -47,14 +47,14 @@ pub(super) async fn listen<L: Link>(press: &Press, mut client: Client<L>, mut si
         while Instant::now() < until {
             tokio::select! {
                 answer = side.answers.recv() => if matches!(answer, None | Some(Answer::Stop)) { return },
-                // A sign of life during a long pause.
+                // Status update during a long pause.
                 () = sleep_until(until.min(Instant::now() + STATUS)) => side.status.send_modify(|_| ()),
             }
         }
     }
 }
 
-/// Reads the whole block: its words, and what they mean.
+/// Reads the whole block: its words and their decoded values.
 async fn look<L: Link>(
     press: &Press,
     client: &mut Client<L>,

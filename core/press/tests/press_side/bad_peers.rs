@@ -1,4 +1,4 @@
-//! Protocol faults of Modbus TCP peers: every wrong answer drops the connection and none is accepted.
+//! Protocol faults of Modbus TCP peers: every wrong answer drops the connection, and none is accepted.
 
 use std::time::Duration;
 

@@ -468,8 +468,8 @@ fn an_acknowledge_of_the_stroke_before_is_not_the_next_ones() {
     assert!(!harness.machine.image().valid, "its own acknowledge");
 }
 
-/// A trigger that rises while a stroke is being measured, and still stands when its result is valid: the result keeps its time for the
-/// acknowledgement, and the record tells whether it got one.
+/// The trigger rises while a stroke is being measured and is still up when its result is valid. The result keeps its
+/// time for the acknowledgement, and the record contains whether it was acknowledged.
 #[test]
 fn a_trigger_that_rose_early_waits_for_the_result_before() {
     for acknowledges in [true, false] {

@@ -1,4 +1,4 @@
-//! README of this crate against the code: table of transitions, table of states.
+//! Consistency of this crate's README with the code: table of transitions, table of states.
 
 use platen_press::{State, Transition};
 

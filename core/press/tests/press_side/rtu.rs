@@ -93,8 +93,8 @@ async fn gateway(plc: SharedPlc, late: u64, seed: u64) -> u16 {
     port
 }
 
-/// Answers on the PLC's side of a pseudo terminal until the test ends. On a thread: an event loop would report the hang-up
-/// of a closed terminal without end.
+/// Answers on the PLC's side of a pseudo terminal until the test ends. On a thread: an event loop would report the
+/// hang-up of a closed terminal without end.
 fn slave(mut line: TTYPort, plc: &SharedPlc, ended: &AtomicBool) {
     let (mut frame, mut bytes) = (Vec::new(), [0; 260]);
     line.set_timeout(Duration::from_millis(10)).unwrap();

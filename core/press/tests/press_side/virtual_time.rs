@@ -181,7 +181,8 @@ async fn a_press_that_moves_during_the_scan_gets_not_measured() {
     assert_eq!(errors, [Code::NotClear.number(); 3]);
 }
 
-/// Soak test: 10,000 strokes with 1 % late answers, 0.5 % resets and 0.5 % lost answers to requests that were carried out.
+/// Soak test: 10,000 strokes with 1 % late answers, 0.5 % resets and 0.5 % lost answers to requests that were carried
+/// out.
 #[tokio::test(start_paused = true)]
 async fn ten_thousand_strokes_on_a_bad_link() {
     let seed = 0x5EED;
@@ -408,7 +409,8 @@ async fn the_wrong_press_is_never_written_to() {
     assert_eq!(cell.plc().writes, 0);
 }
 
-/// A controller that refuses one register of the result: ready is withdrawn and the reason given in those that it takes.
+/// A controller refuses one register of the result: ready is withdrawn, and the reason is written to the registers that
+/// it accepts.
 #[tokio::test(start_paused = true)]
 async fn ready_is_withdrawn_after_a_refused_register() {
     for (refused, withdrawn) in [(30, true), (2, false)] {

@@ -1,4 +1,5 @@
-//! PLC of a press: registers and reference program, written from the printed register map, independent of the host's code.
+//! PLC of a press: registers and reference program, written from the printed register map, independent of the host's
+//! code.
 
 use std::time::Duration;
 
