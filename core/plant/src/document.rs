@@ -12,7 +12,8 @@ use crate::node::{Entry, Node, touch};
 use crate::source::{Place, Source};
 use crate::{Error, Fault, Faults, TomlTable};
 
-/// Limits of a text that may be TOML: errors of syntax that are reported, and lines after which it is parsed again.
+/// Limits for a text that may be TOML: number of syntax errors that are reported, and number of errors after which it
+/// is parsed again.
 const MOST_ERRORS: usize = 500;
 const MOST_PARSES: usize = 20;
 
@@ -22,7 +23,8 @@ pub struct Reported(());
 
 /// Parsed TOML document: [`Document::root`] returns its table, [`Document::finish`] the result or all faults.
 ///
-/// Faults are collected: a reader goes on after a fault and takes its values out with `?` when everything has been read.
+/// Faults are collected: a reader continues after a fault, and takes its values out with `?` when everything has been
+/// read.
 ///
 /// ```
 /// use platen_plant::{Document, Faults, Reported, TomlTable};
@@ -57,10 +59,10 @@ pub struct Document {
 impl Document {
     /// Parses `text`. Faults of syntax are kept until [`Document::finish`], and the rest of the file is read as well.
     ///
-    /// The parser recovers from an error, but one slip may have several errors and may hide keys. Of the errors in one value
-    /// or one line only the first is reported, the value is skipped, and no key is reported as missing. Lines after which
-    /// the parser would lose the following tables are blanked, and the text is parsed again. A key that is defined twice
-    /// hides nothing: its first value is read.
+    /// The parser recovers from an error, but one mistake may cause several errors and may hide keys. Of the errors in
+    /// one value or one line only the first is reported, the value is skipped, and no key is reported as missing. Lines
+    /// after which the parser would lose the following tables are blanked, and the text is parsed again. A key that is
+    /// defined twice hides nothing: its first value is read.
     pub fn parse(file: impl Into<String>, text: impl Into<String>) -> Self {
         let mut source = Source { file: file.into(), text: text.into(), syntax_errors: Vec::new() };
         let mut readable = source.text.clone();
@@ -135,7 +137,7 @@ impl Document {
         Reported(())
     }
 
-    /// Records a fault that has its place.
+    /// Records a fault that already has a place.
     pub(crate) fn report(&self, fault: Fault) -> Reported {
         self.faults.borrow_mut().push(fault);
         Reported(())
@@ -204,8 +206,8 @@ fn blanked(text: &str, lines: &Range<usize>) -> String {
     blanked + &text[lines.end..]
 }
 
-/// Returns the lines because of which the parser loses the tables after an error in `line`: those of an unclosed `value` down
-/// to the next header, or a line that is neither a header nor a key with a value.
+/// Returns the lines that make the parser lose the tables after an error in `line`: the lines of an unclosed `value`
+/// down to the next header, or a line that is neither a header nor a key with a value.
 fn lines_that_hide(text: &str, line: &Range<usize>, value: Option<&Range<usize>>) -> Option<Range<usize>> {
     let header = |line: &str| {
         let line = line.trim_start();

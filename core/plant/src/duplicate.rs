@@ -1,4 +1,4 @@
-//! Faults of keys and headers that are defined twice. The parser keeps the first value and drops the second.
+//! Faults of keys and headers that are defined twice; the parser keeps the first value and drops the second.
 
 use std::ops::Range;
 
@@ -9,7 +9,8 @@ use crate::source::{Place, Source, dotted};
 /// The parser's message.
 pub(crate) const DUPLICATE: &str = "duplicate key";
 
-/// Returns the fault of the key or header whose second definition the parser found at `second`, with the place of the first.
+/// Returns the fault of the key or header whose second definition the parser found at `second`, with the place of the
+/// first.
 pub(crate) fn fault(source: &Source, root: &Node, second: &Range<usize>) -> Fault {
     let text = &source.text;
     let (key, first) = match header(line_at(text, second.start)) {
@@ -33,7 +34,8 @@ pub(crate) fn fault(source: &Source, root: &Node, second: &Range<usize>) -> Faul
     source.fault(&Place { key, offset: second.start }, message)
 }
 
-/// Sets `owner` to the path and node of the last table in the text that begins before `offset` and, if inline, contains it.
+/// Sets `owner` to the path and node of the last table in the text that begins before `offset` and, if inline, contains
+/// it.
 fn find_owner<'a>(
     node: &'a Node,
     path: &str,

@@ -1,4 +1,4 @@
-//! Error of reading a file.
+//! Errors of reading a file.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Returns the faults; a file that cannot be read is one at line 0.
+    /// Returns the faults; an unreadable file is one fault at line 0.
     pub fn into_faults(self) -> Vec<Fault> {
         match self {
             Self::Faulty(faults) => faults.into_iter().collect(),

@@ -1,4 +1,4 @@
-//! Value of one key: missing, found or already reported.
+//! Value of one key, in one of three states: missing, found or already reported.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -13,7 +13,7 @@ pub struct TomlKey<'d, T> {
     document: &'d Document,
     place: Place,
     state: Result<Option<T>, Reported>,
-    /// The fault because of which a missing value is no fault.
+    /// Fault that explains a missing value, which is then not reported.
     excuse: Option<Reported>,
 }
 

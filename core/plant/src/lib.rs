@@ -1,12 +1,14 @@
-//! Reader of plant and plate files: TOML to the types of `platen-model`, with all faults at once, each with file, line and
-//! column.
+//! Reader of plant and plate files: TOML to the types of `platen-model`, with all faults at once, each with file, line
+//! and column.
 //!
-//! Order: [`Document`] parses the text with the `toml` crate's error recovery; [`TomlTable`] and [`TomlKey`] read it key by key and
-//! collect the faults; [`plant`] and [`plate`] are the readers of the two kinds of file, [`press`] of `[press]`. [`check_options`] checks
-//! the options of a plugin against the plugin's declarations. Values leave this crate checked and in metres, radians
-//! and seconds.
+//! 1. [`Document`] parses the text with the error recovery of the `toml` crate.
+//! 2. [`TomlTable`] and [`TomlKey`] read it key by key and collect the faults.
+//! 3. [`plant`] and [`plate`] are the readers of the two kinds of file, [`press`] of `[press]`.
+//! 4. [`check_options`] checks the options of a plugin against the plugin's declarations.
 //!
-//! Limits: files are read and nothing else; no socket, no clock, no plugin.
+//! Returned values are checked and in metres, radians and seconds.
+//!
+//! Limits: this crate only reads files. It uses no socket, clock or plugin.
 
 mod document;
 mod duplicate;

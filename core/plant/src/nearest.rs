@@ -1,10 +1,10 @@
-//! Nearest allowed name to a misspelt one, by Jaro-Winkler similarity.
+//! Search for the allowed name nearest to a misspelt one, by Jaro-Winkler similarity.
 
-/// Below this Jaro-Winkler similarity a name is no likely misspelling. `raidus_mm` and `radius_mm` score 0.97,
+/// Below this Jaro-Winkler similarity a name is not a likely misspelling. `raidus_mm` and `radius_mm` score 0.97,
 /// `chord` and `chord_mm` 0.93, `width_mm` and `height_mm` 0.82, unrelated keys of the plate file below 0.75.
 const LIKELY: f64 = 0.80;
 
-/// Returns the allowed name most similar to `found`, if any is likely to be meant; the first of equals.
+/// Returns the allowed name most similar to `found`, if any is a likely match; the first of equals.
 pub fn nearest<'a>(found: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let mut best: Option<(f64, &str)> = None;
     for name in allowed {

@@ -112,7 +112,7 @@ pub struct OptionValue {
 pub struct RawOptions {
     source: Arc<Source>,
     place: Place,
-    /// The proof of a fault when the file has something else than a table.
+    /// Proof of a fault if the file has a value that is not a table.
     entries: Result<Vec<Entry>, Reported>,
 }
 
@@ -121,7 +121,7 @@ impl RawOptions {
         Self { source, place, entries }
     }
 
-    /// Makes an empty set, for a plugin that no plant file names; messages have `owner` in place of a file.
+    /// Returns an empty set, for a plugin that no plant file uses; messages contain `owner` in place of a file.
     pub fn none(owner: &str) -> Self {
         let source = Source { file: owner.to_owned(), text: String::new(), syntax_errors: Vec::new() };
         Self::new(Arc::new(source), Place { key: String::new(), offset: 0 }, Ok(Vec::new()))
@@ -164,7 +164,7 @@ pub fn check_options(
     raw: &RawOptions,
     declared: &[OptionDecl],
 ) -> Result<Vec<OptionValue>, Faults> {
-    // Options that are no table were reported with the file.
+    // Options that are not a table were reported with the file.
     let Ok(entries) = &raw.entries else { return Ok(Vec::new()) };
     let document = raw.document(entries);
     let mut table = document.root();
@@ -330,7 +330,7 @@ impl fmt::Display for OptionDecl {
 }
 
 fn whole(value: f64) -> Option<i64> {
-    // Beyond 2^53 a f64 no longer holds every whole number.
+    // Above 2^53 a f64 cannot represent every whole number.
     (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
 }
 

@@ -30,9 +30,9 @@ use crate::document::{Document, Reported};
 use crate::press::{Input, Press};
 use crate::{Error, Fault, Faults, Located, TomlTable};
 
-/// Used where the plant file names no flattening.
+/// Flattening used if the plant file specifies none.
 const FLATTENING: &str = "elastic";
-/// Used where the plant file lists no comparison; `comparison = []` asks for none.
+/// Comparisons used if the plant file lists none; `comparison = []` requests none.
 const COMPARISONS: [&str; 2] = ["displacement", "template"];
 
 /// The comparison whose figures fill the press's registers, unless another has `fills_registers = true`.
@@ -42,14 +42,14 @@ const REGISTER_SOURCE: &str = "template";
 const WINDOWS: [(&str, ScanWindow); 3] =
     [("plate", ScanWindow::Plate), ("region", ScanWindow::Region), ("everything", ScanWindow::Everything)];
 
-/// Largest range error of a scanner that measures plates, millimetres: above it a figure has another unit.
+/// Largest range error of a scanner that measures plates, millimetres: a larger figure is probably in another unit.
 const LARGEST_RANGE_ERROR_MM: f64 = 20.0;
 
-/// Part of the dome that is scanned, by a driver that plans its scans (one that estimates their time).
+/// Part of the field of view that is scanned by a driver that plans its scans (one that estimates their time).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ScanWindow {
-    /// Place of the last stroke's plate with a margin; the region of interest for a new plate, and once more for a plate
-    /// that has moved out.
+    /// Surroundings of the last stroke's plate with a margin. For a new plate it is the region of interest; if a plate
+    /// has moved out, that region is scanned once more.
     #[default]
     Plate,
     /// Region of interest.
@@ -103,7 +103,7 @@ pub struct PlantFile {
     pub scan_store: Option<ScanStore>,
 }
 
-/// Codes of crews in the record.
+/// Recording of crew codes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Crews {
     /// Purpose for which they are recorded.
@@ -112,7 +112,7 @@ pub struct Crews {
     pub forward: bool,
 }
 
-/// Use of a plugin: the table of the plant file that names it.
+/// Use of a plugin: the table of the plant file that specifies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PluginRole {
     /// `[scanner]`.
@@ -125,12 +125,12 @@ pub enum PluginRole {
     Advisor,
 }
 
-/// Parts of a plant file that further checks start from, whether or not other parts are faulty.
+/// Parts of a plant file that further checks need, whether or not other parts are faulty.
 #[derive(Debug)]
 pub struct Survey {
     /// The file, or all its faults.
     pub plant: Result<PlantFile, Faults>,
-    /// Every plugin named or implied.
+    /// Every plugin that is specified or implied.
     pub plugins: Vec<(PluginRole, PluginUse)>,
     /// Folder of the plate files, and the fault to report, with a message, at its place.
     pub plates: Option<(PathBuf, Fault)>,
@@ -333,7 +333,8 @@ impl PlantFile {
     }
 }
 
-/// Returns the comparison whose figures go to the press: the one with `fills_registers`, else the one named [`REGISTER_SOURCE`].
+/// Returns the comparison whose figures go to the press: the one with `fills_registers`, else the one named
+/// [`REGISTER_SOURCE`].
 fn register_source(uses: &[PluginUse], document: &Document) -> Result<Option<usize>, Reported> {
     let asked = uses.iter().any(|used| used.fills_registers);
     let claims = |used: &PluginUse| if asked { used.fills_registers } else { used.plugin == REGISTER_SOURCE };
@@ -364,7 +365,7 @@ fn plate_path(folder: &Path, recipe: u16) -> PathBuf {
     folder.join(format!("plate-{recipe:03}.toml"))
 }
 
-/// Returns the plate files of a folder with their recipe numbers, by number. Files of other names are left alone.
+/// Returns the plate files of a folder with their recipe numbers, by number. Files with other names are ignored.
 ///
 /// # Errors
 /// [`Error::Unreadable`] when there is no such folder.

@@ -1,4 +1,4 @@
-//! Plate file: a plate, its target, and the places, lines and templates to be evaluated.
+//! Plate file: a plate, its target, and the points, lines and templates to be evaluated.
 
 mod edges;
 mod place;
@@ -37,7 +37,7 @@ pub struct PlateFile {
     pub markers: Vec<Marker>,
     /// Lines to be reported, on which templates lie.
     pub reference_lines: Vec<ReferenceLine>,
-    /// Places on the supports of the press during a scan.
+    /// Points on the supports of the press during a scan.
     pub supports: Vec<Support>,
     /// Templates to be laid on the plate.
     pub templates: Vec<Template>,
@@ -47,7 +47,7 @@ pub struct PlateFile {
     pub trim_lines: Vec<TrimLine>,
 }
 
-/// Reference line and its name, which is kept where the line is faulty: a template on it is then no second fault.
+/// Reference line and its name. The name is kept if the line is faulty, so that a template on it is not a second fault.
 #[derive(Debug, Clone)]
 struct NamedLine {
     name: Result<String, Reported>,
@@ -134,7 +134,7 @@ impl PlateFile {
     }
 }
 
-/// Reads every element of an array of tables with `read`, which also gets the names taken so far.
+/// Reads every element of an array of tables with `read`, which also receives the names used so far.
 fn read_all<'d, T>(
     root: &mut TomlTable<'d>,
     key: &str,
@@ -158,7 +158,7 @@ fn read_steel(mut table: TomlTable<'_>) -> Result<Steel, Reported> {
     Ok(Steel { grade: grade?, yield_strength: 1e6 * yield_mpa?, heat: heat? })
 }
 
-/// Reads `[plate]`; sets `rectangle` if both sides are sound.
+/// Reads `[plate]`; sets `rectangle` if both sides are valid.
 fn read_plate(mut table: TomlTable<'_>, rectangle: &mut Option<Rectangle>) -> Result<Plate, Reported> {
     let id = table.name("id").required();
     let width = table.number("width_mm").in_range(SIDE_MM).required();

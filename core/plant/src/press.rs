@@ -1,4 +1,4 @@
-//! `[press]` of the plant file: link, register map, write permissions, time limits and policy.
+//! Table `[press]` of the plant file: link, register map, write permissions, time limits and policy.
 
 mod allow;
 mod field;
@@ -42,7 +42,7 @@ pub struct Press {
     pub advice: Option<AdviceBlock>,
 }
 
-/// Registers for the advice of the next stroke: for a display, apart from those of the handshake.
+/// Registers for the advice on the next stroke: for a display, apart from the registers of the handshake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AdviceBlock {
     /// Address of the first, as on the wire.

@@ -1,4 +1,4 @@
-//! Text of a file and places in it.
+//! Text of a file, and places in it.
 
 use std::ops::Range;
 

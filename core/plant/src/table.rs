@@ -1,4 +1,4 @@
-//! Reader of one table: every key is asked for by name and type; a key not asked for is a fault.
+//! Reader of one table: every key is read by name and type; a key that is never read is a fault.
 
 use crate::RawOptions;
 use crate::document::{Document, Reported};
@@ -9,8 +9,8 @@ use crate::source::{Place, dotted};
 
 /// Reader of one table of a [`Document`].
 ///
-/// Each getter notes its key as known; [`TomlTable::finish`] reports the others. Read every key, then finish, then take the
-/// values out: see [`Document`].
+/// Each getter marks its key as known; [`TomlTable::finish`] reports the others. Read every key, then finish, then take
+/// the values out: see [`Document`].
 #[derive(Debug)]
 #[must_use = "finish() reports the unknown keys"]
 pub struct TomlTable<'d> {
@@ -26,7 +26,7 @@ impl<'d> TomlTable<'d> {
         Self { document, place, entries, asked: Vec::new(), excuse: None }
     }
 
-    /// Lets missing keys pass from here on, because the fault `excuse` leaves open which keys are required.
+    /// Accepts missing keys from here on: because of the fault `excuse` it is unknown which keys are required.
     pub(crate) fn excuse_missing(&mut self, excuse: Reported) {
         self.excuse = Some(excuse);
     }
@@ -41,7 +41,7 @@ impl<'d> TomlTable<'d> {
         &self.place
     }
 
-    /// Returns whether the key is there, of any type; does not count as asking for it.
+    /// Returns whether the key exists, with any type; it does not count as read.
     pub fn has(&self, key: &str) -> bool {
         self.entries.iter().any(|entry| entry.key == key)
     }
@@ -139,7 +139,7 @@ impl<'d> TomlTable<'d> {
     /// Reads a table below this one in which every key has a default; a missing one is empty.
     ///
     /// # Errors
-    /// [`Reported`] when the key is there and is no table.
+    /// [`Reported`] if the key exists and is not a table.
     pub fn section(&mut self, key: &str) -> Result<TomlTable<'d>, Reported> {
         let empty = Self::new(self.document, self.missing_place(key), &[]);
         Ok(self.table(key).optional()?.unwrap_or(empty))
@@ -148,7 +148,7 @@ impl<'d> TomlTable<'d> {
     /// Reads the elements of an array of tables (`[[key]]`) in their order; a missing one has none.
     ///
     /// # Errors
-    /// [`Reported`] when the key is there and is no array of tables.
+    /// [`Reported`] if the key exists and is not an array of tables.
     pub fn tables(&mut self, key: &str) -> Result<Vec<TomlTable<'d>>, Reported> {
         let (document, path) = (self.document, self.place_of(key));
         let field = self.value(key, &format!("tables, each under [[{path}]]"), |node| match &node.kind {
@@ -187,7 +187,7 @@ impl<'d> TomlTable<'d> {
         TomlKey::new(self.document, place, state, self.excuse)
     }
 
-    /// Reports every key that was never asked for, with the nearest one that could have been meant.
+    /// Reports every key that was never read, with the nearest name that could have been meant.
     pub fn finish(self) {
         self.finish_with(|near, asked| match near {
             Some(near) => format!("unknown key; did you mean \"{near}\"?"),
@@ -195,7 +195,7 @@ impl<'d> TomlTable<'d> {
         });
     }
 
-    /// As [`TomlTable::finish`], with a message made from the nearest key and all keys that were asked for.
+    /// Like [`TomlTable::finish`], with a message made from the nearest key and all keys that were read.
     pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
         for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
             let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };
@@ -204,7 +204,7 @@ impl<'d> TomlTable<'d> {
         }
     }
 
-    /// Reads the value of `key` with `read`; where that refuses, the fault names what was expected.
+    /// Reads the value of `key` with `read`; if it refuses, the fault contains the expected type.
     fn value<T>(
         &mut self,
         key: &str,

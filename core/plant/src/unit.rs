@@ -1,4 +1,4 @@
-//! Units of measure: of TOML values, of plugin options and of scaled registers.
+//! Units of measure of TOML values, of plugin options and of scaled registers.
 
 use std::f64::consts::PI;
 
@@ -132,8 +132,8 @@ impl Unit {
         self.numerator / self.denominator
     }
 
-    /// Returns whether a register field of `dimension` may have this unit. A pure number stands for the base unit, except
-    /// where registers commonly hold another one.
+    /// Returns whether a register field of `dimension` may have this unit. A pure number stands for the base unit,
+    /// except where registers commonly hold another one.
     pub fn fits(&self, dimension: Dimension) -> bool {
         let explicit = matches!(dimension, Dimension::Length | Dimension::Angle | Dimension::Force);
         self.dimension == dimension || (*self == Self::ONE && !explicit)
@@ -144,13 +144,13 @@ impl Unit {
         UNITS.iter().filter(|unit| unit.fits(dimension)).map(|unit| (unit.symbol, *unit)).collect()
     }
 
-    /// The unit with this symbol; `µ` and `°` are accepted for `u` and `deg`.
+    /// Returns the unit with this symbol; `µ` and `°` are accepted for `u` and `deg`.
     pub fn find(symbol: &str) -> Option<Self> {
         let symbol = symbol.replace(['µ', 'μ'], "u").replace("°C", "degC").replace('°', "deg");
         UNITS.iter().find(|unit| unit.symbol == symbol).copied()
     }
 
-    /// The symbol.
+    /// Returns the symbol.
     pub fn symbol(&self) -> &'static str {
         self.symbol
     }
@@ -158,7 +158,7 @@ impl Unit {
     /// Reads `"30 m"` or `"30"` as a number of this unit.
     ///
     /// # Errors
-    /// The sentence for the fault: no number, an unknown unit, a unit of something else.
+    /// The sentence for the fault: no number, an unknown unit, a unit of another quantity.
     pub fn read(&self, text: &str) -> Result<f64, String> {
         let text = text.trim();
         let digits = number_len(text);
@@ -209,7 +209,8 @@ pub(crate) fn millimetres(m: f64) -> f64 {
     (m * 1e6).round() / 1000.0
 }
 
-/// Returns the length of the number that `text` begins with. An exponent needs its digits, so that "2 eV" or "3em" ends at the digit.
+/// Returns the length of the number that `text` begins with. An exponent needs its digits, so that "2 eV" or "3em" ends
+/// at the digit.
 fn number_len(text: &str) -> usize {
     let plain =
         |from: &str| from.find(|c: char| !matches!(c, '0'..='9' | '.' | '+' | '-')).unwrap_or(from.len());

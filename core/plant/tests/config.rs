@@ -1,4 +1,4 @@
-//! Every file in `config/` loads, and values arrive in the units of the model.
+//! Test that every file in `config/` loads, and that its values are in the units of the model.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 

@@ -1,4 +1,4 @@
-//! Files damaged at random: the reader never panics, always has a reason, and every reason has its place.
+//! Fuzz test with randomly damaged files: the reader never panics, always gives a reason, and every reason has a place.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -9,7 +9,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 const PLATE: &str = include_str!("../../../config/plates/plate-017.toml");
 const PLANT: &str = include_str!("../../../config/plant-faro-file.toml");
 
-/// One slip of the hand.
+/// One typing error.
 #[derive(Debug, Clone)]
 enum Slip {
     Delete,

@@ -1,6 +1,6 @@
-//! Faulty files and every message about them: `golden/NAME.toml` against `golden/NAME.faults`.
+//! Golden test of all messages about faulty files: `golden/NAME.toml` against `golden/NAME.faults`.
 //!
-//! `PLATEN_BLESS=1 cargo test -p platen-plant` writes the messages anew; read them before you commit them.
+//! `PLATEN_BLESS=1 cargo test -p platen-plant` writes the messages again; review them before committing.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 

@@ -1,4 +1,4 @@
-//! `[press]`: what is taken, and every conflict with both fields.
+//! Tests of `[press]`: accepted values, and every conflict with both fields.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
@@ -19,7 +19,7 @@ fn taken(text: &str) -> Press {
     }
 }
 
-/// `text` begins on line 7.
+/// Checks that `text` is refused; `text` begins on line 7.
 #[track_caller]
 fn refused(text: &str, expected: &[&str]) {
     let faults = PlantFile::parse("p.toml", &format!("{LINK}{text}")).err().unwrap();

@@ -1,11 +1,11 @@
-//! The walker alone: syntax, doubled keys, types, unknown keys, options, each with its place.
+//! Tests of the table reader alone: syntax, duplicate keys, types, unknown keys, options, each with its place.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 use platen_plant::{
     Document, OptionDecl, OptionType, OptionValue, RawOptions, Reported, Value, check_options,
 };
 
-/// Faults of `text` read as a table of known keys, without the file's name.
+/// Returns the faults of `text` read as a table of known keys, without the file's name.
 fn faults(text: &str) -> Vec<String> {
     let document = Document::parse("f.toml", text);
     let mut root = document.root();
@@ -195,7 +195,7 @@ fn faults_serialise_as_a_list() {
     assert_eq!(json, expected);
 }
 
-/// A proof that some other document was refused.
+/// Returns a proof that another document was refused.
 fn refused() -> Reported {
     let document = Document::parse("other.toml", "");
     document.fault(document.root().place(), "wrong")

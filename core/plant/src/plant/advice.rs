@@ -1,4 +1,4 @@
-//! `[advice]` and `[[die]]`: the advisor of the next stroke, and the dies of the press.
+//! Tables `[advice]` and `[[die]]`: the advisor of the next stroke, and the dies of the press.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ const SHOWS: [(&str, Show); 3] =
     [("shadow", Show::Shadow), ("screen", Show::Screen), ("screen_and_registers", Show::ScreenAndRegisters)];
 /// First of the advice registers: behind those of the built-in map.
 const REGISTERS_START: i64 = 164;
-/// Finished plates of the same kind that the advisor is told of.
+/// Largest number of finished plates of the same class that are passed to the advisor.
 const LIKE_PLATES: i64 = 20;
 /// Deadline of an advice, milliseconds.
 const DEADLINE_MS: i64 = 2000;
@@ -24,15 +24,15 @@ const OPENING_MM: std::ops::RangeInclusive<f64> = 20.0..=5000.0;
 /// Range of punch radii, millimetres.
 const PUNCH_RADIUS_MM: std::ops::RangeInclusive<f64> = 1.0..=2000.0;
 
-/// Where advice is shown.
+/// Place where advice is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Show {
-    /// Recorded and scored, shown to nobody.
+    /// Recorded and scored, but not shown.
     #[default]
     Shadow,
     /// On the operator's page and in the report.
     Screen,
-    /// There and in registers of their own, for a display at the press.
+    /// As `Screen`, and in registers of their own for a display at the press.
     ScreenAndRegisters,
 }
 
@@ -44,14 +44,14 @@ impl Show {
     }
 }
 
-/// The advisor of the next stroke. Without the table there is no advice.
+/// Advisor of the next stroke. Without the table there is no advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdviceUse {
     /// The plugin.
     pub plugin: PluginUse,
-    /// Where its advice is shown.
+    /// Place where its advice is shown.
     pub show: Show,
-    /// Most finished plates of the same kind that it is told of.
+    /// Largest number of finished plates of the same class that are passed to it.
     pub like_plates: usize,
     /// Time from the result to the advice.
     pub deadline: Duration,
@@ -59,11 +59,11 @@ pub struct AdviceUse {
     pub turn_over: bool,
 }
 
-/// `[advice]` with its registers, which wait for `[press]` to be checked.
+/// Content of `[advice]` with its registers, which are checked after `[press]`.
 #[derive(Debug)]
 pub(super) struct ReadAdvice {
     pub(super) advice: AdviceUse,
-    /// First register as the map counts, with its place; `None` where no register is written.
+    /// First register in the addressing of the map, with its place; `None` if no register is written.
     registers: Option<(Located<i64>, bool)>,
 }
 
@@ -71,7 +71,8 @@ impl ReadAdvice {
     /// Returns the advice registers of a press.
     ///
     /// # Errors
-    /// No press, one that is served, or registers of the handshake or outside of the allow-list.
+    /// No press, a press that is the client, or registers that belong to the handshake or lie outside of the
+    /// allow-list.
     pub(super) fn registers(
         &self,
         document: &Document,
@@ -136,7 +137,7 @@ pub(super) fn read_die(mut table: TomlTable<'_>) -> Result<Die, Reported> {
     let punch_radius = table.number("punch_radius_mm").in_range(PUNCH_RADIUS_MM).map(metres).optional();
     table.finish();
     let opening = opening?;
-    // Both shoulders under the plate, and a little.
+    // Both shoulders under the plate, plus a margin.
     let edge = edge?.unwrap_or(0.5 * opening + 0.02);
     Ok(Die { id: u16::try_from(id?).unwrap_or(u16::MAX), opening, edge, punch_radius: punch_radius? })
 }

@@ -1,4 +1,4 @@
-//! `[calibration]`: file written by `platen calibrate`, and its validity.
+//! Table `[calibration]`: the file written by `platen calibrate`, and its validity.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! `[forward]`: where `platen forward` sends the strokes of the record, and under which names.
+//! Table `[forward]`: the destinations of `platen forward` for the recorded strokes, and the names used there.
 
 use std::path::{Path, PathBuf};
 
@@ -58,9 +58,11 @@ pub struct SinkUse {
     pub host: String,
     /// Port of the server.
     pub port: u16,
-    /// Encrypted, and the server known by its certificate. Without it only on this computer.
+    /// Encrypted, with the server verified by its certificate. Without encryption only a server on this computer is
+    /// allowed.
     pub tls: bool,
-    /// Certificates of the authorities that may sign the server's; the system's where none is named.
+    /// Certificates of the authorities that may sign the server's certificate; those of the system if none is
+    /// specified.
     pub ca_file: Option<PathBuf>,
     /// User; `SITE/PRESS` where none is given.
     pub user: String,
@@ -68,7 +70,7 @@ pub struct SinkUse {
     pub password_file: Option<PathBuf>,
     /// Database, of PostgreSQL.
     pub database: String,
-    /// Host application whose state decides when strokes from the past are sent, of Sparkplug.
+    /// Sparkplug host application whose state determines when past strokes are sent.
     pub primary_host: Option<String>,
 }
 
@@ -153,7 +155,7 @@ fn once(document: &Document, sinks: &[Located<SinkUse>]) -> Result<(), Reported>
     Ok(())
 }
 
-/// Checks a name that stands in topics and roles: no separator or wildcard of any of them.
+/// Checks a name that is used in topics and roles: it must not contain a separator or wildcard of any of them.
 fn is_name(name: &String) -> Result<(), String> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     match name.len() <= 40 && name.chars().all(allowed) {

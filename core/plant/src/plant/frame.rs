@@ -1,4 +1,4 @@
-//! `[frame]`: position of the scanner relative to press and plate.
+//! Table `[frame]`: position of the scanner relative to press and plate.
 
 use crate::TomlTable;
 use crate::document::Reported;
@@ -10,8 +10,8 @@ const ROTATION_SLACK: f64 = 2e-3;
 /// Position of the scanner relative to press and plate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
-    /// Transform from the scanner frame to the press frame. The press turns plates about its z; `plate_rot` carries (0, 0) from
-    /// stroke to stroke by it.
+    /// Transform from the scanner frame to the press frame. The press turns plates about its z axis; with this axis
+    /// `plate_rot` carries (0, 0) from stroke to stroke.
     pub press_from_scanner: RigidTransform,
     /// Rough direction of growing u, scanner frame, any length; decides which corner is (0, 0).
     pub u_axis: Option<[f64; 3]>,

@@ -1,4 +1,4 @@
-//! `[output]`: folder of results and storage time of raw scans.
+//! Table `[output]`: folder of results and storage time of raw scans.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

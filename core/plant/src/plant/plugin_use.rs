@@ -1,10 +1,10 @@
-//! Plugin named by the plant file.
+//! Plugin specified in the plant file.
 
 use crate::document::{Document, Reported};
 use crate::key::Located;
 use crate::{Fault, Place, RawOptions, TomlTable};
 
-/// The process in which a plugin runs.
+/// Process in which a plugin runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Worker {
     /// `isolation = "in-process"`: a thread of the host instead, for a debugger.
@@ -13,7 +13,7 @@ pub struct Worker {
     pub memory_mib: u64,
     /// `files`: open files.
     pub files: u64,
-    /// `pool_mib`: memory for frames under way to the host.
+    /// `pool_mib`: memory for frames in transit to the host.
     pub pool_mib: u64,
 }
 
@@ -39,11 +39,11 @@ impl Worker {
 /// Plugin named by the plant file, its options not yet checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PluginUse {
-    /// Name, from which the library's file name follows.
+    /// Name, which determines the file name of the library.
     pub plugin: String,
     /// Options; [`check_options`](crate::check_options) checks them.
     pub options: RawOptions,
-    /// The process in which it runs.
+    /// Process in which it runs.
     pub worker: Worker,
     /// `fills_registers`: a comparison whose figures go to the press.
     pub fills_registers: bool,

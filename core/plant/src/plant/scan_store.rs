@@ -1,11 +1,11 @@
-//! `[scan_store]`: folder to which raw scans are copied under their SHA-256, and which ones.
+//! Table `[scan_store]`: folder to which raw scans are copied under their SHA-256, and the rule that selects them.
 
 use std::path::{Path, PathBuf};
 
 use crate::TomlTable;
 use crate::document::Reported;
 
-/// Scans that are stored where the file names none.
+/// Default classes of scans that are stored.
 const WHICH: [StoredScans; 4] =
     [StoredScans::Baseline, StoredScans::Last, StoredScans::CannotTell, StoredScans::NotMeasured];
 

@@ -1,4 +1,4 @@
-//! `[screen]`: address of the browser pages, and who may read them.
+//! Table `[screen]`: address of the browser pages, and access to them.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::TomlTable;
 use crate::document::Reported;
 
-/// Address where the file names none: this computer alone.
+/// Default address: this computer alone.
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8380);
 
 /// Browser pages of a running host. Without the table no port is opened.
@@ -16,7 +16,7 @@ pub struct Screen {
     pub listen: SocketAddr,
     /// File with the token that a browser must give; required for any address but loopback.
     pub token_file: Option<PathBuf>,
-    /// Further names by which browsers reach the host, as they stand in the address bar: `press3.plant.example`.
+    /// Further host names in the address bar of browsers: `press3.plant.example`.
     pub names: Vec<String>,
 }
 

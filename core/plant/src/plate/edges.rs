@@ -1,4 +1,4 @@
-//! Edges of the plate: square, or with a double-V bevel stated by the inset of the face and the height of the root face.
+//! Edges of the plate: square, or with a double-V bevel given by the inset of the face and the height of the root face.
 
 use crate::TomlTable;
 use crate::document::{Document, Reported};

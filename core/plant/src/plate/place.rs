@@ -1,4 +1,4 @@
-//! Places and names on the plate.
+//! Points and names on the plate.
 
 use std::collections::BTreeMap;
 
@@ -55,7 +55,7 @@ fn on_plate([u_mm, v_mm]: [f64; 2], plate: Option<Rectangle>) -> Result<[f64; 2]
     }
 }
 
-/// Names taken so far in one array of tables, each with its place.
+/// Names used so far in one array of tables, each with its place.
 #[derive(Debug, Default)]
 pub(super) struct Names {
     /// Number of the table being read, from 1.
@@ -64,7 +64,7 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Reads the table's name, which no table before it may have.
+    /// Reads the table's name, which must differ from those of earlier tables.
     pub(super) fn take(&mut self, table: &mut TomlTable<'_>) -> Result<String, Reported> {
         let name = table.name("name").located().required()?;
         self.claim(table, name.value, name.place)

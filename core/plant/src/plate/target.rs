@@ -1,4 +1,4 @@
-//! `[target]`: the shape that the plate is bent toward, each shape with its own keys.
+//! Table `[target]`: the shape toward which the plate is bent, each shape with its own keys.
 
 use std::f64::consts::TAU;
 
@@ -111,7 +111,7 @@ fn reaches(radius_mm: f64, found: f64, plate: Option<Rectangle>) -> Result<(), S
     Ok(())
 }
 
-/// Refuses a cone as good as flat.
+/// Refuses a cone that is practically flat.
 fn slopes(
     document: &Document,
     axis: f64,

@@ -1,4 +1,4 @@
-//! `[[template]]`: templates on reference lines, with rules of the trade as presets.
+//! Table `[[template]]`: templates on reference lines, with rules of the trade as presets.
 
 use platen_model::{Centre, ReferenceLine, Seat, Template};
 
@@ -86,7 +86,7 @@ pub(super) fn read(
 }
 
 impl Preset {
-    /// Returns the source of a template of these measures; a changed rule is marked as changed.
+    /// Returns the source of a template with these measures; a changed rule is marked as changed.
     fn source_for(&self, chord_mm: f64, limit_mm: f64) -> String {
         if (chord_mm, limit_mm) == (self.chord_mm, self.limit_mm) {
             return self.source.to_owned();

@@ -23,8 +23,8 @@ pub struct Refused {
 }
 
 impl WriteAllow {
-    /// Default of [`max_writes_per_s`](Self::max_writes_per_s): two heartbeats and six strokes of eight writes, far
-    /// more than a press makes, far less than its controller can take.
+    /// Default of [`max_writes_per_s`](Self::max_writes_per_s): two heartbeats and six strokes of eight writes. This is
+    /// far more than a press makes and far less than its controller can process.
     pub const MAX_WRITES_PER_S: u32 = 50;
 
     /// Allows these registers at the default rate. Neighbouring and overlapping ranges become one.

@@ -1,4 +1,4 @@
-//! Field of a register map: place, type of its words, scale and unit.
+//! Field of a register map: position, type of its words, scale and unit.
 
 use crate::Unit;
 

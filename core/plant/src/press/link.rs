@@ -38,7 +38,7 @@ pub enum Transport {
     RtuOverTcp(Socket, Quiet),
 }
 
-/// TCP address: that of the press if the host is the client, the one to listen on if it is the server.
+/// TCP address: that of the press if the host is the client, or the one on which the host listens if it is the server.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Socket {
     /// Name or address.
@@ -81,8 +81,8 @@ pub enum Parity {
 
 /// Silence required on a serial line after a fault, before the next request.
 ///
-/// RTU frames have no transaction number, so a late answer would be taken for the next one. Must exceed the longest answer
-/// time of the press.
+/// RTU frames have no transaction number, so a late answer would be taken for the next one. Must exceed the longest
+/// answer time of the press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quiet(pub Duration);
 
@@ -165,8 +165,8 @@ impl Serial {
         Duration::from_secs_f64(f64::from(bytes) * 11.0 / f64::from(self.baud.max(1)))
     }
 
-    /// Returns the default response time limit: three times the line time of the longest exchange (60 registers written, 139 bytes) and 60 ms for the press
-    /// to answer and the adapter to buffer.
+    /// Returns the default response time limit: three times the line time of the longest exchange (60 registers
+    /// written, 139 bytes) and 60 ms for the press to answer and the adapter to buffer.
     pub fn response_timeout(&self) -> Duration {
         self.line_time(139) * 3 + Duration::from_millis(60)
     }

@@ -146,14 +146,14 @@ impl RegisterMap {
         self.outputs.get(&output)
     }
 
-    /// Returns whether the press numbers its strokes. Without numbers a stroke is a rising trigger, the host counts, and a
-    /// missed stroke cannot be detected.
+    /// Returns whether the press numbers its strokes. Without numbers a stroke is a rising trigger, the host counts,
+    /// and a missed stroke cannot be detected.
     pub fn counts_strokes(&self) -> bool {
         self.inputs.contains_key(&Input::StrokeId)
     }
 
-    /// Returns the number of registers from the start of the read block that every poll requires: the handshake without the
-    /// press's data. On a serial line only these are read until the trigger.
+    /// Returns the number of registers from the start of the read block that every poll requires: the handshake without
+    /// the press's data. On a serial line only these are read until the trigger.
     pub fn fast_count(&self) -> u16 {
         const FAST: [Input; 14] = [
             Input::MapVersion,

@@ -190,8 +190,8 @@ impl Output {
         self.dimension() == Dimension::Switch
     }
 
-    /// Returns the figure in this field by default (the key `from` replaces it); `None` for fields of the handshake and for the
-    /// stations, which are a list.
+    /// Returns the figure in this field by default (the key `from` replaces it); `None` for fields of the handshake and
+    /// for the stations, which are a list.
     pub fn measure(self) -> Option<Measure> {
         Some(match self {
             Self::DevMax => Measure::DeviationMax,

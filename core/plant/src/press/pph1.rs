@@ -1,7 +1,7 @@
-//! The built-in register map "PPH-1" (plate press - host, version 1), and the two minimal profiles.
+//! Built-in register map "PPH-1" (plate press - host, version 1), and the two minimal profiles.
 //!
-//! Only 16-bit values where a number is judged, so that no default register depends on a word order. Block lengths
-//! are distinct (8, 32, 64): on a serial line a late answer cannot pass for another block.
+//! Numbers that are judged have 16 bits, so that no default register depends on a word order. The block lengths are
+//! distinct (8, 32, 64): on a serial line a late answer cannot be mistaken for another block.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Reads `[press]`: every key checked on its own here, their conflicts in [`check`].
+//! Reader of `[press]`: every key is checked on its own here, their conflicts in [`check`].
 
 mod check;
 mod field;
@@ -72,7 +72,7 @@ impl Press {
     }
 }
 
-/// A key in milliseconds.
+/// Reads a key in milliseconds.
 fn ms(table: &mut TomlTable<'_>, key: &str, least: i64) -> Result<Option<Duration>, Reported> {
     let field = table.integer(key).in_range(least..=DAY_MS);
     field.map(|ms| Duration::from_millis(ms.unsigned_abs())).optional()
@@ -107,7 +107,7 @@ fn read_policy(mut table: TomlTable<'_>) -> Result<Policy, Reported> {
     Ok(Policy { on_missed_stroke: on_missed_stroke?, on_storage_full: on_storage_full?, no_ack: no_ack? })
 }
 
-/// Reads `[press.write]`; addresses as the map counts them.
+/// Reads `[press.write]`; addresses are in the addressing of the map.
 fn read_write(
     mut table: TomlTable<'_>,
     base: Result<AddressBase, Reported>,

@@ -35,7 +35,7 @@ impl Conflicts<'_> {
         self.found.set(Some(self.document.fault(place.unwrap_or(&self.located.place), message)));
     }
 
-    /// Returns kind and address of a register of a block, as the file counts.
+    /// Returns kind and address of a register of a block, in the addressing of the file.
     fn register(&self, block: &Block, offset: u32) -> String {
         let first = self.located.map.address_base.first(block.table);
         format!("{} register {}", block.table.name(), first + u32::from(block.start) + offset)

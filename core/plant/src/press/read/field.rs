@@ -1,4 +1,4 @@
-//! Reads the fields of `[press.map.in]` and `[press.map.out]`.
+//! Reader of the fields of `[press.map.in]` and `[press.map.out]`.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -19,7 +19,7 @@ pub(super) struct Given<N> {
     pub(super) places: BTreeMap<N, Place>,
 }
 
-/// Reader of fields: their common properties, and properties of the press that fields carry.
+/// Reader of fields: their common properties, and properties of the press that are given with fields.
 pub(super) struct FieldReader {
     pub(super) order: WordOrder,
     /// Block of the fields and base of its addresses; `None` where they are faulty.
@@ -65,7 +65,7 @@ impl FieldReader {
         built_in: Option<&RegisterField>,
     ) -> Result<Option<(Option<RegisterField>, Place)>, Reported> {
         if !table.has(name.name()) {
-            // Asked for, so that it counts as a known key.
+            // The key is read, so that it counts as known.
             return table.node(name.name()).optional().map(|_| None);
         }
         let node = table.node(name.name()).located().required()?;

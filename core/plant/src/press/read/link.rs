@@ -1,4 +1,4 @@
-//! Reads `[press.link]`.
+//! Reader of `[press.link]`.
 
 use std::net::IpAddr;
 use std::path::PathBuf;

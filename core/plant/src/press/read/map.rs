@@ -1,4 +1,4 @@
-//! Reads `[press.map]`: the built-in map of the profile with the changes of the file.
+//! Reader of `[press.map]`: the built-in map of the profile with the changes of the file.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
