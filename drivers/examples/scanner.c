@@ -1,4 +1,4 @@
-/* A scanner: sees a level floor `height` metres below.
+/* Example of a scanner driver: a level floor, `height` metres below the scanner.
  *
  * cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so scanner.c -lm */
 #include "platen.h"

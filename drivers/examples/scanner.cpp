@@ -1,4 +1,4 @@
-// A scanner: sees a level floor `height` metres below.
+// Example of a scanner driver: a level floor, `height` metres below the scanner.
 //
 // c++ -std=c++17 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so scanner.cpp
 #include "platen.hpp"

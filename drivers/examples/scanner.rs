@@ -1,4 +1,4 @@
-//! A scanner: sees a level floor `height` metres below.
+//! Example of a scanner driver: a level floor, `height` metres below the scanner.
 
 use platen_sdk::{
     Column, Face, Info, Job, Outcome, Result, ScanEnd, ScanHeader, ScanSink, Scanner, State, options,

@@ -1,4 +1,4 @@
-//! Hand-over of one file's scan, or of the next one in a watched folder, to the host.
+//! Delivery of a scan to the host, from one file or from the next file in a watched folder.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -16,7 +16,7 @@ use crate::watch::{Listing, Watch, list};
 pub(crate) struct Reading {
     /// Number of the scan in a file that holds several, from 1.
     pub(crate) cloud: Option<usize>,
-    /// Declarations of the plant about the scanner.
+    /// Properties of the scanner that the plant file declares.
     pub(crate) known: Expected,
 }
 
@@ -40,10 +40,10 @@ impl Reading {
     }
 }
 
-/// Receives the share done, 0 to 1; an error ends the work.
+/// Receiver of the share done, 0 to 1; an error ends the work.
 pub(crate) type Progress<'a> = dyn FnMut(f64) -> Result<()> + 'a;
 
-/// Returns the progress of a job as the host sees it.
+/// Returns the progress of a job in the form for the host.
 pub(crate) fn progress<'a>(job: &'a Job<'_>, phase: &'a str) -> impl FnMut(f64) -> Result<()> + 'a {
     move |share| {
         job.progress(share, phase);
@@ -87,12 +87,12 @@ pub(crate) struct Folder {
     pub(crate) stable_polls: u32,
     /// Listing before the trigger; none until the folder could be listed.
     pub(crate) before: Option<Listing>,
-    /// Checksum of the scan measured before.
+    /// Checksum of the previously measured scan.
     pub(crate) measured: Option<u32>,
 }
 
 impl Folder {
-    /// Lists the folder: none of its present files is the next scan.
+    /// Lists the folder: its present files are not the next scan.
     pub(crate) fn look(&mut self) -> Result<()> {
         self.before = Some(list(&self.path).map_err(Error::Folder)?);
         Ok(())
@@ -108,8 +108,8 @@ impl Folder {
         glob::Pattern::new(&named)
     }
 
-    /// Waits for the next scan; returns it with its path. `pause` waits between two polls, receives the reason why there
-    /// is no scan yet, and ends the wait with an error.
+    /// Waits for the next scan; returns it with its path. `pause` waits between two polls, receives the reason why
+    /// there is no scan yet, and ends the wait with an error.
     pub(crate) fn wait<'a>(
         &mut self,
         reading: &Reading,
@@ -146,15 +146,16 @@ impl Folder {
         }
     }
 
-    /// Ends the wait, with the checksum of the scan when one was delivered. Files present now are not the scan of the next
-    /// stroke.
+    /// Ends the wait; `delivered` is the checksum of the scan if one was delivered. Files present now are not the scan
+    /// of the next stroke.
     pub(crate) fn close(&mut self, delivered: Option<u32>) {
         self.before = list(&self.path).ok();
         self.measured = delivered.or(self.measured);
     }
 }
 
-/// Waits `poll` in slices short enough for the host, and ends early enough before the deadline to report the reason.
+/// Waits for `poll` in intervals short enough for the host, and ends early enough before the deadline to report the
+/// reason.
 pub(crate) fn pause(job: &Job<'_>, poll: Duration, why: String) -> Result<()> {
     const SLICE: Duration = Duration::from_millis(20);
     let mut left = poll;

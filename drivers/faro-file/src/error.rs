@@ -1,4 +1,4 @@
-//! Errors of the driver, by who must act.
+//! Errors of the driver, by the person who must act.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use platen_sdk::ErrorKind;
 /// Result of the driver's functions.
 pub(crate) type Result<T> = std::result::Result<T, Error>;
 
-/// Reason why no scan was delivered. In a watched folder the path is added where the error leaves the driver.
+/// Reason why no scan was delivered. In a watched folder the path is added when the error leaves the driver.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
     /// The file gives no lattice.
@@ -17,13 +17,13 @@ pub(crate) enum Error {
     /// The operating system does not list the watched folder.
     #[error("listing the watched folder: {0}")]
     Folder(io::Error),
-    /// Same cells as the scan before, under any name.
+    /// Same cells as the previous scan, under any name.
     #[error("the same points as the scan measured before: a copy, not a new scan")]
     Repeated,
-    /// Several new scans where one is awaited.
+    /// Several new scans where one is expected.
     #[error("{} new scans at once ({}); take all but one away, or let the pattern name the stroke", .0.len(), .0.join(", "))]
     Ambiguous(Vec<String>),
-    /// The deadline is reached; the text is the latest reason to wait.
+    /// The deadline was reached; the text is the latest reason to wait.
     #[error("no scan in time: {0}")]
     TooLate(String),
     /// The host cancelled the job or refused a frame.
@@ -63,13 +63,13 @@ impl Error {
         }
     }
 
-    /// Returns the error as it crosses the plugin boundary.
+    /// Returns the error in the form of the plugin boundary.
     pub(crate) fn into_sdk(self) -> platen_sdk::Error {
         let message = self.to_string();
         self.crossing(message)
     }
 
-    /// Returns the error as it crosses the plugin boundary, with the path where it arose.
+    /// Returns the error in the form of the plugin boundary, with the path where it occurred.
     pub(crate) fn at(self, path: &std::path::Path) -> platen_sdk::Error {
         let message = format!("{}: {self}", path.display());
         self.crossing(message)

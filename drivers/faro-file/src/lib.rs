@@ -1,19 +1,24 @@
-//! Reads laser scans from files: structured E57, PTX, XYZ with row and column, XYB.
+//! Driver `faro-file`: reads laser scans from files (structured E57, PTX, XYZ with row and column, XYB).
 //!
 //! # Operation
-//! The format is detected from the content, the file is checked for completeness, rows, columns, handedness and units
-//! are decided from the geometry (`platen-formats`), and the lattice is delivered column by column in the scanner's
-//! frame. Every decision is a sentence in the scan's notes. The file is opened for reading only; it is never locked,
-//! changed or deleted.
+//! The format is detected from the content, and the file is checked for completeness. Rows, columns, handedness and
+//! units are determined from the geometry (`platen-formats`). The lattice is delivered column by column in the
+//! scanner's frame. Every decision is recorded as a sentence in the scan's notes. The file is opened for reading only;
+//! it is never locked, changed or deleted.
 //!
 //! Missing cells may be flagged, left out, written as the origin or as NaN. A pose in the file is reported and not
-//! applied. Formats without a lattice, or that only their maker's software reads (`.fls`, `.fws`, `.lsproj`, `.las`,
-//! `.pts`, `.pod`, `.cpe`), are refused with the format to export instead.
+//! applied. Formats without a lattice, and formats that only their maker's software reads (`.fls`, `.fws`, `.lsproj`,
+//! `.las`, `.pts`, `.pod`, `.cpe`), are refused; the message gives the format to export instead.
 //!
-//! A scan is read from one file, or from the next one in a watched folder. There a file is taken when its name matches
-//! the pattern, when it is new or changed since the press was ready, when it stays the same for some polls, and when its
-//! structure is sound (lengths, checksums, number of lines). A refused file is examined again until the stroke's
-//! deadline; then the reason is the answer. Polling works on every share; no events are needed.
+//! A scan is read from one file, or from the next file in a watched folder. A file in the folder is accepted if
+//!
+//! - its name matches the pattern,
+//! - it is new or has changed since the press was ready,
+//! - it stays the same for a number of polls, and
+//! - its structure is valid (lengths, checksums, number of lines).
+//!
+//! A refused file is examined again until the stroke's deadline; then the reason is returned. Polling works on every
+//! network share; no events are needed.
 //!
 //! # Example
 //! ```toml
@@ -27,7 +32,7 @@
 //! | key | meaning |
 //! |---|---|
 //! | `file` | the scan; or |
-//! | `folder` | where scans arrive |
+//! | `folder` | folder in which scans arrive |
 //! | `pattern` | names of scans, with `*`, `?`, `[..]`, and `{stroke}` or `{job}` for their numbers |
 //! | `poll_ms` | time between two polls of the folder |
 //! | `stable_polls` | polls for which a file must stay the same |
@@ -82,7 +87,7 @@ pub struct FaroFile {
     poll: Duration,
 }
 
-/// Source of the scan.
+/// Source of the scan: one file or a watched folder.
 #[derive(Debug)]
 enum Place {
     File(PathBuf),
@@ -143,7 +148,7 @@ impl Scanner for FaroFile {
                     let oriented = self.reading.orient(&mut reader, &mut progress)?;
                     device::deliver(job, &mut reader, &oriented, out)
                 });
-                // A cancelled job ends reading with an error of its own. The host adds the name of the file.
+                // A cancelled job ends the reading with an error of its own. The host adds the name of the file.
                 read.map_err(|error| job.check().err().unwrap_or_else(|| error.into_sdk()))
             }
             Place::Folder(folder) => {

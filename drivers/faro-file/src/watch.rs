@@ -1,9 +1,9 @@
 //! Selection of the stroke's scan among the files of a watched folder, by polling; a pure function of the listings.
 //!
-//! Network shares send no events, report sizes before the bytes arrive, vanish and come back, and have another clock.
-//! Files present before the trigger are therefore recognised by name, size and time and not by age; a file counts as
-//! written when it stays the same for some polls, and its own structure decides in the end. A refused file is due again
-//! when it changes, and with exponential back-off when it does not.
+//! Network shares send no events, report sizes before the bytes arrive, disappear and come back, and have another
+//! clock. Files present before the trigger are therefore identified by name, size and time, not by age. A file counts
+//! as completely written if it stays the same for some polls; the final check is that of its own structure. A refused
+//! file is due again when it changes; if it does not change, it is examined again with exponential back-off.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -44,7 +44,7 @@ const UNFINISHED: [&str; 6] = [".part", ".partial", ".tmp", ".temp", ".crdownloa
 /// Largest number of polls between two examinations of an unchanged file, in units of the polls for stability.
 const MAX_PATIENCE: u32 = 16;
 
-/// A file that may be the scan.
+/// File that may be the scan.
 #[derive(Debug, Clone)]
 struct Candidate {
     entry: Entry,
@@ -54,7 +54,7 @@ struct Candidate {
     refused: Option<String>,
 }
 
-/// Waits for one scan.
+/// Wait for one scan.
 #[derive(Debug)]
 pub(crate) struct Watch {
     pattern: glob::Pattern,
@@ -65,8 +65,8 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Starts a wait. Files of `before`, the listing before the trigger, are no candidates while they stay the same; without
-    /// it the first listing takes its place.
+    /// Starts a wait. Files of `before`, the listing before the trigger, are not candidates while they stay the same;
+    /// without it the first listing replaces it.
     pub(crate) fn new(pattern: glob::Pattern, stable_polls: u32, before: Option<Listing>) -> Self {
         Self { pattern, stable_polls, before, candidates: BTreeMap::new(), lost: None }
     }

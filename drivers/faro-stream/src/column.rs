@@ -1,4 +1,4 @@
-//! Lattice announced by ScanBegin, and its columns converted to the order of `platen-scan`.
+//! Lattice announced by ScanBegin, and conversion of its columns to the order of `platen-scan`.
 
 use platen_scan::{Column, Face, ScanHeader, State, data_sheet_range_error_m, wrap_azimuth};
 

@@ -1,4 +1,4 @@
-//! Socket and clock: connections are made and lost, the session continues.
+//! Connections to the bridge over TCP with their time limits; the session continues across lost connections.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -21,7 +21,7 @@ const SILENCE: Duration = Duration::from_secs(4);
 const CONNECT: Duration = Duration::from_secs(2);
 /// First and longest wait between two connections (exponential back-off).
 const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(5));
-/// Time before the deadline reserved for reporting why there is no scan.
+/// Time before the deadline reserved for reporting the reason of a missing scan.
 const REPORT_TIME: Duration = Duration::from_millis(100);
 
 /// Connection to a bridge.
@@ -94,8 +94,8 @@ impl Link {
     }
 }
 
-/// Scans through the bridge at `address`; delivers columns to the host as they arrive. Returns the state of the instrument as last told
-/// beside the outcome.
+/// Scans through the bridge at `address`, and delivers columns to the host as they arrive. Returns the outcome and the
+/// last reported state of the instrument.
 pub(crate) fn scan(
     address: &str,
     request: Request,
@@ -106,7 +106,7 @@ pub(crate) fn scan(
     (session.health(), ended)
 }
 
-/// Connects again and again until the scan is complete or cannot be.
+/// Connects repeatedly until the scan is complete or can no longer be completed.
 fn attempts(address: &str, session: &mut Session, host: &mut impl ScanReceiver) -> Result<()> {
     let mut wait = BACK_OFF.0;
     loop {
@@ -116,7 +116,7 @@ fn attempts(address: &str, session: &mut Session, host: &mut impl ScanReceiver) 
             Err(error @ (Error::Broken(_) | Error::Busy { .. })) => error,
             Err(error) => return Err(error),
         };
-        // The back-off restarts after a connection that lasted.
+        // The back-off restarts after a connection that lasted for some time.
         wait = if started.elapsed() > SILENCE { BACK_OFF.0 } else { (wait * 2).min(BACK_OFF.1) };
         let pause = match &error {
             Error::Busy { retry_ms, .. } => Duration::from_millis(*retry_ms).min(BACK_OFF.1),
@@ -169,8 +169,8 @@ fn pause_for(pause: Duration, host: &impl ScanReceiver, error: &Error) -> Result
     Ok(())
 }
 
-/// Asks a bridge whether the settings are possible; returns the duration of the scan, seconds. `health` receives the state of the
-/// instrument where the bridge tells it meanwhile.
+/// Queries a bridge whether the settings are possible; returns the duration of the scan in seconds. `health` receives
+/// the state of the instrument if the bridge reports it meanwhile.
 pub(crate) fn ask(
     address: &str,
     request: &Request,

@@ -1,4 +1,5 @@
-//! Bridges in reach, section 8 of `PROTOCOL.md`: Hello to an address, which may be that of a whole network, and who answers.
+//! Discovery of bridges, section 8 of `PROTOCOL.md`: Hello is sent to an address, which may be that of a whole network,
+//! and the answers are collected.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
@@ -33,7 +34,7 @@ pub(crate) fn bridges(address: &str, client: &str) -> Result<Vec<Device>> {
         match socket.recv_from(&mut datagram) {
             Ok((length, from)) => found.extend(device(&datagram[..length], from)),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            // The end of the time, or nobody listens at a single address.
+            // The time has elapsed, or no program listens at a single address.
             Err(_) => break,
         }
     }
@@ -42,7 +43,7 @@ pub(crate) fn bridges(address: &str, client: &str) -> Result<Vec<Device>> {
     Ok(found)
 }
 
-/// Returns the bridge that sent a datagram; `None` when it is not from one.
+/// Returns the bridge that sent a datagram; `None` if the datagram is not from a bridge.
 fn device(datagram: &[u8], from: SocketAddr) -> Option<Device> {
     let mut decoder = Decoder::default();
     decoder.push(datagram);

@@ -1,4 +1,4 @@
-//! Errors between driver and bridge, by who must act.
+//! Errors between driver and bridge, by the person who must act.
 
 use platen_sdk::ErrorKind;
 

@@ -1,12 +1,13 @@
-//! Driver `faro-stream`: scans through a bridge, a small server beside the scanner's own software that implements the scan bridge
-//! protocol (`PROTOCOL.md` beside this crate, sufficient to write a bridge).
+//! Driver `faro-stream`: scans through a bridge, a small server beside the scanner's own software.
+//!
+//! The bridge implements the scan bridge protocol (`PROTOCOL.md` beside this crate, sufficient to write a bridge).
 //!
 //! # Method
-//! The driver requests each scan under a job name of its own, so that a lost answer never causes a second scan, and
-//! delivers columns as they arrive. After a broken connection it reconnects and resumes the scan; damaged columns are requested
-//! again. A scan is complete only when every column has arrived and the CRC-32C digest over all of them agrees, so that late, repeated,
-//! shuffled or damaged frames cannot produce an inconsistent lattice. Rows and columns are brought into the host's order for either
-//! direction of rotation.
+//! The driver requests each scan under a job name of its own, so that a lost answer never causes a second scan. It
+//! delivers columns as they arrive. After a broken connection it reconnects and resumes the scan; damaged columns are
+//! requested again. A scan is complete only when every column has arrived and the CRC-32C digest over all of them
+//! agrees. Late, repeated, shuffled or damaged frames therefore cannot produce an inconsistent lattice. Rows and
+//! columns are brought into the host's order for either direction of rotation.
 //!
 //! # Example
 //! ```toml
@@ -69,7 +70,7 @@ pub struct FaroStream {
     options: Options,
     /// Start time, part of the job names of this run.
     run: u64,
-    /// State of the instrument as last told.
+    /// Last reported state of the instrument.
     health: Option<Health>,
 }
 

@@ -1,4 +1,5 @@
-//! JSON messages of the protocol, sections 2 to 7 of `PROTOCOL.md`. A member that a bridge may omit is an `Option` or has a default.
+//! JSON messages of the protocol, sections 2 to 7 of `PROTOCOL.md`. A member that a bridge may omit is an `Option` or
+//! has a default.
 
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +95,7 @@ pub(crate) struct Status {
 }
 
 impl Status {
-    /// Returns the instrument's state; what the bridge does not know stays unknown.
+    /// Returns the instrument's state; values that the bridge does not report stay unknown.
     pub(crate) fn health(&self) -> Health {
         Health {
             temperature_c: self.temperature_c,

@@ -1,11 +1,13 @@
-//! Session: the protocol's state machine for one scan; a pure function of received frames, without socket or clock.
+//! Session: the state machine of the protocol for one scan. It is a pure function of received frames, without socket or
+//! clock.
 //!
 //! ```text
 //! connected -> Hello; Capabilities -> Start, or Resume when the scan is known; ScanBegin; Columns;
 //! ScanEnd -> done, or Resume for the missing columns
 //! ```
-//! A broken connection loses nothing: the next one continues. Each column is delivered once, even if frames are repeated, late,
-//! out of order or damaged; the end is delivered when every column has arrived and the digest agrees.
+//! No data is lost with a broken connection: the next connection continues the scan. Each column is delivered once,
+//! even if frames are repeated, late, out of order or damaged. The end is delivered when every column has arrived and
+//! the digest agrees.
 
 use std::collections::VecDeque;
 
@@ -68,7 +70,7 @@ pub(crate) struct Session {
     greeted: bool,
     scanner: String,
     scan: Option<Scan>,
-    /// Of the newest Status.
+    /// State of the instrument in the newest Status.
     health: Option<Health>,
     actions: VecDeque<Action>,
 }
@@ -80,7 +82,7 @@ impl Session {
         Self { request, greeted: false, scanner, scan: None, health: None, actions }
     }
 
-    /// Returns the state of the instrument as last told.
+    /// Returns the last reported state of the instrument.
     pub(crate) fn health(&self) -> Option<Health> {
         self.health
     }

@@ -1,4 +1,4 @@
-//! Tests of the session against a bridge in memory, written from the protocol's page, and of the socket.
+//! Tests of the session against a bridge in memory, written from the protocol document, and tests of the socket.
 
 mod bridge;
 mod faults;

@@ -24,7 +24,7 @@ pub(crate) mod kind {
     pub(crate) const SCAN_BEGIN: u16 = 0x8010;
     pub(crate) const COLUMN: u16 = 0x8011;
     pub(crate) const SCAN_END: u16 = 0x8012;
-    /// Critical bit: a receiver that does not know the type must reject the frame.
+    /// Critical bit: a receiver that does not support the type must reject the frame.
     pub(crate) const CRITICAL: u16 = 0x8000;
 }
 
@@ -186,7 +186,7 @@ mod tests {
             let mut bytes = whole.clone();
             let bit = bit.index(bytes.len() * 8);
             bytes[bit / 8] ^= 1 << (bit % 8);
-            // A longer length waits for bytes that never come; a header's checksum comes first.
+            // The longer length would require bytes that never arrive; the checksum of the header is checked first.
             match decode(&bytes, 1000) {
                 Ok(frames) => prop_assert!(bit / 8 >= HEADER && frames.iter().all(|frame| !frame.sound())),
                 Err(_) => prop_assert!(bit / 8 < HEADER),

@@ -1,4 +1,4 @@
-//! One scan: from the plate's state to delivered columns.
+//! Simulated scan, from the plate's state to delivered columns.
 
 use crate::Options;
 use crate::error::Error;
@@ -24,7 +24,7 @@ const SEED_STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 /// Computing time of one cell on one core, seconds.
 const SECONDS_PER_CELL: f64 = 2e-6;
 
-/// Scan prepared to be taken.
+/// Scan that is prepared but not yet taken.
 #[derive(Debug)]
 pub(crate) struct PreparedScan {
     scene: Scene,
@@ -44,7 +44,8 @@ struct Truth {
 }
 
 impl PreparedScan {
-    /// Prepares the `number`-th scan of a run, of a plate or an empty press; without a window, of the plate and its margin.
+    /// Prepares the `number`-th scan of a run, of a plate or an empty press; without a window, of the plate and its
+    /// margin.
     pub(crate) fn new(
         options: &Options,
         state: Option<PlateState>,
@@ -177,7 +178,7 @@ fn lattice(
     Ok(SimLattice::covering(w.azimuth_start, w.azimuth_width, low, high, step).on_encoder())
 }
 
-/// Gap between the plate and the wall behind the press at least, metres.
+/// Smallest distance between the plate and the wall behind the press, metres.
 const BEHIND_PLATE: f64 = 2.0;
 
 fn surroundings(options: &Options, plate: Option<&Plate>) -> Surroundings {

@@ -1,4 +1,4 @@
-//! Errors of the driver, by who must act.
+//! Errors of the driver, by the person who must act.
 
 use platen_sdk::ErrorKind;
 use std::path::PathBuf;

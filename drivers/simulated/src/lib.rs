@@ -1,13 +1,13 @@
 //! Driver `simulated`: scans of a simulated plate by ray casting.
 //!
 //! # Method
-//! Each trigger fetches the present shape of the plate, places it in a simulated press shop and casts the rays of a terrestrial laser
-//! scanner, with its errors (`platen-sim-scanner`). Without a window the plate and `margin_deg` around it are scanned. Scans are
-//! marked as simulated.
+//! Each trigger fetches the present shape of the plate and places it in a simulated press shop. Then the rays of a
+//! terrestrial laser scanner are cast, with its errors (`platen-sim-scanner`). Without a window the plate and
+//! `margin_deg` around it are scanned. Scans are marked as simulated.
 //!
-//! The plate comes from a simulated press (`cell`), from a description file (`plate_file`), or from the options `shape`, `radius_mm`,
-//! `axis_deg` and the dimensions. Each scan of a run has its own noise: the n-th scans of two runs with the same `seed` agree to
-//! the last bit.
+//! The plate comes from a simulated press (`cell`), from a description file (`plate_file`), or from the options
+//! `shape`, `radius_mm`, `axis_deg` and the dimensions. Each scan of a run has its own noise. The n-th scans of two
+//! runs with the same `seed` agree to the last bit.
 //!
 //! # Example
 //! ```toml
@@ -28,13 +28,13 @@
 //! | `step_deg`, `margin_deg` | angle between cells; scanned margin around the plate |
 //! | `noise_mm`, `tail_dof` | standard deviation of a range at 10 m; degrees of freedom of heavy tails |
 //! | `wide_share`, `wide_factor` | share of the ranges whose standard deviation is larger by a factor |
-//! | `footprint_mrad`, `beam_wings` | width of the beam; whether it has power beyond |
+//! | `footprint_mrad`, `beam_wings` | width of the beam; whether it has power beyond this width |
 //! | `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
 //! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
 //! | `warm_up_columns` | columns measured before the laser is warm |
 //! | `plate_reflectivity` | share of the light that the plate's faces scatter back |
 //! | `hidden_by` | object in front of the plate |
-//! | `strip_deg` | angle by which the table shows beyond the plate's far edges |
+//! | `strip_deg` | angle by which the table is visible beyond the plate's far edges |
 //! | `seed` | seed of all random numbers |
 //! | `time_scale`, `rate_kpts` | duration of a scan relative to a real scanner, and the measuring rate it follows from |
 //! | `threads` | number of threads; 0: one per core |

@@ -43,7 +43,7 @@ impl Pace {
         wait_until(started, self.scale * self.device.column_s(self.width, done), check)
     }
 
-    /// Waits until the scan's file would no longer change.
+    /// Waits until the time at which a real scanner's file would be complete.
     pub(crate) fn wait_for_end(&self, started: Instant, check: impl FnMut() -> Result<()>) -> Result<()> {
         wait_until(started, self.duration_s(), check)
     }

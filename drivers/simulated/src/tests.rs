@@ -217,7 +217,7 @@ fn every_fault_of_the_press_is_one_sentence() {
     assert!(moving.to_string().contains("the ram is down"));
     assert_eq!(answered("HTTP/1.1 400 Bad Request\n").kind(), ErrorKind::BadData);
     assert_eq!(answered("").kind(), ErrorKind::Disconnected);
-    // A port without a listener: bound, then closed. At an address of its own, where no other test takes it.
+    // A port without a listener: bound, then closed. The address is used by no other test.
     let closed = TcpListener::bind("127.0.0.77:0").unwrap().local_addr().unwrap().to_string();
     assert_eq!(refusal(&Options { cell: Some(closed), ..options() }).kind(), ErrorKind::Disconnected);
 }
@@ -249,7 +249,7 @@ fn a_paced_scan_takes_its_share_of_the_real_time() {
     let (lattice, end) = taken(&options, None, 1);
     assert!(started.elapsed().as_secs_f64() > 0.21);
     assert_eq!(end.columns as usize, lattice.n_columns());
-    // Cancelled while the mirror spins up: at once.
+    // Cancelled while the mirror spins up, the scan ends at once.
     let slow = Options { time_scale: 10.0, ..options };
     let shot = PreparedScan::new(&slow, plate::fetch(&slow).unwrap(), None, 1).unwrap();
     let mut keep = Keep { stop_after: Some(0), ..Keep::default() };

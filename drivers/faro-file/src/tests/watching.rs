@@ -1,4 +1,4 @@
-//! A watched folder: one test for each way in which shares and exporters mislead.
+//! Tests of the watched folder, one for each way in which network shares and exporters can mislead.
 
 use std::io;
 use std::path::Path;
@@ -16,7 +16,7 @@ const ROWS: u32 = 24;
 const COLUMNS: u32 = 32;
 const STEP: f64 = 0.012;
 
-/// A small lattice with gaps, its ranges multiplied by `scale`, as a file of the format with this extension.
+/// Returns a small lattice with gaps and ranges multiplied by `scale`, as a file of the format with this extension.
 fn file(extension: &str, scale: f64) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("scan.{extension}"));
@@ -134,7 +134,7 @@ fn stale_file_of_yesterday_is_no_candidate_until_it_changes() {
     let mut watch = watch("*", listing(&[("old.e57", 900)]));
     never_due(&mut watch, &[("old.e57", 900)]);
     assert_eq!(watch.why(), "no new file matches *");
-    // Written again under the same name: a new scan.
+    // Written again under the same name, the file is a new scan.
     assert_eq!(until_due(&mut watch, &[("old.e57", 901)]).0, STABLE);
 }
 
@@ -159,7 +159,7 @@ fn watch_lost_share_vanishes_and_comes_back() {
         assert!(watch.poll(Err(io::Error::from(io::ErrorKind::NotFound))).is_empty());
     }
     assert!(watch.why().starts_with("the folder cannot be read: "), "{}", watch.why());
-    // What was old before the share vanished is old still.
+    // A file that was old before the share vanished is still old.
     assert_eq!(until_due(&mut watch, &[("old.e57", 1), ("new.e57", 7)]).1, ["new.e57"]);
 }
 
@@ -194,7 +194,7 @@ fn a_file_that_is_taken_away_is_forgotten() {
     assert_eq!(until_due(&mut watch, &[("a.e57", 5)]).0, STABLE);
 }
 
-/// One look at every file that is due in a real folder: names that open, and the reason for the rest.
+/// Examines every file that is due in a real folder: returns the names that open, and the reason for the rest.
 fn look(watch: &mut Watch, folder: &Path) -> Vec<String> {
     let due = watch.poll(list(folder));
     let (mut sound, mut refused) = (Vec::new(), Vec::new());
@@ -242,7 +242,8 @@ fn fls_is_folder_gets_its_sentence_while_the_export_is_awaited() {
     assert_eq!(taken.as_deref(), Some("Scan_001.e57"));
 }
 
-/// Follows a folder in which `act` changes something at every pause; the points of the scan after at most 200 pauses.
+/// Follows a folder in which `act` makes a change at every pause; returns the points of the scan after at most 200
+/// pauses.
 fn follow(
     folder: &mut Folder,
     pattern: &str,
@@ -284,7 +285,7 @@ fn a_scan_that_grows_in_the_folder_is_measured_once_whole() {
         let path = temporary.path().join(name);
         let mut watched = folder(temporary.path());
         let mut write = |pause: u32, _: &Path| {
-            // Ten pieces, with a rest between them that is longer than the polls for stability.
+            // Ten pieces, with a pause between them that is longer than the polls for stability.
             if pause.is_multiple_of(8) && pause <= 80 {
                 std::fs::write(&path, &file[..file.len() * pause as usize / 80]).unwrap();
             }

@@ -1,4 +1,4 @@
-//! Bridge in memory, written from the protocol's page and not from the driver.
+//! Bridge in memory for tests, written from the protocol document and not from the driver.
 
 use platen_scan::{Column, Lattice, ScanEnd, State};
 use serde_json::{Value, json};
@@ -184,7 +184,7 @@ pub(super) fn run(
     Err(Error::TooLate("50 connections".to_owned()))
 }
 
-/// Asserts that every cell is where the bridge measured it.
+/// Asserts that every cell is at the place where the bridge measured it.
 #[track_caller]
 pub(super) fn check(bridge: &Bridge, got: &Got) {
     let lattice = &got.lattice;

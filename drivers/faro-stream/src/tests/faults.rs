@@ -1,4 +1,4 @@
-//! Faults between bridge and driver: the scan is complete, or fails with the reason.
+//! Tests of faults between bridge and driver: the scan is complete, or fails with the reason.
 
 use serde_json::json;
 

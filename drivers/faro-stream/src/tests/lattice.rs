@@ -1,4 +1,4 @@
-//! Columns in every direction and value type, and invalid payloads.
+//! Tests of columns in every direction and value type, and of invalid payloads.
 
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Socket: a bridge on a port chosen by the system.
+//! Tests of the socket with a bridge on a port chosen by the system.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -27,7 +27,7 @@ fn serve(answer: impl Fn(u16, &Value) -> Option<(u16, Value)> + Send + 'static) 
             while let Some(frame) = decoder.next().unwrap() {
                 let asked = serde_json::from_slice(&frame.payload).unwrap_or(Value::Null);
                 let Some((kind, value)) = answer(frame.kind, &asked) else { return };
-                // Byte by byte: frames need not arrive in one piece.
+                // Byte by byte, since frames need not arrive in one piece.
                 for byte in encode(kind, 0, sequence, &serde_json::to_vec(&value).unwrap()) {
                     stream.write_all(&[byte]).unwrap();
                 }
